@@ -1,0 +1,29 @@
+"""What a robot is, does and did: description, dynamics, limits, signals and the virtual robot."""
+
+from __future__ import annotations
+
+from robots.common.lazy import lazy_exports
+
+_EXPORTS = {
+    "AssumedValueWarning": "robots.common.errors",
+    "BaseParameters": "robots.base_parameters",
+    "InfeasibleError": "robots.common.errors",
+    "InputError": "robots.common.errors",
+    "Limits": "robots.limits",
+    "Log": "robots.signals",
+    "Motion": "robots.signals",
+    "NotIdentifiableError": "robots.common.errors",
+    "OedError": "robots.common.errors",
+    "Plant": "robots.plants",
+    "Robot": "robots.robot",
+    "Sensors": "robots.plants",
+    "SolverError": "robots.common.errors",
+    "TorqueModel": "robots.regressor",
+    "base_parameters": "robots.base_parameters",
+    "default_model": "robots.regressor",
+    "load_robot": "robots.loading",
+    "nominal_plant": "robots.plants",
+    "simulate": "robots.plants",
+}
+__all__ = list(_EXPORTS)
+__getattr__ = lazy_exports(__name__, _EXPORTS)

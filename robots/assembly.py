@@ -1,0 +1,275 @@
+"""Putting a robot together from what its files say."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from robots.common.config import read_config
+from robots.common.errors import InputError
+from robots.description import UNITS, Bounds, Geometry, Pose, Range, RobotDescription, Values
+from robots.geometry.chain import Chain, homogeneous, rotation_from_rpy
+from robots.geometry.dh import DhRow, chain_from_dh, dh_frames
+from robots.geometry.inertia import SIZE, check_body, inertial_parameters, symmetric
+from robots.geometry.urdf import read_urdf
+from robots.limits import Limits
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+Choice = tuple[str | None, Sequence[str] | None, Mapping[str, float] | None]  # tip, joints, locked
+
+
+def robot_from_urdf(
+    path: Path, tip: str | None, joints: Sequence[str] | None, locked: Mapping[str, float] | None
+) -> Robot:
+    """Make a robot of a URDF.
+
+    Args:
+        path: the file.
+        tip: the link at which the chain ends.
+        joints: the moving joints, in the chain's order.
+        locked: positions of locked joints [rad or m].
+
+    Returns:
+        The robot; what a URDF cannot state (acceleration, jerk, drives) is unlimited or unknown.
+
+    Raises:
+        InputError: naming the file and the link or joint.
+    """
+    tree = read_urdf(path)
+    chain, limits, inertia, names = tree.chain(tip, joints, locked)
+    chosen = tip is not None or joints is not None or bool(locked)
+    return Robot(
+        name=tree.name or path.stem,
+        chain=chain,
+        limits=limits,
+        inertia=inertia,
+        friction=tree.friction(names),
+        origin=str(path),
+        # A choice of joints makes another robot of the same file; without one the digest is the file's own.
+        digest=_digest(tree.digest, (tip, joints, locked)) if chosen else tree.digest,
+    )
+
+
+def robot_from_yaml(
+    path: Path, origin: str, tip: str | None, joints: Sequence[str] | None, locked: Mapping[str, float] | None
+) -> Robot:
+    """Make a robot of a robot YAML file.
+
+    Args:
+        path: the file.
+        origin: the catalogue name or the path, as the user gave it.
+        tip: in place of the file's own choice, the link at which the chain ends; for a file that names a URDF.
+        joints: likewise, the moving joints in the chain's order.
+        locked: likewise, positions of locked joints [rad or m], added to the file's.
+
+    Returns:
+        The robot.
+
+    Raises:
+        InputError: naming the file and the key, link or joint.
+    """
+    text = read_config(path, RobotDescription)
+    content = path.read_bytes()
+    chosen = tip is not None or joints is not None or bool(locked)
+    if text.geometry is not None:
+        if chosen:
+            problem = "the robot is a Denavit-Hartenberg table, which leaves no joints to choose"
+            raise InputError(problem, file=path, remedy="leave out tip, joints and locked")
+        chain = _chain(text, text.geometry)
+        entries = _PerJoint(str(path), chain, chain.names)
+        inertia, friction, limits = _inertia(text, text.geometry, str(path)), None, None
+        digest = _digest(content)
+    else:
+        tree = read_urdf(path.parent / (text.urdf or ""))
+        own: Choice = (text.tip, text.joints, text.locked)
+        choice = _override(text, tip, joints, locked) if chosen else own
+        chain, limits, inertia, names = tree.chain(*choice)
+        if text.gravity is not None:
+            chain = Chain(chain.joints, np.array(text.gravity), chain.tip)
+        entries = _PerJoint(str(path), chain, tree.chain(*own).names if chosen else names)
+        friction = tree.friction(names)
+        digest = _digest(content, tree.digest, *([choice] if chosen else []))
+    ratio, rotor, constant = _drives(text, entries)
+    return Robot(
+        name=text.name,
+        title=text.title,
+        chain=chain,
+        limits=_limits(text, entries, limits),
+        inertia=inertia,
+        rotor_inertia=rotor,
+        friction=_friction(text, entries, friction),
+        gear_ratio=ratio,
+        torque_constant=constant,
+        period=text.period,
+        assumed=tuple(text.assumed()),
+        origin=origin,
+        digest=digest,
+        payload=None if text.payload is None else text.payload.value,
+        ambient=None if text.ambient is None else (text.ambient.lowest, text.ambient.highest),
+    )
+
+
+def _digest(*parts: bytes | str | Choice) -> str:
+    sha = hashlib.sha256()
+    for part in parts:
+        if isinstance(part, tuple):
+            tip, joints, locked = part
+            part = json.dumps(
+                [tip, list(joints or []), {k: float(v) for k, v in (locked or {}).items()}], sort_keys=True
+            )
+        sha.update(part if isinstance(part, bytes) else part.encode())
+    return sha.hexdigest()
+
+
+def _override(
+    text: RobotDescription, tip: str | None, joints: Sequence[str] | None, locked: Mapping[str, float] | None
+) -> Choice:
+    both = {**(text.locked or {}), **(locked or {})}
+    if joints is not None:
+        return tip, joints, {name: value for name, value in both.items() if name not in joints}
+    if tip is not None:
+        return tip, None, both
+    # Locking a joint that the file lists as moving takes it off that list.
+    kept = None if text.joints is None else [name for name in text.joints if name not in (locked or {})]
+    return text.tip, kept, both
+
+
+@dataclass(frozen=True)
+class _PerJoint:
+    """Places a file's lists, one entry a joint of its own choice, on the joints of the chain in use."""
+
+    file: str
+    chain: Chain
+    names: tuple[str, ...]
+
+    def place(self, values: Sequence[float], key: str, default: ArrayLike, scale: Array | float = 1.0) -> Array:
+        n = len(self.names)
+        if len(values) != n:
+            raise InputError(f"{len(values)} values", file=self.file, column=key, allowed=f"{n}, one per joint")
+        stated = dict(zip(self.names, np.asarray(values, dtype=np.float64) * scale, strict=True))
+        fallback = np.broadcast_to(np.asarray(default, dtype=np.float64), (self.chain.n,))
+        return np.array([stated.get(name, fallback[i]) for i, name in enumerate(self.chain.names)])
+
+    def scale(self, unit: str | list[str], key: str, quantity: str) -> Array:
+        n = len(self.names)
+        units = [unit] * n if isinstance(unit, str) else unit
+        if len(units) != n:
+            raise InputError(f"{len(units)} units", file=self.file, column=key, allowed=f"one, or {n}")
+        kinds = dict(zip(self.chain.names, self.chain.kinds, strict=True))
+        factors = []
+        for i, (name, text) in enumerate(zip(self.names, units, strict=True)):
+            kind = kinds.get(name)
+            suitable = [u for u, (_, k, q) in UNITS.items() if q == quantity and kind in (k, None)]
+            if text not in suitable:
+                problem, allowed = f"the unit {text!r} of a {quantity}", ", ".join(suitable)
+                raise InputError(problem, file=self.file, column=key, joint=i + 1, allowed=allowed)
+            factors.append(UNITS[text][0])
+        return np.array(factors)
+
+
+def _pose(pose: Pose | None) -> Array | None:
+    return None if pose is None else homogeneous(rotation_from_rpy(pose.rpy), pose.xyz)
+
+
+def _rows(geometry: Geometry) -> list[DhRow]:
+    turn: Callable[[float], float] = (lambda x: float(np.deg2rad(x))) if geometry.angles == "deg" else float
+    return [
+        DhRow(kind=row.kind, alpha=turn(row.alpha), a=row.a, d=row.d, offset=turn(row.offset), name=row.name)
+        for row in geometry.joints
+    ]
+
+
+def _chain(text: RobotDescription, geometry: Geometry) -> Chain:
+    return chain_from_dh(
+        _rows(geometry),
+        geometry.convention,
+        base=_pose(text.base),
+        flange=_pose(text.flange),
+        gravity=(0.0, 0.0, -9.81) if text.gravity is None else text.gravity,
+    )
+
+
+def _inertia(text: RobotDescription, geometry: Geometry, file: str) -> Array:
+    links = text.dynamics.links
+    n = len(geometry.joints)
+    if links is None:
+        return np.full((n, SIZE), np.nan)
+    if len(links) != n:
+        raise InputError(f"{len(links)} links", file=file, column="dynamics.links", allowed=f"{n}, one per joint")
+    inertia = np.empty((n, SIZE))
+    for i, (link, frame) in enumerate(zip(links, dh_frames(_rows(geometry), geometry.convention), strict=True)):
+        about_com = symmetric(link.inertia_at_com)
+        check_body(link.mass, about_com, f"dynamics.links[{i + 1}]", file=file)
+        inertia[i] = inertial_parameters(link.mass, link.com, about_com, frame)
+    return inertia
+
+
+def _limits(text: RobotDescription, entries: _PerJoint, known: Limits | None) -> Limits:
+    def default(quantity: str) -> ArrayLike:
+        if known is not None:
+            return getattr(known, quantity)
+        return -np.inf if quantity == "lower" else np.inf
+
+    bounds: dict[str, Array] = {}
+    position: Range | None = text.limits.position
+    for quantity in ("lower", "upper"):
+        if position is None:
+            bounds[quantity] = np.broadcast_to(np.asarray(default(quantity)), (entries.chain.n,))
+        else:
+            scale = entries.scale(position.unit, "limits.position.unit", "position")
+            key = f"limits.position.{quantity}"
+            bounds[quantity] = entries.place(getattr(position, quantity), key, default(quantity), scale)
+    for quantity in ("velocity", "acceleration", "jerk", "torque"):
+        stated: Bounds | None = getattr(text.limits, quantity)
+        if stated is None:
+            bounds[quantity] = np.broadcast_to(np.asarray(default(quantity)), (entries.chain.n,))
+        else:
+            scale = entries.scale(stated.unit, f"limits.{quantity}.unit", quantity)
+            bounds[quantity] = entries.place(stated.values, f"limits.{quantity}.values", default(quantity), scale)
+    try:
+        return Limits(**bounds)
+    except InputError as error:
+        raise InputError(
+            error.problem,
+            file=entries.file,
+            column=f"limits.{error.column or 'position'}",
+            joint=error.joint,
+            allowed=error.allowed,
+            remedy=error.remedy,
+        ) from error
+
+
+def _values(stated: Values | None, entries: _PerJoint, key: str, default: ArrayLike) -> Array:
+    if stated is None:
+        return np.array(np.broadcast_to(np.asarray(default, dtype=np.float64), (entries.chain.n,)))
+    return entries.place(stated.values, f"{key}.values", default)
+
+
+def _drives(text: RobotDescription, entries: _PerJoint) -> tuple[Array, Array, Array]:
+    """Gear ratio, then rotor inertia and torque constant as felt at the joint."""
+    drives = text.dynamics.drives
+    if drives.gear_ratio is None and (drives.rotor_inertia is not None or drives.torque_constant is not None):
+        given = "rotor_inertia" if drives.rotor_inertia is not None else "torque_constant"
+        problem = f"{given} is that of the motor; without gear_ratio it says nothing of the joint"
+        raise InputError(problem, file=entries.file, column="dynamics.drives", remedy="state gear_ratio")
+    key = "dynamics.drives"
+    ratio = _values(drives.gear_ratio, entries, f"{key}.gear_ratio", 1.0)
+    rotor = _values(drives.rotor_inertia, entries, f"{key}.rotor_inertia", 0.0)
+    constant = _values(drives.torque_constant, entries, f"{key}.torque_constant", np.nan)
+    return ratio, ratio**2 * rotor, ratio * constant
+
+
+def _friction(text: RobotDescription, entries: _PerJoint, known: Array | None) -> Array:
+    stated = text.dynamics.friction
+    columns = []
+    for i, name in enumerate(("coulomb", "viscous", "quadratic", "cubic")):
+        default = 0.0 if known is None else known[:, i]
+        columns.append(_values(getattr(stated, name), entries, f"dynamics.friction.{name}", default))
+    return np.column_stack(columns)

@@ -1,0 +1,187 @@
+"""Which parameters a robot's torques can tell: base parameters, their regrouping, and the essential ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from robots.common.errors import NotIdentifiableError
+from robots.regressor import TorqueModel
+from robots.terms import Column
+
+Array = NDArray[np.float64]
+
+IDENTIFIABLE, COMBINED, UNIDENTIFIABLE = "identifiable", "in combination", "unidentifiable"
+
+
+@dataclass(frozen=True)
+class BaseParameters:
+    """A minimal parameter set: Y pi = Y_b pi_b with pi_b = grouping pi.
+
+    Attributes:
+        model: the torque model with p standard parameters.
+        independent: indices (b,) of the columns kept, ascending.
+        grouping: (b, p); row i says which standard parameters base parameter i sums, with what coefficients.
+        singular_values: (p,) of the column-scaled sample regressor, descending: the gap after b confirms the rank.
+    """
+
+    model: TorqueModel
+    independent: tuple[int, ...]
+    grouping: Array
+    singular_values: Array
+
+    @property
+    def size(self) -> int:
+        """b, the number of base parameters."""
+        return len(self.independent)
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """The kept columns' descriptions (b,)."""
+        return tuple(self.model.columns[i] for i in self.independent)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The kept columns' names (b,)."""
+        return tuple(column.name for column in self.columns)
+
+    @cached_property
+    def classes(self) -> tuple[str, ...]:
+        """Each standard parameter's class (p,) after the thesis, section 1.1.
+
+        ``identifiable``: alone in its own base parameter. ``in combination``: shares a base parameter.
+        ``unidentifiable``: in none.
+        """
+        used = self.grouping != 0
+        alone = used.sum(axis=1) == 1
+        return tuple(
+            UNIDENTIFIABLE if not used[:, j].any() else IDENTIFIABLE if alone[used[:, j]].all() else COMBINED
+            for j in range(self.model.size)
+        )
+
+    def formulas(self) -> tuple[str, ...]:
+        """Writes each base parameter as the sum it stands for, such as ``Izz_3 + Iyy_4 + 0.0049 m_4``."""
+        names = self.model.names
+        return tuple(_formula(row, names, kept) for row, kept in zip(self.grouping, self.independent, strict=True))
+
+    def from_standard(self, parameters: ArrayLike) -> Array:
+        """Regroups standard parameters (p,) into base parameters (b,)."""
+        return self.grouping @ np.asarray(parameters, dtype=float)
+
+    def regressor(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
+        """Evaluates Y_b (N, n, b)."""
+        return self.model.regressor(q, dq, ddq, columns=self.independent)
+
+    def torque(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike, parameters: ArrayLike) -> Array:
+        """Evaluates tau = Y_b pi_b (N, n) for base parameters (b,)."""
+        return self.model.torque(q, dq, ddq, parameters, columns=self.independent)
+
+    def essential(
+        self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike, parameters: ArrayLike, threshold: float = 0.01
+    ) -> tuple[int, ...]:
+        """Finds the base parameters that matter on a motion.
+
+        A parameter is essential when its own torque's RMS exceeds the threshold's share of the torque's RMS on at
+        least one joint (thesis section 1.3: essential parameters).
+
+        Args:
+            q: positions (N, n).
+            dq: velocities (N, n).
+            ddq: accelerations (N, n).
+            parameters: base parameters (b,).
+            threshold: the share, 0 to 1.
+
+        Returns:
+            Indices into the base parameters, ascending.
+        """
+        Y = self.regressor(q, dq, ddq)
+        pi = np.asarray(parameters, dtype=float)
+        total = np.sqrt(np.mean((Y @ pi) ** 2, axis=0))  # (n,)
+        own = np.sqrt(np.mean(Y**2, axis=0)) * np.abs(pi)  # (n, b)
+        share = np.divide(own, total[:, None], out=np.zeros_like(own), where=total[:, None] > 0)
+        return tuple(int(i) for i in np.flatnonzero((share >= threshold).any(axis=0)))
+
+
+def base_parameters(
+    model: TorqueModel, *, samples: int = 400, seed: int = 0, tolerance: float = 1e-8
+) -> BaseParameters:
+    """Finds the base parameters by a QR factorisation that walks the columns from left to right.
+
+    A column that the ones before it span, on random states all over the robot's ranges, is regrouped into them
+    (thesis section 1.3.1); the singular values must confirm the rank (section 1.3.2).
+
+    Args:
+        model: the torque model.
+        samples: how many random states.
+        seed: of the random states.
+        tolerance: the part of a column, of its own norm, below which it counts as spanned.
+
+    Returns:
+        The base parameters.
+
+    Raises:
+        NotIdentifiableError: the two factorisations disagree on the rank.
+    """
+    Y = _random_regressor(model, samples, seed)
+    norms = np.linalg.norm(Y, axis=0)
+    # A column that is zero but for rounding must not be blown up to unit length.
+    present = norms > tolerance * norms.max()
+    scale = np.where(present, norms, 1.0)
+    unit = np.where(present, Y / scale, 0.0)
+    independent = _walk(unit, tolerance)
+    singular_values = np.linalg.svd(unit, compute_uv=False)
+    rank = int(np.sum(singular_values > tolerance * singular_values[0]))
+    if rank != len(independent):
+        raise NotIdentifiableError(
+            f"{len(independent)} base parameters by QR, {rank} by SVD: the robot's geometry is close to a special case",
+            remedy="state another tolerance",
+        )
+    combination = np.linalg.lstsq(unit[:, independent], unit, rcond=None)[0]  # (b, p)
+    grouping = combination * scale[None, :] / scale[independent][:, None]
+    grouping = np.where(np.abs(combination) < 1e3 * tolerance, 0.0, _snap(grouping))
+    grouping[:, independent] = np.eye(len(independent))
+    return BaseParameters(model, tuple(independent), grouping, singular_values)
+
+
+def _random_regressor(model: TorqueModel, samples: int, seed: int) -> Array:
+    robot = model.robot
+    rng = np.random.default_rng(seed)
+    revolute = np.array([joint.kind == "revolute" for joint in robot.chain.joints])
+    # Whole turns rather than the limits: which parameters act is the geometry's, not a narrow range's.
+    half = np.where(revolute, np.pi, 1.0)
+    q, dq, ddq = (rng.uniform(-1, 1, (samples, robot.n)) * factor for factor in (half, 3.0, 10.0))
+    return model.regressor(q, dq, ddq, backend="vectorised").reshape(samples * robot.n, model.size)
+
+
+def _walk(unit: Array, tolerance: float) -> list[int]:
+    """Orthogonalises the columns in order, twice each for accuracy, and keeps those that bring something new."""
+    basis = np.empty((unit.shape[0], 0))
+    kept = []
+    for j in range(unit.shape[1]):
+        column = unit[:, j]
+        for _ in range(2):
+            column = column - basis @ (basis.T @ column)
+        length = np.linalg.norm(column)
+        if length > tolerance:
+            basis = np.column_stack([basis, column / length])
+            kept.append(j)
+    return kept
+
+
+def _snap(values: Array) -> Array:
+    rounded = np.round(values)
+    return np.where(np.abs(values - rounded) < 1e-9, rounded, values)
+
+
+def _formula(row: Array, names: Sequence[str], kept: int) -> str:
+    others = [j for j in np.flatnonzero(row) if j != kept]
+    text = names[kept]
+    for j in others:
+        size = abs(row[j])
+        factor = "" if size == 1.0 else f"{size:.6g} "
+        text += f" {'-' if row[j] < 0 else '+'} {factor}{names[j]}"
+    return text

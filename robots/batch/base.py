@@ -1,0 +1,93 @@
+"""Evaluating one CasADi function on many samples at a time."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.common.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+class BatchFunction(ABC):
+    """A CasADi function of vectors and matrices, called with arrays whose first axis counts samples.
+
+    CasADi's own call converts numbers one by one, which costs more than the arithmetic; these evaluators read and
+    write numpy memory directly.
+
+    Args:
+        function: a function of SX inputs; inputs are column vectors (k,), outputs matrices (r, c).
+    """
+
+    def __init__(self, function: casadi.Function) -> None:
+        self.input_sizes = tuple(function.numel_in(i) for i in range(function.n_in()))
+        self.output_shapes = tuple(function.size_out(i) for i in range(function.n_out()))
+
+    def __call__(self, *arguments: Array, out: tuple[Array, ...] | None = None) -> tuple[Array, ...]:
+        """Evaluates all samples.
+
+        Args:
+            *arguments: one array (N, k) per input.
+            out: arrays to write into, as an earlier call of as many samples returned them. Fresh memory costs as
+                much as the arithmetic.
+
+        Returns:
+            One C-ordered array (N, r, c) per output.
+
+        Raises:
+            InputError: arrays of the wrong shape.
+        """
+        arrays = [np.ascontiguousarray(argument, dtype=np.float64) for argument in arguments]
+        samples = arrays[0].shape[0] if arrays and arrays[0].ndim else 0
+        for position, (array, size) in enumerate(zip(arrays, self.input_sizes, strict=True)):
+            if array.reshape(array.shape[0], -1).shape != (samples, size):
+                raise InputError(f"argument {position + 1} has shape {array.shape}", allowed=f"({samples}, {size})")
+        shapes = tuple((samples, *shape) for shape in self.output_shapes)
+        outputs = tuple(np.empty(shape) for shape in shapes) if out is None else out
+        for array, shape in zip(outputs, shapes, strict=True):
+            if array.shape != shape or array.dtype != np.float64 or not array.flags.c_contiguous:
+                raise InputError(f"out has shape {array.shape}", allowed=f"{shape}, C-ordered float64")
+        self._evaluate(samples, arrays, outputs)
+        return outputs
+
+    @abstractmethod
+    def _evaluate(self, samples: int, arguments: list[Array], outputs: tuple[Array, ...]) -> None:
+        """Fills the outputs."""
+
+
+def row_major(function: casadi.Function) -> casadi.Function:
+    """Rewrites a function so that its outputs, dense and transposed, lie in memory as numpy rows."""
+    symbols = function.sx_in()
+    outputs = function(*symbols)
+    outputs = outputs if isinstance(outputs, tuple) else (outputs,)
+    return casadi.Function("batch", symbols, [casadi.densify(casadi.vec(output.T)) for output in outputs])
+
+
+def batch_function(function: casadi.Function, backend: str = "auto") -> BatchFunction:
+    """Chooses the fastest evaluator that this machine has.
+
+    Args:
+        function: see `BatchFunction`.
+        backend: ``compiled`` (C, by the machine's compiler, cached), ``vectorised`` (numpy) or ``auto``: compiled
+            where a compiler works. The environment variable ROBOT_OED_BACKEND overrides ``auto``.
+
+    Raises:
+        InputError: an unknown backend, or ``compiled`` without a working compiler.
+    """
+    from robots.batch.compiled import CompiledFunction, CompilerError, default_backend
+    from robots.batch.vectorised import VectorisedFunction
+
+    chosen = default_backend() if backend == "auto" else backend
+    if chosen not in ("auto", "compiled", "vectorised"):
+        raise InputError(f"backend {chosen!r}", allowed="auto, compiled, vectorised")
+    if chosen != "vectorised":
+        try:
+            return CompiledFunction(function)
+        except CompilerError as error:
+            if chosen == "compiled":
+                raise InputError(f"cannot compile: {error}", remedy="install a C compiler or use vectorised") from error
+    return VectorisedFunction(function)

@@ -1,0 +1,189 @@
+"""What a robot's YAML file may hold: keys, types, units and the sources of its values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from robots.common.config import Config
+
+Source = Literal["thesis", "public", "derived", "assumed", "datasheet", "measured", "identified"]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Number = Annotated[float, Field(allow_inf_nan=True)]
+Three = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+Six = Annotated[list[Finite], Field(min_length=6, max_length=6)]
+
+# unit -> (factor to SI, the joint kinds it suits, the quantity it measures)
+UNITS: dict[str, tuple[float, str, str]] = {
+    f"{unit}{suffix}": (factor, kind, quantity)
+    for unit, factor, kind in (
+        ("rad", 1.0, "revolute"),
+        ("deg", 0.017453292519943295, "revolute"),
+        ("m", 1.0, "prismatic"),
+        ("mm", 1e-3, "prismatic"),
+    )
+    for suffix, quantity in (("", "position"), ("/s", "velocity"), ("/s2", "acceleration"), ("/s3", "jerk"))
+} | {"N m": (1.0, "revolute", "torque"), "N": (1.0, "prismatic", "torque")}
+
+
+class Sourced(Config):
+    """Anything that may say where it comes from; ``assumed`` means that no source exists."""
+
+    source: Source | None = None
+    note: str | None = None
+
+
+class Values(Sourced):
+    """One number a joint, without a unit."""
+
+    values: list[Finite]
+
+
+class Bounds(Sourced):
+    """One bound a joint, in a unit for all joints or one for each; .inf where there is none."""
+
+    values: list[Number]
+    unit: str | list[str]
+
+
+class Range(Sourced):
+    """A lowest and a highest position a joint."""
+
+    lower: list[Number]
+    upper: list[Number]
+    unit: str | list[str]
+
+
+class LimitsDescription(Config):
+    """Limits of the joints; a quantity left out is unlimited, or as the URDF states it."""
+
+    position: Range | None = None
+    velocity: Bounds | None = None
+    acceleration: Bounds | None = None
+    jerk: Bounds | None = None
+    torque: Bounds | None = None
+
+
+class Pose(Config):
+    """A pose: shift [m], then fixed-axis roll, pitch and yaw [rad], as in a URDF."""
+
+    xyz: Three = Field(default=[0.0, 0.0, 0.0])
+    rpy: Three = Field(default=[0.0, 0.0, 0.0])
+
+
+class DhJoint(Sourced):
+    """One row of a Denavit-Hartenberg table: lengths in m, angles in the unit of the geometry."""
+
+    name: str | None = None
+    kind: Literal["revolute", "prismatic"] = "revolute"
+    alpha: Finite = 0.0
+    a: Finite = 0.0
+    d: Finite = 0.0
+    offset: Finite = 0.0
+
+
+class Geometry(Config):
+    """A Denavit-Hartenberg table, its convention and the unit of its angles."""
+
+    convention: Literal["modified", "standard"]
+    angles: Literal["deg", "rad"] = "rad"
+    joints: Annotated[list[DhJoint], Field(min_length=1)]
+
+
+class LinkDescription(Sourced):
+    """One link: mass [kg], centre of mass [m] and inertia about it [kg m2] (Ixx Ixy Ixz Iyy Iyz Izz), in DH frame i."""
+
+    mass: Finite
+    com: Three
+    inertia_at_com: Six
+
+
+class FrictionDescription(Config):
+    """Friction on the joint's side: f1 sign(dq) + f2 dq + f3 dq|dq| + f4 dq^3, in N m and rad/s (N and m/s)."""
+
+    coulomb: Values | None = None
+    viscous: Values | None = None
+    quadratic: Values | None = None
+    cubic: Values | None = None
+
+
+class Drives(Config):
+    """Drives: motor turns per joint turn, rotor inertia [kg m2] and torque constant [N m/A] at the motor."""
+
+    gear_ratio: Values | None = None
+    rotor_inertia: Values | None = None
+    torque_constant: Values | None = None
+
+
+class Dynamics(Config):
+    """Nominal dynamics."""
+
+    links: list[LinkDescription] | None = None
+    drives: Drives = Drives()
+    friction: FrictionDescription = FrictionDescription()
+
+
+class Rating(Sourced):
+    """One rated value in SI units."""
+
+    value: Positive
+
+
+class Ambient(Sourced):
+    """Ambient temperatures of operation [degC]."""
+
+    lowest: Finite
+    highest: Finite
+
+
+class RobotDescription(Config):
+    """A robot's YAML file: a Denavit-Hartenberg table or a URDF, then limits and nominal dynamics."""
+
+    name: str
+    title: str = ""
+    credit: str | None = None
+    licence: str | None = None
+    geometry: Geometry | None = None
+    urdf: str | None = None
+    tip: str | None = None
+    joints: list[str] | None = None
+    locked: dict[str, Finite] | None = None
+    base: Pose | None = None
+    flange: Pose | None = None
+    gravity: Three | None = None
+    limits: LimitsDescription = LimitsDescription()
+    dynamics: Dynamics = Dynamics()
+    payload: Rating | None = None
+    mass: Rating | None = None
+    ambient: Ambient | None = None
+    period: Positive = 0.004
+
+    @model_validator(mode="after")
+    def _one_geometry(self) -> RobotDescription:
+        if (self.geometry is None) == (self.urdf is None):
+            raise ValueError("a robot has either 'geometry' or 'urdf'")
+        if self.geometry is not None and (self.tip or self.joints or self.locked):
+            raise ValueError("'tip', 'joints' and 'locked' choose among a URDF's joints; 'geometry' has no choice")
+        if self.urdf is not None and (self.base or self.flange or self.dynamics.links):
+            raise ValueError("'base', 'flange' and 'dynamics.links' belong to 'geometry'; a URDF states them itself")
+        return self
+
+    def assumed(self) -> Iterator[str]:
+        """Names of the quantities whose source is "assumed", such as ``limits.jerk``."""
+        if self.geometry is not None and any(row.source == "assumed" for row in self.geometry.joints):
+            yield "geometry"
+        yield from _assumed(self.limits, "limits")
+        if any(link.source == "assumed" for link in self.dynamics.links or ()):
+            yield "dynamics.links"
+        yield from _assumed(self.dynamics.drives, "dynamics.drives")
+        yield from _assumed(self.dynamics.friction, "dynamics.friction")
+
+
+def _assumed(section: Config, name: str) -> Iterator[str]:
+    for key in type(section).model_fields:
+        entry = getattr(section, key)
+        if entry is not None and entry.source == "assumed":
+            yield f"{name}.{key}"

@@ -1,0 +1,257 @@
+"""The tree of links that a URDF describes, and the serial chain a user picks from it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.common.errors import InputError
+from robots.geometry.chain import Chain, Joint, joint_motion
+from robots.geometry.inertia import SIZE, check_body, inertial_parameters
+from robots.geometry.urdf_selection import Selection, nearest, select
+from robots.geometry.urdf_xml import UrdfElements, UrdfJoint, UrdfLink, read_elements
+from robots.limits import Limits
+
+Array = NDArray[np.float64]
+
+_log = logging.getLogger(__name__)
+
+
+class UrdfChain(NamedTuple):
+    """A chain taken from a URDF: ``inertia`` is (n, 10) about the link frames, everything locked lumped in."""
+
+    chain: Chain
+    limits: Limits
+    inertia: Array
+    names: tuple[str, ...]
+
+
+class UrdfTree:
+    """Links and joints of a URDF that hang together as one tree.
+
+    Args:
+        elements: what the file states.
+
+    Raises:
+        InputError: naming the link or joint, when they do not form one tree.
+    """
+
+    def __init__(self, elements: UrdfElements) -> None:
+        self.file = elements.file
+        self.name = elements.name
+        self.digest = elements.digest
+        self.links: dict[str, UrdfLink] = {link.name: link for link in elements.links}
+        self.joints: dict[str, UrdfJoint] = {joint.name: joint for joint in elements.joints}
+        if not self.joints:
+            raise InputError("the URDF has no joint", file=self.file)
+        self._declare_world()
+        self.parent_joint: dict[str, UrdfJoint] = {}
+        self.child_joints: dict[str, list[UrdfJoint]] = {name: [] for name in self.links}
+        for joint in self.joints.values():
+            self._attach(joint)
+        self.root = self._find_root()
+
+    def _declare_world(self) -> None:
+        # Simulators accept a "world" that is nowhere declared, so exported files leave it out.
+        used, given = {joint.parent for joint in self.joints.values()}, {joint.child for joint in self.joints.values()}
+        if "world" in used - given - set(self.links):
+            self.links["world"] = UrdfLink(name="world", com=np.zeros(3), inertia_at_com=np.zeros((3, 3)))
+
+    def _attach(self, joint: UrdfJoint) -> None:
+        for role, name in (("parent", joint.parent), ("child", joint.child)):
+            if name not in self.links:
+                problem = f"the {role} link {name!r} does not exist"
+                raise InputError(problem, file=self.file, joint=joint.name, remedy=nearest(name, self.links))
+        if joint.mimic is not None and joint.mimic[0] not in self.joints:
+            problem = f"it mimics the joint {joint.mimic[0]!r}, which does not exist"
+            raise InputError(problem, file=self.file, joint=joint.name, remedy=nearest(joint.mimic[0], self.joints))
+        first = self.parent_joint.get(joint.child)
+        if first is not None:
+            raise InputError(
+                f"link {joint.child!r} has two parents, by the joints {first.name!r} and {joint.name!r}",
+                file=self.file,
+                remedy="cut the loop: only trees of links are supported",
+            )
+        self.parent_joint[joint.child] = joint
+        self.child_joints[joint.parent].append(joint)
+
+    def _find_root(self) -> str:
+        roots = [name for name in self.links if name not in self.parent_joint]
+        if len(roots) > 1:
+            listed = ", ".join(repr(name) for name in roots)
+            raise InputError(f"{len(roots)} links have no parent: {listed}", file=self.file, allowed="one root link")
+        reached = set(roots)
+        stack = list(roots)
+        while stack:
+            children = [joint.child for joint in self.child_joints[stack.pop()]]
+            reached.update(children)
+            stack.extend(children)
+        lost = next((name for name in self.links if name not in reached), None)
+        if lost is not None:
+            raise InputError(f"link {lost!r} is part of a loop that hangs on no root", file=self.file)
+        return roots[0]
+
+    def path(self, link: str) -> tuple[UrdfJoint, ...]:
+        """Joints from the root to a link, fixed ones included.
+
+        Args:
+            link: the name of a link.
+
+        Returns:
+            The joints in order; empty for the root.
+        """
+        joints = []
+        while link != self.root:
+            joint = self.parent_joint[link]
+            joints.append(joint)
+            link = joint.parent
+        return tuple(reversed(joints))
+
+    @cached_property
+    def leaves(self) -> tuple[str, ...]:
+        """Links without children, in the order of the file."""
+        return tuple(name for name, joints in self.child_joints.items() if not joints)
+
+    def chain(
+        self,
+        tip: str | None = None,
+        joints: Sequence[str] | None = None,
+        locked: Mapping[str, float] | None = None,
+    ) -> UrdfChain:
+        """Take a serial chain out of the tree; every other joint is locked and its links' inertia lumped in.
+
+        Args:
+            tip: the link at which the chain ends; also the flange.
+            joints: the moving joints, in the chain's order; those between that are not named are locked.
+            locked: positions of locked joints [rad or m]; 0 where not stated. A joint that mimics another one follows
+                that one's locked position.
+
+        Returns:
+            The chain, its limits (acceleration and jerk are infinite: a URDF does not state them), and the inertial
+            parameters of its n bodies about their link frames. Gravity is along -z of the root link.
+
+        Raises:
+            InputError: naming the joint or link; and when several chains are possible, listing them.
+        """
+        selection = select(self, tip, joints, locked)
+        moving = {joint.name: i for i, joint in enumerate(selection.moving)}
+        chain_joints: list[Joint] = []
+        inertia = np.zeros((len(moving), SIZE))
+        lumped: list[list[str]] = [[] for _ in moving]
+        flange: Array = np.eye(4)
+        stack: list[tuple[str, int, Array]] = [(self.root, -1, np.eye(4))]
+        while stack:
+            name, body, pose = stack.pop()
+            if body >= 0:
+                link = self.links[name]
+                # Only what moves: bodies of the base without a proper inertia are common, and do no harm.
+                check_body(link.mass, link.inertia_at_com, f"link {name!r}", file=self.file)
+                inertia[body] += inertial_parameters(link.mass, link.com, link.inertia_at_com, pose)
+                lumped[body].append(name)
+            if name == selection.tip:
+                flange = pose
+            for joint in self.child_joints[name]:
+                placement = pose @ joint.placement
+                if joint.name in moving:
+                    body_joint = Joint(joint.name, joint.kind, placement[:3, :3], placement[:3, 3], joint.axis)
+                    chain_joints.append(body_joint)
+                    stack.append((joint.child, moving[joint.name], np.eye(4)))
+                else:
+                    stack.append((joint.child, body, placement @ self._locked_motion(joint, selection)))
+        for i, names in enumerate(lumped):
+            if not inertia[i, 0] > 0.0:
+                listed = ", ".join(repr(name) for name in names)
+                raise InputError(
+                    f"the body it moves has no mass (links {listed})",
+                    file=self.file,
+                    joint=selection.moving[i].name,
+                    remedy="give one of these links an <inertial>, or lock the joint",
+                )
+        inertia.flags.writeable = False
+        chain_joints.sort(key=lambda joint: moving[joint.name])
+        chain = Chain(tuple(chain_joints), tip=flange)
+        return UrdfChain(chain, self._limits(selection.moving), inertia, chain.names)
+
+    def _locked_motion(self, joint: UrdfJoint, selection: Selection) -> Array:
+        if not joint.moves:
+            return np.eye(4)
+        return joint_motion(joint.kind, joint.axis, self._locked_value(joint, selection, ()))
+
+    def _locked_value(self, joint: UrdfJoint, selection: Selection, seen: tuple[str, ...]) -> float:
+        if joint.name in selection.locked:
+            return selection.locked[joint.name]
+        if joint.mimic is None:
+            return 0.0
+        leader, multiplier, offset = joint.mimic
+        if leader in seen or leader == joint.name:
+            raise InputError("it mimics itself, through other joints or directly", file=self.file, joint=joint.name)
+        if any(leader == moving.name for moving in selection.moving):
+            _log.warning("%s: joint %s mimics the moving joint %s; taken as locked", self.file, joint.name, leader)
+            return offset
+        return multiplier * self._locked_value(self.joints[leader], selection, (*seen, joint.name)) + offset
+
+    def _limits(self, moving: Sequence[UrdfJoint]) -> Limits:
+        bounds = np.array([self._bounds(joint) for joint in moving])
+        unknown = np.full(len(moving), np.inf)
+        return Limits(
+            lower=bounds[:, 0],
+            upper=bounds[:, 1],
+            velocity=bounds[:, 2],
+            acceleration=unknown,
+            jerk=unknown.copy(),
+            torque=bounds[:, 3],
+        )
+
+    def _bounds(self, joint: UrdfJoint) -> tuple[float, float, float, float]:
+        limit = joint.limit
+        if limit is None:
+            if joint.type == "continuous":
+                return -np.inf, np.inf, np.inf, np.inf
+            problem = f"a {joint.type} joint without <limit>"
+            raise InputError(
+                problem, file=self.file, joint=joint.name, allowed="<limit> with lower, upper, velocity and effort"
+            )
+        if joint.type != "continuous" and (limit.velocity is None or limit.effort is None):
+            missing = "velocity" if limit.velocity is None else "effort"
+            raise InputError(f"<limit> states no {missing}", file=self.file, joint=joint.name)
+        velocity = np.inf if limit.velocity is None else limit.velocity
+        effort = np.inf if limit.effort is None else limit.effort
+        # Both zero is what exporters write, and what URDF assumes, where nothing was filled in.
+        if joint.type == "continuous" or limit.lower == limit.upper == 0.0:
+            return -np.inf, np.inf, velocity, effort
+        if limit.lower >= limit.upper:
+            problem = f"<limit> has lower {limit.lower:g} and upper {limit.upper:g}"
+            raise InputError(problem, file=self.file, joint=joint.name, allowed="lower below upper")
+        return limit.lower, limit.upper, velocity, effort
+
+    def friction(self, names: Sequence[str]) -> Array:
+        """Friction as the file's ``<dynamics friction= damping=>`` states it.
+
+        Args:
+            names: the joints.
+
+        Returns:
+            (n, 4) coefficients f1..f4, of which a URDF states f1 [N m] and f2 [N m s/rad]; 0 where it states none.
+        """
+        return np.array([[self.joints[name].friction, self.joints[name].damping, 0.0, 0.0] for name in names])
+
+
+def read_urdf(path: str | Path) -> UrdfTree:
+    """Read a URDF file.
+
+    Args:
+        path: the file, expanded if it came from xacro.
+
+    Returns:
+        Its tree of links; ``tree.chain(...)`` takes the robot's chain out of it.
+
+    Raises:
+        InputError: naming the file and the line, link or joint at fault.
+    """
+    return UrdfTree(read_elements(path))

@@ -1,0 +1,237 @@
+"""What the joints may do, and how far a motion stays from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.common.errors import InputError
+from robots.signals import FloatArray, Motion
+
+
+@dataclass(frozen=True, kw_only=True)
+class Margin:
+    """The closest approach of one joint to one limit.
+
+    Args:
+        quantity: "lower" or "upper" (position), "velocity", "acceleration", "jerk", or another, such as "torque".
+        joint: the joint, counted from 1.
+        value: the value at the closest approach, with its sign, in the unit of the quantity.
+        limit: the bound; of a symmetric one its magnitude.
+        time: when it happens [s].
+        slack_fraction: the distance to the limit over the limit (of a position: over its range); 1 far from it or where
+            there is no limit, 0 on it, negative beyond it.
+    """
+
+    quantity: str
+    joint: int
+    value: float
+    limit: float
+    time: float
+    slack_fraction: float
+
+    @property
+    def slack(self) -> float:
+        """The distance to the limit in the unit of the quantity, negative beyond it."""
+        if self.quantity == "lower":
+            return self.value - self.limit
+        return self.limit - (self.value if self.quantity == "upper" else abs(self.value))
+
+    @property
+    def violated(self) -> bool:
+        """Whether the limit is exceeded."""
+        return self.slack < 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """The bounds of n joints; infinite where there is none.
+
+    A velocity of zero can be stated: that no motion fits is for the design to say.
+
+    Args:
+        lower: lowest positions [rad], (n,).
+        upper: highest positions [rad], (n,).
+        velocity: highest speeds [rad/s], (n,).
+        acceleration: highest accelerations [rad/s^2], (n,).
+        jerk: highest jerks [rad/s^3], (n,).
+        torque: highest joint torques [N m], (n,).
+
+    Raises:
+        InputError: arrays of different lengths, NaN, ``lower`` not below ``upper``, or a negative bound.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    torque: FloatArray
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            array = _bound(item.name, getattr(self, item.name))
+            if len(array) != len(np.atleast_1d(self.lower)):
+                raise InputError(f"{len(array)} values, but lower has {len(self.lower)}", column=item.name)
+            if item.name not in ("lower", "upper"):
+                _reject(array < 0.0, array, item.name, "zero or more")
+            array.setflags(write=False)
+            object.__setattr__(self, item.name, array)
+        wrong = np.flatnonzero(self.lower >= self.upper)
+        if len(wrong):
+            joint = int(wrong[0])
+            raise InputError(
+                f"lower {self.lower[joint]:g} is not below upper {self.upper[joint]:g}",
+                joint=joint + 1,
+                allowed="lower < upper",
+                remedy="correct the position limits",
+            )
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return len(self.lower)
+
+    def scaled(
+        self, *, velocity: float = 1.0, acceleration: float = 1.0, jerk: float = 1.0, torque: float = 1.0
+    ) -> Limits:
+        """Returns limits multiplied by factors, such as 0.8 to keep a reserve; positions stay.
+
+        Args:
+            velocity: factor of the velocity limits.
+            acceleration: factor of the acceleration limits.
+            jerk: factor of the jerk limits.
+            torque: factor of the torque limits.
+
+        Raises:
+            InputError: a factor that is not a positive number.
+        """
+        factors = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk, "torque": torque}
+        for name, factor in factors.items():
+            if not (np.isfinite(factor) and factor > 0.0):
+                raise InputError(f"a factor of {factor}", column=name, allowed="a positive number")
+        return Limits(self.lower, self.upper, *(getattr(self, name) * factor for name, factor in factors.items()))
+
+    def margins(self, motion: Motion) -> list[Margin]:
+        """Returns the smallest margin of each quantity and joint, quantity by quantity.
+
+        Position has two (lower, upper); jerk is the finite difference of the acceleration, in mid step, and is left out
+        of a motion of one sample. Torque is that of a model: see `symmetric_margins`.
+
+        Args:
+            motion: the motion, of as many joints.
+
+        Raises:
+            InputError: the motion has another number of joints.
+        """
+        if motion.n != self.n:
+            raise InputError(f"the motion has {motion.n} joints, the limits are for {self.n}")
+        margins = self._position_margins(motion)
+        margins += symmetric_margins("velocity", motion.t, motion.dq, self.velocity)
+        margins += symmetric_margins("acceleration", motion.t, motion.ddq, self.acceleration)
+        if len(motion) > 1:
+            middle, jerk = finite_jerk(motion)
+            margins += symmetric_margins("jerk", middle, jerk, self.jerk)
+        return margins
+
+    def _position_margins(self, motion: Motion) -> list[Margin]:
+        span = self.upper - self.lower
+        margins = []
+        for quantity, bound, rows in (
+            ("lower", self.lower, motion.q.argmin(axis=0)),
+            ("upper", self.upper, motion.q.argmax(axis=0)),
+        ):
+            for joint, row in enumerate(rows):
+                value, limit = float(motion.q[row, joint]), float(bound[joint])
+                slack = value - limit if quantity == "lower" else limit - value
+                # A range that is open at the other end has no length to compare with.
+                scale = span[joint] if np.isfinite(span[joint]) else max(abs(limit), 1.0)
+                margins.append(
+                    Margin(
+                        quantity=quantity,
+                        joint=joint + 1,
+                        value=value,
+                        limit=limit,
+                        time=float(motion.t[row]),
+                        slack_fraction=float(slack / scale) if np.isfinite(limit) else 1.0,
+                    )
+                )
+        return margins
+
+
+def symmetric_margins(
+    quantity: str, t: FloatArray, values: NDArray[np.floating], limit: NDArray[np.floating]
+) -> list[Margin]:
+    """Returns the closest approach of each column of any signal to a bound on its magnitude.
+
+    Args:
+        quantity: its name, such as "torque".
+        t: time [s], (N,).
+        values: the signal, (N, n).
+        limit: the bound on its magnitude, (n,), zero or more, may be infinite.
+
+    Raises:
+        InputError: shapes that do not fit, a value that is not finite, or a negative bound.
+    """
+    values, bounds = np.asarray(values, dtype=float), _bound(quantity, limit)
+    if values.ndim != 2 or values.shape != (len(t), len(bounds)) or len(t) == 0:
+        raise InputError(
+            f"shape {values.shape}", column=quantity, allowed=f"shape ({len(t)}, {len(bounds)}), not empty"
+        )
+    _reject(bounds < 0.0, bounds, quantity, "zero or more")
+    bad = np.argwhere(~np.isfinite(values))
+    if len(bad):
+        row, joint = (int(index) for index in bad[0])
+        raise InputError(
+            f"found {values[row, joint]}", column=quantity, row=row + 1, joint=joint + 1, allowed="finite numbers"
+        )
+    rows = np.abs(values).argmax(axis=0)
+    return [
+        Margin(
+            quantity=quantity,
+            joint=joint + 1,
+            value=float(values[row, joint]),
+            limit=float(bounds[joint]),
+            time=float(t[row]),
+            slack_fraction=_slack_fraction(abs(float(values[row, joint])), float(bounds[joint])),
+        )
+        for joint, row in enumerate(rows)
+    ]
+
+
+def finite_jerk(motion: Motion) -> tuple[FloatArray, FloatArray]:
+    """Returns the jerk between samples as the difference of the acceleration over time.
+
+    Args:
+        motion: a motion of N samples and n joints.
+
+    Returns:
+        The times in mid step [s], (N-1,), and the jerks [rad/s^3], (N-1, n).
+    """
+    step = np.diff(motion.t)
+    return motion.t[:-1] + 0.5 * step, np.diff(motion.ddq, axis=0) / step[:, None]
+
+
+def _slack_fraction(magnitude: float, limit: float) -> float:
+    if limit > 0.0:
+        return 1.0 - magnitude / limit
+    return 0.0 if magnitude == 0.0 else -np.inf
+
+
+def _bound(name: str, value: NDArray[np.floating]) -> FloatArray:
+    try:
+        array = np.array(value, dtype=np.float64, order="C")
+    except (TypeError, ValueError) as error:
+        raise InputError(f"not an array of numbers ({error})", column=name, allowed="numbers, (n,)") from error
+    if array.ndim != 1 or len(array) == 0:
+        raise InputError(f"shape {array.shape}", column=name, allowed="shape (n,)")
+    _reject(np.isnan(array), array, name, "a number, or inf for no limit")
+    return array
+
+
+def _reject(wrong: NDArray[np.bool_], array: FloatArray, name: str, allowed: str) -> None:
+    if wrong.any():
+        joint = int(np.flatnonzero(wrong)[0])
+        raise InputError(f"found {array[joint]:g}", column=name, joint=joint + 1, allowed=allowed)

@@ -1,0 +1,87 @@
+"""Robots by catalogue name, from a URDF, or from a robot YAML file."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from pathlib import Path
+
+from robots.assembly import robot_from_urdf, robot_from_yaml
+from robots.common.errors import AssumedValueWarning, InputError
+from robots.common.files import existing_file
+from robots.robot import Robot
+
+CATALOG = Path(__file__).parent / "catalog"
+_warned: set[str] = set()  # robots whose assumed values this process was told of
+
+
+def catalogue() -> tuple[str, ...]:
+    """List the robots that come with this software.
+
+    Returns:
+        Their names, sorted.
+    """
+    return tuple(sorted(path.stem for path in CATALOG.glob("*.yaml")))
+
+
+def load_robot(
+    spec: str | Path | Robot,
+    *,
+    tip: str | None = None,
+    joints: Sequence[str] | None = None,
+    locked: Mapping[str, float] | None = None,
+) -> Robot:
+    """Load a robot.
+
+    Args:
+        spec: a catalogue name, the path of a ``.urdf`` or of a robot's ``.yaml``, or a robot, which is returned.
+        tip: of a URDF, the link at which the chain ends.
+        joints: of a URDF, the moving joints in the chain's order.
+        locked: of a URDF, positions of locked joints [rad or m].
+
+    Returns:
+        The robot.
+
+    Raises:
+        InputError: on an unknown name, with the nearest one; on a file that is missing or wrong, naming the key, link
+            or joint; when a URDF branches and nothing says which chain is meant.
+
+    Warns:
+        AssumedValueWarning: once per process and robot, when the description holds values that no source backs.
+    """
+    if isinstance(spec, Robot):
+        if tip is not None or joints is not None or locked:
+            raise InputError(f"{spec.name} is loaded already", remedy="give tip, joints and locked when loading it")
+        return spec
+    if str(spec) in catalogue():
+        robot = robot_from_yaml(CATALOG / f"{spec}.yaml", str(spec), tip, joints, locked)
+    else:
+        path = _robot_file(spec)
+        if path.suffix.lower() == ".urdf":
+            robot = robot_from_urdf(path, tip, joints, locked)
+        else:
+            robot = robot_from_yaml(path, str(path), tip, joints, locked)
+    if robot.assumed and robot.origin not in _warned:
+        _warned.add(robot.origin)
+        message = f"{robot.name}: these values are assumed, no source backs them: {', '.join(robot.assumed)}"
+        warnings.warn(message, AssumedValueWarning, stacklevel=2)
+    return robot
+
+
+def _robot_file(spec: str | Path) -> Path:
+    text = str(spec)
+    path = Path(text)
+    suffix = path.suffix.lower()
+    if suffix in (".urdf", ".yaml", ".yml"):
+        return existing_file(path)
+    if suffix == ".xacro":
+        raise InputError("a xacro file", file=text, remedy="expand it first: xacro FILE.xacro > FILE.urdf")
+    if text and path.exists():
+        raise InputError("not a robot file by its name", file=text, allowed=".urdf, .yaml or .yml")
+    close = get_close_matches(text.lower(), catalogue(), n=1, cutoff=0.4)
+    raise InputError(
+        f"unknown robot {text!r}",
+        allowed=f"{', '.join(catalogue())}, or the path of a .urdf or .yaml file",
+        remedy=f"did you mean {close[0]!r}?" if close else None,
+    )

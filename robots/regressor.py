@@ -1,0 +1,185 @@
+"""The torque model: a robot, the terms that act in it, and their regressor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from robots.batch import BatchFunction, batch_function
+from robots.common.errors import InputError
+from robots.robot import Robot
+from robots.terms import (
+    COULOMB_VISCOUS,
+    POLYNOMIAL,
+    Column,
+    FrictionPolynomial,
+    RigidBody,
+    RotorInertia,
+    Term,
+    TorqueOffset,
+)
+
+Array = NDArray[np.float64]
+FRICTIONS = {"polynomial": POLYNOMIAL, "coulomb-viscous": COULOMB_VISCOUS}
+
+
+@dataclass(frozen=True)
+class TorqueModel:
+    """tau = Y(q, dq, ddq) pi, the terms' columns side by side.
+
+    Attributes:
+        robot: the robot with n joints.
+        terms: the effects; together they have p parameters.
+    """
+
+    robot: Robot
+    terms: tuple[Term, ...]
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """The p parameters, in the order of the regressor's columns."""
+        return tuple(column for term in self.terms for column in term.columns(self.robot))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters' names (p,)."""
+        return tuple(column.name for column in self.columns)
+
+    @property
+    def size(self) -> int:
+        """p, the number of parameters."""
+        return len(self.columns)
+
+    @cached_property
+    def nominal(self) -> Array:
+        """The robot description's parameters (p,), NaN where it states none."""
+        return np.concatenate([term.nominal(self.robot) for term in self.terms])
+
+    @cached_property
+    def _expression(self) -> tuple[list[casadi.SX], casadi.SX]:
+        n = self.robot.n
+        q, dq, ddq = (casadi.SX.sym(name, n) for name in ("q", "dq", "ddq"))
+        parts = [term.regressor(self.robot, q, dq, ddq) for term in self.terms]
+        return [q, dq, ddq], casadi.horzcat(*parts)
+
+    def symbolic(self, columns: Sequence[int] | None = None) -> casadi.Function:
+        """Builds (q, dq, ddq) -> Y (n, p') as a CasADi function, of all columns or of the given ones."""
+        inputs, Y = self._expression
+        chosen = Y if columns is None else Y[:, list(columns)]
+        return casadi.Function("regressor", inputs, [chosen], ["q", "dq", "ddq"], ["Y"])
+
+    def adjoint(self, columns: Sequence[int] | None = None) -> casadi.Function:
+        """Builds the reverse mode of `symbolic`.
+
+        Returns:
+            (q, dq, ddq, Ybar) -> the gradients (n,) of sum(Ybar * Y) by q, dq and ddq; Ybar (n p',) lists the
+            weights row by row.
+        """
+        inputs, Y = self._expression
+        chosen = Y if columns is None else Y[:, list(columns)]
+        weights = casadi.SX.sym("Ybar", chosen.shape[0] * chosen.shape[1])
+        total = casadi.dot(weights, casadi.densify(casadi.vec(chosen.T)))
+        gradients = [casadi.densify(casadi.gradient(total, symbol)) for symbol in inputs]
+        return casadi.Function("adjoint", [*inputs, weights], gradients)
+
+    def _evaluator(self, columns: Sequence[int] | None, backend: str) -> BatchFunction:
+        key = (None if columns is None else tuple(int(c) for c in columns), backend)
+        evaluators: dict[object, BatchFunction] = self.__dict__.setdefault("_evaluators", {})
+        if key not in evaluators:
+            evaluators[key] = batch_function(self.symbolic(columns), backend)
+        return evaluators[key]
+
+    def regressor(
+        self,
+        q: ArrayLike,
+        dq: ArrayLike,
+        ddq: ArrayLike,
+        *,
+        columns: Sequence[int] | None = None,
+        backend: str = "auto",
+        out: Array | None = None,
+    ) -> Array:
+        """Evaluates Y on N samples.
+
+        Args:
+            q: positions (N, n) [rad or m].
+            dq: velocities (N, n) [rad/s or m/s].
+            ddq: accelerations (N, n) [rad/s2 or m/s2].
+            columns: indices of the p' columns wanted; all by default.
+            backend: see `robots.batch.batch_function`.
+            out: an array (N, n, p') to write into.
+
+        Returns:
+            Y (N, n, p'); ``Y.reshape(N * n, p')`` goes sample by sample, joint by joint.
+        """
+        arrays = [np.atleast_2d(np.asarray(array, dtype=float)) for array in (q, dq, ddq)]
+        return self._evaluator(columns, backend)(*arrays, out=None if out is None else (out,))[0]
+
+    def torque(
+        self,
+        q: ArrayLike,
+        dq: ArrayLike,
+        ddq: ArrayLike,
+        parameters: ArrayLike,
+        *,
+        columns: Sequence[int] | None = None,
+    ) -> Array:
+        """Evaluates tau = Y pi (N, n) [N m or N] for parameters (p',), those of `columns` where given.
+
+        Raises:
+            InputError: not as many parameters as columns.
+        """
+        pi = np.asarray(parameters, dtype=float)
+        expected = self.size if columns is None else len(columns)
+        if pi.shape != (expected,):
+            raise InputError(f"{pi.shape} parameters", allowed=f"({expected},)")
+        arrays = [np.atleast_2d(np.asarray(array, dtype=float)) for array in (q, dq, ddq)]
+        samples, chunk = arrays[0].shape[0], 4096
+        tau = np.empty((samples, self.robot.n))
+        # In chunks: the regressor of a long log would not fit into memory.
+        for start in range(0, samples, chunk):
+            rows = slice(start, start + chunk)
+            tau[rows] = self.regressor(*(array[rows] for array in arrays), columns=columns) @ pi
+        return tau
+
+    def __getstate__(self) -> dict[str, object]:
+        # Symbols and loaded libraries do not cross process borders; they are rebuilt where they are needed.
+        return {"robot": self.robot, "terms": self.terms}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+
+
+def default_model(
+    robot: Robot,
+    *,
+    friction: str = "polynomial",
+    velocity_scale: float = 0.0,
+    rotor: bool = True,
+    offset: bool = True,
+) -> TorqueModel:
+    """Builds rigid body + friction + rotor inertia + torque offset.
+
+    Args:
+        robot: the robot.
+        friction: ``polynomial`` (f1..f4, thesis eq. 35) or ``coulomb-viscous`` (f1, f2).
+        velocity_scale: see `FrictionPolynomial`.
+        rotor: with rotor inertia.
+        offset: with a torque offset on each joint.
+
+    Raises:
+        InputError: an unknown friction model.
+    """
+    if friction not in FRICTIONS:
+        raise InputError(f"friction model {friction!r}", allowed=", ".join(FRICTIONS))
+    terms: list[Term] = [RigidBody(), FrictionPolynomial(FRICTIONS[friction], velocity_scale)]
+    if rotor:
+        terms.append(RotorInertia())
+    if offset:
+        terms.append(TorqueOffset())
+    return TorqueModel(robot, tuple(terms))

@@ -1,0 +1,136 @@
+"""What is known of a robot before any experiment: geometry, limits and nominal dynamics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.common.errors import InputError
+from robots.geometry.chain import Chain
+from robots.limits import Limits
+
+Array = NDArray[np.float64]
+
+
+class _Term(Protocol):
+    def nominal(self, robot: Any, /) -> Array: ...
+
+
+class _Model(Protocol):
+    @property
+    def terms(self) -> Sequence[_Term]: ...
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Robot:
+    """A robot: its chain, its limits, and what is known of its dynamics.
+
+    Args:
+        name: short name, as in the catalogue.
+        chain: the kinematic chain.
+        limits: limits of the n joints.
+        inertia: (n, 10) per link ``m, mPx, mPy, mPz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz`` [kg, kg m, kg m2] about the
+            link frame's origin, in its axes; a row of NaN where unknown. All unknown by default.
+        rotor_inertia: (n,) as felt at the joint, ``gear_ratio^2 J_motor`` [kg m2, or kg of a prismatic joint];
+            0 where unknown.
+        friction: (n, 4) coefficients f1..f4 of ``f1 sign(dq) + f2 dq + f3 dq |dq| + f4 dq^3``
+            [N m, N m s/rad, N m s2/rad2, N m s3/rad3]; 0 where unknown.
+        gear_ratio: (n,) motor turns per joint turn; 1 where unknown.
+        torque_constant: (n,) joint torque per motor current, ``gear_ratio k_motor`` [N m/A]; NaN where unknown.
+        period: sample period of the controller [s].
+        assumed: the quantities that no source backs, such as "limits.jerk".
+        origin: the catalogue name, or the file it was read from.
+        digest: SHA-256 of what defines the robot; empty for a robot made in memory.
+        title: full name, for reports.
+        payload: rated payload [kg].
+        ambient: (lowest, highest) ambient temperature of operation [degC].
+
+    Raises:
+        InputError: naming the joint and the quantity that is of a wrong shape or not possible.
+    """
+
+    name: str
+    chain: Chain
+    limits: Limits
+    # None stands for unknown until __post_init__ fills in the arrays.
+    inertia: Array = None  # type: ignore[assignment]
+    rotor_inertia: Array = None  # type: ignore[assignment]
+    friction: Array = None  # type: ignore[assignment]
+    gear_ratio: Array = None  # type: ignore[assignment]
+    torque_constant: Array = None  # type: ignore[assignment]
+    period: float = 0.004
+    assumed: tuple[str, ...] = ()
+    origin: str = ""
+    digest: str = ""
+    title: str = ""
+    payload: float | None = None
+    ambient: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        n = self.n
+        if not self.name:
+            raise InputError("the robot has no name")
+        if len(np.atleast_1d(self.limits.lower)) != n:
+            raise InputError(f"{self.name}: limits of {len(self.limits.lower)} joints", allowed=f"{n}, as in the chain")
+        if not (np.isfinite(self.period) and self.period > 0.0):
+            raise InputError(f"{self.name}: a sample period of {self.period} s", allowed="a positive time")
+        self._freeze("inertia", (n, 10), np.nan)
+        self._freeze("rotor_inertia", (n,), 0.0)
+        self._freeze("friction", (n, 4), 0.0)
+        self._freeze("gear_ratio", (n,), 1.0)
+        self._freeze("torque_constant", (n,), np.nan)
+        unknown = np.isnan(self.inertia).all(axis=1)
+        self._require(np.isfinite(self.inertia).all(axis=1) | unknown, "inertia", "ten finite numbers, or ten NaN")
+        self._require(self.rotor_inertia >= 0.0, "rotor_inertia", "zero or more")
+        self._require(np.isfinite(self.rotor_inertia), "rotor_inertia", "a finite number")
+        self._require(np.isfinite(self.friction).all(axis=1), "friction", "finite numbers")
+        self._require(np.isfinite(self.gear_ratio) & (self.gear_ratio != 0.0), "gear_ratio", "finite and not zero")
+        usable = np.isnan(self.torque_constant) | (np.isfinite(self.torque_constant) & (self.torque_constant != 0.0))
+        self._require(usable, "torque_constant", "finite and not zero, or NaN where unknown")
+        object.__setattr__(self, "assumed", tuple(self.assumed))
+
+    def _freeze(self, quantity: str, shape: tuple[int, ...], unknown: float) -> None:
+        value = getattr(self, quantity)
+        try:
+            array = np.full(shape, unknown) if value is None else np.array(value, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{self.name}: {quantity} is not numeric") from error
+        if array.shape != shape:
+            raise InputError(f"{self.name}: {quantity} has the shape {array.shape}", allowed=f"the shape {shape}")
+        array.flags.writeable = False
+        object.__setattr__(self, quantity, array)
+
+    def _require(self, valid: NDArray[np.bool_] | np.bool_, quantity: str, allowed: str) -> None:
+        if not np.all(valid):
+            i = int(np.argmin(valid))
+            raise InputError(f"{self.name}: {quantity} is {getattr(self, quantity)[i]}", joint=i + 1, allowed=allowed)
+
+    @property
+    def n(self) -> int:
+        """Number of moving joints."""
+        return self.chain.n
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Joint names from the base to the flange."""
+        return self.chain.names
+
+    @property
+    def has_inertia(self) -> bool:
+        """Whether the inertial parameters of every link are known."""
+        return bool(np.isfinite(self.inertia).all())
+
+    def nominal(self, model: _Model) -> Array:
+        """Parameters of a torque model as far as this description knows them.
+
+        Args:
+            model: a ``TorqueModel``; its terms give their parameters in the order of its columns.
+
+        Returns:
+            (p,) in the columns' units; NaN or 0 where the description knows nothing, as each term says.
+        """
+        return np.concatenate([np.asarray(term.nominal(self), dtype=np.float64) for term in model.terms])

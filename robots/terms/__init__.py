@@ -1,0 +1,59 @@
+"""Physical effects, one a file, each used by simulator, design, estimation and diagnosis alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+from robots.common.errors import InputError
+from robots.terms.base import Column, Term
+from robots.terms.friction import COULOMB_VISCOUS, POLYNOMIAL, FrictionPolynomial
+from robots.terms.rigid_body import RigidBody
+from robots.terms.rotor_inertia import RotorInertia
+from robots.terms.torque_offset import TorqueOffset
+
+# Adding an effect is one file, and one line here.
+TERMS: dict[str, type[Term]] = {
+    "rigid_body": RigidBody,
+    "friction": FrictionPolynomial,
+    "rotor_inertia": RotorInertia,
+    "torque_offset": TorqueOffset,
+}
+
+
+def describe_term(term: Term) -> dict[str, Any]:
+    """Writes a term as plain data, for a model file."""
+    return {item.name: getattr(term, item.name) for item in fields(term)}  # type: ignore[arg-type]
+
+
+def build_term(description: Mapping[str, Any]) -> Term:
+    """Reads what `describe_term` wrote.
+
+    Raises:
+        InputError: an unknown term, or settings that it does not have.
+    """
+    settings = dict(description)
+    name = settings.pop("name", None)
+    if name not in TERMS:
+        raise InputError(f"unknown term {name!r}", allowed=", ".join(TERMS), remedy="use a newer version")
+    try:
+        values = {key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()}
+        return TERMS[name](**values)
+    except TypeError as error:
+        raise InputError(f"term {name}: {error}") from error
+
+
+__all__ = [
+    "TERMS",
+    "COULOMB_VISCOUS",
+    "POLYNOMIAL",
+    "Column",
+    "FrictionPolynomial",
+    "RigidBody",
+    "RotorInertia",
+    "Term",
+    "TorqueOffset",
+    "build_term",
+    "describe_term",
+]

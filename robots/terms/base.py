@@ -1,0 +1,79 @@
+"""What a physical effect must say of itself to be simulated, designed for, fitted and diagnosed."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """One column of the regressor, that is one parameter.
+
+    Attributes:
+        name: the parameter's name, unique in a model, such as ``mPx_2``.
+        symbol: the name without the joint, such as ``mPx``.
+        joint: the joint or link it belongs to, counted from 1.
+        unit: its unit, such as ``kg m``.
+        term: the name of the term that brings it.
+    """
+
+    name: str
+    symbol: str
+    joint: int
+    unit: str
+    term: str
+
+
+class Term(ABC):
+    """A physical effect whose torque is linear in its parameters: tau = Y(q, dq, ddq) pi."""
+
+    name: str
+
+    @abstractmethod
+    def columns(self, robot: Robot) -> tuple[Column, ...]:
+        """Describes the k parameters, in the order of the regressor's columns."""
+
+    @abstractmethod
+    def regressor(self, robot: Robot, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX) -> casadi.SX:
+        """Builds Y, symbolic.
+
+        Args:
+            robot: the robot with n joints.
+            q: joint positions (n,) [rad or m].
+            dq: joint velocities (n,) [rad/s or m/s].
+            ddq: joint accelerations (n,) [rad/s2 or m/s2].
+
+        Returns:
+            Y (n, k): generalised force [N m or N] per unit of each parameter.
+        """
+
+    @abstractmethod
+    def nominal(self, robot: Robot) -> NDArray[np.float64]:
+        """Gives the robot description's value of each parameter (k,), NaN where it states none."""
+
+
+def force_unit(robot: Robot, joint: int) -> str:
+    """Gives the unit of a joint's generalised force; `joint` counts from 0."""
+    return "N m" if robot.chain.joints[joint].kind == "revolute" else "N"
+
+
+def length_unit(robot: Robot, joint: int) -> str:
+    """Gives the unit of a joint's position; `joint` counts from 0."""
+    return "rad" if robot.chain.joints[joint].kind == "revolute" else "m"
+
+
+def joint_columns(robot: Robot, term: str, symbol: str, units: list[str]) -> tuple[Column, ...]:
+    """Describes one parameter per joint, `units` giving the unit of each joint's."""
+    return tuple(
+        Column(name=f"{symbol}_{joint}", symbol=symbol, joint=joint, unit=units[joint - 1], term=term)
+        for joint in range(1, robot.n + 1)
+    )

@@ -1,0 +1,126 @@
+"""Rigid links in a serial chain: the Newton-Euler recursion, linear in ten parameters a link."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.geometry.chain import Joint
+from robots.terms.base import Column, Term
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+SYMBOLS = ("m", "mPx", "mPy", "mPz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+UNITS = ("kg",) + ("kg m",) * 3 + ("kg m2",) * 6
+
+
+@dataclass(frozen=True)
+class RigidBody(Term):
+    """Inertia, Coriolis, centrifugal and gravity torque of the links (thesis eq. 4 to 33).
+
+    The parameters of each link are its mass, first moments and inertia tensor about the link frame (eq. 3).
+    """
+
+    name: str = "rigid_body"
+
+    def columns(self, robot: Robot) -> tuple[Column, ...]:
+        """Describes m, mPx, mPy, mPz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz of link 1, then of link 2, and so on."""
+        return tuple(
+            Column(name=f"{symbol}_{link}", symbol=symbol, joint=link, unit=unit, term=self.name)
+            for link in range(1, robot.n + 1)
+            for symbol, unit in zip(SYMBOLS, UNITS, strict=True)
+        )
+
+    def regressor(self, robot: Robot, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX) -> casadi.SX:
+        """Builds Y (n, 10 n): joint k feels the links from k outwards, so Y is block upper triangular."""
+        chain = robot.chain
+        rotations, translations = zip(
+            *(_placement(joint, q[i]) for i, joint in enumerate(chain.joints)), strict=True
+        )
+        blocks = _link_wrenches(chain.joints, rotations, translations, chain.gravity, dq, ddq)
+        Y = casadi.SX(chain.n, 10 * chain.n)
+        for link, block in enumerate(blocks):
+            wrench = block  # (6, 10): force, then moment, of the link on its parent, in the frame it stands in
+            for k in range(link, -1, -1):
+                joint = chain.joints[k]
+                part = wrench[3:, :] if joint.kind == "revolute" else wrench[:3, :]
+                Y[k, 10 * link : 10 * link + 10] = casadi.sparsify(casadi.SX(_clean(joint.axis)).T @ part)
+                if k:
+                    force = rotations[k] @ wrench[:3, :]
+                    moment = rotations[k] @ wrench[3:, :] + casadi.skew(translations[k]) @ force
+                    wrench = casadi.vertcat(force, moment)
+        return Y
+
+    def nominal(self, robot: Robot) -> NDArray[np.float64]:
+        """Gives the described inertial parameters, link after link (10 n,)."""
+        return np.asarray(robot.inertia, dtype=float).reshape(-1)
+
+
+def _clean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    # cos(pi / 2) is 6e-17: left in, it hides exact zeros and ones from the symbolic simplifier.
+    rounded = np.round(values)
+    return np.where(np.abs(values - rounded) < 1e-15, rounded, values)
+
+
+def _placement(joint: Joint, q: casadi.SX) -> tuple[casadi.SX, casadi.SX]:
+    """Pose of the moved joint frame in its parent: rotation (3, 3) and origin (3,) [m]."""
+    rotation, translation = casadi.SX(_clean(joint.rotation)), casadi.SX(_clean(joint.translation))
+    axis = _clean(joint.axis)
+    if joint.kind == "prismatic":
+        return casadi.sparsify(rotation), translation + rotation @ casadi.SX(axis) * q
+    cross = casadi.skew(casadi.SX(axis))
+    outer = casadi.SX(axis) @ casadi.SX(axis).T
+    # Rodrigues, written so that a coordinate axis leaves no 1 - cos(q) behind.
+    turn = outer + casadi.cos(q) * (casadi.SX(_clean(np.eye(3) - np.outer(axis, axis)))) + casadi.sin(q) * cross
+    return casadi.sparsify(rotation @ turn), translation
+
+
+def _link_wrenches(
+    joints: tuple[Joint, ...],
+    rotations: tuple[casadi.SX, ...],
+    translations: tuple[casadi.SX, ...],
+    gravity: NDArray[np.float64],
+    dq: casadi.SX,
+    ddq: casadi.SX,
+) -> list[casadi.SX]:
+    """Forward recursion (eq. 4 to 7): per link the (6, 10) map from its parameters to its inertial wrench (eq. 23)."""
+    omega, alpha = casadi.SX(3, 1), casadi.SX(3, 1)
+    acceleration = casadi.SX(-_clean(np.asarray(gravity, dtype=float)))
+    blocks = []
+    for i, joint in enumerate(joints):
+        back, offset, axis = rotations[i].T, translations[i], casadi.SX(_clean(joint.axis))
+        acceleration = back @ (
+            acceleration + casadi.cross(alpha, offset) + casadi.cross(omega, casadi.cross(omega, offset))
+        )
+        omega, alpha = back @ omega, back @ alpha
+        if joint.kind == "revolute":
+            alpha = alpha + casadi.cross(omega, axis) * dq[i] + axis * ddq[i]
+            omega = omega + axis * dq[i]
+        else:
+            acceleration = acceleration + 2 * casadi.cross(omega, axis) * dq[i] + axis * ddq[i]
+        blocks.append(_parameter_map(omega, alpha, acceleration))
+    return blocks
+
+
+def _parameter_map(omega: casadi.SX, alpha: casadi.SX, acceleration: casadi.SX) -> casadi.SX:
+    spin = casadi.skew(omega)
+    force = casadi.horzcat(acceleration, casadi.skew(alpha) + spin @ spin, casadi.SX(3, 6))
+    moment = casadi.horzcat(casadi.SX(3, 1), -casadi.skew(acceleration), _dot(alpha) + spin @ _dot(omega))
+    return casadi.vertcat(force, moment)
+
+
+def _dot(vector: casadi.SX) -> casadi.SX:
+    """The (3, 6) matrix with I @ vector = _dot(vector) @ [Ixx, Ixy, Ixz, Iyy, Iyz, Izz]."""
+    x, y, z = vector[0], vector[1], vector[2]
+    return casadi.sparsify(
+        casadi.vertcat(
+            casadi.horzcat(x, y, z, 0, 0, 0),
+            casadi.horzcat(0, x, 0, y, z, 0),
+            casadi.horzcat(0, 0, x, 0, y, z),
+        )
+    )

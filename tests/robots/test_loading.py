@@ -1,0 +1,295 @@
+"""Loading robots by name, from URDF files and from YAML files."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+import warnings
+
+import numpy as np
+import pytest
+
+from robots import loading
+from robots.common.errors import AssumedValueWarning, InputError
+from robots.geometry.dh import DhRow, chain_from_dh
+from robots.loading import load_robot
+
+pytestmark = pytest.mark.filterwarnings(f"ignore::{AssumedValueWarning.__module__}.{AssumedValueWarning.__name__}")
+
+BODY = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+URDF = f"""<robot name="two"><link name="base"/><link name="l1">{BODY}</link><link name="l2">{BODY}</link>
+<joint name="j1" type="revolute"><parent link="base"/><child link="l1"/>
+<limit lower="-1" upper="1" velocity="2" effort="3"/><dynamics damping="0.5" friction="0.25"/></joint>
+<joint name="j2" type="prismatic"><parent link="l1"/><child link="l2"/><origin xyz="1 0 0"/>
+<limit lower="-0.1" upper="0.1" velocity="0.2" effort="30"/></joint></robot>
+"""
+TABLE = """\
+name: pair
+geometry:
+  convention: standard
+  angles: deg
+  joints:
+    - {alpha: 90, a: 0.5, d: 0.1}
+    - {kind: prismatic, alpha: 0, a: 0, d: 0.2, offset: 90}
+limits:
+  position: {lower: [-90, -100], upper: [90, 100], unit: [deg, mm]}
+  velocity: {values: [180, .inf], unit: [deg/s, m/s]}
+dynamics:
+  links:
+    - {mass: 2, com: [-0.25, 0, 0], inertia_at_com: [0.01, 0, 0, 0.02, 0, 0.03]}
+    - {mass: 1, com: [0, 0, 0], inertia_at_com: [0.01, 0, 0, 0.01, 0, 0.01]}
+  drives:
+    gear_ratio: {values: [100, 20]}
+    rotor_inertia: {values: [1e-5, 2E-5]}
+    torque_constant: {values: [0.1, 0.2]}
+  friction:
+    coulomb: {values: [1, 2]}
+    cubic: {values: [3, 4]}
+"""
+
+
+@pytest.fixture
+def urdf(tmp_path):
+    path = tmp_path / "two.urdf"
+    path.write_text(URDF)
+    return path
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(text):
+        path = tmp_path / "robot.yaml"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def test_a_table_becomes_a_robot(write):
+    """A Denavit-Hartenberg file gives geometry, limits and dynamics in SI units at the joint."""
+    path = write(TABLE)
+    robot = load_robot(path)
+    expected = chain_from_dh(
+        [DhRow(alpha=np.pi / 2, a=0.5, d=0.1), DhRow(kind="prismatic", d=0.2, offset=np.pi / 2)], "standard"
+    )
+    np.testing.assert_allclose(robot.chain.flange([0.3, 0.1]), expected.flange([0.3, 0.1]), atol=1e-16)
+    np.testing.assert_allclose(robot.limits.upper, [np.pi / 2, 0.1], rtol=1e-15)
+    np.testing.assert_allclose(robot.limits.velocity, [np.pi, np.inf], rtol=1e-15)
+    assert np.isinf(robot.limits.jerk).all()
+    np.testing.assert_allclose(robot.rotor_inertia, [0.1, 0.008], rtol=1e-14)
+    np.testing.assert_allclose(robot.torque_constant, [10.0, 4.0], rtol=1e-14)
+    np.testing.assert_array_equal(robot.friction, [[1, 0, 0, 3], [2, 0, 0, 4]])
+    assert (robot.name, robot.origin, robot.period, robot.assumed) == ("pair", str(path), 0.004, ())
+
+
+def test_dynamics_of_a_standard_table_are_given_in_its_frames(write):
+    """In the standard convention a link's entry, given in frame i, is moved to the frame on the joint's own axis."""
+    inertia = load_robot(write(TABLE)).inertia
+    # Frame 1 lies 0.5 m out and 0.1 m up, turned by 90 deg about x: its y is our z. Its com -0.25 m is our +0.25 m.
+    mass, c = 2.0, np.array([0.25, 0.0, 0.1])
+    about = np.diag([0.01, 0.03, 0.02]) + mass * (c @ c * np.eye(3) - np.outer(c, c))
+    expected = [mass, *(mass * c), *about[np.triu_indices(3)]]
+    np.testing.assert_allclose(inertia[0], expected, atol=1e-15)
+
+
+def test_dynamics_may_be_unknown(write):
+    """Without dynamics, inertia and torque constants are NaN, rotor inertia and friction zero, gear ratios one."""
+    robot = load_robot(write(TABLE[: TABLE.index("dynamics")]))
+    assert np.isnan(robot.inertia).all()
+    assert not robot.has_inertia
+    assert np.isnan(robot.torque_constant).all()
+    assert not robot.rotor_inertia.any()
+    assert not robot.friction.any()
+    np.testing.assert_array_equal(robot.gear_ratio, [1.0, 1.0])
+
+
+def test_base_flange_and_gravity_of_a_table(write):
+    """Base and flange poses and gravity may be stated."""
+    extra = "base: {xyz: [0, 0, 1]}\nflange: {xyz: [0, 0, 0.5]}\ngravity: [0, 9.81, 0]\n"
+    plain, robot = load_robot(write(TABLE)), load_robot(write(TABLE + extra))
+    shift = robot.chain.flange([0, 0])[:3, 3] - plain.chain.flange([0, 0])[:3, 3]
+    # the last z axis is -y of the base
+    np.testing.assert_allclose(shift, [0.0, -0.5, 1.0], atol=1e-15)
+    np.testing.assert_array_equal(robot.chain.gravity, [0.0, 9.81, 0.0])
+
+
+def test_a_urdf_becomes_a_robot(urdf):
+    """A URDF gives a robot of its name, whose digest is the file's."""
+    robot = load_robot(str(urdf))
+    assert (robot.name, robot.origin, robot.joint_names) == ("two", str(urdf), ("j1", "j2"))
+    np.testing.assert_array_equal(robot.friction[0], [0.25, 0.5, 0.0, 0.0])
+    np.testing.assert_array_equal(robot.limits.torque, [3.0, 30.0])
+    assert robot.assumed == ()
+    assert robot.digest == hashlib.sha256(urdf.read_bytes()).hexdigest()
+
+
+def test_the_choice_of_joints_is_part_of_the_digest(urdf):
+    """The same file with other joints is another robot."""
+    digests = {
+        load_robot(urdf).digest,
+        load_robot(urdf, joints=["j1"]).digest,
+        load_robot(urdf, locked={"j2": 0.0}).digest,
+        load_robot(urdf, locked={"j2": 0.05}).digest,
+        load_robot(urdf, tip="l1").digest,
+    }
+    assert len(digests) == 5
+    assert load_robot(urdf, locked={"j2": 0}).digest in digests
+    assert load_robot(urdf, joints=("j1",)).digest == load_robot(urdf, joints=["j1"]).digest
+
+
+def test_a_yaml_may_add_to_a_urdf(urdf, write):
+    """A YAML file that names a URDF adds limits and drives to it, and overrides what it states."""
+    text = (
+        "name: added\nurdf: two.urdf\nlimits:\n  acceleration: {values: [5, 6], unit: [rad/s2, m/s2],"
+        " source: assumed}\n"
+        "  velocity: {values: [1, .1], unit: [rad/s, m/s]}\ndynamics:\n  drives: {gear_ratio: {values: [50, 60]}}\n"
+        "  friction: {coulomb: {values: [7, 8]}}\ngravity: [0, 0, 0]\n"
+    )
+    robot = load_robot(write(text))
+    np.testing.assert_array_equal(robot.limits.acceleration, [5.0, 6.0])
+    np.testing.assert_array_equal(robot.limits.velocity, [1.0, 0.1])
+    np.testing.assert_array_equal(robot.limits.upper, [1.0, 0.1])
+    np.testing.assert_array_equal(robot.friction, [[7, 0.5, 0, 0], [8, 0, 0, 0]])
+    np.testing.assert_array_equal(robot.gear_ratio, [50.0, 60.0])
+    np.testing.assert_array_equal(robot.chain.gravity, [0.0, 0.0, 0.0])
+    assert robot.assumed == ("limits.acceleration",)
+
+
+def test_a_choice_overrides_that_of_the_yaml():
+    """Joints may be locked in a catalogue robot; its lists stay with the joints they were written for."""
+    whole = load_robot("panda")
+    part = load_robot("panda", locked={"panda_joint3": 0.1})
+    assert part.joint_names == tuple(name for name in whole.joint_names if name != "panda_joint3")
+    np.testing.assert_array_equal(part.limits.jerk, np.delete(whole.limits.jerk, 2))
+    assert part.digest != whole.digest
+    fingered = load_robot("panda", tip="panda_leftfinger", locked={"panda_joint1": 0.0}, joints=["panda_finger_joint1"])
+    assert fingered.joint_names == ("panda_finger_joint1",)
+    np.testing.assert_array_equal(fingered.limits.jerk, [np.inf])
+    wrist = load_robot("panda", tip="panda_link3")
+    np.testing.assert_array_equal(wrist.limits.acceleration, whole.limits.acceleration[:3])
+
+
+def test_a_robot_is_returned_as_it_is(urdf):
+    """A robot loaded already is returned; a choice of joints then comes too late."""
+    robot = load_robot(urdf)
+    assert load_robot(robot) is robot
+    with pytest.raises(InputError, match="two is loaded already"):
+        load_robot(robot, tip="l1")
+
+
+def test_a_robot_crosses_process_borders(urdf):
+    """A robot pickles."""
+    robot = load_robot(urdf)
+    copy = pickle.loads(pickle.dumps(robot))
+    np.testing.assert_array_equal(copy.inertia, robot.inertia)
+    np.testing.assert_array_equal(copy.chain.flange([0.1, 0.2]), robot.chain.flange([0.1, 0.2]))
+
+
+def test_assumed_values_are_told_once(write, monkeypatch):
+    """A robot with values that no source backs warns in one line the first time it is loaded, and then no more."""
+    monkeypatch.setattr(loading, "_warned", set())
+    path = write(TABLE.replace("cubic: {values: [3, 4]}", "cubic: {values: [3, 4], source: assumed}"))
+    with pytest.warns(AssumedValueWarning, match=r"^pair: .*assumed.*: dynamics\.friction\.cubic$") as caught:
+        load_robot(path)
+    assert len(caught) == 1
+    assert caught[0].filename == __file__
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        load_robot(path)
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ("er3b", "unknown robot 'er3b'; allowed: er3a, .*ur10.*, or the path of .*; did you mean 'er3a'"),
+        ("UR-10", "did you mean 'ur10'"),
+        ("", "unknown robot ''"),
+        ("missing.urdf", "missing.urdf: no such file"),
+        ("missing.yaml", "missing.yaml: no such file"),
+        ("robot.urdf.xacro", "expand it first"),
+    ],
+)
+def test_a_robot_that_does_not_exist_is_refused(spec, message):
+    """An unknown name is answered with the catalogue and the nearest name, a missing file by its name."""
+    with pytest.raises(InputError, match=message):
+        load_robot(spec)
+
+
+def test_a_file_of_another_kind_is_refused(tmp_path):
+    """A file that is no robot by its suffix, and a folder, are refused with the suffixes allowed."""
+    path = tmp_path / "robot.txt"
+    path.write_text("hello")
+    with pytest.raises(InputError, match=r"robot\.txt: not a robot file by its name; allowed: \.urdf, \.yaml or \.yml"):
+        load_robot(path)
+    with pytest.raises(InputError, match="not a robot file by its name"):
+        load_robot(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "column", "message"),
+    [
+        ("name: pair", "title: pair", "name", "the key 'name' is missing"),
+        (
+            "alpha: 90",
+            "alhpa: 90",
+            "geometry.joints[1].alhpa",
+            "unknown key 'alhpa'; allowed: .*; did you mean 'alpha'",
+        ),
+        ("alpha: 90", "alpha: ninety", "geometry.joints[1].alpha", "found 'ninety'"),
+        ("alpha: 90", "alpha: .nan", "geometry.joints[1].alpha", "found nan"),
+        ("standard", "craig", "geometry.convention", "found 'craig'; allowed: 'modified' or 'standard'"),
+        ("kind: prismatic", "kind: helical", "geometry.joints[2].kind", "found 'helical'"),
+        ("angles: deg", "angles: 5", "geometry.angles", "found 5"),
+        ("values: [180, .inf]", "values: [180]", "limits.velocity.values", "1 values; allowed: 2, one per joint"),
+        ("lower: [-90, -100]", "lower: [-90]", "limits.position.lower", "1 values"),
+        ("lower: [-90, -100]", "lower: [-90, 200]", "limits.position", "joint 2: lower 0.2 is not below upper 0.1"),
+        (
+            "[deg/s, m/s]",
+            "[deg/s, deg/s]",
+            "limits.velocity.unit",
+            "joint 2: the unit 'deg/s' of a velocity; allowed: m/s",
+        ),
+        ("[deg/s, m/s]", "rpm", "limits.velocity.unit", "joint 1: the unit 'rpm'"),
+        ("[deg/s, m/s]", "[deg/s]", "limits.velocity.unit", "1 units; allowed: one, or 2"),
+        ("gear_ratio: {values: [100, 20]}", "", "dynamics.drives", "without gear_ratio"),
+        ("[100, 20]", "[0, 20]", None, "gear_ratio is 0.0"),
+        ("[1e-5, 2E-5]", "[1e-5, -2E-5]", None, "joint 2: pair: rotor_inertia is"),
+        ("mass: 2", "mass: -2", None, r"dynamics\.links\[1\] has a mass of -2 kg"),
+        ("mass: 2, ", "", "dynamics.links[1].mass", "the key 'mass' is missing"),
+        ("com: [-0.25, 0, 0]", "com: [0, 0]", "dynamics.links[1].com", "found a list; list should have at least 3"),
+        (
+            "    - {mass: 1, com: [0, 0, 0], inertia_at_com: [0.01, 0, 0, 0.01, 0, 0.01]}\n",
+            "",
+            "dynamics.links",
+            "1 links",
+        ),
+        ("name: pair", "name: pair\ntip: hand", None, "'geometry' has no choice"),
+        ("name: pair", "name: pair\nurdf: a.urdf", None, "either 'geometry' or 'urdf'"),
+        ("name: pair", "name: pair\nperiod: 0", "period", "greater than 0"),
+        ("name: pair", "name: pair\nperiod: true", "period", "found True"),
+        ("name: pair", "name: pair\nname: two", "name", "row 2: the key stands twice"),
+    ],
+)
+def test_a_wrong_yaml_is_refused(old, new, column, message, write):
+    """A robot file with an error is refused, naming the file, the key by its path, and what is allowed."""
+    assert old in TABLE
+    path = write(TABLE.replace(old, new, 1))
+    with pytest.raises(InputError, match=message) as caught:
+        load_robot(path)
+    if column is not None:
+        assert caught.value.column == column
+        assert caught.value.file == str(path)
+
+
+def test_a_choice_of_joints_needs_a_urdf(write):
+    """A table has no joints to choose from."""
+    with pytest.raises(InputError, match="leaves no joints to choose"):
+        load_robot(write(TABLE), joints=["J1"])
+
+
+def test_a_urdf_states_its_own_links(urdf, write):
+    """A file that names a URDF may not state links beside it, and the URDF must exist."""
+    with pytest.raises(InputError, match="a URDF states them itself"):
+        load_robot(write("name: x\nurdf: two.urdf\nbase: {xyz: [0, 0, 1]}\n"))
+    with pytest.raises(InputError, match=r"three\.urdf: no such file"):
+        load_robot(write("name: x\nurdf: three.urdf\n"))
