@@ -1,0 +1,143 @@
+"""The columns of a log: their names, the field of a `Log` each belongs to, and their units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from robots.common.errors import InputError
+from robots.common.table import Table
+
+_DEGREE = float(np.pi / 180.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """One measured quantity.
+
+    Args:
+        prefix: the column name, to which a per-joint quantity adds the joint, counted from 1.
+        field: the field of `Log`.
+        units: the units a file may state, without spaces and signs of product or power, with their factor to the first,
+            which is the unit of `Log`.
+        unit: that unit as it is written.
+        per_joint: whether there is a column a joint.
+        complete: whether all joints must have their column.
+    """
+
+    prefix: str
+    field: str
+    units: Mapping[str, float]
+    unit: str
+    per_joint: bool = True
+    complete: bool = True
+
+
+QUANTITIES = (
+    Quantity(prefix="t", field="t", unit="s", units={"s": 1.0, "ms": 1e-3}, per_joint=False),
+    Quantity(prefix="q", field="q", unit="rad", units={"rad": 1.0, "deg": _DEGREE, "m": 1.0}),
+    Quantity(prefix="dq", field="dq", unit="rad/s", units={"rad/s": 1.0, "deg/s": _DEGREE, "m/s": 1.0}),
+    Quantity(prefix="ddq", field="ddq", unit="rad/s^2", units={"rad/s2": 1.0, "deg/s2": _DEGREE, "m/s2": 1.0}),
+    Quantity(prefix="tau", field="tau", unit="N m", units={"Nm": 1.0, "N": 1.0}),
+    Quantity(prefix="i", field="current", unit="A", units={"A": 1.0, "mA": 1e-3}),
+    Quantity(prefix="temp", field="temperature", unit="degC", units={"degC": 1.0, "deg_C": 1.0}, complete=False),
+    Quantity(prefix="temp_env", field="ambient", unit="degC", units={"degC": 1.0, "deg_C": 1.0}, per_joint=False),
+    Quantity(prefix="qlink", field="qlink", unit="rad", units={"rad": 1.0, "deg": _DEGREE, "m": 1.0}),
+    Quantity(prefix="segment", field="segment", unit="", units={"": 1.0}, per_joint=False),
+    Quantity(prefix="cycle", field="cycle", unit="", units={"": 1.0}, per_joint=False),
+)
+"""All quantities in the order of a written log."""
+
+BY_FIELD = {quantity.field: quantity for quantity in QUANTITIES}
+
+_BY_PREFIX = {quantity.prefix: quantity for quantity in QUANTITIES}
+_NAME = re.compile(r"([a-z]+)(\d+)")
+_ANGLES = {"q": "", "qlink": "", "dq": "/s", "ddq": "/s2"}
+
+
+def parse_name(name: str) -> tuple[Quantity, int | None] | None:
+    """Returns the quantity and the joint number of a column, or None for a column that is not one of a log.
+
+    Args:
+        name: the column name; the joint number is returned as written, so 0 and numbers beyond n are possible.
+    """
+    match = _NAME.fullmatch(name)
+    if match is None:
+        quantity = _BY_PREFIX.get(name)
+        return (quantity, None) if quantity is not None and not quantity.per_joint else None
+    quantity = _BY_PREFIX.get(match[1])
+    return (quantity, int(match[2])) if quantity is not None and quantity.per_joint else None
+
+
+def column_name(quantity: Quantity, joint: int | None) -> str:
+    """Returns the column name of a quantity at a joint, counted from 1."""
+    return f"{quantity.prefix}{joint}" if quantity.per_joint and joint is not None else quantity.prefix
+
+
+def unit_factors(table: Table, names: Mapping[str, Quantity]) -> dict[str, float]:
+    """Returns the factor that brings each column to the unit of `Log`.
+
+    A file states units by column (ECSV, Parquet), for all angles (``units: deg``), or by quantity
+    (``units: {q: deg, tau: N m}``); without a statement the columns are in SI units.
+
+    Args:
+        table: the file as read.
+        names: the quantity of each column.
+
+    Raises:
+        InputError: a unit that is not known, or two statements that differ.
+    """
+    stated = _stated_units(table)
+    factors: dict[str, float] = {}
+    for name, quantity in names.items():
+        own = _normal(table.units[name]) if name in table.units else None
+        shared = stated.get(quantity.prefix)
+        if own is not None and shared is not None and own != shared:
+            raise InputError(
+                f"the column's unit is {table.units[name]!r}, but `units` of the file says {shared!r}",
+                file=table.path,
+                column=name,
+                remedy="state the unit once",
+            )
+        unit = own if own is not None else shared
+        if unit is None:
+            factors[name] = 1.0
+        elif unit in quantity.units:
+            factors[name] = quantity.units[unit]
+        else:
+            raise InputError(
+                f"unit {table.units.get(name, unit)!r}",
+                file=table.path,
+                column=name,
+                allowed=", ".join(quantity.units) or "no unit",
+            )
+    return factors
+
+
+def _stated_units(table: Table) -> dict[str, str]:
+    for key in table.metadata:
+        if key != "units" and key.lower() in ("unit", "units"):
+            raise InputError(
+                f"key {key!r} in the head of the file", file=table.path, allowed="units", remedy="rename it"
+            )
+    stated: Any = table.metadata.get("units")
+    if stated is None:
+        return {}
+    if isinstance(stated, Mapping):
+        for key in stated:
+            if key not in _BY_PREFIX:
+                raise InputError(
+                    f"`units` names {key!r}", file=table.path, allowed=", ".join(_BY_PREFIX), remedy="correct the key"
+                )
+        return {str(key): _normal(str(unit)) for key, unit in stated.items()}
+    if stated not in ("rad", "deg"):
+        raise InputError(f"`units` is {stated!r}", file=table.path, allowed="rad or deg, or a mapping such as {q: deg}")
+    return {prefix: f"{stated}{rate}" for prefix, rate in _ANGLES.items()}
+
+
+def _normal(unit: str) -> str:
+    return re.sub(r"[\s*.^·]", "", unit)

@@ -1,0 +1,224 @@
+"""Logs from CSV and Parquet files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Any, NoReturn
+
+import numpy as np
+
+from estimation.logs.columns import BY_FIELD, QUANTITIES, Quantity, column_name, parse_name, unit_factors
+from robots.common.errors import InputError
+from robots.common.table import Table
+from robots.common.tables import read_table
+from robots.signals import FloatArray, Log
+
+
+def read_log(path: str | PathLike[str], n: int | None = None, *, torque: bool = True) -> Log:
+    """Reads a log: ``t, q1..qn``, torque or current, and whatever optional columns there are.
+
+    Args:
+        path: a ``.csv`` file (comma separated, UTF-8, a leading ``#`` block may state units, robot and period) or a
+            ``.parquet`` file.
+        n: the number of joints of the robot, where it is known.
+        torque: whether torque or current must be there; a prediction needs the motion only.
+
+    Returns:
+        The log in SI units. ``metadata`` holds what the file says of itself, ``file`` (its path) and
+        ``ignored_columns`` (the names of columns that are no part of a log).
+
+    Raises:
+        InputError: anything that keeps the file from being a log, with column and row: the line of a CSV file, the
+            record of a Parquet file, both counted from 1.
+    """
+    table = read_table(path, wanted=lambda name: parse_name(name) is not None)
+    quantities = _checked_names(table)
+    joints = _count_joints(table, quantities, n)
+    for name in table.names:
+        if table.is_text(name):
+            raise InputError(
+                f"found {str(table.columns[name][0])[:40]!r}",
+                file=table.path,
+                column=name,
+                row=table.first_row,
+                allowed="a number",
+            )
+    if len(table) < 2:
+        raise InputError("only one row", file=table.path, row=table.first_row, allowed="2 or more rows")
+    factors = unit_factors(table, quantities)
+    signals = {
+        quantity.field: _signal(table, quantity, joints, factors)
+        for quantity in QUANTITIES
+        if any(found is quantity for found in quantities.values())
+    }
+    if torque and "tau" not in signals and "current" not in signals:
+        raise InputError(
+            f"neither tau1..tau{joints} nor i1..i{joints}",
+            file=table.path,
+            column="tau1",
+            row=_header_row(table),
+            allowed="columns of joint torque [N m] or motor current [A]",
+        )
+    metadata = _metadata(table)
+    try:
+        return Log(**signals, name=table.path.stem, metadata=metadata)
+    except InputError as error:
+        _raise_for_file(error, table)
+
+
+def read_logs(paths: Sequence[str | PathLike[str]], n: int | None = None) -> tuple[Log, ...]:
+    """Reads the logs of one robot.
+
+    Args:
+        paths: the files, each once.
+        n: the number of joints of the robot; without it the first log decides.
+
+    Raises:
+        InputError: no file, a file twice, another number of joints, or a file that is not a log.
+    """
+    if isinstance(paths, str | PathLike):
+        paths = [paths]
+    if not paths:
+        raise InputError("no logs", allowed="one or more files")
+    seen: set[str] = set()
+    logs: list[Log] = []
+    for path in paths:
+        real = os.path.realpath(path)
+        if real in seen:
+            raise InputError("the log is given twice", file=path, remedy="name each log once: it would count double")
+        seen.add(real)
+        log = read_log(path, n)
+        if logs and log.n != logs[0].n:
+            raise InputError(
+                f"{log.n} joints, but {logs[0].metadata['file']} has {logs[0].n}",
+                file=path,
+                remedy="give logs of one robot",
+            )
+        logs.append(log)
+    return tuple(logs)
+
+
+def _checked_names(table: Table) -> dict[str, Quantity]:
+    quantities: dict[str, Quantity] = {}
+    for name in table.names:
+        parsed = parse_name(name)
+        assert parsed is not None
+        quantity, joint = parsed
+        if joint is not None and name != f"{quantity.prefix}{max(joint, 1)}":
+            raise InputError(
+                f"joint number {name.removeprefix(quantity.prefix)}",
+                file=table.path,
+                column=name,
+                row=_header_row(table),
+                allowed="joints counted from 1, without leading zeros",
+                remedy="rename the columns",
+            )
+        quantities[name] = quantity
+    if "t" not in quantities:
+        raise InputError(
+            "the column is missing",
+            file=table.path,
+            column="t",
+            row=_header_row(table),
+            allowed="t (seconds), q1.. and tau1.. or i1..",
+            remedy="rename or add it",
+        )
+    return quantities
+
+
+def _count_joints(table: Table, quantities: Mapping[str, Quantity], n: int | None) -> int:
+    """Returns the number of joints after checking that each quantity has its columns."""
+    present: dict[str, set[int]] = {}
+    for name, quantity in quantities.items():
+        if quantity.per_joint:
+            present.setdefault(quantity.prefix, set()).add(int(name.removeprefix(quantity.prefix)))
+    # The highest number, so that q1, q2, q4 is a missing q3 and not three joints.
+    joints = max(present.get("q", {0}))
+    for quantity in QUANTITIES:
+        found = present.get(quantity.prefix, set())
+        if not quantity.per_joint or (not found and quantity.prefix != "q"):
+            continue
+        for joint in range(1, max(joints, 1) + 1):
+            if joint not in found and quantity.complete:
+                others = ", ".join(f"{quantity.prefix}{other}" for other in sorted(found)) or "none"
+                raise InputError(
+                    f"the column is missing (present: {others})",
+                    file=table.path,
+                    column=f"{quantity.prefix}{joint}",
+                    row=_header_row(table),
+                    allowed=f"one column for each of q1..q{joints}" if joints else "q1..qn",
+                    remedy="record the joint, or leave out all columns of this quantity" if found else None,
+                )
+        extra = sorted(found - set(range(1, joints + 1)))
+        if extra:
+            raise InputError(
+                f"there is no q{extra[0]}: the log has {joints} joints",
+                file=table.path,
+                column=f"{quantity.prefix}{extra[0]}",
+                row=_header_row(table),
+                remedy=f"add q{extra[0]} or remove the column",
+            )
+    if n is not None and joints != n:
+        raise InputError(
+            f"the log has {joints} joints (q1..q{joints}), the robot has {n}",
+            file=table.path,
+            column=f"q{min(joints, n) + 1}",
+            row=_header_row(table),
+            allowed=f"{n} joints",
+            remedy="choose the robot of this log",
+        )
+    return joints
+
+
+def _signal(table: Table, quantity: Quantity, joints: int, factors: Mapping[str, float]) -> FloatArray:
+    """Returns the array of one quantity in SI units, (N,) or (N, n); NaN for a joint that has no column."""
+    if not quantity.per_joint:
+        name = quantity.prefix
+        values: FloatArray = table.columns[name]
+        return values if factors[name] == 1.0 else values * factors[name]
+    signal = np.full((len(table), joints), np.nan)
+    for joint in range(1, joints + 1):
+        name = column_name(quantity, joint)
+        if name in table.columns:
+            np.multiply(table.columns[name], factors[name], out=signal[:, joint - 1])
+    return signal
+
+
+def _metadata(table: Table) -> dict[str, Any]:
+    metadata = {key: value for key, value in table.metadata.items() if key != "units"}
+    period = metadata.get("period")
+    if period is not None:
+        try:
+            metadata["period"] = float(period)
+        except (TypeError, ValueError):
+            metadata["period"] = np.nan
+        if isinstance(period, bool) or not 0.0 < metadata["period"] < np.inf:
+            raise InputError(f"`period` is {period!r}", file=table.path, allowed="seconds, a positive number")
+    robot = metadata.get("robot")
+    if robot is not None and not isinstance(robot, str):
+        raise InputError(f"`robot` is {robot!r}", file=table.path, allowed="a name")
+    return {**metadata, "file": os.fspath(table.path), "ignored_columns": list(table.skipped)}
+
+
+def _header_row(table: Table) -> int | None:
+    return table.first_row - 1 or None
+
+
+def _raise_for_file(error: InputError, table: Table) -> NoReturn:
+    """Raises an error about an array as one about the file: its column by name, its row by line."""
+    quantity = BY_FIELD[error.column or "t"]
+    if error.problem.startswith("time"):
+        remedy = "sort the rows by time and keep one of each time"
+    else:
+        remedy = "repair or remove these rows, or leave out all columns of the quantity; an empty cell counts as nan"
+    raise InputError(
+        error.problem,
+        file=table.path,
+        column=column_name(quantity, error.joint if isinstance(error.joint, int) else None),
+        row=None if error.row is None else table.line(error.row - 1),
+        joint=error.joint,
+        allowed=error.allowed,
+        remedy=remedy,
+    ) from error

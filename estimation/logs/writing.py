@@ -1,0 +1,43 @@
+"""Logs to CSV and Parquet files."""
+
+from __future__ import annotations
+
+from os import PathLike
+
+import numpy as np
+
+from estimation.logs.columns import QUANTITIES, column_name
+from robots.common.table import Column
+from robots.common.tables import write_table
+from robots.signals import Log
+
+_OF_THE_FILE = ("file", "ignored_columns", "units")
+
+
+def write_log(path: str | PathLike[str], log: Log, force: bool = False) -> None:
+    """Writes a log so that `read_log` returns it bit by bit.
+
+    Args:
+        path: a ``.csv`` or ``.parquet`` file.
+        log: the log.
+        force: whether an existing file may be replaced.
+
+    Raises:
+        InputError: the file exists and ``force`` is not set, or it cannot be written.
+    """
+    columns: dict[str, Column] = {}
+    units: dict[str, str] = {}
+    for quantity in QUANTITIES:
+        signal = getattr(log, quantity.field)
+        if signal is None:
+            continue
+        if quantity.field in ("segment", "cycle"):
+            signal = signal.astype(np.int64)
+        parts = {quantity.prefix: signal}
+        if quantity.per_joint:
+            parts = {column_name(quantity, joint + 1): signal[:, joint] for joint in range(log.n)}
+        columns.update(parts)
+        if quantity.unit:
+            units.update(dict.fromkeys(parts, quantity.unit))
+    metadata = {key: value for key, value in log.metadata.items() if key not in _OF_THE_FILE}
+    write_table(path, columns, metadata, units=units, force=force)

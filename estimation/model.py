@@ -1,0 +1,206 @@
+"""The identified model: parameters with their uncertainty, and the file that carries them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from robots.common.errors import InputError
+from robots.common.files import write_atomic
+from robots.geometry.chain import Chain, Joint
+from robots.limits import Limits
+from robots.regressor import TorqueModel
+from robots.robot import Robot
+from robots.terms import Column, build_term, describe_term
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+FORMAT = "robot-oed model"
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Model:
+    """A torque model with the parameters that the data determined.
+
+    Attributes:
+        torque_model: robot and terms.
+        columns: indices (b,) of the regressor columns that carry a parameter.
+        values: base parameters (b,), in the columns' units.
+        covariance: (b, b) of the values.
+        determined: (b,), False where the data do not determine a parameter: its value is then a convention that
+            makes the others right together, and means nothing by itself.
+        formulas: (b,) the sum of standard parameters that each value stands for.
+        provenance: logs with hashes, method, residual level per joint, tool version.
+    """
+
+    torque_model: TorqueModel
+    columns: tuple[int, ...]
+    values: Array
+    covariance: Array
+    determined: NDArray[np.bool_]
+    formulas: tuple[str, ...]
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.torque_model.robot
+
+    @cached_property
+    def parameters(self) -> tuple[Column, ...]:
+        """The parameters' descriptions (b,)."""
+        return tuple(self.torque_model.columns[i] for i in self.columns)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters' names (b,)."""
+        return tuple(column.name for column in self.parameters)
+
+    @property
+    def standard_errors(self) -> Array:
+        """Standard errors (b,), infinite where the data do not determine the parameter."""
+        return np.where(self.determined, np.sqrt(np.diag(self.covariance)), np.inf)
+
+    def torque(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
+        """Predicts the torque (N, n) [N m or N] of a motion given by arrays (N, n)."""
+        return self.torque_model.torque(q, dq, ddq, self.values, columns=self.columns)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per parameter: joint, value, standard error, percent, unit, determined, formula."""
+        import pandas as pd
+
+        errors = self.standard_errors
+        with np.errstate(divide="ignore", invalid="ignore"):
+            percent = 100 * errors / np.abs(self.values)
+        columns = {
+            "joint": [column.joint for column in self.parameters],
+            "value": self.values,
+            "standard_error": errors,
+            "percent": percent,
+            "unit": [column.unit for column in self.parameters],
+            "determined": self.determined,
+            "stands_for": self.formulas,
+        }
+        return pd.DataFrame(columns, index=pd.Index(self.names, name="parameter"))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes the model as plain data for `model.json`."""
+        robot, errors = self.robot, np.sqrt(np.diag(self.covariance))
+        parameters = [
+            {
+                "name": column.name,
+                "joint": column.joint,
+                "term": column.term,
+                "value": float(value),
+                "unit": column.unit,
+                # A number that JSON cannot hold, and that nobody should trust, is left out.
+                "standard_error": float(error) if known else None,
+                "determined": bool(known),
+                "stands_for": formula,
+            }
+            for column, value, error, known, formula in zip(
+                self.parameters, self.values, errors, self.determined, self.formulas, strict=True
+            )
+        ]
+        return {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "robot": {"name": robot.name, "origin": robot.origin, "sha256": robot.digest, **_describe_chain(robot)},
+            "terms": [describe_term(term) for term in self.torque_model.terms],
+            "parameters": parameters,
+            "covariance": self.covariance.tolist(),
+            "provenance": dict(self.provenance),
+        }
+
+    def save(self, path: Path, *, force: bool = False) -> None:
+        """Writes `model.json`, whole or not at all.
+
+        Raises:
+            InputError: the file is there, and force is not given.
+        """
+        write_atomic(path, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
+
+
+def load_model(path: str | Path) -> Model:
+    """Reads a `model.json`, or the one in a folder.
+
+    The file holds the robot's geometry, so that a prediction needs nothing else.
+
+    Raises:
+        InputError: a missing file, or one that is no model.
+    """
+    file = Path(path)
+    file = file / "model.json" if file.is_dir() else file
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError("no such file", file=file, remedy="give a model.json, or the folder that holds one") from None
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"cannot be read as JSON: {error}", file=file) from error
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise InputError("is no model file", file=file, allowed=f'"format": "{FORMAT}"')
+    if data.get("format_version", 0) > FORMAT_VERSION:
+        raise InputError(f"format version {data['format_version']}", file=file, allowed=f"up to {FORMAT_VERSION}")
+    try:
+        return _from_dict(data)
+    except InputError as error:
+        raise InputError(error.problem, file=file, allowed=error.allowed, remedy=error.remedy) from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"is damaged: {type(error).__name__} {error}", file=file) from error
+
+
+def _from_dict(data: Mapping[str, Any]) -> Model:
+    terms = tuple(build_term(term) for term in data["terms"])
+    torque_model = TorqueModel(_build_robot(data["robot"]), terms)
+    index = {name: i for i, name in enumerate(torque_model.names)}
+    parameters = data["parameters"]
+    unknown = [item["name"] for item in parameters if item["name"] not in index]
+    if unknown:
+        raise InputError(f"parameter {unknown[0]} is none of the model's terms")
+    return Model(
+        torque_model=torque_model,
+        columns=tuple(index[item["name"]] for item in parameters),
+        values=np.array([item["value"] for item in parameters], dtype=float),
+        covariance=np.array(data["covariance"], dtype=float).reshape(len(parameters), len(parameters)),
+        determined=np.array([item["determined"] for item in parameters], dtype=bool),
+        formulas=tuple(item["stands_for"] for item in parameters),
+        provenance=data["provenance"],
+    )
+
+
+def _describe_chain(robot: Robot) -> dict[str, Any]:
+    joints = [
+        {
+            "name": joint.name,
+            "kind": joint.kind,
+            "rotation": joint.rotation.tolist(),
+            "translation": joint.translation.tolist(),
+            "axis": joint.axis.tolist(),
+        }
+        for joint in robot.chain.joints
+    ]
+    return {"gravity": robot.chain.gravity.tolist(), "joints": joints}
+
+
+def _build_robot(data: Mapping[str, Any]) -> Robot:
+    joints = tuple(Joint(**joint) for joint in data["joints"])
+    free = np.full(len(joints), np.inf)
+    limits = Limits(lower=-free, upper=free, velocity=free, acceleration=free, jerk=free, torque=free)
+    return Robot(
+        name=data["name"],
+        chain=Chain(joints, np.array(data["gravity"])),
+        limits=limits,
+        origin=data["origin"],
+        digest=data["sha256"],
+    )

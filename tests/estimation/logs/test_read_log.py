@@ -1,0 +1,376 @@
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from estimation.logs import read_log, read_logs, write_log
+from robots.common.errors import InputError
+from robots.signals import Log
+
+
+def columns(rows=4, joints=2, **changes):
+    """A smallest log, as columns; None leaves a column out."""
+    made = {"t": 0.5 * np.arange(rows)}
+    for offset, prefix in ((0.0, "q"), (10.0, "tau")):
+        made |= {f"{prefix}{joint}": offset + joint + 0.1 * np.arange(rows) for joint in range(1, joints + 1)}
+    made |= changes
+    return {name: values for name, values in made.items() if values is not None}
+
+
+def text(data, block=""):
+    rows = zip(*data.values(), strict=True)
+    return block + "\n".join([",".join(data), *(",".join(str(cell) for cell in row) for row in rows)]) + "\n"
+
+
+@pytest.fixture(params=["csv", "parquet"])
+def save(request, tmp_path):
+    """Saves columns by pyarrow or as plain text; returns the path and the row number of the first sample."""
+
+    def to_file(data):
+        path = tmp_path / f"log.{request.param}"
+        if request.param == "csv":
+            path.write_text(text(data, "# units: rad\n"))
+            return path, 3
+        pq.write_table(pa.table({name: pa.array(list(values)) for name, values in data.items()}), path)
+        return path, 1
+
+    return to_file
+
+
+def csv(tmp_path, content, name="log.csv"):
+    path = tmp_path / name
+    path.write_text(content)
+    return path
+
+
+def refused(path, n=None):
+    with pytest.raises(InputError) as caught:
+        read_log(path, n)
+    assert caught.value.file == str(path)
+    return caught.value
+
+
+def spoil(values, *spots):
+    values = np.array(values, dtype=float)
+    for index, value in spots:
+        values[index] = value
+    return values
+
+
+def test_time_position_and_torque_are_enough(save):
+    """A log of t, q and tau only is read whole, under the name of its file."""
+    path, _ = save(columns())
+    log = read_log(path, n=2)
+    assert (log.n, len(log), log.period, log.name) == (2, 4, 0.5, "log")
+    assert log.q[:, 1].tolist() == columns()["q2"].tolist()
+    assert log.tau[:, 0].tolist() == columns()["tau1"].tolist()
+    assert (log.current, log.dq, log.ddq, log.temperature, log.ambient, log.qlink) == (None,) * 6
+    assert log.metadata == {"file": str(path), "ignored_columns": []}
+
+
+def test_every_optional_column_is_read(save):
+    """Current, velocities, accelerations, temperatures, link positions, segment and cycle find their fields."""
+    optional = {
+        "current": {"i1": [1.0] * 4, "i2": [2.0] * 4},
+        "dq": {"dq1": [3.0] * 4, "dq2": [4.0] * 4},
+        "ddq": {"ddq1": [5.0] * 4, "ddq2": [6.0] * 4},
+        "temperature": {"temp1": [7.0] * 4, "temp2": [8.0] * 4},
+        "qlink": {"qlink1": [9.0] * 4, "qlink2": [10.0] * 4},
+    }
+    more = {name: values for group in optional.values() for name, values in group.items()}
+    path, _ = save(columns(**more, temp_env=[20.5] * 4, segment=[0, 0, 1, 1], cycle=[3, 3, 3, 3]))
+    log = read_log(path)
+    for name, group in optional.items():
+        np.testing.assert_array_equal(getattr(log, name), np.column_stack(list(group.values())))
+    assert (log.ambient.tolist(), log.segment.tolist(), log.cycle.tolist()) == ([20.5] * 4, [0, 0, 1, 1], [3] * 4)
+
+
+def test_current_stands_in_for_torque(save):
+    """A log of currents only is a log without torque."""
+    path, _ = save(columns(tau1=None, tau2=None, i1=[1.0] * 4, i2=[2.0] * 4))
+    log = read_log(path)
+    assert not log.has_torque
+    assert log.current[0].tolist() == [1.0, 2.0]
+
+
+def test_order_of_columns_does_not_matter(save):
+    """Columns are found by name; ten joints are in the order of their numbers."""
+    data = columns(joints=10)
+    path, _ = save(dict(reversed(data.items())))
+    np.testing.assert_array_equal(read_log(path).q, np.column_stack([data[f"q{joint}"] for joint in range(1, 11)]))
+
+
+def test_other_columns_are_listed_and_not_looked_at(save):
+    """Columns that are no part of a log may hold anything; their names are kept."""
+    path, _ = save(columns(note=["start", "", "1", "x"], Q1=["a"] * 4, tau_cmd=[1.0] * 4, q=[0.0] * 4, t1=[2.0] * 4))
+    assert read_log(path).metadata["ignored_columns"] == ["note", "Q1", "tau_cmd", "q", "t1"]
+
+
+def test_silent_temperature_sensors_are_accepted(save):
+    """NaN temperatures stay NaN, also of a joint without a sensor."""
+    path, _ = save(columns(temp2=[20.0, np.nan, 21.0, 22.0], temp_env=[np.nan] * 4))
+    log = read_log(path)
+    np.testing.assert_array_equal(log.temperature[:, 0], [np.nan] * 4)
+    np.testing.assert_array_equal(log.temperature[:, 1], [20.0, np.nan, 21.0, 22.0])
+    assert np.isnan(log.ambient).all()
+
+
+@pytest.mark.parametrize("missing", ["q1", "q3", "tau1", "tau3", "t"])
+def test_missing_column_is_named(save, missing):
+    """A gap in q1..q6 or tau1..tau6, or no time, names the missing column."""
+    path, first = save(columns(joints=6, **{missing: None}))
+    error = refused(path)
+    assert (error.column, error.row) == (missing, first - 1 or None)
+    assert "missing" in error.problem
+
+
+def test_fewer_torques_than_positions_name_the_first_missing(save):
+    """tau1..tau4 beside q1..q6 is a missing tau5, and the message lists what is there."""
+    path, _ = save(columns(joints=6, tau5=None, tau6=None))
+    error = refused(path)
+    assert error.column == "tau5"
+    assert "tau1, tau2, tau3, tau4" in error.problem
+    assert "q1..q6" in error.allowed
+
+
+@pytest.mark.parametrize("prefix", ["dq", "ddq", "i", "qlink"])
+def test_incomplete_optional_quantity_names_the_missing_column(save, prefix):
+    """An optional quantity has a column for each joint or none."""
+    path, _ = save(columns(joints=3, **{f"{prefix}1": [0.0] * 4, f"{prefix}3": [0.0] * 4}))
+    assert refused(path).column == f"{prefix}2"
+
+
+@pytest.mark.parametrize("extra", ["tau3", "dq3", "temp3"])
+def test_column_of_a_joint_without_position_is_refused(save, extra):
+    """More torques, velocities or temperatures than positions name the first one too many."""
+    more = {"dq1": [0.0] * 4, "dq2": [0.0] * 4} if extra == "dq3" else {}
+    path, _ = save(columns(**more, **{extra: [0.0] * 4}))
+    error = refused(path)
+    assert error.column == extra
+    assert "no q3" in error.problem
+
+
+def test_no_position_at_all_is_a_missing_q1(save):
+    """A log without positions names q1."""
+    path, _ = save(columns(q1=None, q2=None))
+    assert refused(path).column == "q1"
+
+
+def test_neither_torque_nor_current_is_refused(save):
+    """The message says which columns would do."""
+    path, _ = save(columns(tau1=None, tau2=None))
+    assert "neither tau1..tau2 nor i1..i2" in str(refused(path))
+
+
+@pytest.mark.parametrize("n", [1, 3, 6])
+def test_joints_of_log_and_robot_agree(save, n):
+    """Another number of joints than the robot's is refused with both numbers."""
+    path, _ = save(columns())
+    error = refused(path, n)
+    assert "the log has 2 joints (q1..q2), the robot has" in error.problem
+    assert f"{n} joints" in error.allowed
+
+
+@pytest.mark.parametrize("name", ["q0", "q01", "tau0", "q1000000000000"])
+def test_joint_numbers_start_at_one(save, name):
+    """Joints counted from 0 or with leading zeros are refused, not read one joint off."""
+    path, _ = save(columns(**{name: [0.0] * 4}))
+    error = refused(path)
+    assert error.column in (name, "q3")
+
+
+@pytest.mark.parametrize("name", ["t", "q2", "tau1", "dq1", "ddq2", "i1", "qlink1"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_value_that_is_not_finite_names_column_row_and_count(save, name, value):
+    """NaN or infinity in a needed or optional quantity names the column, the first row, and how many there are."""
+    prefix = name.rstrip("12")
+    group = {f"{prefix}{joint}": np.zeros(4) for joint in (1, 2)} if prefix in ("dq", "ddq", "i", "qlink") else {}
+    data = columns(**group)
+    data[name] = spoil(data[name], (1, value), (3, value))
+    path, first = save(data)
+    error = refused(path)
+    assert (error.column, error.row) == (name, first + 1)
+    assert f"found {value} (the first of 2)" in error.problem
+    assert "finite" in error.allowed
+    assert error.remedy
+
+
+def test_empty_cell_is_a_missing_value(tmp_path):
+    """An empty cell of a needed column is refused with its line."""
+    error = refused(csv(tmp_path, "t,q1,tau1\n0,1,2\n1,,3\n"))
+    assert (error.column, error.row, error.joint) == ("q1", 3, 1)
+    assert "empty cell" in error.remedy
+
+
+@pytest.mark.parametrize("name", ["temp1", "temp_env"])
+def test_infinite_temperature_is_refused(save, name):
+    """A temperature may be missing but not infinite."""
+    path, first = save(columns(temp2=[0.0] * 4, **{name: [1.0, 2.0, np.inf, 3.0]}))
+    error = refused(path)
+    assert (error.column, error.row) == (name, first + 2)
+
+
+@pytest.mark.parametrize(("last", "word"), [(1.0, "repeats"), (0.25, "backward")])
+def test_time_that_does_not_increase_names_row_and_values(save, last, word):
+    """A repeated or backward time names the row of the later sample and both values."""
+    path, first = save(columns(t=[0.0, 0.5, 1.0, last]))
+    error = refused(path)
+    assert (error.column, error.row) == ("t", first + 3)
+    assert word in error.problem
+    assert f"{last} after 1.0" in error.problem
+
+
+@pytest.mark.parametrize("name", ["segment", "cycle"])
+def test_segment_and_cycle_are_whole_numbers(save, name):
+    """A fraction in segment or cycle is refused with its row."""
+    path, first = save(columns(**{name: [0.0, 1.0, 1.5, 2.0]}))
+    error = refused(path)
+    assert (error.column, error.row) == (name, first + 2)
+
+
+@pytest.mark.parametrize("name", ["q1", "temp1", "segment"])
+def test_text_in_a_column_of_a_log_is_refused(save, name):
+    """A column of words where numbers belong is refused with its first cell."""
+    path, first = save(columns(**{name: ["a", "b", "c", "d"]}))
+    error = refused(path)
+    assert (error.column, error.row) == (name, first)
+    assert "'a'" in error.problem
+
+
+def test_one_row_is_too_few(save):
+    """A log has two rows or more."""
+    path, first = save(columns(rows=1))
+    error = refused(path)
+    assert error.row == first
+    assert "2 or more" in error.allowed
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [
+        ("t;q1;tau1\n0;1;2\n1;2;3\n", "semicolons"),
+        ("t,q1,q1,tau1\n0,1,1,2\n1,2,2,3\n", "twice"),
+        ("t,q1,tau1\n0,1,2\n1,2\n", "2 cells"),
+        ("t,q1,tau1\n0,1,2\n1,x,3\n", "'x'"),
+        ("0,1,2\n1,2,3\n", "no header"),
+        ("", "empty"),
+        ("t,q1,tau1\n", "no rows"),
+    ],
+)
+def test_broken_file_is_refused(tmp_path, content, word):
+    """Faults of the table itself are input errors of the log."""
+    assert word in refused(csv(tmp_path, content)).problem
+
+
+@pytest.mark.parametrize(
+    "block", ["# units: deg\n", "#units=deg\n", "# units: {q: deg, dq: deg/s, ddq: deg/s^2, qlink: deg}\n"]
+)
+def test_degrees_become_radians(tmp_path, block):
+    """With units in degrees all angles and their rates are converted, torque is not, and the statement is used up."""
+    names = [f"{prefix}{joint}" for prefix in ("q", "dq", "ddq", "qlink", "tau") for joint in (1, 2)]
+    rows = "\n".join(",".join([str(t), *["90", "-180"] * 5]) for t in range(3))
+    log = read_log(csv(tmp_path, f"{block}t,{','.join(names)}\n{rows}\n"))
+    for signal in (log.q, log.dq, log.ddq, log.qlink):
+        np.testing.assert_allclose(signal, [[np.pi / 2, -np.pi]] * 3, rtol=1e-15)  # one rounding of the product
+    assert log.tau[0].tolist() == [90.0, -180.0]
+    assert "units" not in log.metadata
+
+
+def test_units_by_column_are_honoured(tmp_path):
+    """Units of an ECSV block apply column by column: milliseconds, degrees, metres and milliamperes."""
+    units = {"t": "ms", "q1": "deg", "q2": "m", "i1": "mA", "i2": "A"}
+    entries = "".join(f"# - {{name: {name}, unit: {unit}, datatype: float64}}\n" for name, unit in units.items())
+    head = "# %ECSV 1.0\n# ---\n# delimiter: ','\n# datatype:\n" + entries
+    log = read_log(csv(tmp_path, head + "t,q1,q2,i1,i2\n0,180,2,500,3\n4,180,2,500,3\n"))
+    np.testing.assert_allclose(log.t, [0.0, 0.004], rtol=1e-15)
+    np.testing.assert_allclose(log.q[0], [np.pi, 2.0], rtol=1e-15)
+    np.testing.assert_allclose(log.current[0], [0.5, 3.0], rtol=1e-15)
+
+
+@pytest.mark.parametrize("unit", ["N m", "N*m", "N.m", "Nm"])
+def test_spellings_of_a_unit_are_one(tmp_path, unit):
+    """Spaces and signs of product do not matter in a unit."""
+    block = f"# units: {{tau: '{unit}', ddq: rad / s2}}\n"
+    assert read_log(csv(tmp_path, block + "t,q1,tau1\n0,1,2\n1,2,3\n")).has_torque
+
+
+@pytest.mark.parametrize(
+    ("block", "word"),
+    [
+        ("# units: grad\n", "'grad'"),
+        ("# units: [rad]\n", "['rad']"),
+        ("# units: {tau: lbf}\n", "lbf"),
+        ("# units: {position: deg}\n", "position"),
+        ("# unit: deg\n", "'unit'"),
+        ("# Units: deg\n", "'Units'"),
+        ("# robot: 3\n", "`robot`"),
+        ("# period: fast\n", "`period`"),
+        ("# period: 0\n", "`period`"),
+        ("# period: -0.004\n", "`period`"),
+        ("# period: .nan\n", "`period`"),
+        ("# period: true\n", "`period`"),
+        ("# period: [1]\n", "`period`"),
+        ("# %ECSV 1.0\n# delimiter: ','\n# datatype: [{name: q1, unit: turns}]\n", "turns"),
+        ("# %ECSV 1.0\n# delimiter: ','\n# datatype: [{name: q1, unit: rad}]\n# meta: {units: deg}\n", "says 'deg'"),
+    ],
+)
+def test_statement_that_is_not_understood_is_refused(tmp_path, block, word):
+    """An unknown unit, a misspelt key, a robot that is no name and a period that is no time are never ignored."""
+    assert word in str(refused(csv(tmp_path, block + "t,q1,tau1\n0,1,2\n1,2,3\n")))
+
+
+def test_robot_and_period_are_kept(tmp_path):
+    """What the block says of the recording is metadata of the log."""
+    path = csv(tmp_path, "# robot: er3a\n# period: '0.004'\n# operator: Ann\nt,q1,tau1,x\n0,1,2,3\n1,2,3,4\n")
+    assert read_log(path).metadata == {
+        "robot": "er3a",
+        "period": 0.004,
+        "operator": "Ann",
+        "file": str(path),
+        "ignored_columns": ["x"],
+    }
+
+
+def test_parquet_file_of_others_states_units_in_its_key_value_pairs(tmp_path):
+    """A units entry of any Parquet writer counts."""
+    path = tmp_path / "log.parquet"
+    pq.write_table(
+        pa.table({"t": [0, 1], "q1": [180, 90], "tau1": [1, 2]}).replace_schema_metadata({"units": "deg"}), path
+    )
+    np.testing.assert_allclose(read_log(path).q[:, 0], [np.pi, np.pi / 2], rtol=1e-15)
+
+
+def test_logs_of_one_robot_are_read_in_order(tmp_path):
+    """Several files give logs in their order; one path gives one log."""
+    paths = [csv(tmp_path, text(columns()), f"{name}.csv") for name in "ba"]
+    assert [log.name for log in read_logs(paths, n=2)] == ["b", "a"]
+    assert len(read_logs(str(paths[0]))) == 1
+
+
+def test_logs_that_do_not_belong_together_are_refused(tmp_path):
+    """No log, a log twice (by any path), and logs of different robots are input errors."""
+    path = csv(tmp_path, text(columns()), "a.csv")
+    other = csv(tmp_path, text(columns(joints=3)), "b.csv")
+    (tmp_path / "link.csv").symlink_to(path)
+    with pytest.raises(InputError, match="no logs"):
+        read_logs([])
+    with pytest.raises(InputError, match="twice"):
+        read_logs([path, tmp_path / "link.csv"])
+    with pytest.raises(InputError, match=r"3 joints, but .*a\.csv has 2"):
+        read_logs([path, other])
+    with pytest.raises(InputError, match="robot has 6"):
+        read_logs([path], n=6)
+
+
+def test_long_log_is_read_by_the_fast_reader(tmp_path):
+    """A log of 200,000 rows takes a fraction of a second; a reader that walks lines would take tens."""
+    import time
+
+    rng = np.random.default_rng(0)
+    log = Log(0.004 * np.arange(200_000), *rng.normal(size=(2, 200_000, 6)))
+    for suffix in ("csv", "parquet"):
+        write_log(tmp_path / f"log.{suffix}", log)
+        start = time.perf_counter()
+        read = read_log(tmp_path / f"log.{suffix}")
+        assert time.perf_counter() - start < 3.0
+        np.testing.assert_array_equal(read.tau, log.tau)
