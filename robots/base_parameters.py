@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +15,9 @@ from robots.regressor import TorqueModel
 from robots.terms import Column
 
 Array = NDArray[np.float64]
+log = logging.getLogger(__name__)
+
+_ROUNDING = 1e-9  # of a column; rounding in the regressor, and in its least squares, stays well below
 
 IDENTIFIABLE, COMBINED, UNIDENTIFIABLE = "identifiable", "in combination", "unidentifiable"
 
@@ -27,12 +31,15 @@ class BaseParameters:
         independent: indices (b,) of the columns kept, ascending.
         grouping: (b, p); row i says which standard parameters base parameter i sums, with what coefficients.
         singular_values: (p,) of the column-scaled sample regressor, descending: the gap after b confirms the rank.
+        neglected: the largest part of a column that the kept ones do not span, of the largest norm of its kind: some
+            1e-15 by rounding; more where the geometry is close to a special case.
     """
 
     model: TorqueModel
     independent: tuple[int, ...]
     grouping: Array
     singular_values: Array
+    neglected: float
 
     @property
     def size(self) -> int:
@@ -107,44 +114,45 @@ class BaseParameters:
 
 
 def base_parameters(
-    model: TorqueModel, *, samples: int = 400, seed: int = 0, tolerance: float = 1e-8
+    model: TorqueModel, *, samples: int = 400, seed: int = 0, tolerance: float = 1e-4
 ) -> BaseParameters:
     """Finds the base parameters by a QR factorisation that walks the columns from left to right.
 
     A column that the ones before it span, on random states all over the robot's ranges, is regrouped into them
-    (thesis section 1.3.1); the singular values must confirm the rank (section 1.3.2).
+    (thesis section 1.3.1); the singular values must confirm the rank (section 1.3.2). Columns are measured against the
+    largest of their kind (masses, moments, inertias, ...): where right angles are rounded to 1.57, some stand out by
+    parts in a million, which no experiment can tell; `BaseParameters.neglected` says how much that is.
 
     Args:
         model: the torque model.
         samples: how many random states.
         seed: of the random states.
-        tolerance: the part of a column, of its own norm, below which it counts as spanned.
+        tolerance: the part of a column, of the largest norm of its kind, below which it counts as spanned (the thesis
+            takes 1/10000 too).
 
     Returns:
         The base parameters.
 
     Raises:
-        NotIdentifiableError: the two factorisations disagree on the rank.
+        NotIdentifiableError: the singular values show a lower rank than the columns kept.
     """
     Y = _random_regressor(model, samples, seed)
-    norms = np.linalg.norm(Y, axis=0)
-    # A column that is zero but for rounding must not be blown up to unit length.
-    present = norms > tolerance * norms.max()
-    scale = np.where(present, norms, 1.0)
-    unit = np.where(present, Y / scale, 0.0)
-    independent = _walk(unit, tolerance)
-    singular_values = np.linalg.svd(unit, compute_uv=False)
-    rank = int(np.sum(singular_values > tolerance * singular_values[0]))
-    if rank != len(independent):
-        raise NotIdentifiableError(
-            f"{len(independent)} base parameters by QR, {rank} by SVD: the robot's geometry is close to a special case",
-            remedy="state another tolerance",
+    scale = _scales(model, np.linalg.norm(Y, axis=0))
+    scaled = Y / scale
+    independent = _walk(scaled, tolerance)
+    singular_values = np.asarray(np.linalg.svd(scaled, compute_uv=False), dtype=np.float64)
+    _confirm(singular_values, len(independent))
+    combination = np.linalg.lstsq(scaled[:, independent], scaled, rcond=None)[0]  # (b, p)
+    neglected = float(np.linalg.norm(scaled - scaled[:, independent] @ combination, axis=0).max())
+    if neglected > _ROUNDING:
+        log.warning(
+            "%s is close to a special geometry: %.1e of the regressor is neglected", model.robot.name, neglected
         )
-    combination = np.linalg.lstsq(unit[:, independent], unit, rcond=None)[0]  # (b, p)
     grouping = combination * scale[None, :] / scale[independent][:, None]
-    grouping = np.where(np.abs(combination) < 1e3 * tolerance, 0.0, _snap(grouping))
+    # What is as small as the neglected part is noise of it.
+    grouping = np.where(np.abs(combination) < max(_ROUNDING, 10 * neglected), 0.0, _snap(grouping))
     grouping[:, independent] = np.eye(len(independent))
-    return BaseParameters(model, tuple(independent), grouping, singular_values)
+    return BaseParameters(model, tuple(independent), grouping, singular_values, neglected)
 
 
 def _random_regressor(model: TorqueModel, samples: int, seed: int) -> Array:
@@ -157,12 +165,21 @@ def _random_regressor(model: TorqueModel, samples: int, seed: int) -> Array:
     return model.regressor(q, dq, ddq, backend="vectorised").reshape(samples * robot.n, model.size)
 
 
-def _walk(unit: Array, tolerance: float) -> list[int]:
+def _scales(model: TorqueModel, norms: Array) -> Array:
+    """The largest norm (p,) among the columns of the same kind, 1 where all of a kind are zero."""
+    kinds = [(column.term, column.unit) for column in model.columns]
+    largest: dict[tuple[str, str], float] = {}
+    for kind, norm in zip(kinds, norms, strict=True):
+        largest[kind] = max(largest.get(kind, 0.0), float(norm))
+    return np.array([largest[kind] or 1.0 for kind in kinds])
+
+
+def _walk(scaled: Array, tolerance: float) -> list[int]:
     """Orthogonalises the columns in order, twice each for accuracy, and keeps those that bring something new."""
-    basis = np.empty((unit.shape[0], 0))
+    basis = np.empty((scaled.shape[0], 0))
     kept = []
-    for j in range(unit.shape[1]):
-        column = unit[:, j]
+    for j in range(scaled.shape[1]):
+        column = scaled[:, j]
         for _ in range(2):
             column = column - basis @ (basis.T @ column)
         length = np.linalg.norm(column)
@@ -172,13 +189,22 @@ def _walk(unit: Array, tolerance: float) -> list[int]:
     return kept
 
 
+def _confirm(singular_values: Array, kept: int) -> None:
+    rank = int(np.sum(singular_values > _ROUNDING * singular_values[0]))
+    if kept > rank:
+        raise NotIdentifiableError(
+            f"{kept} base parameters by QR, {rank} by SVD: columns that differ by rounding were kept",
+            remedy="state a larger tolerance",
+        )
+
+
 def _snap(values: Array) -> Array:
     rounded = np.round(values)
     return np.where(np.abs(values - rounded) < 1e-9, rounded, values)
 
 
 def _formula(row: Array, names: Sequence[str], kept: int) -> str:
-    others = [j for j in np.flatnonzero(row) if j != kept]
+    others = [j for j in map(int, np.flatnonzero(row)) if j != kept]
     text = names[kept]
     for j in others:
         size = abs(row[j])

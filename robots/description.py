@@ -139,6 +139,51 @@ class Ambient(Sourced):
     highest: Finite
 
 
+class CapsuleDescription(Sourced):
+    """A capsule that encloses a link or a part of it; several may share a link.
+
+    ``link`` is 0 for the base and i for the link that joint i moves; ``start`` and ``end`` [m] are in that link's
+    frame, the joint's own frame (z or the URDF's axis along the joint) moved by q; ``radius`` [m].
+    """
+
+    link: Annotated[int, Field(ge=0)]
+    name: str | None = None
+    start: Three
+    end: Three
+    radius: Positive
+
+
+class ObstacleBox(Sourced):
+    """A box around the robot: edge lengths [m] along the axes of a frame, which is at its centre."""
+
+    name: str
+    size: Annotated[list[Positive], Field(min_length=3, max_length=3)]
+    xyz: Three
+    rpy: Three = Field(default=[0.0, 0.0, 0.0])
+
+
+class ObstacleCapsule(Sourced):
+    """A capsule around the robot, in the base frame [m]."""
+
+    name: str
+    start: Three
+    end: Three
+    radius: Positive
+
+
+class CollisionDescription(Config):
+    """Shapes of the links, obstacles in the base frame, and the pairs that may touch.
+
+    ``ignore`` lists pairs of link numbers, or of a link number and the name of an obstacle (the floor's is "floor").
+    """
+
+    links: list[CapsuleDescription] = []
+    floor: Finite | None = None
+    boxes: list[ObstacleBox] = []
+    capsules: list[ObstacleCapsule] = []
+    ignore: list[Annotated[list[int | str], Field(min_length=2, max_length=2)]] = []
+
+
 class RobotDescription(Config):
     """A robot's YAML file: a Denavit-Hartenberg table or a URDF, then limits and nominal dynamics."""
 
@@ -159,6 +204,7 @@ class RobotDescription(Config):
     payload: Rating | None = None
     mass: Rating | None = None
     ambient: Ambient | None = None
+    collision: CollisionDescription | None = None
     period: Positive = 0.004
 
     @model_validator(mode="after")
@@ -172,7 +218,10 @@ class RobotDescription(Config):
         return self
 
     def assumed(self) -> Iterator[str]:
-        """Names of the quantities whose source is "assumed", such as ``limits.jerk``."""
+        """Names of the quantities whose source is "assumed", such as ``limits.jerk``.
+
+        Assumed collision shapes are not among them: their model warns of them where they are used.
+        """
         if self.geometry is not None and any(row.source == "assumed" for row in self.geometry.joints):
             yield "geometry"
         yield from _assumed(self.limits, "limits")

@@ -159,7 +159,7 @@ def default_model(
     robot: Robot,
     *,
     friction: str = "polynomial",
-    velocity_scale: float = 0.0,
+    velocity_scale: float | tuple[float, ...] = 0.0,
     rotor: bool = True,
     offset: bool = True,
 ) -> TorqueModel:

@@ -31,7 +31,7 @@ class BatchFunction(ABC):
         """Evaluates all samples.
 
         Args:
-            *arguments: one array (N, k) per input.
+            *arguments: one array (N, k) per input; further axes may split k.
             out: arrays to write into, as an earlier call of as many samples returned them. Fresh memory costs as
                 much as the arithmetic.
 
@@ -42,12 +42,16 @@ class BatchFunction(ABC):
             InputError: arrays of the wrong shape.
         """
         arrays = [np.ascontiguousarray(argument, dtype=np.float64) for argument in arguments]
+        if len(arrays) != len(self.input_sizes):
+            raise InputError(f"{len(arrays)} arguments", allowed=f"{len(self.input_sizes)}")
         samples = arrays[0].shape[0] if arrays and arrays[0].ndim else 0
         for position, (array, size) in enumerate(zip(arrays, self.input_sizes, strict=True)):
-            if array.reshape(array.shape[0], -1).shape != (samples, size):
+            if array.shape[:1] != (samples,) or array.size != samples * size:
                 raise InputError(f"argument {position + 1} has shape {array.shape}", allowed=f"({samples}, {size})")
         shapes = tuple((samples, *shape) for shape in self.output_shapes)
         outputs = tuple(np.empty(shape) for shape in shapes) if out is None else out
+        if len(outputs) != len(shapes):
+            raise InputError(f"{len(outputs)} arrays in out", allowed=f"{len(shapes)}")
         for array, shape in zip(outputs, shapes, strict=True):
             if array.shape != shape or array.dtype != np.float64 or not array.flags.c_contiguous:
                 raise InputError(f"out has shape {array.shape}", allowed=f"{shape}, C-ordered float64")
@@ -62,8 +66,7 @@ class BatchFunction(ABC):
 def row_major(function: casadi.Function) -> casadi.Function:
     """Rewrites a function so that its outputs, dense and transposed, lie in memory as numpy rows."""
     symbols = function.sx_in()
-    outputs = function(*symbols)
-    outputs = outputs if isinstance(outputs, tuple) else (outputs,)
+    outputs = function.call(symbols)
     return casadi.Function("batch", symbols, [casadi.densify(casadi.vec(output.T)) for output in outputs])
 
 

@@ -1,4 +1,4 @@
-"""Evaluation by compiled C: CasADi writes the code, the machine's compiler builds it, a cache keeps it."""
+"""Evaluation by compiled C: the machine's compiler builds it, a cache keeps it."""
 
 from __future__ import annotations
 
@@ -16,24 +16,13 @@ from pathlib import Path
 import casadi
 
 from robots.batch.base import Array, BatchFunction, row_major
+from robots.batch.c_source import c_source
 
 log = logging.getLogger(__name__)
 
-FLAGS = ("-O2", "-march=native", "-fno-math-errno", "-fPIC", "-shared")
-
-# One call for all samples: strides are the lengths of one sample's arguments and results.
-_LOOP = """
-CASADI_SYMBOL_EXPORT void batch_all(long long samples, const double** in, const long long* in_size,
-                                    double** out, const long long* out_size) {
-  const double* arg[%(n_in)d]; double* res[%(n_out)d];
-  casadi_int iw[%(iw)d]; double w[%(w)d];
-  for (long long k = 0; k < samples; ++k) {
-    for (int i = 0; i < %(n_in)d; ++i) arg[i] = in[i] + k * in_size[i];
-    for (int i = 0; i < %(n_out)d; ++i) res[i] = out[i] + k * out_size[i];
-    batch(arg, res, iw, w, 0);
-  }
-}
-"""
+FLAGS = ("-march=native", "-fno-math-errno", "-fPIC", "-shared")
+# Optimisation pays, up to a length at which it would take minutes: a chain of ten oblique joints, differentiated.
+LONG = 600_000
 
 
 class CompilerError(RuntimeError):
@@ -49,18 +38,17 @@ class CompiledFunction(BatchFunction):
 
     def __init__(self, function: casadi.Function) -> None:
         super().__init__(function)
-        inner = row_major(function)
-        self._library = ctypes.CDLL(str(_build(_source(inner))))
-        self._call = self._library.batch_all
+        library = _build(c_source(row_major(function)))
+        try:
+            self._call = ctypes.CDLL(str(library)).batch_all
+        except (OSError, AttributeError) as error:
+            raise CompilerError(f"{library} cannot be loaded: {error}") from error
         self._call.restype = None
-        self._in_sizes = (ctypes.c_longlong * len(self.input_sizes))(*self.input_sizes)
-        sizes = [rows * columns for rows, columns in self.output_shapes]
-        self._out_sizes = (ctypes.c_longlong * len(sizes))(*sizes)
 
     def _evaluate(self, samples: int, arguments: list[Array], outputs: tuple[Array, ...]) -> None:
         pointers_in = (ctypes.c_void_p * len(arguments))(*(a.ctypes.data for a in arguments))
         pointers_out = (ctypes.c_void_p * len(outputs))(*(a.ctypes.data for a in outputs))
-        self._call(ctypes.c_longlong(samples), pointers_in, self._in_sizes, pointers_out, self._out_sizes)
+        self._call(ctypes.c_longlong(samples), pointers_in, pointers_out)
 
 
 def default_backend() -> str:
@@ -100,26 +88,17 @@ def _processor() -> str:
     return next((line for line in lines if line.startswith(("flags", "Features"))), "")
 
 
-def _source(function: casadi.Function) -> str:
-    with tempfile.TemporaryDirectory() as folder:
-        generator = casadi.CodeGenerator("batch.c", {"with_header": False})
-        generator.add(function)
-        generator.generate(folder + os.sep)
-        text = (Path(folder) / "batch.c").read_text(encoding="utf-8")
-    sizes = {"n_in": function.n_in(), "n_out": function.n_out()}
-    return text + _LOOP % {**sizes, "iw": max(1, function.sz_iw()), "w": max(1, function.sz_w())}
-
-
 def _build(source: str) -> Path:
     path, identity = compiler()
     key = hashlib.sha256("\0".join((source, identity, *FLAGS)).encode()).hexdigest()[:32]
     for folder in (cache_folder(), Path(tempfile.gettempdir()) / f"robot-oed-{os.getuid()}"):
         library = folder / f"{key}.so"
-        if library.exists():
-            return library
         try:
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-            _compile(path, source, library)
+            if folder.stat().st_uid != os.getuid():
+                raise PermissionError(f"{folder} is somebody else's")  # who could leave any code there
+            if not library.exists():
+                _compile(path, source, library)
         except OSError as error:
             log.info("cannot keep compiled code in %s: %s", folder, error)
             continue
@@ -131,10 +110,9 @@ def _compile(path: str, source: str, library: Path) -> None:
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         code, built = Path(folder) / "batch.c", Path(folder) / "batch.so"
         code.write_text(source, encoding="utf-8")
-        command = [path, *FLAGS, str(code), "-o", str(built), "-lm"]
+        command = [path, "-O3" if len(source) < LONG else "-O1", *FLAGS, str(code), "-o", str(built), "-lm"]
         result = subprocess.run(command, capture_output=True, text=True, check=False)
         if result.returncode:
             raise CompilerError(f"{path} failed: {result.stderr.strip()[:500]}")
         # Another process may have built the same file meanwhile: replacing it is atomic and harmless.
         os.replace(built, library)
-

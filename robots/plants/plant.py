@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
 import numpy as np
@@ -30,7 +30,7 @@ class Plant:
 
     model: TorqueModel
     parameters: Array
-    sensors: Sensors = Sensors()
+    sensors: Sensors = field(default_factory=Sensors)
 
     def __post_init__(self) -> None:
         """Checks the parameters.
@@ -61,6 +61,7 @@ def nominal_plant(
     robot: Robot,
     *,
     friction: str = "polynomial",
+    velocity_scale: float = 1e-3,
     sensors: Sensors | None = None,
     spread: float = 0.0,
     seed: int = 0,
@@ -71,6 +72,7 @@ def nominal_plant(
     Args:
         robot: the robot; all its nominal dynamics must be known.
         friction: see `default_model`.
+        velocity_scale: below which Coulomb friction fades, tanh(dq / scale) [rad/s]: a joint that stands feels none.
         sensors: what the log sees.
         spread: relative standard deviation by which the truth differs from the description: masses and frictions are
             scaled, centres of mass and inertias follow, so that every link stays a possible body.
@@ -93,13 +95,15 @@ def nominal_plant(
         friction=np.asarray(robot.friction) * rng.lognormal(0.0, spread, (robot.n, 1)),
         rotor_inertia=np.asarray(robot.rotor_inertia) * rng.lognormal(0.0, spread, robot.n),
     )
-    model = default_model(robot, friction=friction)
+    model = default_model(robot, friction=friction, velocity_scale=velocity_scale)
     parameters = replace(model, robot=varied).nominal.copy()
     for name, value in (overrides or {}).items():
         if name not in model.names:
             near = get_close_matches(name, model.names, n=3)
             raise InputError(
-                f"unknown parameter {name}", column="parameters", allowed=f"such as {', '.join(near or model.names[:3])}"
+                f"unknown parameter {name}",
+                column="parameters",
+                allowed=f"such as {', '.join(near or model.names[:3])}",
             )
         parameters[model.names.index(name)] = value
     return Plant(model=model, parameters=parameters, sensors=sensors or Sensors())
@@ -131,7 +135,7 @@ def simulate(plant: Plant, motion: Motion, *, seed: int = 0) -> Log:
         raise InputError(f"a motion of {motion.n} joints", allowed=f"{plant.robot.n}, as {plant.robot.name} has")
     tau = plant.model.torque(motion.q, motion.dq, motion.ddq, plant.parameters)
     rng = np.random.default_rng(seed)
-    period = float(np.median(np.diff(motion.t)))
+    period = float(np.median(np.diff(motion.t))) if len(motion) > 1 else 0.0
     return Log(
         t=motion.t,
         q=plant.sensors.position(motion.q, np.asarray(plant.robot.gear_ratio)),

@@ -40,8 +40,8 @@ class Sensors:
             InputError: a negative number, or a share outside 0 to 1.
         """
         for name in ("encoder_counts", "torque_noise", "correlation_time", "torque_step"):
-            if not getattr(self, name) >= 0:
-                raise InputError(f"sensors: {name} is {getattr(self, name)}", allowed="zero or more")
+            if not 0 <= getattr(self, name) < np.inf:
+                raise InputError(f"sensors: {name} is {getattr(self, name)}", allowed="zero or a positive number")
         if not 0 <= self.coloured_share <= 1:
             raise InputError(f"sensors: coloured_share is {self.coloured_share}", allowed="0 to 1")
 

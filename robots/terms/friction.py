@@ -26,22 +26,24 @@ class FrictionPolynomial(Term):
     Attributes:
         powers: which of f1..f4 are there: (1, 2) is Coulomb and viscous friction.
         velocity_scale: with a value v0 > 0 [rad/s or m/s], sign(dq) is tanh(dq / v0): differentiable, as a design
-            needs it, and finite in slope where a log's velocity is known to v0 only. With 0 it is the sign.
+            needs it, and finite in slope where a log's velocity is known to v0 only. With 0 it is the sign. One for
+            all joints, or one each.
     """
 
     powers: tuple[int, ...] = POLYNOMIAL
-    velocity_scale: float = 0.0
+    velocity_scale: float | tuple[float, ...] = 0.0
     name: str = "friction"
 
     def __post_init__(self) -> None:
         """Checks the powers and the scale.
 
         Raises:
-            InputError: an unknown power or a negative scale.
+            InputError: an unknown or repeated power, or a negative scale.
         """
-        if not self.powers or any(power not in POLYNOMIAL for power in self.powers):
-            raise InputError(f"friction powers {self.powers}", allowed="some of 1, 2, 3, 4")
-        if not self.velocity_scale >= 0:
+        known = all(power in POLYNOMIAL for power in self.powers)
+        if not self.powers or not known or len(set(self.powers)) < len(self.powers):
+            raise InputError(f"friction powers {self.powers}", allowed="some of 1, 2, 3, 4, each once")
+        if not np.all(np.asarray(self.velocity_scale) >= 0):
             raise InputError(f"friction velocity scale {self.velocity_scale}", allowed="zero or a positive number")
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
@@ -53,11 +55,18 @@ class FrictionPolynomial(Term):
         return tuple(of_power[joint] for joint in range(robot.n) for of_power in columns)
 
     def regressor(self, robot: Robot, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX) -> casadi.SX:
-        """Builds Y (n, k n), block diagonal."""
-        return casadi.diagcat(*(self._row(dq[joint]) for joint in range(robot.n)))
+        """Builds Y (n, k n), block diagonal.
 
-    def _row(self, dq: casadi.SX) -> casadi.SX:
-        sign = casadi.tanh(dq / self.velocity_scale) if self.velocity_scale else casadi.sign(dq)
+        Raises:
+            InputError: velocity scales for another number of joints.
+        """
+        scales = self.velocity_scale if isinstance(self.velocity_scale, tuple) else (self.velocity_scale,) * robot.n
+        if len(scales) != robot.n:
+            raise InputError(f"{len(scales)} friction velocity scales", allowed=f"one, or {robot.n}")
+        return casadi.diagcat(*(self._row(dq[joint], scale) for joint, scale in enumerate(scales)))
+
+    def _row(self, dq: casadi.SX, scale: float) -> casadi.SX:
+        sign = casadi.tanh(dq / scale) if scale else casadi.sign(dq)
         shapes = {1: sign, 2: dq, 3: dq * casadi.fabs(dq), 4: dq**3}
         return casadi.horzcat(*(shapes[power] for power in self.powers))
 

@@ -39,9 +39,7 @@ class RigidBody(Term):
     def regressor(self, robot: Robot, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX) -> casadi.SX:
         """Builds Y (n, 10 n): joint k feels the links from k outwards, so Y is block upper triangular."""
         chain = robot.chain
-        rotations, translations = zip(
-            *(_placement(joint, q[i]) for i, joint in enumerate(chain.joints)), strict=True
-        )
+        rotations, translations = zip(*(_placement(joint, q[i]) for i, joint in enumerate(chain.joints)), strict=True)
         blocks = _link_wrenches(chain.joints, rotations, translations, chain.gravity, dq, ddq)
         Y = casadi.SX(chain.n, 10 * chain.n)
         for link, block in enumerate(blocks):
@@ -115,7 +113,7 @@ def _parameter_map(omega: casadi.SX, alpha: casadi.SX, acceleration: casadi.SX) 
 
 
 def _dot(vector: casadi.SX) -> casadi.SX:
-    """The (3, 6) matrix with I @ vector = _dot(vector) @ [Ixx, Ixy, Ixz, Iyy, Iyz, Izz]."""
+    """Builds the (3, 6) matrix D of a vector v with I v = D [Ixx, Ixy, Ixz, Iyy, Iyz, Izz]."""
     x, y, z = vector[0], vector[1], vector[2]
     return casadi.sparsify(
         casadi.vertcat(

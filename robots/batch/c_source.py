@@ -1,0 +1,102 @@
+"""Writes a CasADi function as C that treats as many samples at a time as the processor's vectors hold."""
+
+from __future__ import annotations
+
+import math
+
+import casadi
+
+from robots.batch.operations import operation
+
+# `vec` is GCC's and Clang's portable vector type: its arithmetic needs no intrinsics and no luck with optimisers.
+# Samples are transposed into it at the entrance and back at the exit; the last block repeats its last sample.
+_HEAD = """#include <math.h>
+#if defined(__AVX512F__)
+#define W 8
+#elif defined(__AVX__)
+#define W 4
+#else
+#define W 2
+#endif
+typedef double vec __attribute__((vector_size(8 * W)));
+#define EACH(target, value) for (int k = 0; k < W; ++k) target[k] = value;
+
+static void evaluate(const vec* restrict x, vec* restrict y) {
+"""
+_TAIL = """}
+
+static void scatter(const vec* restrict y, long long size, double* restrict out) {
+  const double* from = (const double*)y;
+  for (long long j = 0; j < size; ++j)
+    for (int k = 0; k < W; ++k) out[k * size + j] = from[j * W + k];
+}
+
+void batch_all(long long samples, const double** in, double** out) {
+  static const long long in_size[] = {%(in_sizes)s}, out_size[] = {%(out_sizes)s};
+  vec x[%(x_size)d], y[%(y_size)d];
+  for (long long start = 0; start < samples; start += W) {
+    const int left = samples - start < W ? (int)(samples - start) : W;
+    long long at = 0;
+    for (int i = 0; i < %(n_in)d; ++i)
+      for (long long j = 0; j < in_size[i]; ++j, ++at)
+        for (int k = 0; k < W; ++k) x[at][k] = in[i][(start + (k < left ? k : left - 1)) * in_size[i] + j];
+    evaluate(x, y);
+    at = 0;
+    for (int i = 0; i < %(n_out)d; at += out_size[i], ++i) {
+      if (left == W) {
+        scatter(y + at, out_size[i], out[i] + start * out_size[i]);
+        continue;
+      }
+      for (int k = 0; k < left; ++k)
+        for (long long j = 0; j < out_size[i]; ++j) out[i][(start + k) * out_size[i] + j] = y[at + j][k];
+    }
+  }
+}
+"""
+
+
+def c_source(function: casadi.Function) -> str:
+    """Writes the C of ``batch_all(samples, inputs, outputs)``.
+
+    Args:
+        function: a function of SX with dense column vectors as inputs and outputs.
+
+    Returns:
+        The source text; its arrays are sample after sample.
+    """
+    inputs = [function.numel_in(i) for i in range(function.n_in())]
+    outputs = [function.numel_out(i) for i in range(function.n_out())]
+    names = ", ".join(f"w{i}" for i in range(max(1, function.sz_w())))
+    lines = [f"  const vec zero = {{0}}; vec {names};"]
+    for k in range(function.n_instructions()):
+        identifier = function.instruction_id(k)
+        into, source = function.instruction_output(k), function.instruction_input(k)
+        if identifier == casadi.OP_CONST:
+            lines.append(f"  w{into[0]} = zero + {_literal(function.instruction_constant(k))};")
+        elif identifier == casadi.OP_INPUT:
+            lines.append(f"  w{into[0]} = x[{sum(inputs[: source[0]]) + source[1]}];")
+        elif identifier == casadi.OP_OUTPUT:
+            lines.append(f"  y[{sum(outputs[: into[0]]) + into[1]}] = w{source[0]};")
+        else:
+            known = operation(identifier)
+            if known.c is None:
+                lines.append(f"  w{into[0]} = " + known.numpy.format(*(f"w{i}" for i in source)) + ";")
+            else:
+                lines.append(f"  EACH(w{into[0]}, " + known.c.format(*(f"w{i}[k]" for i in source)) + ")")
+    tail = _TAIL % {
+        "in_sizes": ", ".join(map(str, inputs)),
+        "out_sizes": ", ".join(map(str, outputs)),
+        "x_size": max(1, sum(inputs)),
+        "y_size": max(1, sum(outputs)),
+        "n_in": len(inputs),
+        "n_out": len(outputs),
+    }
+    return _HEAD + "\n".join(lines) + "\n" + tail
+
+
+def _literal(value: float) -> str:
+    if math.isnan(value):
+        return "NAN"
+    if math.isinf(value):
+        return "INFINITY" if value > 0 else "-INFINITY"
+    return repr(float(value))

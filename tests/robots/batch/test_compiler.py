@@ -1,0 +1,141 @@
+"""Finding a compiler, doing without, and the cache of what it built."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import casadi
+import numpy as np
+import pytest
+
+from robots.batch import batch_function, compiled
+from robots.batch.compiled import CompiledFunction
+from robots.batch.vectorised import VectorisedFunction
+from robots.common.errors import InputError
+
+ROOT = Path(__file__).parents[3]
+X = np.arange(20.0).reshape(-1, 1)
+
+
+@pytest.fixture
+def square() -> casadi.Function:
+    x = casadi.SX.sym("x")
+    return casadi.Function("f", [x], [x**2 + 1])
+
+
+def works(evaluate) -> bool:
+    return np.array_equal(evaluate(X)[0].ravel(), X.ravel() ** 2 + 1)
+
+
+def fake_compiler(folder: Path, script: str) -> str:
+    path = folder / "fake-cc"
+    path.write_text(f"#!/bin/sh\n{script}\n")
+    path.chmod(0o755)
+    return str(path)
+
+
+def test_auto_compiles_where_a_compiler_works(fresh, needs_compiler, square):
+    """With a compiler `auto` compiles, and leaves one library in the cache."""
+    evaluate = batch_function(square)
+    assert isinstance(evaluate, CompiledFunction)
+    assert works(evaluate)
+    assert [path.suffix for path in fresh.iterdir()] == [".so"]
+
+
+def test_a_library_is_built_once(fresh, needs_compiler, square, monkeypatch):
+    """A function compiled before is loaded from the cache, without a call of the compiler."""
+    batch_function(square, "compiled")
+    monkeypatch.setattr(compiled, "_compile", None)
+    assert works(batch_function(square, "compiled"))
+
+
+def test_without_a_compiler_auto_is_vectorised(fresh, square, monkeypatch):
+    """Without a compiler on the path `auto` is vectorised, and `compiled` says what is missing."""
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("CC", raising=False)
+    evaluate = batch_function(square)
+    assert isinstance(evaluate, VectorisedFunction)
+    assert works(evaluate)
+    with pytest.raises(InputError, match=r"no C compiler .* on the path; install a C compiler or use vectorised"):
+        batch_function(square, "compiled")
+
+
+def test_a_failing_compiler_is_done_without(fresh, square, monkeypatch, tmp_path):
+    """A compiler that fails leaves nothing in the cache; `auto` is vectorised, `compiled` shows what it said."""
+    monkeypatch.setenv("CC", fake_compiler(tmp_path, "echo out of licences >&2; exit 3"))
+    assert isinstance(batch_function(square), VectorisedFunction)
+    with pytest.raises(InputError, match="out of licences"):
+        batch_function(square, "compiled")
+    assert list(fresh.iterdir()) == []
+
+
+def test_a_library_that_cannot_be_loaded_is_done_without(fresh, square, monkeypatch, tmp_path):
+    """A compiler whose library does not load is done without too."""
+    script = 'while [ "$1" != -o ]; do shift; done; echo rubbish > "$2"'
+    monkeypatch.setenv("CC", fake_compiler(tmp_path, f'[ "$1" = --version ] && exit 0\n{script}'))
+    assert isinstance(batch_function(square), VectorisedFunction)
+    with pytest.raises(InputError, match="cannot be loaded"):
+        batch_function(square, "compiled")
+
+
+def test_the_environment_chooses(fresh, square, monkeypatch):
+    """ROBOT_OED_BACKEND decides what `auto` means; a backend stated in the call wins over it."""
+    monkeypatch.setenv("ROBOT_OED_BACKEND", "vectorised")
+    assert isinstance(batch_function(square), VectorisedFunction)
+    monkeypatch.setenv("ROBOT_OED_BACKEND", "fortran")
+    with pytest.raises(InputError, match="backend 'fortran'; allowed: auto, compiled, vectorised"):
+        batch_function(square)
+    assert isinstance(batch_function(square, "vectorised"), VectorisedFunction)
+
+
+def test_an_unwritable_cache_is_done_without(fresh, needs_compiler, square, tmp_path):
+    """Where the cache folder cannot be made, libraries go to a private temporary folder."""
+    fresh.write_text("a file where the folder should be")
+    assert works(batch_function(square, "compiled"))
+    (private,) = tmp_path.glob("robot-oed-*")
+    assert private.stat().st_mode & 0o777 == 0o700
+    assert len(list(private.iterdir())) == 1
+
+
+def test_no_folder_at_all_is_done_without(fresh, needs_compiler, square, tmp_path):
+    """Where no folder can be written, `auto` is vectorised."""
+    fresh.write_text("")
+    (tmp_path / f"robot-oed-{os.getuid()}").write_text("")
+    assert isinstance(batch_function(square), VectorisedFunction)
+    with pytest.raises(InputError, match="no folder for compiled code"):
+        batch_function(square, "compiled")
+
+
+def test_a_folder_of_another_user_is_not_trusted(fresh, needs_compiler, square, monkeypatch):
+    """Libraries are not loaded from a folder that another user made."""
+    fresh.mkdir()
+    monkeypatch.setattr(os, "getuid", lambda: fresh.stat().st_uid + 1)
+    assert isinstance(batch_function(square), VectorisedFunction)
+
+
+def test_another_compiler_builds_anew(fresh, needs_compiler, square, monkeypatch, tmp_path):
+    """A library is used again only with the compiler, the processor and the source it was built for."""
+    batch_function(square, "compiled")
+    path, _ = compiled.compiler()
+    compiled.compiler.cache_clear()
+    monkeypatch.setenv("CC", fake_compiler(tmp_path, f'[ "$1" = --version ] && echo other || exec {path} "$@"'))
+    batch_function(square, "compiled")
+    assert len(list(fresh.glob("*.so"))) == 2
+
+
+def test_two_processes_may_build_the_same(fresh, needs_compiler, monkeypatch, tmp_path):
+    """Processes that build the same function at once all get a whole library."""
+    path, _ = compiled.compiler()
+    # Slow enough that the builds overlap.
+    monkeypatch.setenv("CC", fake_compiler(tmp_path, f'[ "$1" = --version ] || sleep 0.5\nexec {path} "$@"'))
+    script = (
+        "import casadi, numpy as np; from robots.batch import batch_function; x = casadi.SX.sym('x');"
+        "f = batch_function(casadi.Function('f', [x], [x**2 + 1]), 'compiled'); print(f(np.full((5, 1), 3.0))[0].sum())"
+    )
+    command = [sys.executable, "-c", script]
+    processes = [subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    assert [process.communicate(timeout=60)[0].strip() for process in processes] == ["50.0", "50.0"]
+    assert [path.suffix for path in fresh.iterdir()] == [".so"]
