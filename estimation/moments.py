@@ -1,0 +1,87 @@
+"""Normal equations per joint: all that least squares needs of a log, however long it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Sums over samples, joint by joint.
+
+    Attributes:
+        gram: (n, p, p), Y_j' Y_j.
+        cross: (n, p), Y_j' tau_j.
+        square: (n,), tau_j' tau_j.
+        count: (n,), rows.
+    """
+
+    gram: Array
+    cross: Array
+    square: Array
+    count: Array
+
+    @staticmethod
+    def of(Y: Array, tau: Array, mask: Array) -> Moments:
+        """Sums the rows of Y (N, n, p) and tau (N, n) where the mask (N, n) is one."""
+        n, p = Y.shape[1:]
+        gram, cross = np.empty((n, p, p)), np.empty((n, p))
+        for joint in range(n):
+            rows = Y[:, joint] * mask[:, joint, None]
+            gram[joint] = rows.T @ rows
+            cross[joint] = rows.T @ tau[:, joint]
+        return Moments(gram, cross, (mask * tau**2).sum(axis=0), mask.sum(axis=0))
+
+    def __add__(self, other: Moments) -> Moments:
+        return Moments(
+            self.gram + other.gram, self.cross + other.cross, self.square + other.square, self.count + other.count
+        )
+
+    def __sub__(self, other: Moments) -> Moments:
+        return Moments(
+            self.gram - other.gram, self.cross - other.cross, self.square - other.square, self.count - other.count
+        )
+
+    def columns(self, chosen: NDArray[np.intp]) -> Moments:
+        """Keeps some of the p columns."""
+        return Moments(self.gram[:, chosen][:, :, chosen], self.cross[:, chosen], self.square, self.count)
+
+    def solve(self, weights: Array, ridge: float) -> Array:
+        """Solves for parameters (p,).
+
+        Args:
+            weights: of each joint's rows (n,).
+            ridge: added to the diagonal of the weighted Gram matrix once its columns have unit length.
+        """
+        scale, matrix = self._scaled(weights)
+        right = (weights @ self.cross) / scale
+        return cho_solve(cho_factor(matrix + ridge * np.eye(len(scale))), right) / scale
+
+    def inverse(self, weights: Array, ridge: float) -> Array:
+        """Inverts the weighted Gram matrix (p, p) with the ridge of `solve`."""
+        scale, matrix = self._scaled(weights)
+        inverse = cho_solve(cho_factor(matrix + ridge * np.eye(len(scale))), np.eye(len(scale)))
+        return inverse / scale[:, None] / scale
+
+    def _scaled(self, weights: Array) -> tuple[Array, Array]:
+        matrix = np.tensordot(weights, self.gram, axes=1)
+        scale = np.sqrt(np.diag(matrix))
+        scale = np.where(scale > 0, scale, 1.0)
+        return scale, matrix / scale[:, None] / scale
+
+    def residual(self, parameters: Array) -> Array:
+        """Sums each joint's squared residuals (n,)."""
+        quadratic = np.einsum("p,jpq,q->j", parameters, self.gram, parameters, optimize=True)
+        return np.maximum(self.square - 2 * self.cross @ parameters + quadratic, 0.0)
+
+    def level(self, parameters: Array) -> Array:
+        """Gives each joint's residual RMS (n,) [N m or N], floored where a fit is exact."""
+        rows = np.maximum(self.count, 1)
+        floor = 1e-6 * self.square / rows
+        return np.sqrt(np.maximum(self.residual(parameters) / rows, np.maximum(floor, np.finfo(float).tiny)))

@@ -1,0 +1,99 @@
+"""Uneven, repeated and quantised position samples, on a uniform grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from robots.common.errors import InputError
+
+Array = NDArray[np.float64]
+
+# A longer hold is a rest, or a crawl below the encoder's step, and no repeated message.
+LONGEST_HOLD = 3
+# A repeated value is stale when the arm has moved on by more than the encoder could hide.
+STALE_STEPS = 2.0
+# Relative jitter of the time stamps above which straight lines between samples would leave kinks.
+EVEN = 0.02
+
+
+@dataclass(frozen=True)
+class Resampled:
+    """Positions on a uniform grid.
+
+    Attributes:
+        t: times (M,) [s].
+        q: positions (M, n) [rad or m].
+        period: of the grid [s].
+        dropped: rows of the log that repeated an older position.
+        original: the log's own times (N,) [s].
+    """
+
+    t: Array
+    q: Array
+    period: float
+    dropped: int
+    original: Array
+
+
+def resample(t: Array, q: Array) -> Resampled:
+    """Puts positions on a grid of the median period.
+
+    Args:
+        t: increasing times (N,) [s].
+        q: positions (N, n) [rad or m].
+
+    Returns:
+        The grid; where time is even and no row is stale, the log itself.
+
+    Raises:
+        InputError: fewer than 20 distinct rows.
+    """
+    stale = stale_rows(t, q)
+    kept_t, kept_q = t[~stale], q[~stale]
+    if len(kept_t) < 20:
+        raise InputError(f"{len(kept_t)} rows", allowed="20 or more", remedy="record a longer log")
+    steps = np.diff(t)
+    period = float(np.median(steps))
+    grid = t[0] + period * np.arange(int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1)
+    if stale.any() or np.ptp(steps) > EVEN * period:
+        values = PchipInterpolator(kept_t, kept_q)(np.minimum(grid, kept_t[-1]))
+    else:
+        values = np.column_stack([np.interp(grid, kept_t, column) for column in kept_q.T])
+    return Resampled(grid, values, period, int(stale.sum()), t)
+
+
+def stale_rows(t: Array, q: Array) -> NDArray[np.bool_]:
+    """Finds rows that repeat the position of the row before although the arm has moved on.
+
+    A slow network delivers the same message twice; a filter would make a jerk of it. A row counts when all joints
+    repeat, for at most three rows, and some joint is more than two encoder steps off the line between the distinct
+    rows around.
+
+    Args:
+        t: times (N,) [s].
+        q: positions (N, n).
+
+    Returns:
+        (N,), True where the row is stale.
+    """
+    repeated = np.concatenate([[False], (np.diff(q, axis=0) == 0).all(axis=1)])
+    if not repeated.any():
+        return repeated
+    line = np.column_stack([np.interp(t, t[~repeated], column[~repeated]) for column in q.T])
+    off = (np.abs(q - line) > STALE_STEPS * np.maximum(_step(q), 1e-9)).any(axis=1)
+    # Length of the run of repeats that each row belongs to.
+    edges = np.flatnonzero(np.diff(repeated.astype(int), prepend=0, append=0))
+    length = np.zeros(len(t), dtype=int)
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        length[start:stop] = stop - start
+    return repeated & (length <= LONGEST_HOLD) & off
+
+
+def _step(q: Array) -> Array:
+    """The smallest change of each column (n,): the encoder's step, where one shows."""
+    steps = np.abs(np.diff(q, axis=0))
+    return np.where(steps > 0, steps, np.inf).min(axis=0)

@@ -1,0 +1,99 @@
+"""The colour of a residual: autoregressive models, freed of what the fit has eaten."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len
+from scipy.signal import lfilter
+
+Array = NDArray[np.float64]
+
+HIGHEST_ORDER = 40
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Each joint's noise as an autoregressive process, with innovations correlated across joints.
+
+    Attributes:
+        coefficients: per joint (p_j,): e_t = sum_k a_k e_(t-k) + epsilon_t.
+        covariance: of the innovations (n, n) [(N m)^2].
+    """
+
+    coefficients: tuple[Array, ...]
+    covariance: Array
+
+    def whitened(self, residual: Array) -> Array:
+        """Filters residuals (N, n) to their innovations."""
+        columns = [
+            lfilter(np.concatenate([[1.0], -a]), [1.0], residual[:, j]) for j, a in enumerate(self.coefficients)
+        ]
+        return np.stack(columns, axis=1)
+
+    def simulated(self, samples: int, rng: np.random.Generator, warm_up: int = 1500) -> Array:
+        """Draws noise (N, n)."""
+        root = np.linalg.cholesky(self.covariance)
+        innovations = rng.standard_normal((samples + warm_up, len(root))) @ root.T
+        columns = [
+            lfilter([1.0], np.concatenate([[1.0], -a]), innovations[:, j])[warm_up:]
+            for j, a in enumerate(self.coefficients)
+        ]
+        return np.stack(columns, axis=1)
+
+
+def autocovariance(series: Array, count: float, lags: int = HIGHEST_ORDER) -> Array:
+    """Sums products at lags 0..`lags` over `count` rows (lags + 1,); masked rows must be zero."""
+    length = next_fast_len(len(series) + lags + 1)
+    spectrum = np.fft.rfft(series, length)
+    return np.fft.irfft(np.abs(spectrum) ** 2, length)[: lags + 1] / max(count, 1.0)
+
+
+def fit_noise(residual: Array, counts: Array, covariances: Array) -> Noise:
+    """Fits one process per joint.
+
+    Args:
+        residual: (N, n), zero where masked.
+        counts: rows that are not masked (n,).
+        covariances: autocovariances (n, lags + 1) to fit, the residual's own or corrected ones.
+
+    Returns:
+        The noise, each order chosen by Akaike's criterion.
+    """
+    fits = [_levinson(covariance, count) for covariance, count in zip(covariances, counts, strict=True)]
+    noise = Noise(tuple(a for a, _ in fits), np.eye(len(fits)))
+    innovations = noise.whitened(residual)
+    covariance = innovations.T @ innovations / len(innovations)
+    diagonal = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
+    # Variances from the recursion count the rows that are there; correlations come from the innovations.
+    level = np.sqrt(np.array([variance for _, variance in fits]))
+    correlation = covariance / diagonal[:, None] / diagonal
+    correlation[np.diag_indices(len(fits))] = 1.0
+    return Noise(noise.coefficients, _positive(correlation * level[:, None] * level))
+
+
+def _positive(matrix: Array) -> Array:
+    """Lifts eigenvalues that rounding, or joints that mirror each other, made zero."""
+    values, vectors = np.linalg.eigh(matrix)
+    floor = 1e-10 * max(float(values[-1]), np.finfo(float).tiny)
+    return (vectors * np.maximum(values, floor)) @ vectors.T
+
+
+def _levinson(covariance: Array, count: float) -> tuple[Array, float]:
+    """Levinson-Durbin recursion, the order by N log(variance) + 2 order."""
+    variance = max(float(covariance[0]), np.finfo(float).tiny)
+    coefficients = np.zeros(0)
+    best = (count * np.log(variance), coefficients, variance)
+    for order in range(1, len(covariance)):
+        predicted = coefficients @ covariance[order - 1 : 0 : -1] if order > 1 else 0.0
+        reflection = (covariance[order] - predicted) / variance
+        if not abs(reflection) < 1:
+            break
+        coefficients = np.concatenate([coefficients - reflection * coefficients[::-1], [reflection]])
+        variance *= 1 - reflection**2
+        score = count * np.log(variance) + 2 * order
+        if score < best[0]:
+            best = (score, coefficients, variance)
+    return best[1], best[2]

@@ -1,0 +1,160 @@
+"""Covariance of least squares under coloured noise that is correlated across joints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from estimation.uncertainty.autoregressive import HIGHEST_ORDER, Noise, autocovariance, fit_noise
+
+Array = NDArray[np.float64]
+
+# Rows whose regressor is held at a time.
+CHUNK = 4096
+# Above so many rows the fit eats too little of the noise to matter.
+MOST_CORRECTED = 100_000
+DRAWS, ROUNDS = 8, 2
+
+
+@dataclass(frozen=True)
+class Part:
+    """One log of a fit.
+
+    Attributes:
+        rows: number of samples N.
+        regressor: (start, stop) -> Y (stop - start, n, p).
+        mask: (N, n).
+        residual: (N, n), as the fit left it.
+    """
+
+    rows: int
+    regressor: Callable[[int, int], Array]
+    mask: Array
+    residual: Array
+
+    def chunks(self) -> Iterator[slice]:
+        """Cuts the rows into pieces."""
+        for start in range(0, self.rows, CHUNK):
+            yield slice(start, min(start + CHUNK, self.rows))
+
+
+def covariance(parts: Sequence[Part], weights: Array, inverse: Array, seed: int = 0) -> Array:
+    """Estimates the covariance of weighted least squares.
+
+    The meat of the sandwich is Y'W Gamma W Y, Gamma the autocovariance of an autoregressive model of the residual, with
+    innovations correlated across joints. What the fit has taken out of the residual, most of it at low frequency, is
+    given back: noise drawn from the model goes through the same fit, and the model is corrected by what it loses there.
+    A second estimate from the products of innovations guards against noise that is stronger where the arm moves
+    faster; each parameter's larger standard error counts.
+
+    Args:
+        parts: the logs.
+        weights: of the joints' rows (n,).
+        inverse: of the weighted Gram matrix (p, p).
+        seed: of the drawn noise.
+
+    Returns:
+        The covariance (p, p).
+    """
+    plain = _noise(parts, np.zeros((len(weights), HIGHEST_ORDER + 1)))
+    noise = _corrected(parts, weights, inverse, plain, np.random.default_rng(seed))
+    model, robust = _meats(parts, weights, noise)
+    scale = float(np.mean(np.diag(noise.covariance) / np.diag(plain.covariance)))
+    first, second = inverse @ model @ inverse, scale * (inverse @ robust @ inverse)
+    errors = np.sqrt(np.diag(first))
+    safe = np.where(errors > 0, errors, 1.0)
+    factor = np.maximum(1.0, np.sqrt(np.maximum(np.diag(second), 0)) / safe)
+    return first * factor[:, None] * factor
+
+
+def white_noise_covariance(parts: Sequence[Part], weights: Array, inverse: Array) -> Array:
+    """Gives the textbook covariance (p, p), right only if the residual were white."""
+    count = sum(part.mask.sum(axis=0) for part in parts)
+    variance = sum((part.residual**2).sum(axis=0) for part in parts) / np.maximum(count, 1)
+    meat = np.zeros_like(inverse)
+    for part in parts:
+        for rows in part.chunks():
+            Y = part.regressor(rows.start, rows.stop) * (weights * np.sqrt(variance) * part.mask[rows])[:, :, None]
+            flat = Y.reshape(-1, Y.shape[2])
+            meat += flat.T @ flat
+    return inverse @ meat @ inverse
+
+
+def _noise(parts: Sequence[Part], correction: Array) -> Noise:
+    counts = sum(part.mask.sum(axis=0) for part in parts)
+    residual = np.concatenate([part.residual for part in parts])
+    own = np.stack([autocovariance(residual[:, j], counts[j]) for j in range(residual.shape[1])])
+    return fit_noise(residual, counts, own + correction)
+
+
+def _corrected(
+    parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, rng: np.random.Generator
+) -> Noise:
+    if sum(part.rows for part in parts) > MOST_CORRECTED:
+        return noise
+    for _ in range(ROUNDS):
+        noise = _noise(parts, _lost(parts, weights, inverse, noise, rng))
+    return noise
+
+
+def _lost(
+    parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, rng: np.random.Generator
+) -> Array:
+    """Autocovariance (n, lags + 1) that a fit takes out of noise of this model, by simulation."""
+    joints = len(weights)
+    counts = sum(part.mask.sum(axis=0) for part in parts)
+    drawn = [np.stack([noise.simulated(part.rows, rng) for _ in range(DRAWS)], axis=2) for part in parts]
+    cross = np.zeros((len(inverse), DRAWS))
+    for part, draws in zip(parts, drawn, strict=True):
+        for rows in part.chunks():
+            Y = part.regressor(rows.start, rows.stop)
+            weighted = draws[rows] * (part.mask[rows] * weights)[:, :, None]
+            cross += Y.reshape(-1, Y.shape[2]).T @ weighted.reshape(-1, DRAWS)
+    fitted = inverse @ cross
+    lost = np.zeros((joints, HIGHEST_ORDER + 1))
+    for part, draws in zip(parts, drawn, strict=True):
+        left = np.empty_like(draws)
+        for rows in part.chunks():
+            Y = part.regressor(rows.start, rows.stop)
+            left[rows] = draws[rows] - (Y.reshape(-1, Y.shape[2]) @ fitted).reshape(-1, joints, DRAWS)
+        for j in range(joints):
+            mask = part.mask[:, j]
+            for k in range(DRAWS):
+                before = autocovariance(draws[:, j, k] * mask, counts[j])
+                lost[j] += before - autocovariance(left[:, j, k] * mask, counts[j])
+    return lost / DRAWS
+
+
+def _meats(parts: Sequence[Part], weights: Array, noise: Noise) -> tuple[Array, Array]:
+    """The sandwich's meat from the model, and from the products of innovations (p, p)."""
+    root = np.linalg.cholesky(noise.covariance)
+    model = robust = np.zeros((0, 0))
+    for part in parts:
+        innovations = noise.whitened(part.residual)
+        states = [np.zeros((len(a), 0)) for a in noise.coefficients]
+        # Gamma = A^-1 C A^-T: the transposed inverse filter runs from the last row to the first.
+        for rows in reversed(list(part.chunks())):
+            Y = part.regressor(rows.start, rows.stop)
+            if not model.size:
+                model, robust = np.zeros((2, Y.shape[2], Y.shape[2]))
+            filtered = np.empty((Y.shape[1], Y.shape[0], Y.shape[2]))
+            scores = np.zeros((Y.shape[0], Y.shape[2]))
+            for j, a in enumerate(noise.coefficients):
+                if states[j].shape[1] == 0:
+                    states[j] = np.zeros((len(a), Y.shape[2]))
+                backward = (weights[j] * part.mask[rows, j, None] * Y[:, j])[::-1]
+                if len(a):
+                    result, states[j] = lfilter([1.0], np.concatenate([[1.0], -a]), backward, axis=0, zi=states[j])
+                else:
+                    result = backward
+                filtered[j] = result[::-1]
+                scores += filtered[j] * innovations[rows, j, None]
+            for k in range(len(root)):
+                mixed = np.tensordot(root[k:, k], filtered[k:], axes=1)
+                model = model + mixed.T @ mixed
+            robust = robust + scores.T @ scores
+    return model, robust
