@@ -1,0 +1,20 @@
+"""The command line: thin shells over the functions of the same names."""
+
+from __future__ import annotations
+
+import sys
+
+
+def main() -> None:
+    """Runs ``oed``. Exit codes: 0 done, 1 it could not be done, 2 bad input, 130 interrupted."""
+    from oed.cli.app import app
+    from robots.common.errors import OedError
+
+    try:
+        app()
+    except OedError as error:
+        print(f"oed: {error}", file=sys.stderr)
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        print("oed: interrupted; nothing was written", file=sys.stderr)
+        sys.exit(130)

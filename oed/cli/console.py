@@ -1,0 +1,51 @@
+"""What the command line shows: progress on a terminal, a summary or JSON at the end, one clear message on an error."""
+
+from __future__ import annotations
+
+import json
+import sys
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from robots.common.progress import SILENT, Progress
+
+
+@dataclass(frozen=True, kw_only=True)
+class Console:
+    """Where a command writes: results to standard output, everything else to standard error.
+
+    Attributes:
+        json: results as one JSON object.
+        quiet: no summary, no notes, no progress.
+    """
+
+    json: bool = False
+    quiet: bool = False
+
+    @contextmanager
+    def working(self) -> Iterator[Progress]:
+        """Gives a progress bar on a terminal, silence in a pipe; notes come out once each, without a traceback."""
+        with warnings.catch_warnings(record=False):
+            warnings.simplefilter("default")
+            warnings.showwarning = self._note  # type: ignore[assignment]
+            if self.quiet or self.json or not sys.stderr.isatty():
+                yield SILENT
+            else:
+                from oed.cli.progress import RichProgress
+
+                with RichProgress() as progress:
+                    yield progress
+
+    def _note(self, message: Warning | str, *_: object, **__: object) -> None:
+        if not self.quiet:
+            print(f"note: {message}", file=sys.stderr)
+
+    def result(self, summary: str, data: Mapping[str, Any]) -> None:
+        """Prints what came out: the summary for people or the data for machines."""
+        if self.json:
+            print(json.dumps(data, indent=2, allow_nan=False))
+        elif not self.quiet:
+            print(summary)

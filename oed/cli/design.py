@@ -1,0 +1,79 @@
+"""``oed design``: an optimal excitation experiment."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from oed.cli.console import Console
+from oed.cli.options import (
+    ForceOption,
+    JointsOption,
+    JsonOption,
+    LockOption,
+    PngOption,
+    QuietOption,
+    RobotOption,
+    SeedOption,
+    TipOption,
+    WorkersOption,
+    robot_from,
+)
+
+
+def design(
+    robot: RobotOption,
+    criterion: Annotated[str, typer.Option(help="cond, d (log det), a, e, or cond-d.")] = "cond",
+    friction: Annotated[str, typer.Option(help="The model to fit: polynomial or coulomb-viscous.")] = "polynomial",
+    offset: Annotated[bool, typer.Option("--offset", help="With a torque offset on each joint.")] = False,
+    harmonics: Annotated[int, typer.Option(help="Harmonics of the Fourier series.")] = 5,
+    base_frequency: Annotated[float, typer.Option(help="Frequency of the first harmonic [Hz].")] = 0.1,
+    periods: Annotated[int, typer.Option(help="Repetitions of the Fourier series.")] = 3,
+    strokes: Annotated[bool, typer.Option(help="One stroke a joint to its velocity bound, both ways.")] = True,
+    velocity_fraction: Annotated[float, typer.Option(help="Share of the velocity limits to use.")] = 1.0,
+    effort: Annotated[str, typer.Option(help="How long to search: quick, standard or thorough.")] = "standard",
+    time_limit: Annotated[
+        float | None, typer.Option(help="Stop searching after so many seconds and keep the best.", show_default=False)
+    ] = None,
+    seed: SeedOption = 0,
+    workers: WorkersOption = None,
+    out: Annotated[Path, typer.Option("--out", help="Folder for the results.")] = Path(),
+    tip: TipOption = None,
+    joints: JointsOption = None,
+    lock: LockOption = None,
+    png: PngOption = False,
+    force: ForceOption = False,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Designs an excitation experiment: trajectory.csv, design.json and report.html."""
+    console = Console(json=json, quiet=quiet)
+    with console.working() as progress:
+        from oed.experiments import design as run
+        from oed.reports import save_design_report
+        from robots.common.files import ResultFolder
+
+        with ResultFolder(out, force, names=["trajectory.csv", "design.json", "report.html"]) as folder:
+            result = run(
+                robot_from(robot, tip, joints, lock),
+                criterion=criterion,
+                friction=friction,
+                offset=offset,
+                harmonics=harmonics,
+                base_frequency=base_frequency,
+                periods=periods,
+                strokes=strokes,
+                velocity_fraction=velocity_fraction,
+                effort=effort,
+                time_limit=float("inf") if time_limit is None else time_limit,
+                seed=seed,
+                workers=workers,
+                progress=progress,
+            )
+            result.save(folder.path("trajectory.csv").parent)
+            save_design_report(result, folder, png=png)
+    data = result.to_dict()
+    del data["segments"], data["fourier"]
+    console.result(f"{result.summary()}\nwritten to {out.resolve()}", data)

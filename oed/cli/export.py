@@ -1,0 +1,41 @@
+"""``oed export``: a trajectory in the form that a controller reads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from oed.cli.console import Console
+from oed.cli.options import ForceOption, JsonOption, QuietOption
+
+
+def export(
+    trajectory: Annotated[Path, typer.Argument(help="A trajectory.csv.", show_default=False)],
+    to: Annotated[str, typer.Option("--to", help="The form: csv.")] = "csv",
+    out: Annotated[
+        Path | None, typer.Option("--out", help="The file; by default beside the trajectory.", show_default=False)
+    ] = None,
+    degrees: Annotated[bool, typer.Option("--degrees", help="Angles in degrees.")] = False,
+    positions_only: Annotated[bool, typer.Option("--positions-only", help="Only t and q1..qn.")] = False,
+    bare: Annotated[bool, typer.Option("--bare", help="Only a header line before the numbers.")] = False,
+    force: ForceOption = False,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Writes a trajectory for a controller."""
+    console = Console(json=json, quiet=quiet)
+    with console.working():
+        from oed.exports import FORMS, read_trajectory, write_trajectory
+        from robots.common.errors import InputError
+
+        if to not in FORMS:
+            raise InputError(f"--to {to}", allowed=", ".join(FORMS))
+        motion, metadata = read_trajectory(trajectory)
+        target = out or trajectory.with_name(f"{trajectory.stem}-export.csv")
+        write_trajectory(
+            target, motion, metadata, degrees=degrees, positions_only=positions_only, bare=bare, force=force
+        )
+    data = {"file": str(target), "form": to, "samples": len(motion), "joints": motion.n}
+    console.result(f"{len(motion)} samples of {motion.n} joints written to {target}", data)

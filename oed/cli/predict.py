@@ -1,0 +1,32 @@
+"""``oed predict``: the torques of a motion by an identified model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from oed.cli.console import Console
+from oed.cli.options import ForceOption, JsonOption, QuietOption
+
+
+def predict(
+    model: Annotated[Path, typer.Option("--model", help="A model.json, or its folder.", show_default=False)],
+    log: Annotated[Path, typer.Option("--log", help="A log of the motion.", show_default=False)],
+    out: Annotated[Path, typer.Option("--out", help="The table to write: t, tau1..taun.")] = Path("predicted.csv"),
+    force: ForceOption = False,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Predicts the torques of a log's motion, and their error where the log has torque."""
+    console = Console(json=json, quiet=quiet)
+    with console.working() as progress:
+        from estimation import load_model, predict as run, read_log
+
+        identified = load_model(model)
+        recorded = read_log(log, n=identified.robot.n, torque=False)
+        progress.start("predicting", None)
+        result = run(identified, recorded)
+        result.save(out, force=force)
+    console.result(f"{result.summary()}\nwritten to {out}", {"file": str(out), **result.to_dict()})

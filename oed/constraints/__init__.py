@@ -1,0 +1,33 @@
+"""Limits that hold at all times, also between the samples at which they are imposed."""
+
+from oed.constraints.between_samples import (
+    Extremes,
+    TrigonometricPolynomial,
+    certified_extremes,
+    exact_extremes,
+    overshoot_factor,
+    sampled_bounds,
+    series_extremes,
+    series_polynomials,
+    tightened_bounds,
+)
+from oed.constraints.kinematic import QUANTITIES, KinematicRows, kinematic_rows
+from oed.constraints.spline import hull_matrices, spline_extremes, spline_rows
+
+__all__ = [
+    "QUANTITIES",
+    "Extremes",
+    "KinematicRows",
+    "TrigonometricPolynomial",
+    "certified_extremes",
+    "exact_extremes",
+    "hull_matrices",
+    "kinematic_rows",
+    "overshoot_factor",
+    "sampled_bounds",
+    "series_extremes",
+    "series_polynomials",
+    "spline_extremes",
+    "spline_rows",
+    "tightened_bounds",
+]

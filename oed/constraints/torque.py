@@ -1,0 +1,86 @@
+"""Joint torque within its limit, by a torque model whose parameters are known to a margin."""
+
+from __future__ import annotations
+
+import casadi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from oed.constraints.pointwise import PointwiseLimit
+from robots.batch import batch_function
+from robots.common.errors import InfeasibleError, InputError
+from robots.regressor import TorqueModel
+
+Array = NDArray[np.float64]
+
+
+class TorqueLimit(PointwiseLimit):
+    """|tau_j(q, dq, ddq)| <= (1 - margin) limit_j on every joint that has a limit.
+
+    Args:
+        model: the torque model, smooth in velocity (a Coulomb column of tanh).
+        parameters: (p,), all finite.
+        limit: (n,) [N m or N], infinite where there is none.
+        margin: share of the limit kept for what the parameters are wrong by, 0 to below 1.
+
+    Raises:
+        InputError: parameters that are not finite, no joint with a limit, or a margin out of range.
+        InfeasibleError: a limit of zero.
+    """
+
+    name = "torque"
+
+    def __init__(self, model: TorqueModel, parameters: ArrayLike, limit: ArrayLike, *, margin: float = 0.1) -> None:
+        pi, bound = np.asarray(parameters, dtype=float), np.asarray(limit, dtype=float)
+        if not 0 <= margin < 1:
+            raise InputError(f"a torque margin of {margin}", allowed="0 to below 1")
+        if pi.shape != (model.size,) or not np.isfinite(pi).all():
+            raise InputError("the torque limit needs all nominal parameters", remedy="describe the robot's dynamics")
+        if (bound <= 0).any():
+            joint = int(np.argmax(bound <= 0)) + 1
+            raise InfeasibleError("its torque limit is zero: it cannot even hold itself", joint=joint)
+        limited = np.flatnonzero(np.isfinite(bound))
+        if not limited.size:
+            raise InputError("no joint has a torque limit")
+        self.model, self.parameters, self.margin = model, pi, margin
+        self.joints = tuple(int(j) + 1 for j in limited)
+        self.labels = tuple(f"torque of joint {joint}" for joint in self.joints)
+        self.lower, self.upper = -np.ones(len(limited)), np.ones(len(limited))
+        symbolic = model.symbolic()
+        symbols = [casadi.SX.sym(name, model.robot.n) for name in ("q", "dq", "ddq")]
+        torque = (symbolic(*symbols) @ casadi.SX(pi))[limited.tolist()] / casadi.SX((1 - margin) * bound[limited])
+        torque = casadi.densify(torque)
+        slope = casadi.densify(casadi.jacobian(torque, casadi.vertcat(*symbols)))
+        self._values = batch_function(casadi.Function("torque", symbols, [torque]))
+        self._jacobian = batch_function(casadi.Function("slope", symbols, [slope]))
+
+    def values(self, q: Array, dq: Array, ddq: Array) -> Array:
+        """Gives torque over the usable limit (M, R)."""
+        return self._values(q, dq, ddq)[0][:, :, 0]
+
+    def jacobian(self, q: Array, dq: Array, ddq: Array) -> Array:
+        """Gives its derivatives (M, R, 3 n)."""
+        return self._jacobian(q, dq, ddq)[0]
+
+    def check_holding(self, pose: ArrayLike) -> None:
+        """Checks that the joints can hold a pose (n,) at all.
+
+        Raises:
+            InfeasibleError: naming the joint, its holding torque, and the limit that would do.
+        """
+        q = np.atleast_2d(np.asarray(pose, dtype=float))
+        still = np.zeros_like(q)
+        values = self.values(q, still, still)[0]
+        worst = int(np.argmax(np.abs(values)))
+        if abs(values[worst]) > 1:
+            joint = self.joints[worst]
+            usable = (1 - self.margin) * float(self._limit(joint))
+            need = abs(values[worst]) * usable
+            raise InfeasibleError(
+                f"holding the pose takes {need:.4g}, more than the usable torque limit {usable:.4g}",
+                joint=joint,
+                allowed=f"a torque limit of {need / (1 - self.margin):.4g} or more",
+            )
+
+    def _limit(self, joint: int) -> float:
+        return float(self.model.robot.limits.torque[joint - 1])

@@ -1,0 +1,65 @@
+"""The information matrix of sampled motion, and its reverse mode."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.batch import batch_function
+from robots.regressor import TorqueModel
+
+Array = NDArray[np.float64]
+
+
+class Information:
+    """G = Y'Y over samples and joints, and exact gradients of functions of G by the motion.
+
+    The chain is regressor, Gram matrix, eigenvalues on the way there; on the way back dL/dY = 2 Y dL/dG goes through
+    the reverse mode of the symbolic regressor. No finite differences.
+
+    Args:
+        model: the torque model.
+        columns: indices of the m columns that will be fitted.
+    """
+
+    def __init__(self, model: TorqueModel, columns: Sequence[int]) -> None:
+        self.size = len(columns)
+        self._joints = model.robot.n
+        self._forward = batch_function(model.symbolic(columns))
+        self._reverse = batch_function(model.adjoint(columns))
+        self._motion: tuple[Array, Array, Array] | None = None
+        self._Y: Array | None = None
+
+    def gram(self, q: Array, dq: Array, ddq: Array) -> Array:
+        """Evaluates Y'Y (m, m) on samples (N, n), and remembers them for `pullback`."""
+        reusable = self._Y is not None and self._Y.shape[0] == q.shape[0]
+        out = (self._Y,) if reusable and self._Y is not None else None
+        (Y,) = self._forward(q, dq, ddq, out=out)
+        self._motion, self._Y = (q, dq, ddq), Y
+        rows = Y.reshape(-1, self.size)
+        return rows.T @ rows
+
+    def pullback(self, weights: Array) -> tuple[Array, Array, Array]:
+        """Turns dL/dG (m, m, symmetric) at the last `gram` into the gradients (N, n) of L by q, dq and ddq."""
+        assert self._motion is not None and self._Y is not None, "gram comes first"
+        samples = self._Y.shape[0]
+        adjoint = (self._Y.reshape(-1, self.size) @ (2 * weights)).reshape(samples, -1)
+        q, dq, ddq = self._reverse(*self._motion, adjoint)
+        shape = (samples, self._joints)
+        return q.reshape(shape), dq.reshape(shape), ddq.reshape(shape)
+
+
+def singular_values(model: TorqueModel, columns: Sequence[int], q: Array, dq: Array, ddq: Array) -> Array:
+    """Computes the singular values (m,) of Y on samples (N, n), ascending; in chunks, by a QR of what came before.
+
+    Squaring Y into Y'Y would lose those below 1e-8 of the largest.
+    """
+    size = len(columns)
+    triangle = np.zeros((0, size))
+    for start in range(0, len(q), 2000):
+        rows = slice(start, start + 2000)
+        Y = model.regressor(q[rows], dq[rows], ddq[rows], columns=columns).reshape(-1, size)
+        triangle = np.linalg.qr(np.vstack([triangle, Y]), mode="r")
+    return np.linalg.svd(triangle, compute_uv=False)[::-1]

@@ -1,0 +1,83 @@
+"""From the optimal series to a whole experiment: approach, excitation, one stroke a joint, moves, return."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from oed.retiming import plan_move
+from oed.trajectories import FourierSeries, PiecewisePolynomial, Segment, Sequence, velocity_reaching_stroke
+from robots.common.errors import InputError
+from robots.limits import Limits
+
+Array = NDArray[np.float64]
+
+
+def home_pose(limits: Limits) -> Array:
+    """Gives the pose (n,) where an experiment begins and ends: zero, or the middle of a range without zero."""
+    middle = (limits.lower + limits.upper) / 2
+    inside = (limits.lower <= 0) & (limits.upper >= 0)
+    return np.where(inside, 0.0, np.where(np.isfinite(middle), middle, 0.0))
+
+
+def assemble(
+    series: FourierSeries, limits: Limits, *, period: float, home: ArrayLike | None = None, strokes: bool = True
+) -> Sequence:
+    """Joins the parts of an excitation experiment; the robot rests at both ends.
+
+    Approach from the home pose, the periods of the series, then per joint a stroke there and back that reaches its
+    velocity bound both ways where its range allows (thesis eq. 81 to 83), jerk-limited moves in between, and back home.
+
+    Args:
+        series: the excitation; at rest at its ends.
+        limits: that all parts keep.
+        period: the controller's period [s].
+        home: pose (n,) where it begins and ends; by default `home_pose`.
+        strokes: with the strokes.
+
+    Returns:
+        The experiment.
+
+    Raises:
+        InputError: a period of the series that is no multiple of the controller's period, a home pose outside the
+            limits.
+        InfeasibleError: a limit of zero.
+    """
+    pose = home_pose(limits) if home is None else np.asarray(home, dtype=float)
+    if pose.shape != limits.lower.shape:
+        raise InputError(f"a home pose of shape {pose.shape}", allowed=f"{limits.lower.shape}")
+    outside = (pose < limits.lower) | (pose > limits.upper)
+    if outside.any():
+        joint = int(np.argmax(outside))
+        raise InputError(
+            f"the home pose {pose[joint]:g} lies outside the position limits",
+            joint=joint + 1,
+            allowed=f"{limits.lower[joint]:g} to {limits.upper[joint]:g}",
+        )
+    parts = [Segment(kind="fourier", trajectory=series)]
+    if strokes:
+        for joint in range(1, limits.n + 1):
+            stroke = velocity_reaching_stroke(limits, joint, pose, period=period)
+            parts.append(Segment(kind="sinusoid", trajectory=stroke, joint=joint))
+    segments: list[Segment] = []
+    here = pose
+    for number, part in enumerate(parts):
+        start, end = _ends(part)
+        segments += _move("move" if number else "approach", limits, here, start, period)
+        segments.append(part)
+        here = end
+    segments += _move("move", limits, here, pose, period)
+    return Sequence(segments=tuple(segments), period=period)
+
+
+def _ends(segment: Segment) -> tuple[Array, Array]:
+    q = segment.trajectory.sample(np.array([0.0, segment.trajectory.duration])).q
+    return q[0], q[1]
+
+
+def _move(kind: str, limits: Limits, start: Array, end: Array, period: float) -> list[Segment]:
+    planned = plan_move(limits, start, end, period=period)
+    if planned is None:
+        return []
+    pieces = PiecewisePolynomial(breakpoints=planned.breakpoints, coefficients=planned.coefficients)
+    return [Segment(kind=kind, trajectory=pieces)]

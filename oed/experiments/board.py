@@ -1,0 +1,72 @@
+"""How searches in other processes tell how far they are: one small file each, in a folder that goes away."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from robots.common.progress import Progress
+
+# Often enough for a bar that looks alive.
+INTERVAL = 0.25
+
+
+@dataclass(frozen=True)
+class Board:
+    """A folder that every process of this machine can reach, whatever executor runs it.
+
+    Attributes:
+        folder: holds one file a search: steps done, and the best value so far.
+    """
+
+    folder: Path
+
+    def teller(self, number: int) -> Callable[[int, float], None]:
+        """Gives the function that one search tells its steps and best value."""
+
+        def tell(done: int, best: float) -> None:
+            fresh = self.folder / f"{number}.new"
+            try:
+                fresh.write_text(f"{done} {best!r}", encoding="ascii")
+                os.replace(fresh, self.folder / str(number))
+            except OSError:
+                pass  # on another machine of a cluster: progress is then coarse, the result the same
+
+        return tell
+
+    def read(self) -> tuple[int, float]:
+        """Sums the steps, and finds the best value."""
+        done, best = 0, math.inf
+        for file in self.folder.iterdir():
+            if file.suffix != ".new":
+                steps, value = file.read_text(encoding="ascii").split()
+                done, best = done + int(steps), min(best, float(value))
+        return done, best
+
+    @staticmethod
+    @contextmanager
+    def watched(searches: int, steps: int, progress: Progress, task: str) -> Iterator[Board]:
+        """Opens a board and passes on what it says until the work is over."""
+        with tempfile.TemporaryDirectory(prefix="oed-") as folder:
+            board, over = Board(Path(folder)), threading.Event()
+            progress.start(task, float(searches * steps))
+
+            def watch() -> None:
+                while not over.wait(INTERVAL):
+                    done, best = board.read()
+                    progress.update(float(done), f"best {best:.4g}" if done else "compiling and screening")
+
+            thread = threading.Thread(target=watch, daemon=True)
+            thread.start()
+            try:
+                yield board
+            finally:
+                over.set()
+                thread.join()
+                progress.finish()

@@ -1,0 +1,225 @@
+"""The verb: designs an optimal excitation experiment."""
+
+from __future__ import annotations
+
+import time
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from oed.criteria import Criterion, criterion as choose_criterion
+from oed.experiments.assembly import assemble
+from oed.experiments.board import Board
+from oed.experiments.problem import FourierProblem
+from oed.experiments.result import Design, Outcome, design_model, measure, measured_margins
+from oed.experiments.search import EFFORTS, Effort, Found, Island
+from oed.experiments.solver import Ipopt
+from oed.retiming import finite_limits
+from oed.trajectories import FourierSeries, count_periods
+from robots.base_parameters import base_parameters
+from robots.common.errors import InfeasibleError, InputError
+from robots.common.parallel import parallel_map
+from robots.common.progress import SILENT, Progress
+from robots.limits import Limits
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+# The controller interpolates between the file's samples; a hair of every limit is left to it.
+RESERVE = 0.9995
+
+
+def design(
+    robot: Robot,
+    *,
+    criterion: str | Criterion = "cond",
+    friction: str = "polynomial",
+    offset: bool = False,
+    rotor: bool = True,
+    velocity_scale: float = 0.02,
+    harmonics: int = 5,
+    base_frequency: float = 0.1,
+    periods: int = 3,
+    strokes: bool = True,
+    home: ArrayLike | None = None,
+    velocity_fraction: float = 1.0,
+    effort: str | Effort = "standard",
+    time_limit: float = np.inf,
+    seed: int = 0,
+    solver: Ipopt | None = None,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> Design:
+    """Designs an excitation experiment that is optimal for the model which will be fitted.
+
+    A finite Fourier series per joint, at rest at both ends (thesis eq. 78 to 80), minimises the criterion of the base
+    regressor under the limits of position, velocity, acceleration and jerk, by IPOPT with exact derivatives from
+    screened starts and hops. One stroke per joint to its velocity bound (eq. 81 to 83) and jerk-limited moves complete it.
+
+    Args:
+        robot: the robot.
+        criterion: ``cond``, ``d``, ``a``, ``e``, ``cond-d``, or a criterion of one's own.
+        friction: ``polynomial`` or ``coulomb-viscous``, as it will be fitted.
+        offset: with torque offset columns.
+        rotor: with rotor inertia columns.
+        velocity_scale: of the Coulomb column tanh(dq / scale) [rad/s].
+        harmonics: of the series.
+        base_frequency: of the first harmonic [Hz].
+        periods: how often the series is repeated.
+        strokes: with the strokes to the velocity bounds.
+        home: pose (n,) at both ends [rad or m].
+        velocity_fraction: of the velocity limits that may be used.
+        effort: ``quick``, ``standard``, ``thorough``, or counts of one's own.
+        time_limit: for the search [s]; past it the best design so far is kept. Without it the same seed gives the same
+            design on a fast and on a slow machine.
+        seed: of everything random: the same seed gives the same design.
+        solver: settings of IPOPT.
+        workers: processes; as many as cores by default.
+        executor: runs the starts instead of processes of its own.
+        progress: is told how far it is.
+
+    Returns:
+        The design, checked by its own samples.
+
+    Raises:
+        InputError: options out of range, an unknown criterion.
+        InfeasibleError: a limit of zero, or no start that keeps the limits and excites all parameters.
+    """
+    chosen = choose_criterion(criterion)
+    _check(harmonics, base_frequency, periods, velocity_fraction, time_limit)
+    work = _effort(effort)
+    count_periods(1 / base_frequency, robot.period)
+    settings = {
+        "friction": friction,
+        "offset": offset,
+        "rotor": rotor,
+        "velocity_scale": velocity_scale,
+        "harmonics": harmonics,
+        "base_frequency": base_frequency,
+        "periods": periods,
+        "velocity_fraction": velocity_fraction,
+        "seed": seed,
+        "effort": asdict(work),
+        "time_limit": time_limit if np.isfinite(time_limit) else None,
+        "ipopt": asdict(solver or Ipopt()),
+    }
+    limits = usable_limits(robot.limits, velocity_fraction)
+    base = base_parameters(design_model(robot, settings))
+    problem = FourierProblem(
+        base=base, criterion=chosen, limits=limits, harmonics=harmonics, base_frequency=base_frequency
+    )
+    # The experiment's frame is laid out first: whatever is wrong with a limit or a pose shows before the long work.
+    rest = FourierSeries.from_coefficients(np.zeros((robot.n, 2 * harmonics + 1)), base_frequency)
+    rest = replace(rest, offsets=problem.centre)
+    assemble(rest, limits, period=robot.period, home=home, strokes=strokes)
+    problem.cost(np.zeros(problem.size))  # compiles, once for all processes
+    with Board.watched(work.islands, work.steps, progress or SILENT, f"designing for {robot.name}") as board:
+        tasks = [
+            _Task(
+                problem=problem,
+                effort=work,
+                solver=solver or Ipopt(),
+                seed=seed,
+                number=number,
+                time_limit=time_limit,
+                board=board,
+            )
+            for number in range(work.islands)
+        ]
+        results = parallel_map(_search, tasks, executor=executor, workers=workers)
+    best = min(results, key=lambda found: found.cost)
+    if not np.isfinite(best.cost):
+        raise InfeasibleError(
+            "no motion found that excites all parameters", remedy="allow more motion, or fit fewer parameters"
+        )
+    series = problem.series(best.z, periods)
+    sequence = assemble(series, limits, period=robot.period, home=home, strokes=strokes)
+    motion = sequence.motion()
+    design = Design(
+        robot=robot,
+        base=base,
+        criterion=chosen.name,
+        motion=motion,
+        segments=tuple(sequence.table()),
+        qualities=(),
+        margins=measured_margins(robot, motion, base),
+        islands=tuple(_outcome(found) for found in results),
+        settings=settings,
+        coefficients=series.coefficients,
+    )
+    parts = ["fourier", *(["sinusoid"] if strokes else [])]
+    qualities = (*(measure(part, base, design.part(part)) for part in parts), measure("whole", base, motion))
+    return replace(design, qualities=qualities)
+
+
+def usable_limits(limits: Limits, velocity_fraction: float = 1.0) -> Limits:
+    """Completes infinite acceleration and jerk limits, and keeps a reserve for what happens between the samples.
+
+    Raises:
+        InfeasibleError: a limit of zero.
+        InputError: a joint without a velocity limit.
+    """
+    scaled = finite_limits(limits).scaled(
+        velocity=RESERVE * velocity_fraction, acceleration=RESERVE, jerk=RESERVE, torque=1.0
+    )
+    ranges = limits.upper - limits.lower
+    narrower = np.where(np.isfinite(ranges), ranges, 0.0) * (1 - RESERVE) / 2
+    return replace(scaled, lower=scaled.lower + narrower, upper=scaled.upper - narrower)
+
+
+def _check(
+    harmonics: int, base_frequency: float, periods: int, velocity_fraction: float, time_limit: float
+) -> None:
+    for name, value, least in (("harmonics", harmonics, 2), ("periods", periods, 1)):
+        if value < least or value != int(value):
+            raise InputError(f"{name} is {value}", allowed=f"a whole number, at least {least}")
+    if not (np.isfinite(base_frequency) and base_frequency > 0):
+        raise InputError(f"the base frequency is {base_frequency} Hz", allowed="a positive number")
+    if not 0 < velocity_fraction <= 1:
+        raise InputError(f"the velocity fraction is {velocity_fraction}", allowed="above 0, up to 1")
+    if not time_limit > 0:
+        raise InputError(f"the time limit is {time_limit} s", allowed="a positive number")
+
+
+def _effort(choice: str | Effort) -> Effort:
+    if isinstance(choice, Effort):
+        return choice
+    if choice not in EFFORTS:
+        raise InputError(f"effort {choice!r}", allowed=", ".join(EFFORTS))
+    return EFFORTS[choice]
+
+
+def _outcome(found: Found) -> Outcome:
+    return Outcome(
+        island=found.number + 1,
+        initial=found.initial,
+        final=found.value,
+        iterations=found.iterations,
+        evaluations=found.evaluations,
+        status=found.status,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Task:
+    """All that an island needs, for another process."""
+
+    problem: FourierProblem
+    effort: Effort
+    solver: Ipopt
+    seed: int
+    number: int
+    time_limit: float
+    board: Board
+
+
+def _search(task: _Task) -> Found:
+    deadline = time.monotonic() + task.time_limit
+    tell = task.board.teller(task.number)
+    island = Island(
+        task.problem, task.effort, task.solver, task.seed, task.number, tell=tell, deadline=deadline
+    )
+    return island.search()

@@ -1,0 +1,139 @@
+"""The design problem: a criterion of the information matrix over Fourier coefficients, under kinematic limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oed.constraints import KinematicRows, kinematic_rows
+from oed.criteria import Criterion, Information
+from oed.trajectories import FourierSeries, Kinematics, fourier_basis, rest_basis
+from robots.base_parameters import BaseParameters
+from robots.limits import Limits
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FourierProblem:
+    """Minimise a criterion over the Fourier series that start and end at rest and keep the limits at all times.
+
+    The unknown z (n K,), K = 2 N - 1, scales the free coefficients of each joint (`rest_basis`) so that entries of
+    about one bring the joint to its limits.
+
+    Attributes:
+        base: the parameters that will be fitted (m columns).
+        criterion: what is minimised.
+        limits: of position, velocity, acceleration and jerk.
+        harmonics: N.
+        base_frequency: of the first harmonic [Hz].
+        samples: per period, at which the regressor is evaluated; they lie half a step off the start, for all joints
+            rest there and a row of zeros informs of nothing.
+        limit_samples: per period, at which the limits are imposed, tightened for what lies between.
+    """
+
+    base: BaseParameters
+    criterion: Criterion
+    limits: Limits
+    harmonics: int = 5
+    base_frequency: float = 0.1
+    samples: int = 104
+    limit_samples: int = 250
+
+    def __getstate__(self) -> dict[str, object]:
+        # What is derived, compiled code above all, is rebuilt in the process that needs it.
+        return {item.name: getattr(self, item.name) for item in fields(self)}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+
+    @property
+    def joints(self) -> int:
+        """n, the number of joints."""
+        return self.base.model.robot.n
+
+    @property
+    def size(self) -> int:
+        """n K, the number of unknowns."""
+        return self.joints * (2 * self.harmonics - 1)
+
+    @cached_property
+    def information(self) -> Information:
+        """The information matrix of sampled motion."""
+        return Information(self.base.model, self.base.independent)
+
+    @cached_property
+    def scale(self) -> Array:
+        """(n, K): free coefficients per unit of z, from the range and the velocity limit of each joint."""
+        ranges = (self.limits.upper - self.limits.lower) / 2
+        half = np.where(np.isfinite(ranges), ranges, np.pi)
+        velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, 1.0) / 2
+        rest = np.repeat(velocity[:, None], 2 * self.harmonics - 2, axis=1)
+        return np.column_stack([half, rest])
+
+    @cached_property
+    def centre(self) -> Array:
+        """(n,): the middle of each joint's range, zero where it has none."""
+        middle = (self.limits.lower + self.limits.upper) / 2
+        return np.where(np.isfinite(middle), middle, 0.0)
+
+    @cached_property
+    def _free(self) -> Array:
+        return rest_basis(self.harmonics, self.base_frequency)
+
+    def _bases(self, samples: int, offset: float) -> Kinematics:
+        t = (np.arange(samples) + offset) / (samples * self.base_frequency)
+        whole = fourier_basis(t, self.harmonics, self.base_frequency)
+        return Kinematics(*(matrix @ self._free for matrix in whole))
+
+    @cached_property
+    def _sampled(self) -> Kinematics:
+        return self._bases(self.samples, 0.5)
+
+    @cached_property
+    def rows(self) -> KinematicRows:
+        """The limits as rows in the free coefficients of each joint; kept there, they hold at all times."""
+        bases = self._bases(self.limit_samples, 0.0)
+        return kinematic_rows(bases, self.limits, degree=self.harmonics)
+
+    def free(self, z: Array) -> Array:
+        """Unscales z (n K,) to the free coefficients (n, K) of `rest_basis`."""
+        coefficients = z.reshape(self.joints, -1) * self.scale
+        coefficients[:, 0] += self.centre
+        return coefficients
+
+    def series(self, z: Array, periods: int = 1) -> FourierSeries:
+        """Builds the trajectory of z."""
+        return FourierSeries.from_coefficients(self.free(z) @ self._free.T, self.base_frequency, periods)
+
+    def gram(self, z: Array) -> Array:
+        """Evaluates the mean information matrix Y'Y / samples (m, m)."""
+        free = self.free(z).T
+        q, dq, ddq = (np.ascontiguousarray(basis @ free) for basis in self._sampled[:3])
+        return self.information.gram(q, dq, ddq) / self.samples
+
+    def pullback(self, weights: Array) -> Array:
+        """Turns dL/dG (m, m) at the last `gram` into dL/dz (n K,)."""
+        gradients = self.information.pullback(weights / self.samples)
+        total = sum(g.T @ basis for g, basis in zip(gradients, self._sampled[:3], strict=True))
+        return (total * self.scale).reshape(-1)
+
+    def surrogate(self, z: Array, sharpness: float) -> tuple[float, Array]:
+        """Evaluates the criterion's smooth stand-in and its exact gradient (n K,)."""
+        eigenvalues, vectors = np.linalg.eigh(self.gram(z))
+        value, slope = self.criterion.surrogate(eigenvalues, sharpness)
+        return value, self.pullback((vectors * slope) @ vectors.T)
+
+    def cost(self, z: Array) -> float:
+        """Evaluates the criterion itself on the samples, smaller being better."""
+        return self.criterion.cost(np.linalg.eigvalsh(self.gram(z)))
+
+    def shrunk(self, z: Array, fraction: float = 1.0) -> Array:
+        """Pulls each joint's motion towards the middle of its range until it keeps the limits."""
+        free = self.free(z)
+        excess = self.rows.excess(free).max(axis=1)  # (n,); -1 in the middle, 0 on a bound
+        factor = np.minimum(1.0, fraction / np.maximum(1.0 + excess, 1e-12))
+        return (z.reshape(self.joints, -1) * factor[:, None]).reshape(-1)

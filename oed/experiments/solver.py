@@ -1,0 +1,168 @@
+"""IPOPT on a design problem, with exact gradients and only those limit rows that matter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from oed.experiments.objective import Objective, Watch
+from oed.experiments.problem import FourierProblem
+from oed.experiments.working_set import WorkingSet
+
+Array = NDArray[np.float64]
+
+# By how much a row may be passed, as a share of its bound, before it is added; less than that is shrunk away.
+PASSED = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ipopt:
+    """Settings of the interior-point solver.
+
+    Attributes:
+        max_iter: iterations per stage of the criterion in the search.
+        finish_iter: iterations per stage of the finish.
+        tolerance: at which a stage ends.
+        history: of the limited-memory Hessian.
+        rounds: how often rows that a solution passes are added and the stage is solved again.
+    """
+
+    max_iter: int = 60
+    finish_iter: int = 150
+    tolerance: float = 1e-4
+    history: int = 10
+    rounds: int = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """One smooth stand-in of the criterion to be minimised.
+
+    Attributes:
+        sharpness: of the stand-in.
+        max_iter: iterations.
+        barrier: initial barrier parameter.
+    """
+
+    sharpness: float
+    max_iter: int
+    barrier: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solved:
+    """What one solution came to.
+
+    Attributes:
+        z: a feasible point (n K,).
+        iterations: of IPOPT, all stages together.
+        evaluations: of the criterion with its gradient.
+        status: IPOPT's last word.
+    """
+
+    z: Array
+    iterations: int
+    evaluations: int
+    status: str
+
+
+def minimise(
+    problem: FourierProblem,
+    start: Array,
+    stages: Sequence[Stage],
+    settings: Ipopt,
+    *,
+    tell: Callable[[], bool] = lambda: True,
+) -> Solved:
+    """Solves stages one after the other from a feasible start.
+
+    Args:
+        problem: the design problem.
+        start: z (n K,), within the limits.
+        stages: of the criterion, the smoothest first.
+        settings: of IPOPT.
+        tell: called after each iteration; returning False stops the solver, which keeps its last iterate.
+
+    Returns:
+        The last stage's solution, pulled within the limits where it passes a row that was left out.
+    """
+    objective, working = Objective(problem), WorkingSet(problem)
+    z, iterations, status, going = start, 0, "no iteration", True
+
+    def watch() -> bool:
+        nonlocal going
+        going = going and tell()
+        return going
+
+    for stage in stages:
+        objective.forget(stage.sharpness)
+        max_iter, barrier = stage.max_iter, stage.barrier
+        for _ in range(settings.rounds):
+            run = _Run(objective, working, settings, max_iter, barrier, watch)
+            z, count, status = run.solve(z)
+            iterations += count
+            if not going or not working.add_peaks(z, PASSED):
+                break
+            max_iter, barrier = max(10, max_iter // 2), barrier / 10
+        z = problem.shrunk(z)
+        if not going:
+            break
+    return Solved(z=z, iterations=iterations, evaluations=objective.evaluations, status=status)
+
+
+class _Run:
+    """One call of IPOPT on the rows of the moment."""
+
+    def __init__(
+        self,
+        objective: Objective,
+        working: WorkingSet,
+        settings: Ipopt,
+        max_iter: int,
+        barrier: float,
+        watch: Callable[[], bool],
+    ) -> None:
+        matrix, self._offset = working.matrix()
+        size = objective.problem.size
+        z = casadi.MX.sym("z", size)
+        # CasADi holds no reference to a callback: this object does.
+        self._watch = Watch(size, matrix.shape[0], watch)
+        ipopt = {
+            "print_level": 0,
+            "sb": "yes",
+            "hessian_approximation": "limited-memory",
+            "limited_memory_max_history": settings.history,
+            "limited_memory_initialization": "scalar2",
+            "mu_strategy": "monotone",
+            "mu_init": barrier,
+            "max_iter": max_iter,
+            "max_soc": 0,
+            "tol": settings.tolerance,
+            "jac_d_constant": "yes",
+            "nlp_scaling_method": "none",
+            "bound_relax_factor": 0.0,
+            "bound_push": 1e-6,
+            "bound_frac": 1e-6,
+            "slack_bound_push": 1e-6,
+            "slack_bound_frac": 1e-6,
+        }
+        options = {
+            "print_time": False,
+            "error_on_fail": False,
+            "calc_lam_p": False,
+            "calc_lam_x": False,
+            "iteration_callback": self._watch,
+            "ipopt": ipopt,
+        }
+        problem = {"x": z, "f": objective(z), "g": matrix @ z}
+        self._solver = casadi.nlpsol("design", "ipopt", problem, options)
+
+    def solve(self, z: Array) -> tuple[Array, int, str]:
+        """Returns the last iterate, the number of iterations and IPOPT's status."""
+        result = self._solver(x0=z, lbg=-1 - self._offset, ubg=1 - self._offset)
+        statistics = self._solver.stats()
+        return np.array(result["x"]).ravel(), int(statistics["iter_count"]), str(statistics["return_status"])

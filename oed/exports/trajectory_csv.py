@@ -1,0 +1,190 @@
+"""The trajectory file: an ECSV block, then t, positions, velocities and accelerations at the controller's period."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.common.errors import InputError
+from robots.common.files import write_atomic
+from robots.common.tables import Table, read_table, write_table
+from robots.signals import Motion
+
+Array = NDArray[np.float64]
+
+QUANTITIES = ("q", "dq", "ddq")
+UNITS = {"q": "rad", "dq": "rad/s", "ddq": "rad/s2"}
+_JOINT_COLUMN = re.compile(r"(q|dq|ddq)([1-9]\d*)")
+
+
+def write_trajectory(
+    path: str | PathLike[str],
+    motion: Motion,
+    metadata: Mapping[str, Any] | None = None,
+    *,
+    degrees: bool = False,
+    positions_only: bool = False,
+    bare: bool = False,
+    force: bool = False,
+) -> None:
+    """Writes a motion as t, q1..qn, dq1..dqn, ddq1..ddqn; numbers read back exactly.
+
+    Args:
+        path: the file, ending in .csv.
+        motion: uniform in time.
+        metadata: what else the block shall state, such as robot, criterion and tool version.
+        degrees: angles in degrees; the block says so, and `read_trajectory` turns them back.
+        positions_only: leave out velocities and accelerations.
+        bare: no block, just the header line.
+        force: overwrite an existing file.
+
+    Raises:
+        InputError: a motion with uneven steps, an existing file without force, or a path that cannot be written.
+    """
+    if motion.period is None:
+        raise InputError("the motion is not uniform in time", file=path, remedy="sample it at the controller's period")
+    columns: dict[str, Array] = {"t": motion.t}
+    units = {"t": "s"}
+    for quantity in QUANTITIES[:1] if positions_only else QUANTITIES:
+        values = getattr(motion, quantity)
+        values = np.rad2deg(values) if degrees else values
+        for joint in range(motion.n):
+            columns[f"{quantity}{joint + 1}"] = values[:, joint]
+            units[f"{quantity}{joint + 1}"] = UNITS[quantity].replace("rad", "deg") if degrees else UNITS[quantity]
+    if not bare:
+        stated = {"period": motion.period, **(metadata or {})}
+        write_table(path, columns, stated, units=units, force=force)
+        return
+    rows = np.column_stack(list(columns.values())).tolist()
+    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+    write_atomic(path, "\n".join(lines) + "\n", force=force)
+
+
+def read_trajectory(path: str | PathLike[str], *, n: int | None = None) -> tuple[Motion, dict[str, Any]]:
+    """Reads a trajectory file and checks that it can be followed.
+
+    Other columns than t, q, dq and ddq are ignored. Columns whose stated unit begins with "deg" become radians.
+
+    Args:
+        path: the file.
+        n: the number of joints it must have, if known.
+
+    Returns:
+        The motion in rad and s, and what the block states.
+
+    Raises:
+        InputError: a missing column, an empty cell or NaN, time that runs backward or unevenly, or velocities and
+            accelerations that are not the derivatives of the positions; with column and line of the file.
+    """
+    table = read_table(path, wanted=lambda name: name == "t" or _JOINT_COLUMN.fullmatch(name) is not None)
+    count = _count_joints(table, n)
+    t = _column(table, "t")
+    q, dq, ddq = (
+        np.column_stack([_angles(table, f"{quantity}{joint + 1}") for joint in range(count)]) for quantity in QUANTITIES
+    )
+    _check_time(t, table)
+    motion = Motion(t, q, dq, ddq)
+    _check_derivatives(motion, table)
+    return motion, dict(table.metadata)
+
+
+def _count_joints(table: Table, n: int | None) -> int:
+    found = [int(match[2]) for match in map(_JOINT_COLUMN.fullmatch, table.names) if match is not None]
+    count = n or max(found, default=0)
+    if count == 0:
+        raise InputError("no joint columns", file=table.path, allowed="t,q1..qn,dq1..dqn,ddq1..ddqn")
+    needed = ["t", *(f"{quantity}{joint}" for quantity in QUANTITIES for joint in range(1, count + 1))]
+    missing = [name for name in needed if name not in table.columns]
+    if missing:
+        raise InputError(
+            "the column is missing" + (f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""),
+            file=table.path,
+            column=missing[0],
+            allowed=f"t,q1..q{count},dq1..dq{count},ddq1..ddq{count}",
+            remedy="a file of positions only is for the controller; keep the full one",
+        )
+    if max(found) > count:
+        raise InputError(f"columns for {max(found)} joints", file=table.path, allowed=f"{count} joints")
+    return count
+
+
+def _column(table: Table, name: str) -> Array:
+    values = table.columns[name]
+    if table.is_text(name):
+        raise InputError(f"found {values[0]!r}", file=table.path, column=name, row=table.line(0), allowed="numbers")
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise InputError(
+            f"found {values[bad[0]]}",
+            file=table.path,
+            column=name,
+            row=table.line(int(bad[0])),
+            allowed="finite numbers in every row",
+        )
+    return values
+
+
+def _angles(table: Table, name: str) -> Array:
+    values = _column(table, name)
+    return np.deg2rad(values) if table.units.get(name, "").startswith("deg") else values
+
+
+def _check_time(t: Array, table: Table) -> None:
+    if t.size < 2:
+        raise InputError("one sample makes no trajectory", file=table.path, allowed="two rows or more")
+    steps = np.diff(t)
+    backward = np.flatnonzero(steps <= 0.0)
+    if backward.size:
+        row = int(backward[0]) + 1
+        raise InputError(
+            f"time does not advance: {t[row]:.9g} s after {t[row - 1]:.9g} s",
+            file=table.path,
+            column="t",
+            row=table.line(row),
+            allowed="increasing times",
+        )
+    period = (t[-1] - t[0]) / (t.size - 1)
+    # A file may state its times in whole microseconds.
+    uneven = np.flatnonzero(np.abs(steps - period) > 1e-6 + 1e-6 * period)
+    if uneven.size:
+        row = int(np.abs(steps - np.median(steps)).argmax()) + 1
+        raise InputError(
+            f"a step of {steps[row - 1]:.9g} s where the others are {np.median(steps):.9g} s",
+            file=table.path,
+            column="t",
+            row=table.line(row),
+            allowed="a uniform period",
+            remedy="sample it again at the controller's period",
+        )
+
+
+def _check_derivatives(motion: Motion, table: Table) -> None:
+    """Compares each step with the trapezoidal rule, whose error the change of the next derivative bounds."""
+    step = np.diff(motion.t)[:, None]
+    change = np.abs(np.diff(motion.ddq, axis=0))
+    # The acceleration may rise and fall again within a step: the steps around it tell how fast it can.
+    padded = np.pad(change, ((1, 1), (0, 0)), mode="edge")
+    change = np.maximum(change, np.maximum(padded[:-2], padded[2:]))
+    checks = (
+        # Allowances: acceleration may jump within a step; then 0.1 % of the speed and six decimals in the file.
+        ("dq", motion.q, motion.dq, step**2 * change + 1e-3 * step * np.abs(motion.dq).max(axis=0) + 1e-5),
+        ("ddq", motion.dq, motion.ddq, step * change + 1e-2 * step * np.abs(motion.ddq).max(axis=0) + 1e-4),
+    )
+    for name, integral, rate, allowance in checks:
+        error = np.abs(np.diff(integral, axis=0) - step * (rate[:-1] + rate[1:]) / 2.0)
+        bad = np.argwhere(error > allowance)
+        if bad.size:
+            row, joint = (int(index) for index in bad[0])
+            derived = (integral[row + 1, joint] - integral[row, joint]) / step[row, 0]
+            raise InputError(
+                f"found {rate[row + 1, joint]:.6g}, but {name[1:]}{joint + 1} changes at {derived:.6g} per second",
+                file=table.path,
+                column=f"{name}{joint + 1}",
+                row=table.line(row + 1),
+                allowed="the derivative (radians and seconds, or degrees if the block says so)",
+            )

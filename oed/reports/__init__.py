@@ -1,0 +1,51 @@
+"""Reports: pictures and pages from plain arrays, one HTML file each, readable without a network."""
+
+from __future__ import annotations
+
+from oed.reports.design_report import design_page, save_design_report
+from oed.reports.estimate_report import estimate_page, save_estimate_report
+from oed.reports.matplotlib_ import save_png, to_matplotlib
+from oed.reports.page import Fact, Footer, Page, Section, Table, render
+from oed.reports.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
+from oed.reports.pictures import Band, Line, Panel, Picture, Series, Span
+from oed.reports.plotly_ import to_plotly
+from oed.reports.retime_report import retime_page, save_retime_report
+from oed.reports.significant import percent, significant, significant_error, with_error
+from oed.reports.torque_pictures import residual_picture, torque_picture
+from oed.reports.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
+
+__all__ = [
+    "Band",
+    "Fact",
+    "Footer",
+    "Line",
+    "Page",
+    "Panel",
+    "Picture",
+    "Section",
+    "Series",
+    "Span",
+    "Table",
+    "design_page",
+    "error_bars_picture",
+    "estimate_page",
+    "friction_picture",
+    "margins_picture",
+    "parameter_picture",
+    "percent",
+    "render",
+    "residual_picture",
+    "retime_page",
+    "save_design_report",
+    "save_estimate_report",
+    "save_png",
+    "save_retime_report",
+    "significant",
+    "significant_error",
+    "spectrum_picture",
+    "to_matplotlib",
+    "to_plotly",
+    "torque_picture",
+    "trajectory_picture",
+    "with_error",
+]

@@ -1,0 +1,66 @@
+"""The page of a retimed experiment."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from oed.criteria import CRITERIA
+from oed.experiments import RetimedExperiment
+from oed.reports.design_report import margins_section, parameters_section, quality_section
+from oed.reports.page import Fact, Page, Section
+from oed.reports.saving import footer, save_page
+from oed.reports.trajectory_pictures import trajectory_picture
+from robots.common.files import ResultFolder
+from robots.signals import Motion
+
+
+def save_retime_report(result: RetimedExperiment, given: Motion, folder: ResultFolder, *, png: bool = False) -> None:
+    """Writes the page of a retimed experiment, and its pictures as PNG on request."""
+    save_page(retime_page(result, given), folder, png=png)
+
+
+def retime_page(result: RetimedExperiment, given: Motion) -> Page:
+    """Builds the page: what the new timing gained and what it cost."""
+    robot, retimed = result.robot, result.retimed
+    before, after = result.before.to_dict()["cond_Y"], result.after.to_dict()["cond_Y"]
+    name, joint, share = retimed.peak
+    pictures = tuple(
+        trajectory_picture(
+            motion.t,
+            motion.q,
+            motion.dq,
+            motion.ddq,
+            limits=robot.limits,
+            joint_names=robot.joint_names,
+            kinds=robot.chain.kinds,
+            name=stem,
+        )
+        for stem, motion in (("after", result.motion), ("before", given))
+    )
+    warnings = [] if result.success else ["The new timing passes a limit."]
+    if robot.assumed:
+        warnings.append(f"Assumed, with no source behind them: {', '.join(robot.assumed)}.")
+    return Page(
+        title="Retimed path",
+        subtitle=robot.title or robot.name,
+        verdict=(
+            f"{retimed.method} runs the path in {retimed.duration_after:.1f} s instead of {retimed.duration_before:.1f} s, "
+            f"using {100 * share:.1f} % of the {name} limit of joint {joint}."
+        ),
+        status="good" if result.success else "bad",
+        facts=(
+            Fact(label=f"{CRITERIA['cond']().label} before", value=before if before is not None else "not all excited"),
+            Fact(label="cond(Y) after", value=after if after is not None else "not all excited"),
+            Fact(label="Stops on the way", value=retimed.stops),
+            Fact(label="Path kept to", value=f"{retimed.deviation:.2g}", note="rad or m, in any joint"),
+        ),
+        warnings=tuple(warnings),
+        sections=(
+            Section(title="New motion", pictures=pictures[:1]),
+            quality_section((result.before, result.after)),
+            margins_section(tuple(m for m in result.margins if np.isfinite(m.limit)), robot.joint_names),
+            Section(title="Given motion", pictures=pictures[1:], folded=True),
+            parameters_section(result.base.names, result.base.formulas()),
+        ),
+        footer=footer(),
+    )

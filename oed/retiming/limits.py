@@ -1,0 +1,104 @@
+"""Finite limits for planners, where a robot's description is silent, and how much of them a motion uses."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.common.errors import InfeasibleError, InputError
+from robots.limits import Limits, finite_jerk
+from robots.signals import Motion
+
+Array = NDArray[np.float64]
+
+ACCELERATION_PER_VELOCITY = 4.0
+"""Default acceleration limit over the velocity limit [1/s]: full speed in a quarter of a second, as small arms do."""
+
+JERK_PER_ACCELERATION = 20.0
+"""Default jerk limit over the acceleration limit [1/s]: full acceleration within 50 ms."""
+
+
+def finite_limits(limits: Limits) -> Limits:
+    """Replaces infinite acceleration and jerk limits by cautious finite ones.
+
+    acceleration = 4/s velocity, jerk = 20/s acceleration; finite limits stay as they are.
+
+    Args:
+        limits: bounds of all joints.
+
+    Returns:
+        Bounds with finite velocity, acceleration and jerk.
+
+    Raises:
+        InputError: a joint without a velocity limit, for which no default can be safe.
+        InfeasibleError: a velocity, acceleration or jerk limit of zero.
+    """
+    for name in ("velocity", "acceleration", "jerk"):
+        stuck = getattr(limits, name) <= 0.0
+        if np.any(stuck):
+            raise InfeasibleError(
+                f"its {name} limit is zero: it cannot move",
+                joint=int(np.argmax(stuck)) + 1,
+                allowed=f"a {name} limit above zero",
+            )
+    if not np.all(np.isfinite(limits.velocity)):
+        raise InputError(
+            "has no velocity limit",
+            joint=int(np.argmin(np.isfinite(limits.velocity))) + 1,
+            remedy="state one in the robot file",
+        )
+    acceleration = np.where(
+        np.isfinite(limits.acceleration), limits.acceleration, ACCELERATION_PER_VELOCITY * limits.velocity
+    )
+    jerk = np.where(np.isfinite(limits.jerk), limits.jerk, JERK_PER_ACCELERATION * acceleration)
+    return dataclasses.replace(limits, acceleration=acceleration, jerk=jerk)
+
+
+def limit_usage(motion: Motion, limits: Limits, torque: Array | None = None) -> dict[str, Array]:
+    """Measures by a motion's own samples how much of each limit it uses.
+
+    The jerk is the difference of the acceleration from sample to sample.
+
+    Args:
+        motion: N samples of n joints.
+        limits: bounds; of an infinite one nothing is used.
+        torque: joint torques of the motion, (N, n) [N m], if they are limited.
+
+    Returns:
+        Peak over limit of velocity, acceleration, jerk and, if given, torque, (n,) each; 1 is at the limit.
+    """
+    peaks = {
+        "velocity": (np.abs(motion.dq).max(axis=0), limits.velocity),
+        "acceleration": (np.abs(motion.ddq).max(axis=0), limits.acceleration),
+    }
+    if len(motion) > 1:
+        peaks["jerk"] = (np.abs(finite_jerk(motion)[1]).max(axis=0), limits.jerk)
+    if torque is not None:
+        peaks["torque"] = (np.abs(torque).max(axis=0), limits.torque)
+    return {
+        name: np.divide(peak, limit, out=np.where(peak > 0.0, np.inf, 0.0), where=limit > 0.0)
+        for name, (peak, limit) in peaks.items()
+    }
+
+
+def require_inside(q: Array, limits: Limits, tolerance: float = 1e-9) -> None:
+    """Rejects positions outside the limits.
+
+    Args:
+        q: positions, (N, n) [rad].
+        limits: bounds of all joints.
+        tolerance: what counts as rounding [rad].
+
+    Raises:
+        InfeasibleError: naming the joint, its value and its range.
+    """
+    outside = (q < limits.lower - tolerance) | (q > limits.upper + tolerance)
+    if np.any(outside):
+        row, column = np.argwhere(outside)[0]
+        raise InfeasibleError(
+            f"its position {q[row, column]:.6g} rad lies outside its limits",
+            joint=int(column) + 1,
+            allowed=f"{limits.lower[column]:.6g} to {limits.upper[column]:.6g} rad",
+        )
