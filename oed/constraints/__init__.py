@@ -12,12 +12,16 @@ from oed.constraints.between_samples import (
     tightened_bounds,
 )
 from oed.constraints.kinematic import QUANTITIES, KinematicRows, kinematic_rows
+from oed.constraints.pointwise import PointwiseLimit
 from oed.constraints.spline import hull_matrices, spline_extremes, spline_rows
+from oed.constraints.torque import TorqueLimit
 
 __all__ = [
     "QUANTITIES",
     "Extremes",
     "KinematicRows",
+    "PointwiseLimit",
+    "TorqueLimit",
     "TrigonometricPolynomial",
     "certified_extremes",
     "exact_extremes",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,7 +44,7 @@ class TorqueLimit(PointwiseLimit):
         limited = np.flatnonzero(np.isfinite(bound))
         if not limited.size:
             raise InputError("no joint has a torque limit")
-        self.model, self.parameters, self.margin = model, pi, margin
+        self.model, self.parameters, self.margin, self._bound = model, pi, margin, bound
         self.joints = tuple(int(j) + 1 for j in limited)
         self.labels = tuple(f"torque of joint {joint}" for joint in self.joints)
         self.lower, self.upper = -np.ones(len(limited)), np.ones(len(limited))
@@ -53,6 +55,10 @@ class TorqueLimit(PointwiseLimit):
         slope = casadi.densify(casadi.jacobian(torque, casadi.vertcat(*symbols)))
         self._values = batch_function(casadi.Function("torque", symbols, [torque]))
         self._jacobian = batch_function(casadi.Function("slope", symbols, [slope]))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Compiled code does not cross process borders; it is found again in the cache.
+        return _rebuild, (self.model, self.parameters, self._bound, self.margin)
 
     def values(self, q: Array, dq: Array, ddq: Array) -> Array:
         """Gives torque over the usable limit (M, R)."""
@@ -74,7 +80,7 @@ class TorqueLimit(PointwiseLimit):
         worst = int(np.argmax(np.abs(values)))
         if abs(values[worst]) > 1:
             joint = self.joints[worst]
-            usable = (1 - self.margin) * float(self._limit(joint))
+            usable = (1 - self.margin) * float(self._bound[joint - 1])
             need = abs(values[worst]) * usable
             raise InfeasibleError(
                 f"holding the pose takes {need:.4g}, more than the usable torque limit {usable:.4g}",
@@ -82,5 +88,6 @@ class TorqueLimit(PointwiseLimit):
                 allowed=f"a torque limit of {need / (1 - self.margin):.4g} or more",
             )
 
-    def _limit(self, joint: int) -> float:
-        return float(self.model.robot.limits.torque[joint - 1])
+
+def _rebuild(model: TorqueModel, parameters: Array, limit: Array, margin: float) -> TorqueLimit:
+    return TorqueLimit(model, parameters, limit, margin=margin)

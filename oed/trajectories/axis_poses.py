@@ -21,10 +21,16 @@ POLISHED = 12
 """Scanned poses from which the solution is sought."""
 
 NEARNESS = 1e-3
-"""Weight of one radian from home against one radian of misalignment, while the search looks for its valley."""
+"""Weight of one radian from home against one radian of misalignment, in the scan."""
 
 SIDE = 1e-5
-"""The same at last: it keeps joints that do not matter at home, and costs its square of alignment."""
+"""The same from where the polish starts: joints that do not matter stay there, and alignment costs its square."""
+
+MOVED = np.deg2rad(1.0)
+"""Way from home that counts as moving a joint."""
+
+PROXIMAL = 0.01
+"""Extra weight of a joint's way for each joint after it: a wrist sweeps less room than a shoulder."""
 
 ALIGNED = 1e-6
 """Misalignment that makes no difference [rad]: a millionth of the weight is left to act on the joint."""
@@ -55,7 +61,8 @@ def vertical_axis_pose(
     The axis of a revolute joint is made vertical, either way up; that of a prismatic joint horizontal. Only the
     revolute joints before it turn its axis; all others stay at home. They are scanned in steps of 45 degrees about
     home, and the best poses polished by least squares on the exact kinematics. Of equally good ones that is taken
-    which moves the fewest joints, and moves them least. The same input gives the same pose.
+    which moves the fewest joints, moves them least, and rather the wrist than the shoulder. The same input gives the
+    same pose.
 
     Args:
         chain: the arm.
@@ -89,6 +96,7 @@ class _Search:
         self._chain, self._index, self._down, self._home = chain, index, down, home
         self._free = np.array([k for k in range(index) if chain.kinds[k] == "revolute"], dtype=np.int64)
         self._lower, self._upper = limits.lower[self._free], limits.upper[self._free]
+        self._weights = 1.0 + PROXIMAL * np.arange(chain.n - 1, -1, -1)
         self._linear = chain.kinds[index] == "prismatic"
 
     def best(self) -> AxisPose:
@@ -98,8 +106,8 @@ class _Search:
         poses = self._poses(np.array(candidates))
         angles = self._angles(poses)
         ways = np.abs(poses - self._home)
-        moved = (ways > ALIGNED).sum(axis=1)
-        first = int(np.lexsort((ways.sum(axis=1).round(6), moved, (angles / ALIGNED).round()))[0])
+        moved = (ways > MOVED).sum(axis=1)
+        first = int(np.lexsort(((ways @ self._weights).round(6), moved, (angles / ALIGNED).round()))[0])
         pose = poses[first]
         pose.setflags(write=False)
         return AxisPose(pose=pose, angle=float(angles[first]))
@@ -111,26 +119,16 @@ class _Search:
         ]
         grid = np.stack(np.meshgrid(*options, indexing="ij"), axis=-1).reshape(-1, self._free.size)
         ways = np.abs(grid - self._home[self._free])
-        costs = self._angles(self._poses(grid)) + NEARNESS * (ways.sum(axis=1) + (ways > 0.0).sum(axis=1))
+        far = ways @ self._weights[self._free] + (ways > 0.0).sum(axis=1)
+        costs = self._angles(self._poses(grid)) + NEARNESS * far
         return grid[np.argsort(costs.round(9), kind="stable")[:POLISHED]]
 
     def _polished(self, start: Array) -> Array:
         if self._angles(self._poses(start[None]))[0] < ALIGNED:
             return start
-        point = start
-        # A strong pull towards home ends at the near end of a valley, a weak one then reaches its floor.
-        for weight in (NEARNESS, SIDE):
-            point = least_squares(
-                self._residual,
-                point,
-                self._jacobian,
-                bounds=(self._lower, self._upper),
-                args=(weight,),
-                xtol=1e-15,
-                gtol=1e-15,
-                ftol=1e-15,
-            ).x
-        return point
+        box = (self._lower, self._upper)
+        tight = {"xtol": 1e-15, "gtol": 1e-15, "ftol": 1e-15}
+        return least_squares(self._residual, start, self._jacobian, bounds=box, args=(start,), **tight).x
 
     def _poses(self, free: Array) -> Array:
         poses = np.tile(self._home, (free.shape[0], 1))
@@ -148,16 +146,16 @@ class _Search:
         angle: Array = np.arctan2(along, across) if self._linear else np.arctan2(across, along)
         return angle
 
-    def _residual(self, free: Array, weight: float) -> Array:
+    def _residual(self, free: Array, start: Array) -> Array:
         axis = self._axes(self._poses(free[None])[0])[self._index]
         miss = np.atleast_1d(axis @ self._down) if self._linear else np.cross(axis, self._down)
-        return np.concatenate([miss, weight * (free - self._home[self._free])])
+        return np.concatenate([miss, SIDE * (free - start)])
 
-    def _jacobian(self, free: Array, weight: float) -> NDArray[np.float64]:
+    def _jacobian(self, free: Array, start: Array) -> NDArray[np.float64]:
         axes = self._axes(self._poses(free[None])[0])
         turned = np.cross(axes[self._free], axes[self._index])  # d axis / d q_k, (K, 3)
         miss = (turned @ self._down)[None] if self._linear else np.cross(turned, self._down).T
-        return np.vstack([miss, weight * np.eye(self._free.size)])
+        return np.vstack([miss, SIDE * np.eye(self._free.size)])
 
 
 def _home(limits: Limits) -> Array:

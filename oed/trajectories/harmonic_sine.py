@@ -218,9 +218,10 @@ def harmonic_sine_bounds(
             joint=joint + 1,
             allowed=f"between {limits.lower[joint]:.6g} and {limits.upper[joint]:.6g}",
         )
-    rates = (limits.velocity / reach, np.sqrt(limits.acceleration / reach), np.cbrt(limits.jerk / reach))
-    # An endless joint is bounded by its rates alone, at a vanishing frequency.
-    frequency = np.where(np.isfinite(reach), np.min(np.nan_to_num(rates, nan=0.0, posinf=np.inf), axis=0), 0.0)
+    # Without a range there is no largest amplitude, and no frequency for it.
+    finite = np.where(np.isfinite(reach), reach, 1.0)
+    rates = (limits.velocity / finite, np.sqrt(limits.acceleration / finite), np.cbrt(limits.jerk / finite))
+    frequency = np.where(np.isfinite(reach), np.min(rates, axis=0), 0.0)
     return HarmonicSineBounds(offsets=centre, amplitude=(1.0 - HAIR) * reach / len(factors), frequency=frequency)
 
 

@@ -42,7 +42,9 @@ def test_two_points_make_the_minimum_jerk_move():
 
 
 @settings(deadline=None)
-@given(degree=st.sampled_from([3, 5]), count=st.integers(2, 30), duration=st.floats(0.1, 100.0), seed=st.integers(0, 99))
+@given(
+    degree=st.sampled_from([3, 5]), count=st.integers(2, 30), duration=st.floats(0.1, 100.0), seed=st.integers(0, 99)
+)
 def test_it_rests_where_it_starts_and_ends(degree, count, duration, seed):
     """It starts at the first control point and ends at the last, both at rest, also a moment inside."""
     points = np.random.default_rng(seed).normal(size=(2, count))

@@ -53,7 +53,7 @@ def _harmonic_sine(n: int = 3) -> HarmonicSine:
 def _fourier_polynomial(n: int = 3) -> FourierPolynomial:
     # The duration is no multiple of the base period.
     rows = np.random.default_rng(3).normal(size=(n, 12))
-    return FourierPolynomial.from_coefficients(rows, 0.5, 3.3)
+    return FourierPolynomial.from_coefficients(rows, 0.5, 3.2)
 
 
 def _quintic_spline(n: int = 3) -> BSpline:
@@ -89,11 +89,13 @@ def _sinusoid(n: int = 3) -> Sinusoid:
 
 
 def _polynomial(n: int = 3) -> PiecewisePolynomial:
-    # Half a unit of jerk up, then down: the joints move by 0, s, -2 s and so on.
-    shape = np.array([[0.0, 0.0, 0.0, 1.0], [0.001, 0.03, 0.3, -2.0], [0.007, 0.03, -0.3, 1.0]])
-    factors = np.arange(n) * (-2.0) ** np.arange(n)
+    # Jerk up, down, down and up: the joints move from rest to rest by 0, s, -2 s and so on.
+    shape = np.array(
+        [[0.0, 0.0, 0.0, 1.0], [0.001, 0.03, 0.3, -1.0], [0.006, 0.06, 0.0, -1.0], [0.011, 0.03, -0.3, 1.0]]
+    )
+    factors = np.arange(n) * (-2.0) ** np.arange(-1, n - 1)
     return PiecewisePolynomial(
-        breakpoints=np.array([0.0, 0.1, 0.2, 0.3]), coefficients=shape[:, None, :] * factors[:, None]
+        breakpoints=np.array([0.0, 0.1, 0.2, 0.3, 0.4]), coefficients=shape[:, None, :] * factors[:, None]
     )
 
 
@@ -175,6 +177,16 @@ def test_it_rests_at_both_ends(make):
     # Jerks of up to 1e4 rad/s^3 over the rounding of a time of 20 s.
     np.testing.assert_allclose(dq, 0.0, atol=1e-11)
     np.testing.assert_allclose(ddq, 0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("make", RESTING)
+def test_it_can_be_chained(make):
+    """It joins to a rest before and after it without a jump, in one experiment."""
+    trajectory = make()
+    ends = trajectory.sample([0.0, trajectory.duration]).q
+    parts = (PiecewisePolynomial.hold(ends[0], 0.4), trajectory, PiecewisePolynomial.hold(ends[1], 0.4))
+    chained = Sequence(segments=tuple(Segment(kind="move", trajectory=part) for part in parts), period=0.004)
+    assert chained.duration == pytest.approx(trajectory.duration + 0.8)
 
 
 @pytest.mark.parametrize("n", [1, 7])

@@ -71,7 +71,7 @@ def test_it_starts_with_the_speed_it_says_and_cannot_follow_a_rest():
 
 
 def test_the_bounds_are_thesis_equations_70_and_71():
-    """a <= q_max / N, and k w <= min(dq_max/q_max, sqrt(ddq_max/q_max), cbrt(dddq_max/q_max))."""
+    """A <= q_max / N, and k w <= min(dq_max/q_max, sqrt(ddq_max/q_max), cbrt(dddq_max/q_max))."""
     bounds = harmonic_sine_bounds(_two(velocity=3.0, acceleration=16.0, jerk=500.0), (1, 2, 4), [0.0, 0.0])
     np.testing.assert_allclose(bounds.amplitude, [1.0 / 3, 0.5 / 3], rtol=1e-8)
     np.testing.assert_allclose(bounds.frequency, [3.0, np.sqrt(32.0)], rtol=1e-12)
@@ -121,13 +121,10 @@ def test_one_harmonic_at_full_share_uses_the_whole_range():
 def test_what_cannot_move_is_told():
     """No range, no rate limit, a zero limit, shares out of range and bad multiples are errors that name the joint."""
     limits = _two(velocity=1.0)
-    endless = dataclasses.replace(limits, upper=np.array([2.0, np.inf]))
+    endless = dataclasses.replace(limits, lower=np.array([-1.0, -np.inf]), upper=np.array([2.0, np.inf]))
     with pytest.raises(InputError, match="joint 2: moves without position limits"):
-        HarmonicSine.within(endless, [[1.0], [1.0]], period=0.004, offsets=[0.0, 0.0], multiples=(1,)) if np.isinf(
-            harmonic_sine_bounds(endless, (1,), [0.0, 0.0]).amplitude[1]
-        ) else HarmonicSine.within(
-            dataclasses.replace(endless, lower=np.array([-1.0, -np.inf])), [[1.0], [1.0]], period=0.004
-        )
+        HarmonicSine.within(endless, [[1.0], [1.0]], period=0.004)
+    assert HarmonicSine.within(endless, [[1.0], [0.0]], period=0.004).bounds().q[1] == 0.0
     still = dataclasses.replace(limits, velocity=np.array([1.0, 0.0]))
     with pytest.raises(InfeasibleError, match="joint 2: its velocity limit is 0"):
         HarmonicSine.within(still, [[1.0], [1.0]], period=0.004)

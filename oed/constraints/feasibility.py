@@ -1,0 +1,200 @@
+"""Whether limits in space leave an experiment any room: told before a solver starts, with the number that would do."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares, minimize
+
+from oed.constraints.geometric import CollisionLimit, GeometricLimits
+from oed.constraints.tool import ToolBox
+from robots.collision import CollisionModel, Plane
+from robots.common.errors import InfeasibleError, InputError
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+SAMPLES = 4000  # poses from which the tool's nearest approach to its box is sought
+STARTS = 6
+REACHED = 1e-5  # of the box's distance, below which the tool is within it [m]
+
+
+def check_feasible(robot: Robot, limits: GeometricLimits, home: ArrayLike) -> None:
+    """Checks that a robot may stand at the pose where an experiment starts, and that its tool can enter its box.
+
+    Args:
+        robot: the robot.
+        limits: its limits in space.
+        home: the start pose (n,) [rad or m].
+
+    Raises:
+        InputError: a pose of the wrong shape.
+        InfeasibleError: the start pose is beyond a joint's limit, in collision, out of the tool box, on the wrong side
+            of a plane or too near to a singular pose; an obstacle is above the robot's foot; or no pose at all brings
+            the tool into its box. The message has the number that would do.
+    """
+    q = np.asarray(home, dtype=np.float64)
+    if q.shape != (robot.n,) or not np.isfinite(q).all():
+        raise InputError(f"a start pose {q}", allowed=f"{robot.n} finite numbers, one per joint")
+    _check_joints(robot, q)
+    for limit in limits.limits:
+        if isinstance(limit, ToolBox):
+            _check_box(robot, limit)
+        if isinstance(limit, CollisionLimit):
+            _check_feet(limit)
+    for limit in limits.limits:
+        if isinstance(limit, CollisionLimit):
+            _check_clearance(limit, limits, q)
+    values = limits.linearise(q)[0][0]
+    # Smooth clearances are a little small; whether bodies overlap was judged by the exact ones.
+    others = [row for row, (name, limit) in enumerate(_labelled(limits)) if not isinstance(limit, CollisionLimit)]
+    wrong = [row for row in others if values[row] < -REACHED]
+    if wrong:
+        row = min(wrong, key=lambda index: values[index])
+        unit = f" {limits.units[row]}" if limits.units[row] else ""
+        raise InfeasibleError(
+            f"the start pose breaks the limit {limits.labels[row]!r} by {-values[row]:.4g}{unit}",
+            allowed=f"a limit that is {-values[row]:.4g}{unit} wider, or another start pose",
+            remedy=_advice(nearest_feasible(limits, q)),
+        )
+
+
+def _labelled(limits: GeometricLimits) -> list[tuple[str, object]]:
+    return [(name, limit) for limit in limits.limits for name in limit.names(limits.robot)]
+
+
+def _check_joints(robot: Robot, q: Array) -> None:
+    lower, upper = robot.limits.lower, robot.limits.upper
+    outside = np.flatnonzero((q < lower) | (q > upper))
+    if len(outside):
+        joint = int(outside[0])
+        allowed = f"{lower[joint]:.4g} to {upper[joint]:.4g}"
+        raise InfeasibleError(f"the start pose has {q[joint]:.4g}", joint=joint + 1, allowed=allowed)
+
+
+def _check_feet(limit: CollisionLimit) -> None:
+    """A plane above the first joint cannot be kept in any pose."""
+    foot = limit.model.chain.joints[0].translation
+    for obstacle in limit.model.obstacles:
+        if isinstance(obstacle, Plane):
+            height = float(obstacle.normal @ foot)
+            if obstacle.offset > height:
+                raise InfeasibleError(
+                    f"{obstacle.name!r} at {obstacle.offset:.4g} m lies above the first joint, at {height:.4g} m",
+                    allowed=f"{height:.4g} m at the most, less the size of the first link",
+                    remedy="lengths are in the robot's base frame: a floor below its foot has a negative height",
+                )
+
+
+def _check_clearance(limit: CollisionLimit, limits: GeometricLimits, q: Array) -> None:
+    model: CollisionModel = limit.model
+    clearance = model.clearance(q)[0]
+    if not (clearance < limit.margin).any():
+        return
+    row = int(np.argmin(clearance))
+    lacking = limit.margin - clearance[row]
+    pair = model.pairs[row]
+    what = f"overlap by {-1e3 * clearance[row]:.1f} mm"
+    if clearance[row] >= 0.0:
+        what = f"are {1e3 * clearance[row]:.1f} mm apart, less than the margin of {1e3 * limit.margin:.1f} mm"
+    allowed = f"{1e3 * lacking:.1f} mm more between them"
+    if isinstance(pair.first, Plane):
+        allowed = f"a plane at {pair.first.offset - lacking:.4g} m or lower instead of {pair.first.offset:.4g} m"
+    problem = f"in the start pose {pair.first.name!r} and {pair.second.name!r} {what}"
+    raise InfeasibleError(problem, allowed=allowed, remedy=_advice(nearest_feasible(limits, q)))
+
+
+def _advice(pose: Array | None) -> str:
+    if pose is None:
+        return "no pose nearby keeps all limits: widen them"
+    return f"the nearest pose found that keeps all limits is {', '.join(f'{x:.3f}' for x in pose)} rad"
+
+
+def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0) -> Array | None:
+    """Looks for the pose nearest to a given one that keeps all limits.
+
+    Args:
+        limits: the limits.
+        home: (n,) [rad or m].
+        seed: of the further starts, for where bodies are deep in each other no direction leads out.
+
+    Returns:
+        The best of several local solutions (n,), or None where none was found.
+    """
+    robot, q = limits.robot, np.asarray(home, dtype=np.float64)
+    lower, upper = robot.limits.lower, robot.limits.upper
+    random = np.random.default_rng(seed)
+    starts = [q, *(np.clip(q + random.normal(scale=0.2 * (k + 1), size=robot.n), lower, upper) for k in range(STARTS))]
+    found: list[Array] = []
+    rows = {
+        "type": "ineq",
+        "fun": lambda x: limits.linearise(x)[0][0],
+        "jac": lambda x: limits.linearise(x)[1][0],
+    }
+    for start in starts:
+        result = minimize(
+            lambda x: (float((x - q) @ (x - q)), 2.0 * (x - q)),
+            start,
+            jac=True,
+            bounds=list(zip(lower, upper, strict=True)),
+            constraints=[rows],
+            method="SLSQP",
+            options={"maxiter": 60},
+        )
+        pose = np.clip(result.x, lower, upper)
+        if np.isfinite(pose).all() and limits.linearise(pose)[0].min() >= -REACHED:
+            found.append(pose)
+    return min(found, key=lambda pose: float(np.linalg.norm(pose - q))) if found else None
+
+
+def tool_approach(robot: Robot, box: ToolBox, *, seed: int = 0) -> tuple[float, Array]:
+    """Looks for how near the tool comes to its box, over random poses and then locally.
+
+    Args:
+        robot: the robot.
+        box: the tool box.
+        seed: of the poses.
+
+    Returns:
+        The smallest distance found [m], zero within the box, and the tool's place there (3,) [m].
+    """
+    lower, upper = robot.limits.lower, robot.limits.upper
+    span = np.where(np.isfinite(upper - lower), upper - lower, 2.0 * np.pi)
+    low = np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper - span, -np.pi))
+    q = low + span * np.random.default_rng(seed).uniform(0.001, 0.999, (SAMPLES, robot.n))
+    distances = np.linalg.norm(_beyond(robot, box, q), axis=1)
+    best = q[int(distances.argmin())]
+    if distances.min() > 0.0:
+        for start in q[np.argsort(distances)[:STARTS]]:
+            result = least_squares(lambda x: _beyond(robot, box, x[None])[0], start, bounds=(low, low + span))
+            if np.linalg.norm(_beyond(robot, box, result.x[None])) < np.linalg.norm(_beyond(robot, box, best[None])):
+                best = result.x
+    return float(np.linalg.norm(_beyond(robot, box, best[None]))), _tool(robot, box, best[None])[0]
+
+
+def _tool(robot: Robot, box: ToolBox, q: Array) -> Array:
+    flange = robot.chain.flange(q)
+    return np.asarray(flange[:, :3, 3] + flange[:, :3, :3] @ np.array(box.point))
+
+
+def _beyond(robot: Robot, box: ToolBox, q: Array) -> Array:
+    """How far outside of its box the tool is (N, 3) [m]."""
+    place = _tool(robot, box, q)
+    return place - np.clip(place, box.lower, box.upper)
+
+
+def _check_box(robot: Robot, box: ToolBox) -> None:
+    distance, place = tool_approach(robot, box)
+    if distance <= REACHED:
+        return
+    wider = []
+    for axis, x, low, high in zip("xyz", place, box.lower, box.upper, strict=True):
+        if x < low:
+            wider.append(f"{axis} from {x:.4g} m instead of {low:g} m")
+        elif x > high:
+            wider.append(f"{axis} up to {x:.4g} m instead of {high:g} m")
+    raise InfeasibleError(
+        f"the tool cannot enter its box: it comes no nearer than {distance:.4g} m, at"
+        f" ({', '.join(f'{x:.4g}' for x in place)}) m",
+        allowed=f"a box with {' and '.join(wider)}",
+    )
