@@ -33,6 +33,8 @@ def design(
     periods: Annotated[int, typer.Option(help="Repetitions of the Fourier series.")] = 3,
     strokes: Annotated[bool, typer.Option(help="One stroke a joint to its velocity bound, both ways.")] = True,
     velocity_fraction: Annotated[float, typer.Option(help="Share of the velocity limits to use.")] = 1.0,
+    torque: Annotated[bool, typer.Option(help="Keep the torque limits, by the robot's nominal dynamics.")] = True,
+    torque_margin: Annotated[float, typer.Option(help="Share of the torque limits kept in reserve.")] = 0.1,
     effort: Annotated[str, typer.Option(help="How long to search: quick, standard or thorough.")] = "standard",
     time_limit: Annotated[
         float | None, typer.Option(help="Stop searching after so many seconds and keep the best.", show_default=False)
@@ -66,6 +68,8 @@ def design(
                 periods=periods,
                 strokes=strokes,
                 velocity_fraction=velocity_fraction,
+                torque=torque,
+                torque_margin=torque_margin,
                 effort=effort,
                 time_limit=float("inf") if time_limit is None else time_limit,
                 seed=seed,

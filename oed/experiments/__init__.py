@@ -2,7 +2,8 @@
 
 from oed.experiments.designing import design, usable_limits
 from oed.experiments.result import Design, Outcome, Quality
-from oed.experiments.retimed import METHODS, RetimedExperiment, retime
+from oed.experiments.retimed import RetimedExperiment, TorqueUse
+from oed.experiments.retiming import METHODS, retime
 from oed.experiments.search import EFFORTS, Effort
 from oed.experiments.solver import Ipopt
 
@@ -15,6 +16,7 @@ __all__ = [
     "Outcome",
     "Quality",
     "RetimedExperiment",
+    "TorqueUse",
     "design",
     "retime",
     "usable_limits",

@@ -8,19 +8,22 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from threadpoolctl import threadpool_limits
 
-from oed.criteria import Criterion, criterion as choose_criterion
-from oed.experiments.assembly import assemble
+from oed.constraints import TorqueLimit
+from oed.criteria import Criterion
+from oed.criteria import criterion as choose_criterion
+from oed.experiments.assembly import assemble, home_pose
 from oed.experiments.board import Board
 from oed.experiments.problem import FourierProblem
 from oed.experiments.result import Design, Outcome, design_model, measure, measured_margins
 from oed.experiments.search import EFFORTS, Effort, Found, Island
 from oed.experiments.solver import Ipopt
 from oed.retiming import finite_limits
-from oed.trajectories import FourierSeries, count_periods
-from robots.base_parameters import base_parameters
+from oed.trajectories import FourierSeries, Sequence, count_periods
+from robots.base_parameters import BaseParameters, base_parameters
 from robots.common.errors import InfeasibleError, InputError
-from robots.common.parallel import parallel_map
+from robots.common.parallel import one_blas_thread, parallel_map
 from robots.common.progress import SILENT, Progress
 from robots.limits import Limits
 from robots.robot import Robot
@@ -29,8 +32,11 @@ Array = NDArray[np.float64]
 
 # The controller interpolates between the file's samples; a hair of every limit is left to it.
 RESERVE = 0.9995
+# Shares of the limits of speed and its derivatives that strokes and moves try in turn to keep the torque limits.
+SLOWER = (1.0, 0.85, 0.7, 0.5, 0.35, 0.2)
 
 
+@one_blas_thread()
 def design(
     robot: Robot,
     *,
@@ -45,6 +51,8 @@ def design(
     strokes: bool = True,
     home: ArrayLike | None = None,
     velocity_fraction: float = 1.0,
+    torque: bool = True,
+    torque_margin: float = 0.1,
     effort: str | Effort = "standard",
     time_limit: float = np.inf,
     seed: int = 0,
@@ -72,6 +80,8 @@ def design(
         strokes: with the strokes to the velocity bounds.
         home: pose (n,) at both ends [rad or m].
         velocity_fraction: of the velocity limits that may be used.
+        torque: keep the torque limits by the robot's nominal dynamics, where both are described.
+        torque_margin: share of the torque limits kept for what the nominal dynamics are wrong by.
         effort: ``quick``, ``standard``, ``thorough``, or counts of one's own.
         time_limit: for the search [s]; past it the best design so far is kept. Without it the same seed gives the same
             design on a fast and on a slow machine.
@@ -100,7 +110,10 @@ def design(
         "harmonics": harmonics,
         "base_frequency": base_frequency,
         "periods": periods,
+        "strokes": strokes,
+        "home": None if home is None else np.asarray(home, dtype=float).tolist(),
         "velocity_fraction": velocity_fraction,
+        "torque_margin": torque_margin if torque else None,
         "seed": seed,
         "effort": asdict(work),
         "time_limit": time_limit if np.isfinite(time_limit) else None,
@@ -108,15 +121,24 @@ def design(
     }
     limits = usable_limits(robot.limits, velocity_fraction)
     base = base_parameters(design_model(robot, settings))
+    rest_pose = home_pose(limits) if home is None else np.asarray(home, dtype=float)
+    torque_limit = _torque_limit(base, rest_pose, torque_margin) if torque else None
     problem = FourierProblem(
-        base=base, criterion=chosen, limits=limits, harmonics=harmonics, base_frequency=base_frequency
+        base=base,
+        criterion=chosen,
+        limits=limits,
+        harmonics=harmonics,
+        base_frequency=base_frequency,
+        pointwise=() if torque_limit is None else (torque_limit,),
+        home=rest_pose,
     )
     # The experiment's frame is laid out first: whatever is wrong with a limit or a pose shows before the long work.
     rest = FourierSeries.from_coefficients(np.zeros((robot.n, 2 * harmonics + 1)), base_frequency)
     rest = replace(rest, offsets=problem.centre)
-    assemble(rest, limits, period=robot.period, home=home, strokes=strokes)
+    assemble(rest, limits, period=robot.period, home=rest_pose, strokes=strokes)
     problem.cost(np.zeros(problem.size))  # compiles, once for all processes
     with Board.watched(work.islands, work.steps, progress or SILENT, f"designing for {robot.name}") as board:
+        deadline = time.time() + time_limit
         tasks = [
             _Task(
                 problem=problem,
@@ -124,7 +146,7 @@ def design(
                 solver=solver or Ipopt(),
                 seed=seed,
                 number=number,
-                time_limit=time_limit,
+                deadline=deadline,
                 board=board,
             )
             for number in range(work.islands)
@@ -136,12 +158,12 @@ def design(
             "no motion found that excites all parameters", remedy="allow more motion, or fit fewer parameters"
         )
     series = problem.series(best.z, periods)
-    sequence = assemble(series, limits, period=robot.period, home=home, strokes=strokes)
+    sequence = _within_torque(series, limits, rest_pose, robot.period, strokes, torque_limit)
     motion = sequence.motion()
     design = Design(
         robot=robot,
         base=base,
-        criterion=chosen.name,
+        criterion=chosen,
         motion=motion,
         segments=tuple(sequence.table()),
         qualities=(),
@@ -153,6 +175,39 @@ def design(
     parts = ["fourier", *(["sinusoid"] if strokes else [])]
     qualities = (*(measure(part, base, design.part(part)) for part in parts), measure("whole", base, motion))
     return replace(design, qualities=qualities)
+
+
+def _torque_limit(base: BaseParameters, home: Array, margin: float) -> TorqueLimit | None:
+    """The torque limit by the nominal dynamics, or nothing where one of the two is not described."""
+    model = base.model
+    bound = np.asarray(model.robot.limits.torque)
+    if not (np.isfinite(model.nominal).all() and np.isfinite(bound).any()):
+        return None
+    limit = TorqueLimit(model, model.nominal, bound, margin=margin)
+    limit.check_holding(home)
+    return limit
+
+
+def _within_torque(
+    series: FourierSeries,
+    limits: Limits,
+    home: Array,
+    period: float,
+    strokes: bool,
+    torque: TorqueLimit | None,
+) -> Sequence:
+    """Assembles the experiment, its strokes and moves slower until they keep the torque limits, too."""
+    for factor in SLOWER:
+        gentle = limits.scaled(velocity=factor, acceleration=factor, jerk=factor)
+        sequence = assemble(series, gentle, period=period, home=home, strokes=strokes)
+        if torque is None:
+            return sequence
+        motion = sequence.motion()
+        if torque.excess(motion.q, motion.dq, motion.ddq).max() <= 0:
+            return sequence
+    raise InfeasibleError(
+        "the moves pass a torque limit however slow they are", remedy="state another home pose, or leave out the strokes"
+    )
 
 
 def usable_limits(limits: Limits, velocity_fraction: float = 1.0) -> Limits:
@@ -212,14 +267,16 @@ class _Task:
     solver: Ipopt
     seed: int
     number: int
-    time_limit: float
+    deadline: float
     board: Board
 
 
+@one_blas_thread()
 def _search(task: _Task) -> Found:
-    deadline = time.monotonic() + task.time_limit
     tell = task.board.teller(task.number)
     island = Island(
-        task.problem, task.effort, task.solver, task.seed, task.number, tell=tell, deadline=deadline
+        task.problem, task.effort, task.solver, task.seed, task.number, tell=tell, deadline=task.deadline
     )
-    return island.search()
+    # Threads inside small matrix products cost more than they bring, and would make the result depend on their number.
+    with threadpool_limits(limits=1):
+        return island.search()

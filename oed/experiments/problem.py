@@ -8,10 +8,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.constraints import KinematicRows, kinematic_rows
+from oed.constraints import KinematicRows, PointwiseLimit, kinematic_rows
 from oed.criteria import Criterion, Information
 from oed.trajectories import FourierSeries, Kinematics, fourier_basis, rest_basis
 from robots.base_parameters import BaseParameters
+from robots.common.errors import InfeasibleError
 from robots.limits import Limits
 
 Array = NDArray[np.float64]
@@ -33,6 +34,8 @@ class FourierProblem:
         samples: per period, at which the regressor is evaluated; they lie half a step off the start, for all joints
             rest there and a row of zeros informs of nothing.
         limit_samples: per period, at which the limits are imposed, tightened for what lies between.
+        pointwise: limits that are not linear in the coefficients, such as torque; imposed at the same samples.
+        home: pose (n,) to shrink motions to where the middle of the ranges breaks a pointwise limit.
     """
 
     base: BaseParameters
@@ -42,6 +45,8 @@ class FourierProblem:
     base_frequency: float = 0.1
     samples: int = 104
     limit_samples: int = 250
+    pointwise: tuple[PointwiseLimit, ...] = ()
+    home: Array | None = None
 
     def __getstate__(self) -> dict[str, object]:
         # What is derived, compiled code above all, is rebuilt in the process that needs it.
@@ -57,7 +62,7 @@ class FourierProblem:
 
     @property
     def size(self) -> int:
-        """n K, the number of unknowns."""
+        """N K, the number of unknowns."""
         return self.joints * (2 * self.harmonics - 1)
 
     @cached_property
@@ -76,9 +81,32 @@ class FourierProblem:
 
     @cached_property
     def centre(self) -> Array:
-        """(n,): the middle of each joint's range, zero where it has none."""
+        """(n,): the pose of z = 0: the middle of each range (zero where it has none), or home if that keeps more limits.
+
+        Raises:
+            InfeasibleError: neither keeps the pointwise limits, so that no motion around it does.
+        """
         middle = (self.limits.lower + self.limits.upper) / 2
-        return np.where(np.isfinite(middle), middle, 0.0)
+        middle = np.where(np.isfinite(middle), middle, 0.0)
+        if not self.pointwise:
+            return middle
+        poses = [middle] if self.home is None else [middle, np.asarray(self.home, dtype=float)]
+        still = np.zeros((1, self.joints))
+        broken = []
+        for pose in poses:
+            excess = [limit.excess(pose[None], still, still)[0] for limit in self.pointwise]
+            if max(e.max() for e in excess) < 0:
+                return pose
+            broken = [
+                label
+                for limit, e in zip(self.pointwise, excess, strict=True)
+                for label, passed in zip(limit.labels, e >= 0, strict=True)
+                if passed
+            ]
+        raise InfeasibleError(
+            f"at rest in the home pose and in the middle of the ranges: {', '.join(broken[:3])} passes its limit",
+            remedy="state another home pose or other limits",
+        )
 
     @cached_property
     def _free(self) -> Array:
@@ -96,8 +124,7 @@ class FourierProblem:
     @cached_property
     def rows(self) -> KinematicRows:
         """The limits as rows in the free coefficients of each joint; kept there, they hold at all times."""
-        bases = self._bases(self.limit_samples, 0.0)
-        return kinematic_rows(bases, self.limits, degree=self.harmonics)
+        return kinematic_rows(self.limit_bases, self.limits, degree=self.harmonics)
 
     def free(self, z: Array) -> Array:
         """Unscales z (n K,) to the free coefficients (n, K) of `rest_basis`."""
@@ -131,9 +158,44 @@ class FourierProblem:
         """Evaluates the criterion itself on the samples, smaller being better."""
         return self.criterion.cost(np.linalg.eigvalsh(self.gram(z)))
 
+    @cached_property
+    def limit_bases(self) -> Kinematics:
+        """The basis matrices (M, K) at the limit samples."""
+        return self._bases(self.limit_samples, 0.0)
+
+    def pointwise_excess(self, z: Array) -> Array:
+        """How far the pointwise limits are passed at the limit samples (M, R), negative within."""
+        q, dq, ddq = self.limit_states(z)
+        return np.concatenate([limit.excess(q, dq, ddq) for limit in self.pointwise], axis=1)
+
+    def limit_states(self, z: Array) -> tuple[Array, Array, Array]:
+        """Position, velocity and acceleration (M, n) at the limit samples."""
+        free = self.free(z).T
+        q, dq, ddq = (np.ascontiguousarray(basis @ free) for basis in self.limit_bases[:3])
+        return q, dq, ddq
+
     def shrunk(self, z: Array, fraction: float = 1.0) -> Array:
-        """Pulls each joint's motion towards the middle of its range until it keeps the limits."""
-        free = self.free(z)
-        excess = self.rows.excess(free).max(axis=1)  # (n,); -1 in the middle, 0 on a bound
-        factor = np.minimum(1.0, fraction / np.maximum(1.0 + excess, 1e-12))
-        return (z.reshape(self.joints, -1) * factor[:, None]).reshape(-1)
+        """Pulls each joint's motion towards the pose of z = 0 until it keeps the limits.
+
+        Args:
+            z: any point (n K,).
+            fraction: of the way to the limits that it may go.
+        """
+        still = self.free(np.zeros(self.size))
+        direction = self.free(z) - still
+        values, slope = still @ self.rows.matrix.T, direction @ self.rows.matrix.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            room = np.where(slope > 0, self.rows.upper - values, self.rows.lower - values) / slope
+        room = np.where(slope == 0, np.inf, room).min(axis=1, initial=np.inf)  # (n,)
+        kept = (z.reshape(self.joints, -1) * np.minimum(1.0, fraction * room)[:, None]).reshape(-1)
+        return self._inside(kept) if self.pointwise else kept
+
+    def _inside(self, z: Array) -> Array:
+        """Shrinks all joints alike until the pointwise limits hold; z = 0 does."""
+        low, high = 0.0, 1.0
+        if self.pointwise_excess(z).max() <= 0:
+            return z
+        for _ in range(20):
+            middle = (low + high) / 2
+            low, high = (middle, high) if self.pointwise_excess(middle * z).max() <= 0 else (low, middle)
+        return low * z

@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.criteria import CRITERIA, singular_values
+from oed.criteria import Criterion, criterion as choose_criterion, singular_values
+from oed.experiments.views import motion_frame, plot_velocities
 from oed.exports import read_trajectory, write_trajectory
 from robots.base_parameters import BaseParameters, base_parameters
 from robots.common.errors import InputError
 from robots.common.files import existing_file, write_atomic
+from robots.common.parallel import one_blas_thread
 from robots.limits import Limits, Margin, symmetric_margins
 from robots.loading import load_robot
 from robots.regressor import TorqueModel, default_model
@@ -46,9 +48,9 @@ class Quality:
     samples: int
     singular_values: tuple[float, ...]
 
-    def value(self, criterion: str) -> float:
-        """Evaluates a criterion by its name."""
-        return CRITERIA[criterion]().value(np.square(self.singular_values))
+    def value(self, criterion: str | Criterion) -> float:
+        """Evaluates a criterion."""
+        return choose_criterion(criterion).value(np.square(self.singular_values))
 
     def to_dict(self) -> dict[str, Any]:
         """Lists cond(Y), log det(Y'Y) and the smallest singular value; null where Y has not full rank."""
@@ -83,6 +85,15 @@ class Outcome:
     evaluations: int
     status: str
 
+    def to_dict(self) -> dict[str, Any]:
+        """Writes plain data; null where a point did not excite all parameters."""
+        return {name: None if value != value else value for name, value in asdict(self).items()}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Outcome:
+        """Reads what `to_dict` wrote."""
+        return cls(**{name: np.nan if value is None else value for name, value in data.items()})
+
 
 @dataclass(frozen=True, kw_only=True)
 class Design:
@@ -91,7 +102,7 @@ class Design:
     Attributes:
         robot: what it is for.
         base: the parameters it determines.
-        criterion: the name of what was optimised.
+        criterion: what was optimised.
         motion: the whole experiment at the controller's period.
         segments: kind, start [s], end [s] and joint of each part.
         qualities: of the Fourier part, of the strokes and of the whole.
@@ -103,7 +114,7 @@ class Design:
 
     robot: Robot
     base: BaseParameters
-    criterion: str
+    criterion: Criterion
     motion: Motion
     segments: tuple[Mapping[str, Any], ...]
     qualities: tuple[Quality, ...]
@@ -165,7 +176,8 @@ class Design:
                     f"smallest singular value {values['smallest_singular_value_Y']:.3g}"
                 )
         finals = ", ".join(f"{island.initial:.4g} -> {island.final:.4g} ({island.status})" for island in self.islands)
-        lines.append(f"  {self.criterion} in {len(self.islands)} searches: {finals}")
+        searches = "1 search" if len(self.islands) == 1 else f"{len(self.islands)} searches"
+        lines.append(f"  {self.criterion.name} of one period, in {searches}: {finals}")
         tightest = min((m for m in self.margins if np.isfinite(m.limit)), key=lambda m: m.slack_fraction, default=None)
         if tightest is not None:
             lines.append(
@@ -181,27 +193,11 @@ class Design:
 
     def to_frame(self) -> pd.DataFrame:
         """Gives the experiment as a table: t, q1.., dq1.., ddq1.."""
-        import pandas as pd
-
-        motion, n = self.motion, self.robot.n
-        data = {"t": motion.t}
-        for name in ("q", "dq", "ddq"):
-            data |= {f"{name}{joint + 1}": getattr(motion, name)[:, joint] for joint in range(n)}
-        return pd.DataFrame(data)
+        return motion_frame(self.motion)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws the joint velocities as shares of their limits over time."""
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(9, 4)).subplots()
-        limit = np.asarray(self.robot.limits.velocity)
-        scale = np.where(np.isfinite(limit) & (limit > 0), limit, np.abs(self.motion.dq).max(axis=0))
-        for joint in range(self.robot.n):
-            axes.plot(self.motion.t, self.motion.dq[:, joint] / scale[joint], label=f"joint {joint + 1}")
-        axes.set_xlabel("time [s]")
-        axes.set_ylabel("velocity / limit")
-        axes.legend(loc="upper right", ncols=3)
-        return axes
+        return plot_velocities(self.motion, self.robot.limits, ax)
 
     def to_dict(self) -> dict[str, Any]:
         """Writes everything but the samples as plain data for `design.json`."""
@@ -220,8 +216,8 @@ class Design:
                 "scaling": "none",
                 "coulomb": f"tanh(dq / {self.settings['velocity_scale']:g})",
             },
-            "criterion": self.criterion,
-            "criterion_label": CRITERIA[self.criterion]().label,
+            "criterion": self.criterion.name,
+            "criterion_label": self.criterion.label,
             "quality": [quality.to_dict() for quality in self.qualities],
             "fourier": {
                 "base_frequency_hz": self.settings["base_frequency"],
@@ -233,7 +229,7 @@ class Design:
             "duration": self.motion.duration,
             "period": self.robot.period,
             "smallest_margins": [margin_data(margin) for margin in self.margins],
-            "solver": {"name": "ipopt", "islands": [asdict(island) for island in self.islands]},
+            "solver": {"name": "ipopt", "islands": [island.to_dict() for island in self.islands]},
             "seed": self.settings["seed"],
             "settings": dict(self.settings),
         }
@@ -248,12 +244,16 @@ class Design:
         write_atomic(Path(folder) / DESIGN, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
 
     @classmethod
-    def load(cls, folder: str | Path, robot: Robot | None = None) -> Design:
+    def load(
+        cls, folder: str | Path, robot: Robot | None = None, criterion: str | Criterion | None = None
+    ) -> Design:
         """Reads a saved design.
 
         Args:
             folder: where `save` wrote.
-            robot: the robot; by default the one that the design names.
+            robot: the robot; by default the one that the design names. One that was made in memory, or of chosen
+                joints of a URDF, must be given.
+            criterion: what was optimised, if it was a criterion of one's own.
 
         Raises:
             InputError: a missing or damaged file, or another robot than the design's.
@@ -277,12 +277,12 @@ class Design:
             return cls(
                 robot=known,
                 base=base,
-                criterion=data["criterion"],
+                criterion=choose_criterion(criterion or data["criterion"]),
                 motion=read_trajectory(Path(folder) / TRAJECTORY)[0],
                 segments=tuple(data["segments"]),
                 qualities=qualities,
                 margins=margins,
-                islands=tuple(Outcome(**island) for island in data["solver"]["islands"]),
+                islands=tuple(Outcome.from_dict(island) for island in data["solver"]["islands"]),
                 settings=settings,
                 coefficients=np.array(data["fourier"]["coefficients"]),
             )
@@ -294,7 +294,7 @@ class Design:
         return {
             "robot": self.robot.origin or self.robot.name,
             "period": self.robot.period,
-            "criterion": self.criterion,
+            "criterion": self.criterion.name,
             "tool": f"robot-oed {VERSION}",
         }
 
@@ -305,6 +305,7 @@ def design_model(robot: Robot, settings: Mapping[str, Any]) -> TorqueModel:
     return default_model(robot, **{key: settings[key] for key in keys})
 
 
+@one_blas_thread()
 def measure(part: str, base: BaseParameters, motion: Motion) -> Quality:
     """Computes the singular values of a motion's regressor."""
     values = singular_values(base.model, base.independent, motion.q, motion.dq, motion.ddq)

@@ -1,34 +1,57 @@
-"""The verb: runs an experiment's path at the speed that the limits allow, and says what that did to its criterion."""
+"""A retimed experiment: its motion, and what the new timing did to its criterion, its torques and its duration."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.criteria import CRITERIA, criterion as choose_criterion
-from oed.experiments.designing import usable_limits
-from oed.experiments.result import DESIGN, TRAJECTORY, Quality, design_model, margin_data, measure, measured_margins
-from oed.exports import write_trajectory
-from oed.retiming import Retimed, retime as retime_by_toppra, retime_with_stops
+from oed.criteria import CRITERIA
+from oed.experiments.result import DESIGN, TRAJECTORY, Quality, design_model, margin_data, measured_margins
+from oed.experiments.views import motion_frame, plot_velocities
+from oed.exports import read_trajectory, write_trajectory
+from oed.retiming import Retimed
 from robots.base_parameters import BaseParameters, base_parameters
 from robots.common.errors import InputError
-from robots.common.files import write_atomic
+from robots.common.files import existing_file, write_atomic
 from robots.limits import Margin
-from robots.regressor import TorqueModel
+from robots.loading import load_robot
 from robots.robot import Robot
 from robots.signals import Motion
-from robots.terms import FrictionPolynomial
 from robots.version import VERSION
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 
-METHODS = ("toppra", "ruckig")
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TorqueUse:
+    """What a timing asks of the motors, by the nominal model with friction.
+
+    Attributes:
+        peak: largest magnitude of each joint, (n,) [N m, or N of a prismatic joint].
+        rms: root of the mean square over the motion, (n,).
+    """
+
+    peak: Array
+    rms: Array
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes both as plain lists."""
+        return {"peak": self.peak.tolist(), "rms": self.rms.tolist()}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any] | None) -> TorqueUse | None:
+        """Reads what `to_dict` wrote; null is None."""
+        return None if data is None else cls(peak=np.array(data["peak"]), rms=np.array(data["rms"]))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +65,10 @@ class RetimedExperiment:
         before: the quality of the given timing.
         after: the quality of the new one.
         retimed: the new motion, and how much of each limit it uses.
+        torque_before: of the given timing; None where the robot's dynamics are not described.
+        torque_after: of the new one.
         margins: of the new motion to each limit.
+        settings: of the model.
     """
 
     robot: Robot
@@ -51,7 +77,10 @@ class RetimedExperiment:
     before: Quality
     after: Quality
     retimed: Retimed
+    torque_before: TorqueUse | None
+    torque_after: TorqueUse | None
     margins: tuple[Margin, ...]
+    settings: Mapping[str, Any]
 
     @property
     def motion(self) -> Motion:
@@ -67,7 +96,30 @@ class RetimedExperiment:
         """Says what changed."""
         label = CRITERIA[self.criterion]().label
         before, after = (_value(quality, self.criterion) for quality in (self.before, self.after))
-        return f"{self.retimed.summary()}\n  {label}: {before} before, {after} after"
+        lines = [self.retimed.summary(), f"  {label}: {before} before, {after} after"]
+        if self.torque_before is not None and self.torque_after is not None:
+            for name in ("peak", "rms"):
+                values = (_list(getattr(use, name)) for use in (self.torque_before, self.torque_after))
+                lines.append("  {} torque per joint: {} before, {} after".format(name.replace("rms", "RMS"), *values))
+        for margin in self.margins:
+            if margin.violated:
+                lines.append(
+                    f"  PASSED: {margin.quantity} of joint {margin.joint}: {margin.value:.4g} of {margin.limit:.4g} "
+                    f"at {margin.time:.3f} s"
+                )
+        return "\n".join(lines)
+
+    def check(self) -> tuple[Margin, ...]:
+        """Measures all margins anew from the samples of the motion."""
+        return measured_margins(self.robot, self.motion, self.base)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives the new motion as a table: t, q1.., dq1.., ddq1.."""
+        return motion_frame(self.motion)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the new joint velocities as shares of their limits over time."""
+        return plot_velocities(self.motion, self.robot.limits, ax)
 
     def to_dict(self) -> dict[str, Any]:
         """Writes everything but the samples as plain data for `design.json`."""
@@ -92,8 +144,14 @@ class RetimedExperiment:
                 "duration_after": self.retimed.duration_after,
                 "path_deviation": self.retimed.deviation,
                 "stops": self.retimed.stops,
-                "usage": {name: values.tolist() for name, values in self.retimed.usage.items()},
+                "verdict": self.retimed.verdict(),
+                "given_keeps_limits": self.retimed.given_keeps_limits,
+                "usage": _usage_data(self.retimed.usage),
+                "usage_before": _usage_data(self.retimed.usage_before),
+                "torque_before": None if self.torque_before is None else self.torque_before.to_dict(),
+                "torque_after": None if self.torque_after is None else self.torque_after.to_dict(),
             },
+            "settings": dict(self.settings),
             "segments": [{"kind": "move", "start": 0.0, "end": self.motion.duration, "joint": None}],
             "duration": self.motion.duration,
             "period": self.robot.period,
@@ -114,80 +172,86 @@ class RetimedExperiment:
         write_trajectory(Path(folder) / TRAJECTORY, self.motion, metadata, force=force)
         write_atomic(Path(folder) / DESIGN, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
 
+    @classmethod
+    def load(cls, folder: str | Path, robot: Robot | None = None) -> RetimedExperiment:
+        """Reads what `save` wrote.
 
-def retime(
-    robot: Robot,
-    motion: Motion,
-    *,
-    method: str = "toppra",
-    criterion: str = "cond",
-    friction: str = "polynomial",
-    velocity_scale: float = 0.02,
-    tolerance: float = 0.01,
-) -> RetimedExperiment:
-    """Runs through the path of a motion as fast as the robot's limits allow.
+        Args:
+            folder: where it is.
+            robot: the robot; by default the one that the file names.
 
-    Args:
-        robot: the robot; its torque limits count where its nominal dynamics are described.
-        motion: the path, with its present timing.
-        method: ``toppra`` follows the path; ``ruckig`` moves straight from vertex to vertex and stops at each.
-        criterion: what to compare, see `oed.design`.
-        friction: the model whose parameters are meant.
-        velocity_scale: of its Coulomb column.
-        tolerance: how far ruckig's polyline may leave the path [rad or m].
-
-    Returns:
-        The new motion and the criterion before and after.
-
-    Raises:
-        InputError: an unknown method or criterion, a motion of another number of joints.
-        InfeasibleError: a path that no timing makes possible.
-    """
-    if method not in METHODS:
-        raise InputError(f"retiming method {method!r}", allowed=", ".join(METHODS))
-    if motion.n != robot.n:
-        raise InputError(f"a motion of {motion.n} joints", allowed=f"{robot.n}, as {robot.name} has")
-    chosen = choose_criterion(criterion)
-    settings = {"friction": friction, "velocity_scale": velocity_scale, "rotor": True, "offset": False}
-    model = design_model(robot, settings)
-    base = base_parameters(model)
-    # The path may go to the ends of the ranges; speed and its derivatives keep the reserve of a design.
-    limits = replace(usable_limits(robot.limits), lower=robot.limits.lower, upper=robot.limits.upper)
-    if method == "toppra":
-        rigid, losses = _dynamics(model)
-        retimed = retime_by_toppra(motion, limits, period=robot.period, inverse_dynamics=rigid, friction=losses)
-    else:
-        retimed = retime_with_stops(motion, limits, period=robot.period, tolerance=tolerance)
-    return RetimedExperiment(
-        robot=robot,
-        base=base,
-        criterion=chosen.name,
-        before=measure("before", base, motion),
-        after=measure("after", base, retimed.motion),
-        retimed=retimed,
-        margins=measured_margins(robot, retimed.motion, base),
-    )
+        Raises:
+            InputError: a missing or damaged file, or another robot than the experiment's.
+        """
+        file = Path(folder) / DESIGN
+        try:
+            data = json.loads(existing_file(file).read_text(encoding="utf-8"))
+            known = robot or load_robot(data["robot"]["origin"])
+            base = base_parameters(design_model(known, data["settings"]))
+            if list(base.names) != data["model"]["columns"]:
+                raise InputError(f"the experiment is for {data['robot']['name']}, not for {known.name}", file=file)
+            before, after = (
+                Quality(part=q["part"], samples=q["samples"], singular_values=tuple(q["singular_values_Y"]))
+                for q in data["quality"]
+            )
+            told = data["retiming"]
+            usage = _usage(told["usage"])
+            if usage is None:
+                raise KeyError("usage")
+            return cls(
+                robot=known,
+                base=base,
+                criterion=data["criterion"],
+                before=before,
+                after=after,
+                retimed=Retimed(
+                    motion=read_trajectory(Path(folder) / TRAJECTORY)[0],
+                    method=told["method"],
+                    duration_before=told["duration_before"],
+                    duration_after=told["duration_after"],
+                    usage=usage,
+                    usage_before=_usage(told["usage_before"]),
+                    deviation=told["path_deviation"],
+                    stops=told["stops"],
+                ),
+                torque_before=TorqueUse.from_dict(told["torque_before"]),
+                torque_after=TorqueUse.from_dict(told["torque_after"]),
+                margins=tuple(
+                    Margin(**{**margin, "limit": np.inf if margin["limit"] is None else margin["limit"]})
+                    for margin in data["smallest_margins"]
+                ),
+                settings=data["settings"],
+            )
+        except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
+            raise InputError(f"is no retimed experiment: {type(error).__name__} {error}", file=file) from error
 
 
-def _dynamics(
-    model: TorqueModel,
-) -> tuple[Callable[[Array, Array, Array], Array] | None, Callable[[Array], Array] | None]:
-    """The nominal torque without and of friction, or nothing where the robot's description does not give it."""
-    robot = model.robot
-    if not (np.isfinite(model.nominal).all() and np.isfinite(robot.limits.torque).any()):
-        return None, None
-    smooth = TorqueModel(robot, tuple(term for term in model.terms if not isinstance(term, FrictionPolynomial)))
-    friction = TorqueModel(robot, tuple(term for term in model.terms if isinstance(term, FrictionPolynomial)))
-
-    def rigid(q: Array, dq: Array, ddq: Array) -> Array:
-        return smooth.torque(q, dq, ddq, smooth.nominal)
-
-    def losses(dq: Array) -> Array:
-        return friction.torque(np.zeros_like(dq), dq, np.zeros_like(dq), friction.nominal)
-
-    return rigid, losses
+def torque_use(base: BaseParameters, motion: Motion) -> TorqueUse | None:
+    """Measures the torques of a motion by the nominal model; None where that is not described."""
+    nominal = base.model.nominal
+    if not np.isfinite(nominal).all():
+        return None
+    tau = base.model.torque(motion.q, motion.dq, motion.ddq, nominal)
+    return TorqueUse(peak=np.abs(tau).max(axis=0), rms=np.sqrt(np.square(tau).mean(axis=0)))
 
 
 def _value(quality: Quality, criterion: str) -> str:
     known: Mapping[str, Any] = quality.to_dict()
     return f"{quality.value(criterion):.4g}" if known["cond_Y"] is not None else "not all parameters excited"
+
+
+def _list(values: Array) -> str:
+    return " ".join(f"{value:.4g}" for value in values)
+
+
+def _usage_data(usage: Mapping[str, Array] | None) -> dict[str, Any] | None:
+    """Plain lists; infinite use, of a limit of zero, is null."""
+    if usage is None:
+        return None
+    return {name: [float(v) if np.isfinite(v) else None for v in values] for name, values in usage.items()}
+
+
+def _usage(data: Mapping[str, Any] | None) -> dict[str, Array] | None:
+    if data is None:
+        return None
+    return {name: np.array([np.inf if v is None else v for v in values]) for name, values in data.items()}

@@ -102,7 +102,8 @@ class Island:
         seed: of the whole design.
         number: of this island.
         tell: told after each local solution how many are done, and the best value so far.
-        deadline: as `time.monotonic` counts, after which the best design so far is kept.
+        deadline: as `time.time` counts, for islands of one design may run one after the other or on several machines;
+            after it the best design so far is kept.
     """
 
     def __init__(
@@ -132,13 +133,16 @@ class Island:
         start = self._screen()
         initial = dense(self._problem, start)[1]
         pool = [(self._cost(start), start)]
-        pool += [self._solve(start if not number else self._screen(), [first]) for number in range(self._effort.starts)]
+        for number in range(self._effort.starts):
+            if self._in_time():
+                pool.append(self._solve(start if not number else self._screen(), [first]))
         pool.sort(key=_by_cost)
         # Several starts end in the same few valleys: only the best are worth sharpening.
         pool = [*pool[:1], *(self._solve(z, again) for _, z in pool[: max(1, self._effort.starts // 3)])]
         for hop in range(self._effort.hops):
             pool = sorted(pool, key=_by_cost)[:4]
-            pool.append(self._solve(self._thrown(pool, hop), again))
+            if self._in_time():
+                pool.append(self._solve(self._thrown(pool, hop), again))
         best = min(pool, key=_by_cost)[1]
         best = self._finish(best)
         cost, value = dense(self._problem, best)
@@ -154,13 +158,11 @@ class Island:
         )
 
     def _in_time(self) -> bool:
-        return time.monotonic() < self._deadline
+        return time.time() < self._deadline
 
     def _screen(self) -> Array:
         problem = self._problem
-        points = [
-            problem.shrunk(self._rng.normal(size=problem.size), 0.95) for _ in range(self._effort.screened)
-        ]
+        points = [problem.shrunk(self._rng.normal(size=problem.size), 0.95) for _ in range(self._effort.screened)]
         return min(points, key=problem.cost)
 
     def _thrown(self, pool: list[tuple[float, Array]], hop: int) -> Array:

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi
 import numpy as np
 from numpy.typing import NDArray
 
 from oed.experiments.objective import Objective, Watch
+from oed.experiments.pointwise_rows import PointwiseFunction, PointwiseRows
 from oed.experiments.problem import FourierProblem
+from oed.experiments.trap import Trap
 from oed.experiments.working_set import WorkingSet
 
 Array = NDArray[np.float64]
 
 # By how much a row may be passed, as a share of its bound, before it is added; less than that is shrunk away.
 PASSED = 1e-3
+# IPOPT's last word when CasADi noticed Ctrl-C before Python did.
+INTERRUPTED = ("User_Requested_Stop", "NonIpopt_Exception_Thrown")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +95,9 @@ def minimise(
     Returns:
         The last stage's solution, pulled within the limits where it passes a row that was left out.
     """
-    objective, working = Objective(problem), WorkingSet(problem)
+    trap = Trap()
+    objective, working, pointwise = Objective(problem, trap), WorkingSet(problem), PointwiseRows(problem)
+    pointwise.add_peaks(start, PASSED)
     z, iterations, status, going = start, 0, "no iteration", True
 
     def watch() -> bool:
@@ -102,10 +109,14 @@ def minimise(
         objective.forget(stage.sharpness)
         max_iter, barrier = stage.max_iter, stage.barrier
         for _ in range(settings.rounds):
-            run = _Run(objective, working, settings, max_iter, barrier, watch)
+            run = _Run(objective, working, pointwise, settings, max_iter, barrier, watch, trap)
             z, count, status = run.solve(z)
+            trap.release()
+            if status in INTERRUPTED and going:
+                raise KeyboardInterrupt
             iterations += count
-            if not going or not working.add_peaks(z, PASSED):
+            passed = [rows.add_peaks(z, PASSED) for rows in (working, pointwise)]
+            if not going or not any(passed):
                 break
             max_iter, barrier = max(10, max_iter // 2), barrier / 10
         z = problem.shrunk(z)
@@ -121,17 +132,23 @@ class _Run:
         self,
         objective: Objective,
         working: WorkingSet,
+        pointwise: PointwiseRows,
         settings: Ipopt,
         max_iter: int,
         barrier: float,
         watch: Callable[[], bool],
+        trap: Trap,
     ) -> None:
-        matrix, self._offset = working.matrix()
+        matrix, offset = working.matrix()
         size = objective.problem.size
         z = casadi.MX.sym("z", size)
+        lower, upper = pointwise.bounds()
+        self._lower, self._upper = np.concatenate([-1 - offset, lower]), np.concatenate([1 - offset, upper])
+        self._curved = PointwiseFunction(pointwise, size, trap) if pointwise.size else None
+        rows = matrix @ z if self._curved is None else casadi.vertcat(matrix @ z, self._curved(z))
         # CasADi holds no reference to a callback: this object does.
-        self._watch = Watch(size, matrix.shape[0], watch)
-        ipopt = {
+        self._watch = Watch(size, len(self._lower), watch, trap)
+        ipopt: dict[str, Any] = {
             "print_level": 0,
             "sb": "yes",
             "hessian_approximation": "limited-memory",
@@ -142,7 +159,7 @@ class _Run:
             "max_iter": max_iter,
             "max_soc": 0,
             "tol": settings.tolerance,
-            "jac_d_constant": "yes",
+            "jac_d_constant": "yes" if self._curved is None else "no",
             "nlp_scaling_method": "none",
             "bound_relax_factor": 0.0,
             "bound_push": 1e-6,
@@ -150,7 +167,7 @@ class _Run:
             "slack_bound_push": 1e-6,
             "slack_bound_frac": 1e-6,
         }
-        options = {
+        options: dict[str, Any] = {
             "print_time": False,
             "error_on_fail": False,
             "calc_lam_p": False,
@@ -158,11 +175,11 @@ class _Run:
             "iteration_callback": self._watch,
             "ipopt": ipopt,
         }
-        problem = {"x": z, "f": objective(z), "g": matrix @ z}
+        problem: dict[str, Any] = {"x": z, "f": objective(z), "g": rows}
         self._solver = casadi.nlpsol("design", "ipopt", problem, options)
 
     def solve(self, z: Array) -> tuple[Array, int, str]:
         """Returns the last iterate, the number of iterations and IPOPT's status."""
-        result = self._solver(x0=z, lbg=-1 - self._offset, ubg=1 - self._offset)
+        result = self._solver(x0=z, lbg=self._lower, ubg=self._upper)
         statistics = self._solver.stats()
         return np.array(result["x"]).ravel(), int(statistics["iter_count"]), str(statistics["return_status"])

@@ -1,0 +1,103 @@
+"""The verb: runs an experiment's path at the speed that the limits allow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oed.criteria import criterion as choose_criterion
+from oed.experiments.designing import usable_limits
+from oed.experiments.result import design_model, measure, measured_margins
+from oed.experiments.retimed import RetimedExperiment, torque_use
+from oed.retiming import retime as retime_by_toppra
+from oed.retiming import retime_with_stops
+from robots.base_parameters import base_parameters
+from robots.common.errors import InputError
+from robots.regressor import TorqueModel
+from robots.robot import Robot
+from robots.signals import Motion
+from robots.terms import FrictionPolynomial
+
+Array = NDArray[np.float64]
+
+METHODS = ("toppra", "ruckig")
+
+
+def retime(
+    robot: Robot,
+    motion: Motion,
+    *,
+    method: str = "toppra",
+    criterion: str = "cond",
+    friction: str = "polynomial",
+    velocity_scale: float = 0.02,
+    tolerance: float = 0.01,
+) -> RetimedExperiment:
+    """Runs through the path of a motion as fast as the robot's limits allow.
+
+    Args:
+        robot: the robot; its torque limits count where its nominal dynamics are described.
+        motion: the path, with its present timing.
+        method: ``toppra`` follows the path; ``ruckig`` moves straight from vertex to vertex and stops at each.
+        criterion: what to compare, see `oed.design`.
+        friction: the model whose parameters are meant.
+        velocity_scale: of its Coulomb column.
+        tolerance: how far ruckig's polyline may leave the path [rad or m].
+
+    Returns:
+        The new motion and the criterion before and after.
+
+    Raises:
+        InputError: an unknown method or criterion, a motion of another number of joints.
+        InfeasibleError: a path that no timing makes possible.
+    """
+    if method not in METHODS:
+        raise InputError(f"retiming method {method!r}", allowed=", ".join(METHODS))
+    if motion.n != robot.n:
+        raise InputError(f"a motion of {motion.n} joints", allowed=f"{robot.n}, as {robot.name} has")
+    chosen = choose_criterion(criterion)
+    settings: dict[str, Any] = {"friction": friction, "velocity_scale": velocity_scale, "rotor": True, "offset": False}
+    model = design_model(robot, settings)
+    base = base_parameters(model)
+    # The path may go to the ends of the ranges; speed and its derivatives keep the reserve of a design.
+    limits = replace(usable_limits(robot.limits), lower=robot.limits.lower, upper=robot.limits.upper)
+    if method == "toppra":
+        rigid, losses = _dynamics(model)
+        retimed = retime_by_toppra(motion, limits, period=robot.period, inverse_dynamics=rigid, friction=losses)
+    else:
+        retimed = retime_with_stops(motion, limits, period=robot.period, tolerance=tolerance)
+    return RetimedExperiment(
+        robot=robot,
+        base=base,
+        criterion=chosen.name,
+        before=measure("before", base, motion),
+        after=measure("after", base, retimed.motion),
+        retimed=retimed,
+        torque_before=torque_use(base, motion),
+        torque_after=torque_use(base, retimed.motion),
+        margins=measured_margins(robot, retimed.motion, base),
+        settings=settings,
+    )
+
+
+def _dynamics(
+    model: TorqueModel,
+) -> tuple[Callable[[Array, Array, Array], Array] | None, Callable[[Array], Array] | None]:
+    """The nominal torque without and of friction, or nothing where the robot's description does not give it."""
+    robot = model.robot
+    if not (np.isfinite(model.nominal).all() and np.isfinite(robot.limits.torque).any()):
+        return None, None
+    smooth = TorqueModel(robot, tuple(term for term in model.terms if not isinstance(term, FrictionPolynomial)))
+    friction = TorqueModel(robot, tuple(term for term in model.terms if isinstance(term, FrictionPolynomial)))
+
+    def rigid(q: Array, dq: Array, ddq: Array) -> Array:
+        return smooth.torque(q, dq, ddq, smooth.nominal)
+
+    def losses(dq: Array) -> Array:
+        return friction.torque(np.zeros_like(dq), dq, np.zeros_like(dq), friction.nominal)
+
+    return rigid, losses
