@@ -177,11 +177,11 @@ class CollisionDescription(Config):
     ``ignore`` lists pairs of link numbers, or of a link number and the name of an obstacle (the floor's is "floor").
     """
 
-    links: list[CapsuleDescription] = []
+    links: list[CapsuleDescription] = Field(default=[])
     floor: Finite | None = None
-    boxes: list[ObstacleBox] = []
-    capsules: list[ObstacleCapsule] = []
-    ignore: list[Annotated[list[int | str], Field(min_length=2, max_length=2)]] = []
+    boxes: list[ObstacleBox] = Field(default=[])
+    capsules: list[ObstacleCapsule] = Field(default=[])
+    ignore: list[Annotated[list[int | str], Field(min_length=2, max_length=2)]] = Field(default=[])
 
 
 class RobotDescription(Config):

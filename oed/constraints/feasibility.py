@@ -119,19 +119,18 @@ def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0)
         seed: of the further starts, for where bodies are deep in each other no direction leads out.
 
     Returns:
-        The best of several local solutions (n,), or None where none was found.
+        The first local solution found (n,), sought from that pose first; None where none was found.
     """
     robot, q = limits.robot, np.asarray(home, dtype=np.float64)
     lower, upper = robot.limits.lower, robot.limits.upper
-    random = np.random.default_rng(seed)
-    starts = [q, *(np.clip(q + random.normal(scale=0.2 * (k + 1), size=robot.n), lower, upper) for k in range(STARTS))]
-    found: list[Array] = []
-    rows = {
-        "type": "ineq",
-        "fun": lambda x: limits.linearise(x)[0][0],
-        "jac": lambda x: limits.linearise(x)[1][0],
-    }
-    for start in starts:
+    function, random = limits.symbolic(), np.random.default_rng(seed)
+
+    def values(x: Array) -> Array:
+        return np.array(function(x)[0])[:, 0]
+
+    rows = {"type": "ineq", "fun": values, "jac": lambda x: np.array(function(x)[1])}
+    for attempt in range(STARTS):
+        start = np.clip(q + random.normal(scale=0.2 * attempt, size=robot.n), lower, upper)
         result = minimize(
             lambda x: (float((x - q) @ (x - q)), 2.0 * (x - q)),
             start,
@@ -142,9 +141,9 @@ def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0)
             options={"maxiter": 60},
         )
         pose = np.clip(result.x, lower, upper)
-        if np.isfinite(pose).all() and limits.linearise(pose)[0].min() >= -REACHED:
-            found.append(pose)
-    return min(found, key=lambda pose: float(np.linalg.norm(pose - q))) if found else None
+        if np.isfinite(pose).all() and values(pose).min(initial=np.inf) >= -REACHED:
+            return np.asarray(pose)
+    return None
 
 
 def tool_approach(robot: Robot, box: ToolBox, *, seed: int = 0) -> tuple[float, Array]:
@@ -166,7 +165,9 @@ def tool_approach(robot: Robot, box: ToolBox, *, seed: int = 0) -> tuple[float, 
     best = q[int(distances.argmin())]
     if distances.min() > 0.0:
         for start in q[np.argsort(distances)[:STARTS]]:
-            result = least_squares(lambda x: _beyond(robot, box, x[None])[0], start, bounds=(low, low + span))
+            result = least_squares(
+                lambda x: _beyond(robot, box, x[None])[0], start, lambda x: _slope(robot, box, x), (low, low + span)
+            )
             if np.linalg.norm(_beyond(robot, box, result.x[None])) < np.linalg.norm(_beyond(robot, box, best[None])):
                 best = result.x
     return float(np.linalg.norm(_beyond(robot, box, best[None]))), _tool(robot, box, best[None])[0]
@@ -181,6 +182,17 @@ def _beyond(robot: Robot, box: ToolBox, q: Array) -> Array:
     """How far outside of its box the tool is (N, 3) [m]."""
     place = _tool(robot, box, q)
     return place - np.clip(place, box.lower, box.upper)
+
+
+def _slope(robot: Robot, box: ToolBox, q: Array) -> Array:
+    """Derivative of `_beyond` at one pose (3, n)."""
+    chain, place, poses = robot.chain, _tool(robot, box, q[None])[0], robot.chain.transforms(q)
+    columns = []
+    for joint, pose in zip(chain.joints, poses, strict=True):
+        axis = pose[:3, :3] @ joint.axis
+        columns.append(axis if joint.kind == "prismatic" else np.cross(axis, place - pose[:3, 3]))
+    outside = (place < box.lower) | (place > box.upper)
+    return np.column_stack(columns) * outside[:, None]
 
 
 def _check_box(robot: Robot, box: ToolBox) -> None:

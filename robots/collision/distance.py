@@ -24,6 +24,7 @@ leads out: the gradient vanishes there, deep inside of a collision.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi
@@ -33,7 +34,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Segment = tuple[casadi.SX, casadi.SX]  # its two ends, (3, 1) each, in the base frame [m]
 
-_HUGE = 1e30
+_TINY = 1e-30
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +85,7 @@ def segment_segment(a: Segment, b: Segment, spheres: tuple[bool, bool], rho: flo
     return _contact(f - gap if free else f, apart, point, rho)
 
 
-def segment_box(
-    x: Segment, sphere: bool, pose: Array, half: Array, rho: float, smoothing: float
-) -> Contact:
+def segment_box(x: Segment, sphere: bool, pose: Array, half: Array, rho: float, smoothing: float) -> Contact:
     """Clearance of a capsule from a box.
 
     The slope along the spine is piecewise linear and strictly increasing, with kinks where the spine passes the planes
@@ -105,17 +104,7 @@ def segment_box(
     gap = 0.0 if sphere else _gap(rho, smoothing)
     d, share, s = x1 - x0, 4.0 * gap, casadi.SX(0.5)
     if not sphere:
-        low, high, slope_low, slope_high = casadi.SX(0.0), casadi.SX(1.0), casadi.SX(-_HUGE), casadi.SX(_HUGE)
-        kinks = [_clip((sign * half[i] - x0[i]) / d[i]) for i in range(3) for sign in (-1.0, 1.0)]
-        for kink in (*kinks, casadi.SX(0.0), casadi.SX(1.0)):
-            slope = casadi.dot(_outside(x0 + kink * d, half), d) + share * (kink - 0.5)
-            below, above = slope <= 0.0, slope >= 0.0
-            low = casadi.fmax(low, casadi.if_else(below, kink, 0.0))
-            high = casadi.fmin(high, casadi.if_else(above, kink, 1.0))
-            slope_low = casadi.fmax(slope_low, casadi.if_else(below, slope, -_HUGE))
-            slope_high = casadi.fmin(slope_high, casadi.if_else(above, slope, _HUGE))
-        # The added number is for a root at a kink, where both slopes are zero and so is the interval.
-        s = low - (high - low) * slope_low / (slope_high - slope_low + 1.0 / _HUGE)
+        s = _root(lambda k: casadi.dot(_outside(x0 + k * d, half), d) + share * (k - 0.5), x0, d, half)
     apart = _outside(x0 + s * d, half)
     f = casadi.dot(apart, apart) + (share * (s - 0.5) ** 2 - gap if not sphere else 0.0)
     return _contact(f, turn @ apart, x[0] + s * (x[1] - x[0]), rho)
@@ -150,6 +139,26 @@ def _contact(x: casadi.SX, apart: casadi.SX, point: casadi.SX, rho: float) -> Co
     return Contact(root + (x - bounded) / (2.0 * root) - rho, apart / root, point)
 
 
+def _root(slope: Callable[[casadi.SX], casadi.SX], x0: casadi.SX, d: casadi.SX, half: Array) -> casadi.SX:
+    """Finds where an increasing slope, linear between the kinks, is zero in [0, 1], or the end that is nearer to it.
+
+    Every kink halves what is left of the interval; choosing is written as arithmetic, for compilers do that on whole
+    vectors.
+    """
+    low, high = casadi.SX(0.0), casadi.SX(1.0)
+    slope_low, slope_high = slope(low), slope(high)
+    for i in range(3):
+        for bound in (-half[i], half[i]):
+            kink = casadi.fmin(casadi.fmax((bound - x0[i]) / d[i], low), high)
+            value = slope(kink)
+            below = value <= 0.0
+            above = 1.0 - below
+            low, slope_low = low + below * (kink - low), slope_low + below * (value - slope_low)
+            high, slope_high = high + above * (kink - high), slope_high + above * (value - slope_high)
+    # The added number is for a root at a kink, where the interval has shrunk to nothing.
+    return _clip(low - (high - low) * slope_low / (slope_high - slope_low + _TINY))
+
+
 def _gap(rho: float, smoothing: float) -> float:
     return 2.0 * rho * smoothing - smoothing**2
 
@@ -160,5 +169,6 @@ def _clip(x: casadi.SX) -> casadi.SX:
 
 
 def _outside(x: casadi.SX, half: Array) -> casadi.SX:
+    # x less its nearest point of the box, x - min(max(x, -h), h), as compilers like it best.
     bound = casadi.SX(half)
-    return x - casadi.fmin(casadi.fmax(x, -bound), bound)
+    return x + (casadi.fabs(x - bound) - casadi.fabs(x + bound)) / 2.0

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_PARALLEL = 1e-12  # of |u|^2 |v|^2: below it rounding decides what the common normal is
+_PARALLEL = 1e-6  # squared sine of the angle below which rounding has a say in where the lines are closest
 
 
 def segment_segment(a0: Array, a1: Array, b0: Array, b1: Array) -> Array:
@@ -32,9 +32,21 @@ def segment_segment(a0: Array, a1: Array, b0: Array, b1: Array) -> Array:
     s = _clip(np.where(apart, (b * f - c * e) / np.where(apart, determinant, 1.0), 0.0))
     t = _clip(_ratio(b * s + f, e))
     s = _clip(_ratio(b * t - c, a))
-    # For parallel segments s = 0 was a guess, which the second pass over t completes.
-    t = _clip(_ratio(b * s + f, e))
-    return np.linalg.norm(w + s[..., None] * u - t[..., None] * v, axis=-1)
+    distance = np.asarray(np.linalg.norm(w + s[..., None] * u - t[..., None] * v, axis=-1))
+    if not apart.all():
+        # Then one of the four ends is closest, or as good as it.
+        near = ~apart
+        ends = [
+            _point_segment(p[near], q[near], r[near])
+            for p, q, r in ((a0, b0, v), (a1, b0, v), (b0, a0, u), (b1, a0, u))
+        ]
+        distance[near] = np.minimum(distance[near], np.min(ends, axis=0))
+    return distance
+
+
+def _point_segment(point: Array, start: Array, direction: Array) -> Array:
+    along = _clip(_ratio(_dot(point - start, direction), _dot(direction, direction)))
+    return np.linalg.norm(point - start - along[..., None] * direction, axis=-1)
 
 
 def segment_box(x0: Array, x1: Array, half: Array) -> Array:

@@ -116,10 +116,7 @@ def choose_pairs(
         The pairs, and the name and the reason of each pair of links left out.
     """
     pairs = [
-        Pair(first=first, second=second)
-        for first in capsules
-        for second in capsules
-        if second.link > first.link + 1
+        Pair(first=first, second=second) for first in capsules for second in capsules if second.link > first.link + 1
     ]
     q = np.vstack([reference_pose(limits), random_poses(limits, POSES)])
     poses = poses_of(chain, q)

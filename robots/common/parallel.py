@@ -82,6 +82,19 @@ def available_cores() -> int:
 
 
 @contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Holds BLAS in this process to one thread meanwhile; it decorates functions, too.
+
+    On matrices of some hundred columns more threads gain nothing, and on a busy machine they wait for each other ten
+    times as long as they work. Sums also come out alike, bit by bit, here and in a worker process.
+    """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
+
+
+@contextmanager
 def single_blas_thread() -> Iterator[None]:
     """Sets the environment so that processes started meanwhile use one BLAS thread, and restores it."""
     before = {name: os.environ.get(name) for name in BLAS_VARIABLES}

@@ -1,0 +1,257 @@
+"""The design of an experiment: ours against differential evolution and SLSQP with finite differences.
+
+Run it with ``python benchmarks/design.py [--minutes 9] [--seeds 3] [--rival-seeds 1]``. All minimise the same compiled
+condition number of the same robot under the same limits, and what they find is measured on a grid that none of them
+optimised on. The rivals are what the literature uses (a genetic algorithm, then a gradient solver with finite
+differences), and are treated well: every individual of differential evolution is pulled within the limits instead of
+being punished; SLSQP starts again as often as there is time, and its result is pulled within the limits, too. Once more
+it runs with our screened starts and our working set of limit rows: what is left is due to exact derivatives, smooth
+stand-ins and hops.
+
+Each candidate has one process and one thread. Times are the processor's, which on an idle machine are the clock's, so
+that other work on the machine does not count. The compilation, which all share, is not in them. A ratio is the time at
+which a rival reached its best value over the time that ours took to the same value, the median over our seeds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+from scipy.optimize import LinearConstraint, differential_evolution, minimize
+
+from oed.criteria import criterion
+from oed.experiments import EFFORTS, Ipopt, usable_limits
+from oed.experiments.problem import FourierProblem
+from oed.experiments.search import Island
+from oed.experiments.working_set import WorkingSet
+from robots.base_parameters import base_parameters
+from robots.common.errors import AssumedValueWarning
+from robots.common.parallel import available_cores, parallel_map
+from robots.loading import load_robot
+from robots.regressor import default_model
+
+Array = NDArray[np.float64]
+Trace = list[tuple[float, float]]
+
+FRICTION = {52: "coulomb-viscous", 64: "polynomial"}
+OURS, EVOLUTION = "ours", "differential evolution"
+SLSQP, HELPED = "SLSQP", "SLSQP, our starts and rows"
+MOMENTS = (5, 10, 20, 60, 120, 240, 600)
+OUR_SECONDS = 60.0
+FINE_SAMPLES = 1000
+# Of the coefficients in units of what brings a joint to its limits; the best designs known stay below 1.
+BOX = 1.5
+
+
+class OverError(Exception):
+    """The time is over."""
+
+
+@dataclass
+class Clock:
+    """Seconds of this process, and the best value so far at each improvement."""
+
+    budget: float
+    trace: Trace = field(default_factory=list)
+    start: float = field(default_factory=time.process_time)
+
+    def note(self, value: float) -> None:
+        """Notes an improvement."""
+        if not self.trace or value < self.trace[-1][1]:
+            self.trace.append((self.elapsed, value))
+
+    def check(self) -> None:
+        """Ends the search when the budget is used up."""
+        if self.elapsed > self.budget:
+            raise OverError
+
+    @property
+    def elapsed(self) -> float:
+        """Processor seconds since the start."""
+        return time.process_time() - self.start
+
+
+@dataclass(frozen=True)
+class Task:
+    """One search: who, on how many columns, from which seed, for how long."""
+
+    who: str
+    columns: int
+    seed: int
+    budget: float
+
+
+def problem_of(columns: int) -> FourierProblem:
+    """The ER3A's Fourier part: 5 harmonics, 0.1 Hz, 36 base, 4 rotor and 12 or 24 friction columns, unscaled."""
+    robot = load_robot("er3a")
+    base = base_parameters(default_model(robot, friction=FRICTION[columns], velocity_scale=0.02, offset=False))
+    if base.size != columns:
+        raise SystemExit(f"{base.size} columns instead of {columns}")
+    return FourierProblem(base=base, criterion=criterion("cond"), limits=usable_limits(robot.limits))
+
+
+def ours(problem: FourierProblem, seed: int, clock: Clock) -> None:
+    """The search of ``oed design`` on one island, without its finish on a finer grid."""
+
+    def tell(_: int, best: float) -> None:
+        clock.note(best)
+        clock.check()
+
+    Island(problem, replace(EFFORTS["thorough"], hops=100_000), Ipopt(), seed, 0, tell=tell).search()
+
+
+def evolution(problem: FourierProblem, seed: int, clock: Clock) -> None:
+    """Scipy's differential evolution, two individuals an unknown, every one of them pulled within the limits."""
+    fine = replace(problem, samples=FINE_SAMPLES)
+    best = np.inf
+
+    def objective(z: Array) -> float:
+        nonlocal best
+        clock.check()
+        inside = problem.shrunk(z)
+        value = problem.cost(inside)
+        if value < best:
+            best = value
+            clock.note(fine.cost(inside))
+        return value
+
+    bounds = [(-BOX, BOX)] * problem.size
+    differential_evolution(objective, bounds, popsize=2, maxiter=10**6, tol=0, polish=False, rng=seed)
+
+
+def slsqp(problem: FourierProblem, seed: int, clock: Clock, *, helped: bool = False) -> None:
+    """Scipy's SLSQP on log cond, gradients by finite differences, from one start after the other.
+
+    It gets all limit rows at 100 samples and random starts; helped, it gets our screened starts and our working set.
+    """
+    fine, rng = replace(problem, samples=FINE_SAMPLES), np.random.default_rng(seed)
+    rows = problem if helped else replace(problem, limit_samples=100)
+
+    def objective(z: Array) -> float:
+        clock.check()
+        return float(np.log(problem.cost(z)))
+
+    def note(z: Array) -> None:
+        clock.note(fine.cost(problem.shrunk(z)))
+
+    while True:
+        points = [problem.shrunk(rng.normal(size=problem.size), 0.95) for _ in range(100 if helped else 1)]
+        z, working = min(points, key=problem.cost), WorkingSet(rows, stride=25 if helped else 1)
+        for _ in range(4 if helped else 1):
+            matrix, offset = working.matrix()
+            limits = LinearConstraint(np.array(matrix.full()), -1 - offset, 1 - offset)
+            options = {"maxiter": 60 if helped else 300, "ftol": 1e-4}
+            z = minimize(objective, z, method="SLSQP", constraints=limits, callback=note, options=options).x
+            if not helped or not working.add_peaks(z, 1e-3):
+                break
+        note(z)
+
+
+SEARCHES: dict[str, Callable[[FourierProblem, int, Clock], None]] = {
+    OURS: ours,
+    EVOLUTION: evolution,
+    SLSQP: slsqp,
+    HELPED: partial(slsqp, helped=True),
+}
+
+
+def run(task: Task) -> Trace:
+    """Searches until the time is over."""
+    warnings.simplefilter("ignore")
+    problem = problem_of(task.columns)
+    problem.cost(np.zeros(problem.size))  # compiled, or read from the cache
+    replace(problem, samples=FINE_SAMPLES).cost(np.zeros(problem.size))
+    clock = Clock(task.budget)
+    with suppress(OverError):
+        SEARCHES[task.who](problem, task.seed, clock)
+    return clock.trace
+
+
+def processor() -> str:
+    """Names the machine's processor."""
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
+
+
+def at(trace: Trace, seconds: float) -> float:
+    """The best value after so many seconds."""
+    return min((value for when, value in trace if when <= seconds), default=np.inf)
+
+
+def reached(trace: Trace, value: float) -> float:
+    """When a value was reached."""
+    return next((when for when, best in trace if best <= value), np.inf)
+
+
+def tasks(minutes: float, seeds: int, rival_seeds: int) -> list[Task]:
+    """Shares the time: ours a minute a seed at most and a third of it all; of the rest half is evolution's."""
+    total = 60 * minutes * min(2, available_cores()) / len(FRICTION) - 10
+    mine = min(OUR_SECONDS, total / 3 / seeds)
+    rest = (total - mine * seeds) / rival_seeds
+    plan = [Task(EVOLUTION, c, s, rest / 2) for c in FRICTION for s in range(rival_seeds)]
+    plan += [Task(w, c, s, rest / 4) for w in (SLSQP, HELPED) for c in FRICTION for s in range(rival_seeds)]
+    return plan + [Task(OURS, c, s, mine) for c in FRICTION for s in range(seeds)]
+
+
+def table(columns: int, results: list[tuple[Task, Trace]]) -> None:
+    """Prints the best condition number over time, then the ratios."""
+    chosen = [(task, trace) for task, trace in results if task.columns == columns]
+    chosen.sort(key=lambda entry: (list(SEARCHES).index(entry[0].who), entry[0].seed))
+    print(f"{columns} columns: best cond(Y) after so many seconds")
+    print(f"  {'':28}seed" + "".join(f"{moment:>8} s" for moment in MOMENTS))
+    for task, trace in chosen:
+        cells = (f"{at(trace, m):10.2f}" if m <= task.budget + 1 else f"{'':10}" for m in MOMENTS)
+        print(f"  {task.who:28}{task.seed:4}" + "".join(cells).rstrip())
+    for who in (EVOLUTION, SLSQP, HELPED):
+        traces = [trace for task, trace in chosen if task.who == who and trace]
+        if not traces:
+            continue
+        best = min(traces, key=lambda trace: trace[-1][1])
+        when, value = best[-1]
+        times = [reached(trace, value) for task, trace in chosen if task.who == OURS]
+        mine = float(np.median(times))
+        verdict = f"{when / mine:.0f} times as fast" if np.isfinite(mine) else "which ours did not reach"
+        print(f"  {who} needs {when:.0f} s to its best, {value:.2f}; ours {mine:.1f} s: {verdict}")
+    print()
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--minutes", type=float, default=9.0, help="for all of it, on two cores")
+    parser.add_argument("--seeds", type=int, default=3, help="of ours")
+    parser.add_argument("--rival-seeds", type=int, default=1, help="of each rival")
+    options = parser.parse_args()
+    warnings.simplefilter("ignore", AssumedValueWarning)
+    start = time.perf_counter()
+    for columns in FRICTION:
+        problem = problem_of(columns)
+        problem.cost(np.zeros(problem.size))
+    compiled = time.perf_counter() - start
+    plan = tasks(options.minutes, options.seeds, options.rival_seeds)
+    print(f"{processor()}; Python {platform.python_version()}, scipy {scipy.__version__}; one thread each")
+    print(f"compiled, or read from the cache, in {compiled:.1f} s")
+    budgets = {task.who: task.budget for task in plan}
+    print("budgets: " + ", ".join(f"{who} {budget:.0f} s" for who, budget in budgets.items()) + "\n", flush=True)
+    results = list(zip(plan, parallel_map(run, plan, workers=min(2, available_cores())), strict=True))
+    for columns in FRICTION:
+        table(columns, results)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

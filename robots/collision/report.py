@@ -1,0 +1,70 @@
+"""What a motion's check for collisions came to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+AGREEMENT = 1e-5
+"""By how much coal's distances may differ [m]: its iterative solver ends at 1e-6."""
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionReport:
+    """The smallest clearances along a motion.
+
+    Attributes:
+        names: of the P pairs.
+        clearance: the smallest found for each pair, negative where bodies overlap (P,) [m].
+        time: when [s], (P,).
+        lower_bound: what is proved of each pair for all times (P,) [m].
+        margin: that was to be kept [m].
+        certified: whether every pair is proved to keep the margin at all times.
+        evaluations: poses looked at.
+        disagreement: by how much coal differed at the samples [m]; None if it was not asked.
+    """
+
+    names: tuple[str, ...]
+    clearance: Array
+    time: Array
+    lower_bound: Array
+    margin: float
+    certified: bool
+    evaluations: int
+    disagreement: float | None
+
+    @property
+    def collides(self) -> bool:
+        """Whether a pair was found to fall below the margin."""
+        return bool((self.clearance < self.margin).any())
+
+    @property
+    def confirmed(self) -> bool | None:
+        """Whether coal found the same distances; None if it was not asked."""
+        return None if self.disagreement is None else self.disagreement <= AGREEMENT
+
+    @property
+    def worst(self) -> int | None:
+        """Index of the closest pair; None without any pair."""
+        return int(np.argmin(self.clearance)) if len(self.names) else None
+
+    def summary(self) -> str:
+        """Says in a few lines whether the motion is free, and what comes closest when."""
+        if self.worst is None:
+            return "no pair of bodies to watch"
+        state = "proved free at all times" if self.certified else "undecided between two samples"
+        if self.collides:
+            state = "not free"
+        lines = [f"{state}, margin {1e3 * self.margin:.1f} mm, {self.evaluations} poses"]
+        for index in np.argsort(self.clearance)[:3]:
+            lines.append(
+                f"  {self.names[index]}: {1e3 * self.clearance[index]:.1f} mm at {self.time[index]:.3f} s"
+                f" (proved: {1e3 * self.lower_bound[index]:.1f} mm)"
+            )
+        if self.disagreement is not None:
+            lines.append(f"coal differs by {1e6 * self.disagreement:.1f} um at most")
+        return "\n".join(lines)
