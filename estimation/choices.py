@@ -24,6 +24,8 @@ VELOCITY_SCALES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
 SAVING = 0.03
 # How much worse, in mean log error, a smaller ridge or a lower cut-off may be and still be taken.
 RIDGE_SLACK, CUTOFF_SLACK = 0.01, 0.0005
+# A left-out error below this share of a constant's is rounding.
+EXACT = 1e-9
 # More rows than this do not choose better, only slower.
 MOST_ROWS = 60_000
 
@@ -64,7 +66,7 @@ class Choice:
     @property
     def cost(self) -> float:
         """Mean log of the error relative to a constant, a joint worse than a constant counting as one."""
-        return float(np.log(np.minimum(self.held_out / self.spread, 1.0)).mean())
+        return float(np.log(np.clip(self.held_out / self.spread, EXACT, 1.0)).mean())
 
 
 def choose(

@@ -87,10 +87,7 @@ class Estimate:
     @property
     def colour(self) -> float:
         """Median ratio of honest to white-noise standard errors of the determined parameters."""
-        known = self.model.determined & (self.white_noise_errors > 0)
-        if not known.any():
-            return np.nan
-        return float(np.median(self.model.standard_errors[known] / self.white_noise_errors[known]))
+        return colour_of(self.model.standard_errors, self.white_noise_errors, self.model.determined)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -185,3 +182,9 @@ class Estimate:
             InputError: the file is there, and force is not given.
         """
         self.model.save(Path(folder) / MODEL, force=force)
+
+
+def colour_of(errors: Array, white: Array, determined: NDArray[np.bool_]) -> float:
+    """Gives the median ratio of honest to white-noise standard errors (b,) of the determined parameters; 1 without any."""
+    known = determined & (white > 0)
+    return float(np.median(errors[known] / white[known])) if known.any() else 1.0

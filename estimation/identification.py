@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.choices import VELOCITY_SCALES, Candidates, Choice, choose
-from estimation.estimate import Estimate, JointFit
+from estimation.estimate import Estimate, JointFit, colour_of
 from estimation.estimators import Estimator, estimator as choose_estimator
 from estimation.model import Model
 from estimation.moments import Moments
@@ -36,6 +36,8 @@ RELATIVE = 0.5
 NEGLIGIBLE = 0.02
 # A joint whose left-out torque is predicted hardly better than by a constant is not identified.
 HOPELESS = 0.9
+# A torque that varies by less than this share of its size, or of 1 N m, is constant but for rounding.
+ROUNDING = 1e-9
 
 
 def identify(
@@ -85,12 +87,7 @@ def identify(
     base = base_parameters(sharp)
     bar.update(1.0, "choosing smoothing and regularisation")
     choice = choose(base, prepared, chosen, candidates or Candidates())
-    if (choice.held_out >= HOPELESS * choice.spread).all():
-        raise NotIdentifiableError(
-            "no joint's torque can be predicted from its motion",
-            allowed="left-out torque errors below its standard deviation",
-            remedy="check units and signs of q and tau, and that the arm moves",
-        )
+    predictable = _predictable(prepared, choice)
     model = default_model(robot, friction=friction, velocity_scale=choice.velocity_scales, rotor=rotor, offset=offset)
     base = replace(base, model=model)
     rows = [log.rows(choice.cutoff) for log in prepared]
@@ -103,21 +100,24 @@ def identify(
     inverse = moments.inverse(weights, FAINT)
     full = covariance(parts, weights, inverse, seed)
     white = white_noise_covariance(parts, weights, inverse)
-    joints = _joint_fits(base, prepared, rows, predicted, choice)
+    joints = _joint_fits(base, rows, predicted, choice, predictable)
     bar.finish()
+    determined = _determined(base, moments, values, full, joints)
+    naive = np.sqrt(np.maximum(np.diag(white), 0.0))
+    colour = colour_of(np.sqrt(np.maximum(np.diag(full), 0.0)), naive, determined)
     return Estimate(
         model=Model(
             torque_model=model,
             columns=base.independent,
             values=values,
             covariance=full,
-            determined=_determined(base, moments, values, full, joints),
+            determined=determined,
             formulas=base.formulas(),
-            provenance=_provenance(data, chosen, choice, joints, seed),
+            provenance={**_provenance(data, chosen, choice, joints, seed), "colour": colour},
         ),
         choice=choice,
         joints=joints,
-        white_noise_errors=np.sqrt(np.maximum(np.diag(white), 0.0)),
+        white_noise_errors=naive,
         t=np.concatenate([part.motion.t for part in rows]),
         dq=np.concatenate([part.motion.dq for part in rows]),
         measured=np.concatenate([part.tau for part in rows]),
@@ -147,12 +147,37 @@ def _part(base: BaseParameters, rows: Rows, residual: Array) -> Part:
     return Part(len(motion), regressor, rows.mask, residual * rows.mask)
 
 
+def _predictable(prepared: Sequence[Prepared], choice: Choice) -> NDArray[np.bool_]:
+    """Which joints (n,) move, and have a torque that varies and follows from the motion.
+
+    Raises:
+        NotIdentifiableError: none.
+    """
+    moves = np.any([np.ptp(log.log.q, axis=0) > 0 for log in prepared], axis=0)
+    tau = np.concatenate([log.tau for log in prepared])
+    varies = np.ptp(tau, axis=0) > ROUNDING * np.maximum(1.0, np.abs(tau).max(axis=0))
+    follows = choice.held_out < HOPELESS * choice.spread
+    if (moves & varies & follows).any():
+        return np.asarray(moves & varies & follows)
+    if not moves.any():
+        raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
+    if not varies.any():
+        raise NotIdentifiableError(
+            "no joint's torque varies", remedy="record the torque of the moving arm, and check what tau1.. hold"
+        )
+    raise NotIdentifiableError(
+        "no joint's torque can be predicted from its motion",
+        allowed="left-out torque errors below its standard deviation",
+        remedy="check units and signs of q and tau, and that the arm moves",
+    )
+
+
 def _joint_fits(
     base: BaseParameters,
-    prepared: Sequence[Prepared],
     rows: Sequence[Rows],
     predicted: Sequence[Array],
     choice: Choice,
+    predictable: NDArray[np.bool_],
 ) -> tuple[JointFit, ...]:
     """Measures each joint's errors, beside what a constant and the robot's description would give."""
     measured = np.concatenate([part.tau for part in rows])
@@ -165,7 +190,6 @@ def _joint_fits(
             [base.model.torque(part.motion.q, part.motion.dq, part.motion.ddq, description) for part in rows]
         )
         nominal = np.sqrt(np.mean((measured - torque) ** 2, axis=0))
-    moving = np.concatenate([log.log.q for log in prepared]).std(axis=0) > 0
     return tuple(
         JointFit(
             joint=j + 1,
@@ -175,7 +199,7 @@ def _joint_fits(
             residual_rms=float(np.sqrt(np.mean(residual[:, j] ** 2))),
             held_out_rms=float(choice.held_out[j]),
             nominal_rms=float(nominal[j]),
-            identified=bool(moving[j] and choice.held_out[j] < HOPELESS * choice.spread[j]),
+            identified=bool(predictable[j]),
         )
         for j in range(len(rms))
     )

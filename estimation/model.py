@@ -150,13 +150,14 @@ def load_model(path: str | Path) -> Model:
         raise InputError(f"cannot be read as JSON: {error}", file=file) from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise InputError("is no model file", file=file, allowed=f'"format": "{FORMAT}"')
-    if data.get("format_version", 0) > FORMAT_VERSION:
-        raise InputError(f"format version {data['format_version']}", file=file, allowed=f"up to {FORMAT_VERSION}")
+    version = data.get("format_version")
+    if not isinstance(version, int) or version > FORMAT_VERSION:
+        raise InputError(f"format version {version!r}", file=file, allowed=f"up to {FORMAT_VERSION}")
     try:
         return _from_dict(data)
     except InputError as error:
         raise InputError(error.problem, file=file, allowed=error.allowed, remedy=error.remedy) from error
-    except (KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(f"is damaged: {type(error).__name__} {error}", file=file) from error
 
 
@@ -168,11 +169,22 @@ def _from_dict(data: Mapping[str, Any]) -> Model:
     unknown = [item["name"] for item in parameters if item["name"] not in index]
     if unknown:
         raise InputError(f"parameter {unknown[0]} is none of the model's terms")
+    torque_model.symbolic()  # a term that does not suit the robot says so now, not at the first prediction
+    columns = tuple(index[item["name"]] for item in parameters)
+    values = np.array([item["value"] for item in parameters], dtype=float)
+    covariance = np.array(data["covariance"], dtype=float).reshape(len(parameters), len(parameters))
+    if not columns or len(set(columns)) < len(columns):
+        raise InputError("parameters are missing or repeated", allowed="one or more, each once")
+    if not (np.isfinite(values).all() and np.isfinite(covariance).all()):
+        raise InputError("values or covariances that are not finite", remedy="identify the robot again")
+    cutoff = data["provenance"].get("cutoff_hz", 1.0)
+    if isinstance(cutoff, bool) or not (isinstance(cutoff, int | float) and 0 < cutoff < np.inf):
+        raise InputError(f"provenance: cutoff_hz is {cutoff!r}", allowed="a positive number [Hz]")
     return Model(
         torque_model=torque_model,
-        columns=tuple(index[item["name"]] for item in parameters),
-        values=np.array([item["value"] for item in parameters], dtype=float),
-        covariance=np.array(data["covariance"], dtype=float).reshape(len(parameters), len(parameters)),
+        columns=columns,
+        values=values,
+        covariance=covariance,
         determined=np.array([item["determined"] for item in parameters], dtype=bool),
         formulas=tuple(item["stands_for"] for item in parameters),
         provenance=data["provenance"],
@@ -190,7 +202,9 @@ def _describe_chain(robot: Robot) -> dict[str, Any]:
         }
         for joint in robot.chain.joints
     ]
-    return {"gravity": robot.chain.gravity.tolist(), "joints": joints}
+    # A log of currents is compared by these; NaN, which JSON cannot hold, where unknown.
+    constants = [float(value) if np.isfinite(value) else None for value in robot.torque_constant]
+    return {"gravity": robot.chain.gravity.tolist(), "joints": joints, "torque_constant": constants}
 
 
 def _build_robot(data: Mapping[str, Any]) -> Robot:
@@ -201,6 +215,7 @@ def _build_robot(data: Mapping[str, Any]) -> Robot:
         name=data["name"],
         chain=Chain(joints, np.array(data["gravity"])),
         limits=limits,
+        torque_constant=np.array(data.get("torque_constant", [None] * len(joints)), dtype=float),
         origin=data["origin"],
         digest=data["sha256"],
     )

@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 # Below this share of a joint's RMS speed its friction is not known to have a sign: those rows are left out of its fit.
 SLOW = 0.01
+# A joint with less RMS speed than this [rad/s or m/s] stands: what is left is rounding, and all its rows count.
+STANDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -59,10 +61,11 @@ class Prepared:
         t = motion.t
         edge = transient(motion.duration, cutoff)
         inside = np.flatnonzero((t >= t[0] + edge) & (t <= t[-1] - edge))[::stride]
-        dq = motion.dq
-        fast = np.abs(dq) >= SLOW * np.sqrt(np.mean(dq**2, axis=0))
-        cut = Motion(t=t[inside], q=motion.q[inside], dq=dq[inside], ddq=motion.ddq[inside])
-        return Rows(cut, self.tau[inside], fast[inside].astype(float))
+        dq = motion.dq[inside]
+        speed = np.sqrt(np.mean(dq**2, axis=0))
+        fast = (np.abs(dq) >= SLOW * speed) | (speed < STANDING)
+        cut = Motion(t=t[inside], q=motion.q[inside], dq=dq, ddq=motion.ddq[inside])
+        return Rows(cut, self.tau[inside], fast.astype(float))
 
 
 def prepare(robot: Robot, log: Log) -> Prepared:

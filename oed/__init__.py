@@ -5,10 +5,13 @@ from __future__ import annotations
 from robots.common.lazy import lazy_exports
 
 _EXPORTS = {
+    "Campaign": "oed.campaigns",
     "Design": "oed.experiments",
     "Effort": "oed.experiments",
     "Ipopt": "oed.experiments",
+    "Programme": "oed.campaigns",
     "RetimedExperiment": "oed.experiments",
+    "campaign": "oed.campaigns",
     "design": "oed.experiments",
     "read_trajectory": "oed.exports",
     "retime": "oed.experiments",

@@ -40,7 +40,7 @@ class Resampled:
 
 
 def resample(t: Array, q: Array) -> Resampled:
-    """Puts positions on a grid of the median period.
+    """Puts positions on a grid of the log's period, or of the median period where time is uneven.
 
     Args:
         t: increasing times (N,) [s].
@@ -57,9 +57,11 @@ def resample(t: Array, q: Array) -> Resampled:
     if len(kept_t) < 20:
         raise InputError(f"{len(kept_t)} rows", allowed="20 or more", remedy="record a longer log")
     steps = np.diff(t)
-    period = float(np.median(steps))
+    even = np.ptp(steps) <= EVEN * np.median(steps)
+    # The mean of even steps: large times round each step, and a grid by the median would drift off the samples.
+    period = float(np.mean(steps) if even else np.median(steps))
     grid = t[0] + period * np.arange(int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1)
-    if stale.any() or np.ptp(steps) > EVEN * period:
+    if stale.any() or not even:
         values = PchipInterpolator(kept_t, kept_q)(np.minimum(grid, kept_t[-1]))
     else:
         values = np.column_stack([np.interp(grid, kept_t, column) for column in kept_q.T])
@@ -70,8 +72,8 @@ def stale_rows(t: Array, q: Array) -> NDArray[np.bool_]:
     """Finds rows that repeat the position of the row before although the arm has moved on.
 
     A slow network delivers the same message twice; a filter would make a jerk of it. A row counts when all joints
-    repeat, for at most three rows, and some joint is more than two encoder steps off the line between the distinct
-    rows around.
+    repeat, for at most three rows, and some joint that keeps its direction is more than two encoder steps off the line
+    between the distinct rows around.
 
     Args:
         t: times (N,) [s].
@@ -84,13 +86,20 @@ def stale_rows(t: Array, q: Array) -> NDArray[np.bool_]:
     if not repeated.any():
         return repeated
     line = np.column_stack([np.interp(t, t[~repeated], column[~repeated]) for column in q.T])
-    off = (np.abs(q - line) > STALE_STEPS * np.maximum(_step(q), 1e-9)).any(axis=1)
+    off = (np.abs(q - line) > STALE_STEPS * np.maximum(_step(q), 1e-9)) & _passing(q, repeated)
     # Length of the run of repeats that each row belongs to.
     edges = np.flatnonzero(np.diff(repeated.astype(int), prepend=0, append=0))
     length = np.zeros(len(t), dtype=int)
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
         length[start:stop] = stop - start
-    return repeated & (length <= LONGEST_HOLD) & off
+    return repeated & (length <= LONGEST_HOLD) & off.any(axis=1)
+
+
+def _passing(q: Array, repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Where a joint (N, n) goes on in the direction in which it came: about a turning point equal rows are right."""
+    steps = np.diff(q[~repeated], axis=0, prepend=np.nan, append=np.nan)  # before and after each distinct row
+    held = np.cumsum(~repeated) - 1
+    return ~(steps[held] * steps[held + 1] <= 0)
 
 
 def _step(q: Array) -> Array:

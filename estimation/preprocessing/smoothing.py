@@ -46,7 +46,8 @@ def _low_pass(x: Array, period: float, cutoff: float) -> Array:
     if own >= 0.95 * nyquist:
         return x
     sections = butter(ORDER, own / nyquist, output="sos")
-    padding = int(min(len(x) - 1, max(3 * (2 * ORDER + 1), round(1.5 / (cutoff * period)))))
+    # Four periods of the cut-off: by then the filter has forgotten how the padding began, to a part in 10^7.
+    padding = int(min(len(x) - 1, max(3 * (2 * ORDER + 1), round(4 / (cutoff * period)))))
     return np.asarray(sosfiltfilt(sections, x, axis=0, padtype="odd", padlen=padding))
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
+from oed.cli.campaign import campaign
 from oed.cli.design import design
 from oed.cli.export import export
 from oed.cli.identify import identify
@@ -19,17 +22,22 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (design, retime, export, simulate, identify, predict):
+for command in (design, retime, export, campaign, simulate, identify, predict):
     app.command()(command)
 
 
-@app.callback()
-def version(
-    show: bool = typer.Option(False, "--version", help="Print the version and exit.", is_eager=True),
-) -> None:
-    """Designs excitation experiments for robots, identifies their dynamics, and says how sure it is."""
-    if show:
+def _show_version(wanted: bool) -> None:
+    if wanted:
         from robots.version import VERSION
 
         print(f"robot-oed {VERSION}")
         raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and exit.", is_eager=True, callback=_show_version)
+    ] = False,
+) -> None:
+    """Designs excitation experiments for robots, identifies their dynamics, and says how sure it is."""

@@ -19,13 +19,14 @@ from oed.cli.options import (
     SeedOption,
     TipOption,
     WorkersOption,
+    numbers,
     robot_from,
 )
 
 
 def design(
     robot: RobotOption,
-    criterion: Annotated[str, typer.Option(help="cond, d (log det), a, e, or cond-d.")] = "cond",
+    criterion: Annotated[str, typer.Option(help="cond, d (log det), a, e, i (with --task), or cond-d.")] = "cond",
     friction: Annotated[str, typer.Option(help="The model to fit: polynomial or coulomb-viscous.")] = "polynomial",
     offset: Annotated[bool, typer.Option("--offset", help="With a torque offset on each joint.")] = False,
     harmonics: Annotated[int, typer.Option(help="Harmonics of the Fourier series.")] = 5,
@@ -35,6 +36,16 @@ def design(
     velocity_fraction: Annotated[float, typer.Option(help="Share of the velocity limits to use.")] = 1.0,
     torque: Annotated[bool, typer.Option(help="Keep the torque limits, by the robot's nominal dynamics.")] = True,
     torque_margin: Annotated[float, typer.Option(help="Share of the torque limits kept in reserve.")] = 0.1,
+    scaling: Annotated[str, typer.Option(help="Columns the criterion judges: none, nominal or unit.")] = "none",
+    noise: Annotated[
+        str | None, typer.Option(help="Torque noise of each joint [N m], separated by commas.", show_default=False)
+    ] = None,
+    after: Annotated[
+        Path | None, typer.Option(help="A model.json: add what it does not know yet.", show_default=False)
+    ] = None,
+    task: Annotated[
+        Path | None, typer.Option(help="A trajectory.csv whose torques are to be predicted.", show_default=False)
+    ] = None,
     effort: Annotated[str, typer.Option(help="How long to search: quick, standard or thorough.")] = "standard",
     time_limit: Annotated[
         float | None, typer.Option(help="Stop searching after so many seconds and keep the best.", show_default=False)
@@ -53,13 +64,16 @@ def design(
     """Designs an excitation experiment: trajectory.csv, design.json and report.html."""
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
+        from oed.cli.priors import prior_from
         from oed.experiments import design as run
+        from oed.exports import read_trajectory
         from oed.reports import save_design_report
         from robots.common.files import ResultFolder
 
         with ResultFolder(out, force, names=["trajectory.csv", "design.json", "report.html"]) as folder:
+            described = robot_from(robot, tip, joints, lock)
             result = run(
-                robot_from(robot, tip, joints, lock),
+                described,
                 criterion=criterion,
                 friction=friction,
                 offset=offset,
@@ -70,6 +84,10 @@ def design(
                 velocity_fraction=velocity_fraction,
                 torque=torque,
                 torque_margin=torque_margin,
+                scaling=scaling,
+                noise=numbers("--noise", noise),
+                after=prior_from(after) if after else None,
+                task=read_trajectory(task, n=described.n)[0] if task else None,
                 effort=effort,
                 time_limit=float("inf") if time_limit is None else time_limit,
                 seed=seed,

@@ -58,3 +58,17 @@ def robot_from(
             raise InputError(f"--lock {item}", allowed="name=value, the value in rad or m") from None
     names = [name.strip() for name in joints.split(",")] if joints else None
     return load_robot(spec, tip=tip, joints=names, locked=locked or None)
+
+
+def numbers(option: str, text: str | None) -> list[float] | None:
+    """Reads numbers separated by commas.
+
+    Raises:
+        InputError: something else.
+    """
+    if text is None:
+        return None
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"{option} {text}", allowed="numbers separated by commas") from None

@@ -6,13 +6,15 @@ from oed.criteria.base import Criterion
 from oed.criteria.combined import CondDeterminant
 from oed.criteria.cond import Cond
 from oed.criteria.determinant import Determinant
-from oed.criteria.information import Information, singular_values
+from oed.criteria.information import Information, singular_values, triangle
+from oed.criteria.prediction import PredictionVariance
 from oed.criteria.smallest import SmallestSingularValue
 from oed.criteria.trace import Trace
+from oed.criteria.weighting import SCALINGS, Prior, Weighting, nominal_scale, task_transform
 from robots.common.errors import InputError
 
 CRITERIA: dict[str, type[Criterion]] = {
-    kind.name: kind for kind in (Cond, Determinant, Trace, SmallestSingularValue, CondDeterminant)
+    kind.name: kind for kind in (Cond, Determinant, Trace, SmallestSingularValue, PredictionVariance, CondDeterminant)
 }
 
 
@@ -31,13 +33,20 @@ def criterion(choice: str | Criterion) -> Criterion:
 
 __all__ = [
     "CRITERIA",
+    "SCALINGS",
     "Cond",
     "CondDeterminant",
     "Criterion",
     "Determinant",
     "Information",
+    "PredictionVariance",
+    "Prior",
     "SmallestSingularValue",
     "Trace",
+    "Weighting",
     "criterion",
+    "nominal_scale",
     "singular_values",
+    "task_transform",
+    "triangle",
 ]

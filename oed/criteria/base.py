@@ -44,7 +44,7 @@ class Criterion(ABC):
         """Gives a smooth function to minimise and its derivatives (m,) by the eigenvalues."""
 
     def cost(self, eigenvalues: Array) -> float:
-        """Gives the criterion itself in the sense and scale of the surrogates, to compare designs by."""
+        """Gives the criterion itself in the sense of the surrogates, smaller being better, to compare designs by."""
         return -self.value(eigenvalues) if self.larger_is_better else self.value(eigenvalues)
 
 

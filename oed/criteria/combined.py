@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from oed.criteria.base import Array, Criterion
 from oed.criteria.cond import Cond
 from oed.criteria.determinant import Determinant
@@ -26,7 +28,7 @@ class CondDeterminant(Criterion):
 
     def value(self, eigenvalues: Array) -> float:
         """Gives the weighted sum."""
-        return self.surrogate(eigenvalues, 1e6)[0]
+        return float(np.log(self._cond.value(eigenvalues))) + self.weight * self._determinant.surrogate(eigenvalues, 1)[0]
 
     def surrogate(self, eigenvalues: Array, sharpness: float) -> tuple[float, Array]:
         """Replaces the condition number by its stand-in."""

@@ -22,9 +22,11 @@ class Information:
     Args:
         model: the torque model.
         columns: indices of the m columns that will be fitted.
+        rows: weights (n,) of the joints' rows; all alike by default.
     """
 
-    def __init__(self, model: TorqueModel, columns: Sequence[int]) -> None:
+    def __init__(self, model: TorqueModel, columns: Sequence[int], rows: Array | None = None) -> None:
+        self._rows = None if rows is None else np.asarray(rows, dtype=float)[:, None]
         self.size = len(columns)
         self._joints = model.robot.n
         self._forward = batch_function(model.symbolic(columns))
@@ -37,29 +39,52 @@ class Information:
         reusable = self._Y is not None and self._Y.shape[0] == q.shape[0]
         out = (self._Y,) if reusable and self._Y is not None else None
         (Y,) = self._forward(q, dq, ddq, out=out)
+        if self._rows is not None:
+            Y *= self._rows
         self._motion, self._Y = (q, dq, ddq), Y
         rows = Y.reshape(-1, self.size)
         return rows.T @ rows
 
     def pullback(self, weights: Array) -> tuple[Array, Array, Array]:
         """Turns dL/dG (m, m, symmetric) at the last `gram` into the gradients (N, n) of L by q, dq and ddq."""
-        assert self._motion is not None and self._Y is not None, "gram comes first"
+        if self._motion is None or self._Y is None:
+            raise RuntimeError("gram comes first")
         samples = self._Y.shape[0]
-        adjoint = (self._Y.reshape(-1, self.size) @ (2 * weights)).reshape(samples, -1)
+        adjoint = (self._Y.reshape(-1, self.size) @ (2 * weights)).reshape(samples, self._joints, -1)
+        if self._rows is not None:
+            adjoint *= self._rows
+        adjoint = adjoint.reshape(samples, -1)
         q, dq, ddq = self._reverse(*self._motion, adjoint)
         shape = (samples, self._joints)
         return q.reshape(shape), dq.reshape(shape), ddq.reshape(shape)
 
 
-def singular_values(model: TorqueModel, columns: Sequence[int], q: Array, dq: Array, ddq: Array) -> Array:
-    """Computes the singular values (m,) of Y on samples (N, n), ascending; in chunks, by a QR of what came before.
+def triangle(
+    model: TorqueModel, columns: Sequence[int], q: Array, dq: Array, ddq: Array, rows: Array | None = None
+) -> Array:
+    """Reduces Y on samples (N, n) to a triangle R (m, m) with R'R = Y'WY; in chunks, by a QR of what came before.
 
-    Squaring Y into Y'Y would lose those below 1e-8 of the largest.
+    Squaring Y into Y'Y would lose singular values below 1e-8 of the largest.
+
+    Args:
+        model: the torque model.
+        columns: indices of the m columns.
+        q: positions (N, n).
+        dq: velocities (N, n).
+        ddq: accelerations (N, n).
+        rows: weights (n,) of the joints' rows.
     """
     size = len(columns)
-    triangle = np.zeros((0, size))
+    reduced = np.zeros((0, size))
     for start in range(0, len(q), 2000):
-        rows = slice(start, start + 2000)
-        Y = model.regressor(q[rows], dq[rows], ddq[rows], columns=columns).reshape(-1, size)
-        triangle = np.linalg.qr(np.vstack([triangle, Y]), mode="r")
-    return np.linalg.svd(triangle, compute_uv=False)[::-1]
+        chunk = slice(start, start + 2000)
+        Y = model.regressor(q[chunk], dq[chunk], ddq[chunk], columns=columns)
+        if rows is not None:
+            Y *= np.asarray(rows)[:, None]
+        reduced = np.linalg.qr(np.vstack([reduced, Y.reshape(-1, size)]), mode="r")
+    return np.vstack([reduced, np.zeros((size - len(reduced), size))])
+
+
+def singular_values(model: TorqueModel, columns: Sequence[int], q: Array, dq: Array, ddq: Array) -> Array:
+    """Computes the singular values (m,) of Y on samples (N, n), ascending."""
+    return np.linalg.svd(triangle(model, columns, q, dq, ddq), compute_uv=False)[::-1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,6 +13,11 @@ from robots.common.errors import InputError
 from robots.limits import Limits
 
 Array = NDArray[np.float64]
+
+# The jerk of a move jumps between the file's samples. A quintic through their positions, velocities and accelerations,
+# as a controller may interpolate them, makes up to 1.75 times the jerk of it, and 0.024 jerk periods more acceleration.
+QUINTIC_JERK = 1.75
+QUINTIC_ACCELERATION = 0.024
 
 
 def home_pose(limits: Limits) -> Array:
@@ -43,17 +50,7 @@ def assemble(
             limits.
         InfeasibleError: a limit of zero.
     """
-    pose = home_pose(limits) if home is None else np.asarray(home, dtype=float)
-    if pose.shape != limits.lower.shape:
-        raise InputError(f"a home pose of shape {pose.shape}", allowed=f"{limits.lower.shape}")
-    outside = (pose < limits.lower) | (pose > limits.upper)
-    if outside.any():
-        joint = int(np.argmax(outside))
-        raise InputError(
-            f"the home pose {pose[joint]:g} lies outside the position limits",
-            joint=joint + 1,
-            allowed=f"{limits.lower[joint]:g} to {limits.upper[joint]:g}",
-        )
+    pose = rest_pose(limits, home)
     parts = [Segment(kind="fourier", trajectory=series)]
     if strokes:
         for joint in range(1, limits.n + 1):
@@ -70,13 +67,39 @@ def assemble(
     return Sequence(segments=tuple(segments), period=period)
 
 
+def rest_pose(limits: Limits, home: ArrayLike | None) -> Array:
+    """Checks a home pose (n,); without one, chooses `home_pose`.
+
+    Raises:
+        InputError: a pose of another shape, or outside the limits.
+    """
+    pose = home_pose(limits) if home is None else np.asarray(home, dtype=float)
+    if pose.shape != limits.lower.shape:
+        raise InputError(f"a home pose of shape {pose.shape}", allowed=f"{limits.lower.shape}")
+    outside = ~((pose >= limits.lower) & (pose <= limits.upper))
+    if outside.any():
+        joint = int(np.argmax(outside))
+        raise InputError(
+            f"the home pose {pose[joint]:g} lies outside the position limits",
+            joint=joint + 1,
+            allowed=f"{limits.lower[joint]:g} to {limits.upper[joint]:g}",
+        )
+    return pose
+
+
 def _ends(segment: Segment) -> tuple[Array, Array]:
     q = segment.trajectory.sample(np.array([0.0, segment.trajectory.duration])).q
     return q[0], q[1]
 
 
+def _between_samples(limits: Limits, period: float) -> Limits:
+    """Lowers jerk and acceleration so that the moves keep the limits between the samples, too."""
+    jerk = np.minimum(limits.jerk / QUINTIC_JERK, limits.acceleration / period)
+    return replace(limits, jerk=jerk, acceleration=limits.acceleration - QUINTIC_ACCELERATION * jerk * period)
+
+
 def _move(kind: str, limits: Limits, start: Array, end: Array, period: float) -> list[Segment]:
-    planned = plan_move(limits, start, end, period=period)
+    planned = plan_move(_between_samples(limits, period), start, end, period=period)
     if planned is None:
         return []
     pieces = PiecewisePolynomial(breakpoints=planned.breakpoints, coefficients=planned.coefficients)

@@ -51,8 +51,16 @@ class Board:
 
     @staticmethod
     @contextmanager
-    def watched(searches: int, steps: int, progress: Progress, task: str) -> Iterator[Board]:
-        """Opens a board and passes on what it says until the work is over."""
+    def watched(searches: int, steps: int, progress: Progress, task: str, sign: float = 1.0) -> Iterator[Board]:
+        """Opens a board and passes on what it says until the work is over.
+
+        Args:
+            searches: how many will tell.
+            steps: of each.
+            progress: is told the sum of the steps, and the best value.
+            task: what the work is called.
+            sign: -1 where the smaller value, which is the better, stands for a criterion that is to be large.
+        """
         with tempfile.TemporaryDirectory(prefix="oed-") as folder:
             board, over = Board(Path(folder)), threading.Event()
             progress.start(task, float(searches * steps))
@@ -60,7 +68,7 @@ class Board:
             def watch() -> None:
                 while not over.wait(INTERVAL):
                     done, best = board.read()
-                    progress.update(float(done), f"best {best:.4g}" if done else "compiling and screening")
+                    progress.update(float(done), f"best {sign * best:.4g}" if done else "compiling and screening")
 
             thread = threading.Thread(target=watch, daemon=True)
             thread.start()

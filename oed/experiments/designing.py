@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
 from oed.constraints import TorqueLimit
-from oed.criteria import Criterion
+from oed.criteria import SCALINGS, Criterion, Prior, Weighting, nominal_scale, task_transform
 from oed.criteria import criterion as choose_criterion
-from oed.experiments.assembly import assemble, home_pose
+from oed.experiments.assembly import assemble, rest_pose
 from oed.experiments.board import Board
 from oed.experiments.problem import FourierProblem
 from oed.experiments.result import Design, Outcome, design_model, measure, measured_margins
@@ -27,6 +27,7 @@ from robots.common.parallel import one_blas_thread, parallel_map
 from robots.common.progress import SILENT, Progress
 from robots.limits import Limits
 from robots.robot import Robot
+from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
@@ -53,6 +54,10 @@ def design(
     velocity_fraction: float = 1.0,
     torque: bool = True,
     torque_margin: float = 0.1,
+    scaling: str = "none",
+    noise: ArrayLike | None = None,
+    after: Prior | None = None,
+    task: Motion | None = None,
     effort: str | Effort = "standard",
     time_limit: float = np.inf,
     seed: int = 0,
@@ -65,7 +70,8 @@ def design(
 
     A finite Fourier series per joint, at rest at both ends (thesis eq. 78 to 80), minimises the criterion of the base
     regressor under the limits of position, velocity, acceleration and jerk, by IPOPT with exact derivatives from
-    screened starts and hops. One stroke per joint to its velocity bound (eq. 81 to 83) and jerk-limited moves complete it.
+    screened starts and hops. One stroke per joint to its velocity bound (eq. 81 to 83) and jerk-limited moves complete
+    it.
 
     Args:
         robot: the robot.
@@ -82,6 +88,11 @@ def design(
         velocity_fraction: of the velocity limits that may be used.
         torque: keep the torque limits by the robot's nominal dynamics, where both are described.
         torque_margin: share of the torque limits kept for what the nominal dynamics are wrong by.
+        scaling: of the columns that the criterion judges: ``none``, ``nominal`` (each by the size its parameter has in the
+            robot's description) or ``unit`` (each to unit length).
+        noise: torque noise of each joint (n,) [N m or N]: rows count by one over it; all alike by default.
+        after: what an earlier identification knows: the design adds what that lacks.
+        task: with criterion ``i``, the motion whose torques are to be predicted.
         effort: ``quick``, ``standard``, ``thorough``, or counts of one's own.
         time_limit: for the search [s]; past it the best design so far is kept. Without it the same seed gives the same
             design on a fast and on a slow machine.
@@ -99,7 +110,7 @@ def design(
         InfeasibleError: a limit of zero, or no start that keeps the limits and excites all parameters.
     """
     chosen = choose_criterion(criterion)
-    _check(harmonics, base_frequency, periods, velocity_fraction, time_limit)
+    _check(harmonics, base_frequency, periods, velocity_fraction, time_limit, seed)
     work = _effort(effort)
     count_periods(1 / base_frequency, robot.period)
     settings = {
@@ -114,6 +125,9 @@ def design(
         "home": None if home is None else np.asarray(home, dtype=float).tolist(),
         "velocity_fraction": velocity_fraction,
         "torque_margin": torque_margin if torque else None,
+        "scaling": scaling,
+        "noise": None if noise is None else np.asarray(noise, dtype=float).tolist(),
+        "after": after is not None,
         "seed": seed,
         "effort": asdict(work),
         "time_limit": time_limit if np.isfinite(time_limit) else None,
@@ -121,23 +135,29 @@ def design(
     }
     limits = usable_limits(robot.limits, velocity_fraction)
     base = base_parameters(design_model(robot, settings))
-    rest_pose = home_pose(limits) if home is None else np.asarray(home, dtype=float)
-    torque_limit = _torque_limit(base, rest_pose, torque_margin) if torque else None
+    weighting = _weighting(base, chosen, scaling, noise, after, task, periods / base_frequency / robot.period)
+    pose = rest_pose(limits, home)
+    torque_limit = _torque_limit(base, pose, torque_margin) if torque else None
     problem = FourierProblem(
         base=base,
         criterion=chosen,
         limits=limits,
         harmonics=harmonics,
         base_frequency=base_frequency,
+        samples=max(FourierProblem.samples, 20 * harmonics),
+        limit_samples=max(FourierProblem.limit_samples, 50 * harmonics),
         pointwise=() if torque_limit is None else (torque_limit,),
-        home=rest_pose,
+        home=pose,
+        weighting=weighting,
     )
     # The experiment's frame is laid out first: whatever is wrong with a limit or a pose shows before the long work.
     rest = FourierSeries.from_coefficients(np.zeros((robot.n, 2 * harmonics + 1)), base_frequency)
     rest = replace(rest, offsets=problem.centre)
-    assemble(rest, limits, period=robot.period, home=rest_pose, strokes=strokes)
+    assemble(rest, limits, period=robot.period, home=pose, strokes=strokes)
     problem.cost(np.zeros(problem.size))  # compiles, once for all processes
-    with Board.watched(work.islands, work.steps, progress or SILENT, f"designing for {robot.name}") as board:
+    sign = -1.0 if chosen.larger_is_better else 1.0
+    work_name = f"designing for {robot.name}"
+    with Board.watched(work.islands, work.steps, progress or SILENT, work_name, sign) as board:
         deadline = time.time() + time_limit
         tasks = [
             _Task(
@@ -158,7 +178,7 @@ def design(
             "no motion found that excites all parameters", remedy="allow more motion, or fit fewer parameters"
         )
     series = problem.series(best.z, periods)
-    sequence = _within_torque(series, limits, rest_pose, robot.period, strokes, torque_limit)
+    sequence = _within_torque(series, limits, pose, robot.period, strokes, torque_limit)
     motion = sequence.motion()
     design = Design(
         robot=robot,
@@ -173,8 +193,53 @@ def design(
         coefficients=series.coefficients,
     )
     parts = ["fourier", *(["sinusoid"] if strokes else [])]
-    qualities = (*(measure(part, base, design.part(part)) for part in parts), measure("whole", base, motion))
-    return replace(design, qualities=qualities)
+    qualities = [*(measure(part, base, design.part(part)) for part in parts), measure("whole", base, motion)]
+    if not weighting.plain:
+        one = series.motion(robot.period)
+        qualities.insert(1, measure(f"fourier ({weighting.name})", base, one, weighting))
+    return replace(design, qualities=tuple(qualities))
+
+
+def _weighting(
+    base: BaseParameters,
+    criterion: Criterion,
+    scaling: str,
+    noise: ArrayLike | None,
+    after: Prior | None,
+    task: Motion | None,
+    samples: float,
+) -> Weighting:
+    """Collects how rows and columns count, and what is known already."""
+    if scaling not in SCALINGS:
+        raise InputError(f"scaling {scaling!r}", allowed=", ".join(SCALINGS))
+    if (criterion.name == "i") != (task is not None):
+        raise InputError("criterion i and a task belong together", remedy="give both, or neither")
+    joints = base.model.robot.n
+    levels = after.noise if noise is None and after is not None else noise
+    rows = None
+    if levels is not None:
+        rows = 1 / np.asarray(levels, dtype=float)
+        if rows.shape != (joints,) or not (np.isfinite(rows) & (rows > 0)).all():
+            raise InputError(f"torque noise {levels}", allowed=f"{joints} positive numbers")
+    transform = nominal_scale(base) if scaling == "nominal" else None
+    if task is not None:
+        if task.n != joints:
+            raise InputError(f"a task of {task.n} joints", allowed=f"{joints}")
+        transform = task_transform(base, task.q, task.dq, task.ddq)
+    words = [
+        *([f"columns by {scaling}"] if scaling != "none" else []),
+        *(["rows by noise"] if rows is not None else []),
+        *(["after an earlier model"] if after is not None else []),
+        *(["for the task"] if task is not None else []),
+    ]
+    return Weighting(
+        rows=rows,
+        transform=transform,
+        unit_columns=scaling == "unit",
+        prior=None if after is None else after.information(base.names),
+        amount=samples / (after.colour**2 if after is not None else 1.0),
+        name=", ".join(words) or "none",
+    )
 
 
 def _torque_limit(base: BaseParameters, home: Array, margin: float) -> TorqueLimit | None:
@@ -206,7 +271,8 @@ def _within_torque(
         if torque.excess(motion.q, motion.dq, motion.ddq).max() <= 0:
             return sequence
     raise InfeasibleError(
-        "the moves pass a torque limit however slow they are", remedy="state another home pose, or leave out the strokes"
+        "the moves pass a torque limit however slow they are",
+        remedy="state another home pose, or leave out the strokes",
     )
 
 
@@ -226,9 +292,9 @@ def usable_limits(limits: Limits, velocity_fraction: float = 1.0) -> Limits:
 
 
 def _check(
-    harmonics: int, base_frequency: float, periods: int, velocity_fraction: float, time_limit: float
+    harmonics: int, base_frequency: float, periods: int, velocity_fraction: float, time_limit: float, seed: int
 ) -> None:
-    for name, value, least in (("harmonics", harmonics, 2), ("periods", periods, 1)):
+    for name, value, least in (("harmonics", harmonics, 2), ("periods", periods, 1), ("seed", seed, 0)):
         if value < least or value != int(value):
             raise InputError(f"{name} is {value}", allowed=f"a whole number, at least {least}")
     if not (np.isfinite(base_frequency) and base_frequency > 0):

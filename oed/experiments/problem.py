@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.constraints import KinematicRows, PointwiseLimit, kinematic_rows
-from oed.criteria import Criterion, Information
+from oed.criteria import Criterion, Information, Weighting
 from oed.trajectories import FourierSeries, Kinematics, fourier_basis, rest_basis
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InfeasibleError
@@ -35,6 +35,7 @@ class FourierProblem:
             rest there and a row of zeros informs of nothing.
         limit_samples: per period, at which the limits are imposed, tightened for what lies between.
         pointwise: limits that are not linear in the coefficients, such as torque; imposed at the same samples.
+        weighting: of rows and columns, and what is known already.
         home: pose (n,) to shrink motions to where the middle of the ranges breaks a pointwise limit.
     """
 
@@ -47,6 +48,7 @@ class FourierProblem:
     limit_samples: int = 250
     pointwise: tuple[PointwiseLimit, ...] = ()
     home: Array | None = None
+    weighting: Weighting = Weighting()
 
     def __getstate__(self) -> dict[str, object]:
         # What is derived, compiled code above all, is rebuilt in the process that needs it.
@@ -68,7 +70,7 @@ class FourierProblem:
     @cached_property
     def information(self) -> Information:
         """The information matrix of sampled motion."""
-        return Information(self.base.model, self.base.independent)
+        return Information(self.base.model, self.base.independent, self.weighting.rows)
 
     @cached_property
     def scale(self) -> Array:
@@ -150,13 +152,14 @@ class FourierProblem:
 
     def surrogate(self, z: Array, sharpness: float) -> tuple[float, Array]:
         """Evaluates the criterion's smooth stand-in and its exact gradient (n K,)."""
-        eigenvalues, vectors = np.linalg.eigh(self.gram(z))
+        gram = self.gram(z)
+        eigenvalues, vectors = np.linalg.eigh(self.weighting.apply(gram))
         value, slope = self.criterion.surrogate(eigenvalues, sharpness)
-        return value, self.pullback((vectors * slope) @ vectors.T)
+        return value, self.pullback(self.weighting.pullback((vectors * slope) @ vectors.T, gram))
 
     def cost(self, z: Array) -> float:
         """Evaluates the criterion itself on the samples, smaller being better."""
-        return self.criterion.cost(np.linalg.eigvalsh(self.gram(z)))
+        return self.criterion.cost(np.linalg.eigvalsh(self.weighting.apply(self.gram(z))))
 
     @cached_property
     def limit_bases(self) -> Kinematics:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.criteria import Criterion, criterion as choose_criterion, singular_values
+from oed.criteria import Criterion, Weighting, criterion as choose_criterion, triangle
 from oed.experiments.views import motion_frame, plot_velocities
 from oed.exports import read_trajectory, write_trajectory
 from robots.base_parameters import BaseParameters, base_parameters
@@ -207,13 +207,13 @@ class Design:
             "format_version": 1,
             "tool_version": VERSION,
             "robot": {"name": self.robot.name, "origin": self.robot.origin, "sha256": self.robot.digest},
-            "assumed": list(self.robot.assumed),
+            "assumed": [*self.robot.assumed, *(f"limits.{name}" for name in missing_limits(self.robot.limits))],
             "model": {
                 "columns": list(self.base.names),
                 "units": [column.unit for column in self.base.columns],
                 "stands_for": list(self.base.formulas()),
                 "terms": [term.name for term in model.terms],
-                "scaling": "none",
+                "scaling": self.settings.get("scaling", "none"),
                 "coulomb": f"tanh(dq / {self.settings['velocity_scale']:g})",
             },
             "criterion": self.criterion.name,
@@ -305,10 +305,18 @@ def design_model(robot: Robot, settings: Mapping[str, Any]) -> TorqueModel:
     return default_model(robot, **{key: settings[key] for key in keys})
 
 
+def missing_limits(limits: Limits) -> dict[str, tuple[int, ...]]:
+    """Finds the quantities, and their joints from 1, for which cautious limits had to be assumed."""
+    lacking = {name: np.flatnonzero(~np.isfinite(getattr(limits, name))) + 1 for name in ("acceleration", "jerk")}
+    return {name: tuple(map(int, joints)) for name, joints in lacking.items() if joints.size}
+
+
 @one_blas_thread()
-def measure(part: str, base: BaseParameters, motion: Motion) -> Quality:
-    """Computes the singular values of a motion's regressor."""
-    values = singular_values(base.model, base.independent, motion.q, motion.dq, motion.ddq)
+def measure(part: str, base: BaseParameters, motion: Motion, weighting: Weighting | None = None) -> Quality:
+    """Computes the singular values of a motion's regressor, or of what a weighting makes of it."""
+    judged = weighting or Weighting()
+    reduced = triangle(base.model, base.independent, motion.q, motion.dq, motion.ddq, judged.rows)
+    values = judged.singular_values(reduced, len(motion))
     return Quality(part=part, samples=len(motion), singular_values=tuple(float(v) for v in values))
 
 

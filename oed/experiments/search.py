@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.criteria import singular_values
+from oed.criteria import triangle
 from oed.experiments.problem import FourierProblem
 from oed.experiments.solver import Ipopt, Solved, Stage, minimise
 from oed.trajectories import count_periods
@@ -217,7 +217,9 @@ def dense(problem: FourierProblem, z: Array) -> tuple[float, float]:
     robot = problem.base.model.robot
     t = robot.period * np.arange(count_periods(1 / problem.base_frequency, robot.period))
     q, dq, ddq, _ = problem.series(z).sample(t)
-    values = singular_values(problem.base.model, problem.base.independent, q, dq, ddq)
+    weighting = problem.weighting
+    reduced = triangle(problem.base.model, problem.base.independent, q, dq, ddq, weighting.rows)
+    values = weighting.singular_values(reduced, len(t))
     if values[0] < 1e-10 * values[-1]:
         return np.inf, np.nan
     return problem.criterion.cost(values**2), problem.criterion.value(values**2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from oed.reports.campaign_report import campaign_page, save_campaign_report
 from oed.reports.design_report import design_page, save_design_report
 from oed.reports.estimate_report import estimate_page, save_estimate_report
 from oed.reports.matplotlib_ import save_png, to_matplotlib
@@ -26,6 +27,7 @@ __all__ = [
     "Series",
     "Span",
     "Table",
+    "campaign_page",
     "design_page",
     "error_bars_picture",
     "estimate_page",
@@ -36,6 +38,7 @@ __all__ = [
     "render",
     "residual_picture",
     "retime_page",
+    "save_campaign_report",
     "save_design_report",
     "save_estimate_report",
     "save_png",

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from oed.criteria import CRITERIA
 from oed.experiments import Design
-from oed.experiments.result import Quality
+from oed.experiments.result import Quality, missing_limits
 from oed.reports.page import Cell, Fact, Page, Section, Table
 from oed.reports.saving import footer, save_page
 from oed.reports.significant import significant
@@ -23,8 +22,7 @@ def save_design_report(design: Design, folder: ResultFolder, *, png: bool = Fals
 def design_page(design: Design) -> Page:
     """Builds the page: what the experiment is worth, how it moves, how far it stays from the limits."""
     robot, motion = design.robot, design.motion
-    label = CRITERIA[design.criterion]().label
-    value = design.fourier.value(design.criterion)
+    label, value = design.criterion.label, design.fourier.value(design.criterion)
     verdict = (
         f"The optimised part reaches {label} = {significant(value)} over {design.base.size} parameters, and the whole "
         f"experiment takes {motion.duration:.0f} s."
@@ -151,8 +149,12 @@ def _warnings(design: Design) -> tuple[str, ...]:
     warnings = [f"The motion passes the limit of {_name(margin)}." for margin in design.violated]
     if design.robot.assumed:
         warnings.append(f"Assumed, with no source behind them: {', '.join(design.robot.assumed)}.")
-    if not np.isfinite(design.robot.limits.acceleration).all():
-        warnings.append("The robot's description lacks acceleration limits; cautious ones were taken: 4/s times velocity.")
+    substitutes = {"acceleration": "4/s times the velocity limit", "jerk": "20/s times the acceleration limit"}
+    for name, joints in missing_limits(design.robot.limits).items():
+        warnings.append(
+            f"The robot's description lacks the {name} limit of joint {', '.join(map(str, joints))}; cautiously "
+            f"assumed: {substitutes[name]}."
+        )
     if not any(margin.quantity == "torque" for margin in design.margins):
         warnings.append("Torque was not checked: the robot's description lacks nominal dynamics or torque limits.")
     warnings.append("Collisions were not checked.")
@@ -179,6 +181,7 @@ def _search_text(design: Design) -> str:
 
 
 def _islands(design: Design) -> Table:
-    rows = tuple((i.island, i.initial, i.final, i.iterations, i.evaluations, i.status) for i in design.islands)
-    headings = ("search", f"first {design.criterion}", f"final {design.criterion}", "iterations", "evaluations", "end")
-    return Table(headings=headings, rows=rows)
+    rows = tuple(tuple(island.to_dict().values()) for island in design.islands)
+    name = design.criterion.name
+    headings = ("search", f"first {name}", f"final {name}", "iterations", "evaluations", "end")
+    return Table(headings=headings, rows=rows, caption="The criterion of one period at the controller's samples.")

@@ -7,7 +7,7 @@ import numpy as np
 from oed.criteria import CRITERIA
 from oed.experiments import RetimedExperiment
 from oed.reports.design_report import margins_section, parameters_section, quality_section
-from oed.reports.page import Fact, Page, Section
+from oed.reports.page import Cell, Fact, Page, Section, Table
 from oed.reports.saving import footer, save_page
 from oed.reports.trajectory_pictures import trajectory_picture
 from robots.common.files import ResultFolder
@@ -38,25 +38,35 @@ def retime_page(result: RetimedExperiment, given: Motion) -> Page:
         for stem, motion in (("after", result.motion), ("before", given))
     )
     warnings = [] if result.success else ["The new timing passes a limit."]
+    if retimed.slower:
+        warnings.append(retimed.verdict())
     if robot.assumed:
         warnings.append(f"Assumed, with no source behind them: {', '.join(robot.assumed)}.")
     return Page(
         title="Retimed path",
         subtitle=robot.title or robot.name,
         verdict=(
-            f"{retimed.method} runs the path in {retimed.duration_after:.1f} s instead of {retimed.duration_before:.1f} s, "
-            f"using {100 * share:.1f} % of the {name} limit of joint {joint}."
+            f"{retimed.method} runs the path in {retimed.duration_after:.1f} s instead of "
+            f"{retimed.duration_before:.1f} s, using {100 * share:.1f} % of the {name} limit of joint {joint}. "
+            f"{retimed.verdict()}"
         ),
         status="good" if result.success else "bad",
         facts=(
             Fact(label=f"{CRITERIA['cond']().label} before", value=before if before is not None else "not all excited"),
             Fact(label="cond(Y) after", value=after if after is not None else "not all excited"),
+            Fact(label="Duration before", value=f"{retimed.duration_before:.3f} s"),
+            Fact(
+                label="Duration after",
+                value=f"{retimed.duration_after:.3f} s",
+                status="bad" if retimed.slower and retimed.given_keeps_limits else "neutral",
+            ),
             Fact(label="Stops on the way", value=retimed.stops),
             Fact(label="Path kept to", value=f"{retimed.deviation:.2g}", note="rad or m, in any joint"),
         ),
         warnings=tuple(warnings),
         sections=(
             Section(title="New motion", pictures=pictures[:1]),
+            *_torque_sections(result),
             quality_section((result.before, result.after)),
             margins_section(tuple(m for m in result.margins if np.isfinite(m.limit)), robot.joint_names),
             Section(title="Given motion", pictures=pictures[1:], folded=True),
@@ -64,3 +74,27 @@ def retime_page(result: RetimedExperiment, given: Motion) -> Page:
         ),
         footer=footer(),
     )
+
+
+def _torque_sections(result: RetimedExperiment) -> tuple[Section, ...]:
+    before, after = result.torque_before, result.torque_after
+    if before is None or after is None:
+        return ()
+    limits = result.robot.limits.torque
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
+        (
+            name,
+            float(before.peak[joint]),
+            float(after.peak[joint]),
+            float(limits[joint]) if np.isfinite(limits[joint]) else None,
+            float(before.rms[joint]),
+            float(after.rms[joint]),
+        )
+        for joint, name in enumerate(result.robot.joint_names)
+    )
+    table = Table(
+        headings=("joint", "peak before", "peak after", "peak allowed", "RMS before", "RMS after"),
+        rows=rows,
+        caption="In N m (N of a prismatic joint), by the nominal model with friction.",
+    )
+    return (Section(title="Torque", tables=(table,)),)

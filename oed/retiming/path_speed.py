@@ -27,6 +27,10 @@ Friction = Callable[[Array], Array]
 
 _FRICTION_ROUNDS = 8
 
+_GRIDS = ((1.0, 0.9), (1.0, 0.5), (1.5, 0.9), (2.0, 0.5), (0.7, 0.0))
+"""Cells over those asked for, and how much denser the ends are. Seidel's method, with its absolute tolerances, calls a
+solvable linear programme infeasible now and then; on another grid it meets others."""
+
 # Every failure is raised as one of our errors; the library's warnings would only repeat it.
 logging.getLogger("toppra").setLevel(logging.ERROR)
 
@@ -97,18 +101,30 @@ def path_speed(piece: PathPiece, limits: Limits, torque: TorqueConstraint | None
     Raises:
         InfeasibleError: no timing keeps the limits.
     """
-    fraction = np.linspace(0.0, 1.0, cells + 1)
-    # Denser towards the ends, where the speed changes fastest along the path.
-    grid = piece.length * (fraction - 0.9 * np.sin(2.0 * np.pi * fraction) / (2.0 * np.pi))
-    grid[-1] = piece.length
+    failure: InfeasibleError | None = None
+    for more, clustering in _GRIDS:
+        fraction = np.linspace(0.0, 1.0, int(more * cells) + 1)
+        # Denser towards the ends, where the speed changes fastest along the path.
+        grid = piece.length * (fraction - clustering * np.sin(2.0 * np.pi * fraction) / (2.0 * np.pi))
+        grid[-1] = piece.length
+        try:
+            return grid, _with_friction(piece, limits, torque, grid)
+        except InfeasibleError as error:
+            failure = failure or error
+    assert failure is not None
+    raise failure
+
+
+def _with_friction(piece: PathPiece, limits: Limits, torque: TorqueConstraint | None, grid: Array) -> Array:
     path = _SplinePath(piece)
     constraints = [JointVelocityConstraint(limits.velocity), JointAccelerationConstraint(limits.acceleration)]
     if torque is None:
-        return grid, _solve(path, constraints, grid, None)
+        return _solve(path, constraints, grid, None)
+    torque.speed = None
     constraints.append(torque)
     speed = _solve(path, constraints, grid, torque)
     if torque.friction is None:
-        return grid, speed
+        return speed
     for _ in range(_FRICTION_ROUNDS):
         torque.speed = speed if torque.speed is None else (torque.speed + speed) / 2.0
         try:
@@ -121,7 +137,7 @@ def path_speed(piece: PathPiece, limits: Limits, torque: TorqueConstraint | None
         speed = update
         if change < 1e-3:
             break
-    return grid, speed
+    return speed
 
 
 def _solve(

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from robots.signals import Motion
 
+KEPT = 1.0 + 1e-6
+"""Use of a limit up to which it counts as kept: rounding."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Retimed:
@@ -21,6 +24,7 @@ class Retimed:
         duration_after: duration of `motion` [s].
         usage: peak over limit by the samples of `motion`, (n,) each, of velocity, acceleration, jerk and, where a model
             was given, torque; 1 is at the limit.
+        usage_before: the same of the given timing; None for waypoints.
         deviation: largest distance of any given point from the retimed path in any joint [rad].
         stops: number of rests between the two ends.
     """
@@ -30,20 +34,54 @@ class Retimed:
     duration_before: float
     duration_after: float
     usage: dict[str, NDArray[np.float64]]
+    usage_before: dict[str, NDArray[np.float64]] | None = None
     deviation: float
     stops: int
 
     @property
     def peak(self) -> tuple[str, int, float]:
         """The limit that is used most: its name, the joint from 1, and the fraction."""
-        name = max(self.usage, key=lambda key: self.usage[key].max())
-        return name, int(self.usage[name].argmax()) + 1, float(self.usage[name].max())
+        return _peak(self.usage)
+
+    @property
+    def given_keeps_limits(self) -> bool | None:
+        """Whether the given timing keeps the same limits; None for waypoints without times."""
+        return None if self.usage_before is None else _peak(self.usage_before)[2] <= KEPT
+
+    @property
+    def slower(self) -> bool:
+        """Whether the new timing takes longer than the given one."""
+        return bool(self.duration_after > self.duration_before + 1e-9)
+
+    def verdict(self) -> str:
+        """Says plainly how the new timing compares with the given one; empty for waypoints without times."""
+        if self.usage_before is None:
+            return ""
+        change = abs(self.duration_after - self.duration_before)
+        if self.slower and self.given_keeps_limits:
+            return f"The new timing is {change:.3f} s slower than the given one, which keeps all limits: keep that one."
+        if self.slower:
+            name, joint, fraction = _peak(self.usage_before)
+            return (
+                f"The new timing is {change:.3f} s slower: the given one uses {100 * fraction:.1f} % "
+                f"of the {name} limit of joint {joint}."
+            )
+        if change <= 1e-9:
+            return "The new timing is no faster: the limits leave nothing to gain."
+        return f"The new timing is {change:.3f} s faster."
 
     def summary(self) -> str:
-        """One line for people."""
+        """A few words for people."""
         name, joint, fraction = self.peak
-        return (
-            f"{self.method}: {self.duration_before:.3f} s -> {self.duration_after:.3f} s, "
+        before = "" if np.isnan(self.duration_before) else f"{self.duration_before:.3f} s -> "
+        line = (
+            f"{self.method}: {before}{self.duration_after:.3f} s, "
             f"{100 * fraction:.1f} % of the {name} limit of joint {joint}, "
             f"path kept to {self.deviation:.2g} rad, {self.stops} stops on the way"
         )
+        return f"{line}\n  {self.verdict()}" if self.verdict() else line
+
+
+def _peak(usage: dict[str, NDArray[np.float64]]) -> tuple[str, int, float]:
+    name = max(usage, key=lambda key: usage[key].max())
+    return name, int(usage[name].argmax()) + 1, float(usage[name].max())

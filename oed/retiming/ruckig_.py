@@ -64,6 +64,7 @@ def retime_with_stops(path: Motion | ArrayLike, limits: Limits, *, period: float
         duration_before=path.duration if isinstance(path, Motion) else np.nan,
         duration_after=motion.duration,
         usage=limit_usage(motion, finite_limits(limits)),
+        usage_before=limit_usage(path, finite_limits(limits)) if isinstance(path, Motion) else None,
         deviation=_deviation(points, vertices),
         stops=len(parts) - 1,
     )

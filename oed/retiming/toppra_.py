@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from oed.retiming.limits import finite_limits, limit_usage, require_inside
 from oed.retiming.paths import PathPiece, split_path
-from oed.retiming.result import Retimed
+from oed.retiming.refinement import ORDERS, Torque, refine
+from oed.retiming.result import KEPT, Retimed
+from oed.retiming.stretches import Stretch, split_at_rests
 from oed.retiming.timing import TimeLaw, kinematics
+from oed.retiming.timing_problem import Friction, InverseDynamics
 from robots.common.errors import InfeasibleError, InputError
 from robots.limits import Limits
 from robots.signals import Motion
 
 Array = NDArray[np.float64]
-InverseDynamics = Callable[[Array, Array, Array], Array]
-Friction = Callable[[Array], Array]
+
+EXACT = 1e-4
+"""Deviation from the given path above which a timing that keeps the path exactly is preferred, however slow [rad]."""
 
 _STRETCH_ROUNDS = 60
 
@@ -54,11 +57,14 @@ def retime(
 ) -> Retimed:
     """Runs through the path of a motion as fast as the limits allow, at rest at both ends.
 
-    The path is a cubic spline through the points given. It is split where it has to rest (see `split_path`). Each
-    piece is timed by TOPP-RA (Pham and Pham 2018), the law averaged over a short window (`TimeLaw`) to end without
-    acceleration and keep the jerk limits, sampled at the controller's period, and stretched until its own samples
-    keep every limit. Friction enters at the speed of the solution before, for the algorithm knows torque that is
-    quadratic in speed only.
+    The path is split where it has to rest (see `split_path`). Each piece, a cubic spline, is timed by TOPP-RA (Pham
+    and Pham 2018), the law averaged over a short window (`TimeLaw`) to end without acceleration and keep the jerk
+    limits, sampled at the controller's period, and stretched until its own samples keep every limit. Friction enters
+    at the speed of the solution before, for the algorithm knows torque that is quadratic in speed only.
+
+    TOPP-RA knows no jerk, and averaging pays for it dearly. So `refine` goes on from there, and, from one rest of a
+    motion to the next, from the motion's own timing too; the fastest is kept. A motion whose own timing keeps the
+    limits thus never becomes slower, and its path is kept exactly.
 
     Args:
         path: a motion, or waypoints (W, n) [rad].
@@ -77,16 +83,10 @@ def retime(
             not even hold the arm.
         InputError: waypoints that are no (W, n) array, or a joint without a velocity limit.
     """
-    # Imported here because toppra brings in matplotlib.pyplot, which most commands do not need.
-    from oed.retiming.path_speed import TorqueConstraint, path_speed
-
     choices = options or Toppra()
     usable = stated = finite_limits(limits)
     if not choices.limit_jerk:
         usable = dataclasses.replace(usable, jerk=np.full_like(usable.jerk, np.inf))
-    pieces = split_path(path, usable.velocity)
-    if not pieces:
-        raise InfeasibleError("the path does not move: there is nothing to retime")
 
     def torque(motion: Motion) -> Array | None:
         if inverse_dynamics is None:
@@ -94,22 +94,101 @@ def retime(
         rigid = inverse_dynamics(motion.q, motion.dq, motion.ddq)
         return rigid if friction is None else rigid + friction(motion.dq)
 
-    timed = []
-    for piece in pieces:
-        require_inside(piece.spline(np.linspace(0.0, piece.length, 2001)), usable, tolerance=1e-6)
-        constraint = None if inverse_dynamics is None else TorqueConstraint(inverse_dynamics, friction, usable.torque)
-        grid, speed = path_speed(piece, usable, constraint, choices.grid)
-        timed.append(_best_window(piece, grid, speed, usable, period, torque))
-    motion = _join(timed, period)
+    task = _Task(usable, period, inverse_dynamics, friction, torque, choices)
+    if isinstance(path, Motion) and path.n == limits.n:
+        chosen = [_fastest(stretch, task) for stretch in split_at_rests(path)]
+    else:
+        chosen = [_by_toppra(path, task)]
+    if not any(len(timing.motion) > 1 for timing in chosen):
+        raise InfeasibleError("the path does not move: there is nothing to retime")
+    motion = _join([timing.motion for timing in chosen], period)
     return Retimed(
         motion=motion,
         method="toppra",
         duration_before=path.duration if isinstance(path, Motion) else np.nan,
         duration_after=motion.duration,
         usage=limit_usage(motion, stated, torque(motion)),
-        deviation=max(piece.deviation for piece in pieces),
-        stops=len(pieces) - 1,
+        usage_before=limit_usage(path, usable, torque(path)) if isinstance(path, Motion) else None,
+        deviation=max(timing.deviation for timing in chosen),
+        stops=sum(timing.stops for timing in chosen) + len(chosen) - 1,
     )
+
+
+@dataclasses.dataclass(frozen=True)
+class _Task:
+    """What all pieces of a path share."""
+
+    limits: Limits
+    period: float
+    inverse_dynamics: InverseDynamics | None
+    friction: Friction | None
+    torque: Torque
+    options: Toppra
+
+    def refined(self, motion: Motion) -> Motion | None:
+        return refine(
+            motion,
+            self.limits,
+            period=self.period,
+            inverse_dynamics=self.inverse_dynamics,
+            friction=self.friction,
+        )
+
+    def keeps_limits(self, motion: Motion) -> bool:
+        return max(float(use.max()) for use in limit_usage(motion, self.limits, self.torque(motion)).values()) <= KEPT
+
+
+@dataclasses.dataclass(frozen=True)
+class _Timing:
+    """One way to run through a part of the path."""
+
+    motion: Motion
+    deviation: float = 0.0
+    stops: int = 0
+
+
+def _fastest(stretch: Stretch, task: _Task) -> _Timing:
+    """Takes the fastest of the given timing, what refining makes of it, and TOPP-RA's."""
+    given, timings = stretch.motion, []
+    if stretch.smooth:
+        require_inside(given.q, task.limits, tolerance=1e-6)
+        if given.period is not None and abs(given.period / task.period - 1.0) < 1e-6 and task.keeps_limits(given):
+            timings.append(_Timing(given))
+        faster = task.refined(given)
+        timings += [] if faster is None else [_Timing(faster)]
+    try:
+        found = _by_toppra(given, task)
+    except InfeasibleError:
+        # Its linear programmes can fail on paths that have a timing: the given one is proof.
+        if not timings:
+            raise
+    else:
+        if found.deviation <= EXACT or not timings:
+            timings.append(found)
+    return min(timings, key=lambda timing: len(timing.motion))
+
+
+def _by_toppra(path: Motion | ArrayLike, task: _Task) -> _Timing:
+    # Imported here because toppra brings in matplotlib.pyplot, which most commands do not need.
+    from oed.retiming.path_speed import TorqueConstraint, path_speed
+
+    limits = task.limits
+    pieces = split_path(path, limits.velocity)
+    if not pieces:
+        raise InfeasibleError("the path does not move: there is nothing to retime")
+    timed = []
+    for piece in pieces:
+        require_inside(piece.spline(np.linspace(0.0, piece.length, 2001)), limits, tolerance=1e-6)
+        constraint = None
+        if task.inverse_dynamics is not None:
+            constraint = TorqueConstraint(task.inverse_dynamics, task.friction, limits.torque)
+        grid, speed = path_speed(piece, limits, constraint, task.options.grid)
+        motion = _best_window(piece, grid, speed, limits, task.period, task.torque)
+        if np.isfinite(limits.jerk).any():
+            faster = task.refined(motion)
+            motion = faster if faster is not None and len(faster) < len(motion) else motion
+        timed.append(motion)
+    return _Timing(_join(timed, task.period), max(piece.deviation for piece in pieces), len(pieces) - 1)
 
 
 def _best_window(
@@ -118,7 +197,7 @@ def _best_window(
     speed: Array,
     limits: Limits,
     period: float,
-    torque: Callable[[Motion], Array | None],
+    torque: Torque,
 ) -> Motion:
     """Averages over several windows, stretches each result to the limits, and keeps the shortest."""
     natural = float((2.0 * limits.acceleration / limits.jerk).max())
@@ -141,13 +220,12 @@ def _stretched(
     law: TimeLaw,
     limits: Limits,
     period: float,
-    torque: Callable[[Motion], Array | None],
+    torque: Torque,
     give_up_at: float | None,
 ) -> Motion | None:
     """Stretches a law until its samples keep every limit; None where that fails or takes longer than `give_up_at`."""
     natural = law.duration
     count = int(np.ceil(natural / period - 1e-9))
-    orders = {"velocity": 1.0, "acceleration": 2.0, "jerk": 3.0, "torque": 2.0}
     for _ in range(_STRETCH_ROUNDS):
         if give_up_at is not None and count * period >= give_up_at:
             return None
@@ -155,7 +233,7 @@ def _stretched(
         s, ds, dds = dataclasses.replace(law, stretch=count * period / natural).sample(t)
         motion = Motion(t, *kinematics(piece.spline, np.clip(s, 0.0, piece.length), ds, dds))
         usage = limit_usage(motion, limits, torque(motion))
-        factor = max(float(usage[name].max()) ** (1.0 / orders[name]) for name in usage)
+        factor = max(float(usage[name].max()) ** (1.0 / ORDERS[name]) for name in usage)
         if factor <= 1.0:
             return motion
         count = max(count + 1, int(np.ceil(count * min(factor, 2.0))))

@@ -1,0 +1,198 @@
+"""The verb: plans a campaign of excitation, friction and warm-up stages."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import replace
+from os import PathLike
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oed.campaigns.checking import TorqueCheck, checked, closest_bodies
+from oed.campaigns.excitation import excitation_stage
+from oed.campaigns.fitting import fit_stages
+from oed.campaigns.planning import ALIGNED, Planner
+from oed.campaigns.programme import Programme
+from oed.campaigns.result import Campaign
+from oed.campaigns.stages import Stage
+from oed.campaigns.timetable import make_timetable
+from oed.experiments import Design, usable_limits
+from oed.experiments import design as design_experiment
+from oed.experiments.assembly import home_pose
+from oed.trajectories import Posture
+from robots.common.errors import InputError
+from robots.common.parallel import one_blas_thread
+from robots.common.progress import SILENT, Progress
+from robots.robot import Robot
+from robots.thermal import KnownThermal, known_thermal
+
+Array = NDArray[np.float64]
+
+
+@one_blas_thread()
+def campaign(
+    robot: Robot,
+    *,
+    programme: Programme | None = None,
+    design: Design | str | PathLike[str] | None = None,
+    velocity_fraction: float = 1.0,
+    torque_margin: float = 0.1,
+    ambient: float = 20.0,
+    cold_friction: float = 1.0,
+    thermal: KnownThermal | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> Campaign:
+    """Plans a campaign: what heats a robot through and tells its parameters and its friction on the way.
+
+    A heating cycle is an excitation, friction sweeps of every joint at constant speeds both ways, posed so that gravity
+    does no work on the joint where the arm allows, and a warm-up of all joints at full speed over 80 % of their ranges
+    (thesis sections 2.4 and 5.1). Jerk-limited moves join them; every stage begins and ends at rest at home, so that
+    stages can be played in any order. Where they do not fit into the cycle, first the friction stage gives way, then
+    the warm-up, and the notes say so.
+
+    Args:
+        robot: the robot.
+        programme: what to run how often; 24 cycles of 5 min by default.
+        design: the excitation, or its folder; a quick one is designed by default. Its first pose is home.
+        velocity_fraction: of the velocity limits that may be used.
+        torque_margin: share of the torque limits kept for what the nominal dynamics are wrong by.
+        ambient: temperature of the surroundings [degC].
+        cold_friction: friction of the cold robot over that of the description, for the expected temperatures: above 1
+            where the description is of the warm robot.
+        thermal: models of the joints; by default the published ones, if there are any.
+        seed: of the quick design.
+        workers: processes of the quick design.
+        executor: runs the quick design's searches.
+        progress: is told how far it is.
+
+    Returns:
+        The campaign; all its stages keep all limits by their own samples.
+
+    Raises:
+        InputError: options out of range, a design for another robot.
+        InfeasibleError: a limit of zero, stages that pass a limit, or a cycle that is too short.
+    """
+    plan = programme or Programme()
+    for name, value, allowed, good in (
+        ("velocity_fraction", velocity_fraction, "above 0, up to 1", 0.0 < velocity_fraction <= 1.0),
+        ("ambient", ambient, "a temperature in degC", bool(np.isfinite(ambient))),
+        ("cold_friction", cold_friction, "a positive number", 0.0 < cold_friction < np.inf),
+    ):
+        if not good:
+            raise InputError(f"{name} is {value}", allowed=allowed)
+    limits = usable_limits(robot.limits, velocity_fraction)
+    torque = TorqueCheck(robot, torque_margin)
+    listener = progress or SILENT
+    notes: list[str] = []
+    excitation, home = None, home_pose(limits)
+    if plan.cycles:
+        if design is None:
+            design = design_experiment(
+                robot,
+                effort="quick",
+                velocity_fraction=velocity_fraction,
+                torque_margin=torque_margin,
+                seed=seed,
+                workers=workers,
+                executor=executor,
+                progress=progress,
+            )
+            notes.append("The excitation was designed on the spot, with a quick search; --design takes a better one.")
+        excitation, remarks = excitation_stage(robot, design)
+        notes += remarks
+        home = excitation.motion.q[0]
+        excitation = checked(excitation, robot, home, torque)
+    listener.start(f"planning a campaign for {robot.name}", None)
+    try:
+        planner = Planner(robot=robot, limits=limits, home=home, torque=torque)
+        stages = [_power_on_stage(plan, home, robot.period)] if plan.power_on else []
+        if excitation is not None:
+            stages.append(excitation)
+        if plan.cycles or plan.cooling:
+            fitted, remarks = fit_stages(planner, plan, excitation)
+            stages += fitted
+            notes += remarks
+        stages = [checked(stage, robot, home, torque) for stage in stages]
+        slots = make_timetable(plan, {stage.name: len(stage.motion) for stage in stages}, robot.period)
+        known = thermal or known_thermal(robot, ambient=ambient)
+        if known is not None and len(known.models) != robot.n:
+            raise InputError(f"{len(known.models)} thermal models", allowed=f"{robot.n}, one per joint")
+        if known is not None:
+            known = replace(known, models=tuple(replace(model, ambient=ambient) for model in known.models))
+        notes += _remarks(robot, stages, torque, known)
+    finally:
+        listener.finish()
+    return Campaign(
+        robot=robot,
+        programme=plan,
+        home=home,
+        stages=tuple(stages),
+        slots=slots,
+        thermal=known,
+        ambient=ambient,
+        cold_friction=cold_friction,
+        torque_margin=torque_margin,
+        notes=tuple(notes),
+    )
+
+
+def _power_on_stage(plan: Programme, home: Array, period: float) -> Stage:
+    """Holds home with the motors on; a long test repeats a file of one cycle or less."""
+    blocks = int(np.ceil(plan.power_on / plan.cycle_time - 1e-9))
+    samples = max(2, round(plan.power_on / blocks / period))
+    end = (samples - 1) * period
+    return Stage(
+        name="power_on",
+        kind="power_on",
+        motion=Posture(pose=home, duration=end).motion(period),
+        segments=({"kind": "power_on", "start": 0.0, "end": end, "joint": None},),
+    )
+
+
+def _remarks(robot: Robot, stages: list[Stage], torque: TorqueCheck, known: KnownThermal | None) -> list[str]:
+    notes = []
+    for stage in stages:
+        share = stage.details.get("acceleration_share", 1.0)
+        if share < 1.0:
+            notes.append(
+                f"The {stage.name} stage accelerates at {100 * share:g} % of the limits, to keep the torque limits."
+            )
+        tight = [m for m in stage.margins if m.quantity == "torque" and m.slack_fraction < torque.margin - 1e-9]
+        notes += [
+            f"The {stage.name} stage leaves {100 * m.slack_fraction:.1f} % of the torque limit of joint {m.joint}, "
+            f"less than the {100 * torque.margin:g} % that are asked for."
+            for m in tight
+        ]
+        slow = sorted({p["joint"] for p in stage.plateaus if abs(p["speed"]) < abs(p["asked"]) - 1e-9})
+        if slow:
+            joints = ", ".join(map(str, slow))
+            notes.append(f"The range of joint {joints} is too short for its highest speed in the friction stage.")
+        angles = stage.details.get("angle_to_no_gravity_deg", [])
+        loaded = [str(joint) for joint, angle in enumerate(angles, start=1) if angle > np.rad2deg(ALIGNED)]
+        if loaded:
+            notes.append(
+                f"The arm does not allow a pose in which gravity does no work on joint {', '.join(loaded)}: separate it "
+                "as in thesis eq. 84."
+            )
+        closest = closest_bodies(robot, stage.motion)
+        if closest is not None and closest[1] < 0.0:
+            notes.append(
+                f"COLLISION in the {stage.name} stage, by the shapes of the collision model: {closest[0]} overlap by "
+                f"{-1e3 * closest[1]:.0f} mm at {closest[2]:.1f} s. Check before playing."
+            )
+    if not torque.known:
+        notes.append("Torque was not checked: the description states no nominal dynamics or no torque limits.")
+    if not np.any(np.asarray(robot.friction)):
+        notes.append("The description states no friction: heat is unknown.")
+    if known is None:
+        notes.append("No thermal model of this robot is known: no temperatures are expected.")
+    elif robot.origin == "er3a":
+        notes.append(
+            "Expected temperatures are by the thesis' parameters of joint 4, assumed for the others, and by friction "
+            "alone: heat of the motors' windings is not in the model."
+        )
+    return notes

@@ -1,0 +1,100 @@
+"""Fits the stages of a heating cycle into its time: what gives way, in which order, and what is said about it."""
+
+from __future__ import annotations
+
+from oed.campaigns.planning import Planner
+from oed.campaigns.programme import Programme
+from oed.campaigns.stages import Stage
+from robots.common.errors import InfeasibleError
+
+LEAST_PLATEAU = 0.3
+"""Time at each speed below which the warm-up gives way instead [s]: 75 samples at 4 ms to average over."""
+
+LEAST_WARM_UP = 0.5
+"""Share of the warm-up that must be left."""
+
+FILL = 10.0
+"""Time left over in a cycle that the warm-up takes on [s]; beyond it the robot rests."""
+
+STEPS = 10
+"""Of the bisection for the time at each speed: to a millisecond."""
+
+
+def fit_stages(planner: Planner, programme: Programme, excitation: Stage | None) -> tuple[list[Stage], tuple[str, ...]]:
+    """Plans friction and warm-up stages that fit into the cycle.
+
+    The warm-up keeps its time as long as it can: first the times at constant speed of the friction stage are shortened,
+    down to `LEAST_PLATEAU`, then the warm-up, down to half of what was asked. What little is left over goes to the
+    warm-up.
+
+    Args:
+        planner: plans the stages.
+        programme: what is wanted.
+        excitation: the excitation stage; None in a campaign without heating cycles.
+
+    Returns:
+        The stages but for the excitation, and what was changed.
+
+    Raises:
+        InfeasibleError: a cycle that is too short, with the time that would do.
+    """
+    period = planner.robot.period
+    cycle = round(programme.cycle_time / period)
+    poses = planner.poses()
+
+    def friction(plateau: float) -> Stage:
+        return planner.friction(poses, programme.levels, plateau)
+
+    longest = friction(programme.plateau)
+    if excitation is None:
+        if len(longest.motion) > cycle:
+            needed = len(longest.motion) * period
+            raise _too_short(programme.cycle_time, f"the friction stage takes {needed:.1f} s", needed)
+        return [longest], ()
+    warm_ups = planner.warm_up(programme.warm_up, programme.duties, programme.warm_up_range)
+    budget = cycle - len(excitation.motion) - len(warm_ups[0].motion)
+    chosen, notes = longest, []
+    warm_up_time = round(programme.warm_up / period)
+    if len(longest.motion) > budget:
+        low, high = min(LEAST_PLATEAU, programme.plateau), programme.plateau
+        chosen = friction(low)
+        for _ in range(STEPS if len(chosen.motion) <= budget else 0):
+            middle = (low + high) / 2.0
+            stage = friction(middle)
+            if len(stage.motion) <= budget:
+                chosen, low = stage, middle
+            else:
+                high = middle
+        notes.append(
+            f"Excitation, friction at {programme.plateau:g} s a speed and warm-up take "
+            f"{(cycle - budget + len(longest.motion)) * period:.1f} s, more than the cycle of {programme.cycle_time:g} "
+            f"s: the friction stage was shortened from {longest.duration:.1f} s to {chosen.duration:.1f} s, with at most "
+            f"{low:.2f} s at each speed."
+        )
+    left = budget - len(chosen.motion)
+    if left < 0:
+        needed = (cycle - left) * period
+        warm_up_time += left
+        if warm_up_time * period < LEAST_WARM_UP * programme.warm_up:
+            told = (
+                f"excitation takes {excitation.duration:.1f} s and friction {chosen.duration:.1f} s, which leaves "
+                f"{max(warm_up_time, 0) * period:.1f} s for the warm-up of {programme.warm_up:g} s"
+            )
+            raise _too_short(programme.cycle_time, told, needed)
+        notes.append(
+            f"That was not enough: the warm-up was shortened from {programme.warm_up:g} s to "
+            f"{warm_up_time * period:.1f} s."
+        )
+    if 0 < left * period <= FILL:
+        warm_up_time += left
+    if warm_up_time != round(programme.warm_up / period):
+        warm_ups = planner.warm_up(warm_up_time * period, programme.duties, programme.warm_up_range)
+    return [chosen, *warm_ups], tuple(notes)
+
+
+def _too_short(cycle_time: float, problem: str, needed: float) -> InfeasibleError:
+    return InfeasibleError(
+        f"a cycle of {cycle_time:g} s is too short: {problem}",
+        allowed=f"{needed:.1f} s or more",
+        remedy="lengthen the cycle, shorten the warm-up, or give a shorter design",
+    )

@@ -1,0 +1,110 @@
+"""What a campaign consists of: how many cycles of what, and how long."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from oed.trajectories.sweeps import FRICTION_LEVELS, LONGEST_PLATEAU
+from oed.trajectories.warm_up import RANGE_FRACTION
+from robots.common.errors import InputError
+
+LONGEST = 7 * 24 * 3600.0
+"""A campaign beyond a week is taken for a slip of the pen [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Programme:
+    """Power-on test, then for each duty cycle a run of heating cycles and a cooling test.
+
+    A heating cycle is excitation, friction sweeps and warm-up (thesis section 2.4.1); in a cooling test the robot
+    stands still but for one friction stage at the beginning of every cycle (section 4.3.1).
+
+    Args:
+        cycles: heating cycles of each run.
+        cycle_time: duration of every cycle [s].
+        warm_up: duration of the warm-up in a heating cycle [s].
+        warm_up_range: part of each joint's range that the warm-up drives, above 0 and up to 1.
+        duties: duty cycle of the warm-up in each run, above 0 and up to 1.
+        cooling: friction stages after each run, one every `cycle_time`; 0 for no cooling test.
+        power_on: how long the motors are on without motion before the first run [s]; 0 for no power-on test.
+        levels: speeds of the friction stage as fractions of the velocity limits.
+        plateau: longest time at each of these speeds [s].
+
+    Raises:
+        InputError: a number out of range, or one duty cycle twice.
+    """
+
+    cycles: int = 24
+    cycle_time: float = 300.0
+    warm_up: float = 180.0
+    warm_up_range: float = RANGE_FRACTION
+    duties: tuple[float, ...] = (1.0,)
+    cooling: int = 0
+    power_on: float = 0.0
+    levels: tuple[float, ...] = FRICTION_LEVELS
+    plateau: float = LONGEST_PLATEAU
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "duties", tuple(float(duty) for duty in self.duties))
+        object.__setattr__(self, "levels", tuple(float(level) for level in self.levels))
+        for name, least in (("cycles", 0), ("cooling", 0)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or value != int(value) or value < least:
+                raise InputError(f"{name} is {value}", allowed=f"a whole number, {least} or more")
+        for name in ("cycle_time", "warm_up", "plateau"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise InputError(f"{name} is {value} s", allowed="a positive time")
+        if not (np.isfinite(self.power_on) and self.power_on >= 0.0):
+            raise InputError(f"power_on is {self.power_on} s", allowed="zero or a positive time")
+        if not 0.0 < self.warm_up_range <= 1.0:
+            raise InputError(f"warm_up_range is {self.warm_up_range}", allowed="a fraction above 0 and up to 1")
+        if not self.duties or not all(0.0 < duty <= 1.0 for duty in self.duties):
+            raise InputError(f"duties are {list(self.duties)}", allowed="fractions above 0 and up to 1")
+        if len({duty_name(duty) for duty in self.duties}) < len(self.duties):
+            raise InputError(f"duties are {list(self.duties)}", allowed="each once")
+        if not self.levels or not all(0.0 < level <= 1.0 for level in self.levels):
+            raise InputError(f"levels are {list(self.levels)}", allowed="fractions above 0 and up to 1")
+        if not (self.cycles or self.cooling or self.power_on):
+            raise InputError("a campaign of nothing", allowed="cycles, a cooling test or a power-on test")
+        if self.cycles and self.warm_up >= self.cycle_time:
+            raise InputError(
+                f"a warm-up of {self.warm_up:g} s leaves nothing of a cycle of {self.cycle_time:g} s",
+                remedy="shorten the warm-up, or lengthen the cycle",
+            )
+        if self.duration > LONGEST:
+            raise InputError(f"a campaign of {self.duration / 3600:.0f} h", allowed=f"{LONGEST / 3600:.0f} h")
+
+    @property
+    def runs(self) -> int:
+        """How many runs of heating and cooling there are."""
+        return len(self.duties) if self.cycles else min(self.cooling, 1)
+
+    @property
+    def duration(self) -> float:
+        """Of the whole campaign [s]."""
+        return self.power_on + self.runs * (self.cycles + self.cooling) * self.cycle_time
+
+    @property
+    def stage_names(self) -> tuple[str, ...]:
+        """The distinct stages, in the order of their first appearance."""
+        names = ["power_on"] if self.power_on else []
+        if self.cycles:
+            names.append("excitation")
+        if self.cycles or self.cooling:
+            names.append("friction")
+        if self.cycles:
+            names += [duty_name(duty) for duty in self.duties]
+        return tuple(names)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes plain data."""
+        return {**asdict(self), "duties": list(self.duties), "levels": list(self.levels)}
+
+
+def duty_name(duty: float) -> str:
+    """Names the warm-up stage of a duty cycle: ``warm_up_20`` at 0.2."""
+    return f"warm_up_{100.0 * duty:.4g}".replace(".", "p")

@@ -1,0 +1,299 @@
+"""A campaign: its stages, its timetable, and what to expect of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oed.campaigns.checking import TorqueCheck, checked
+from oed.campaigns.heat import Temperatures, expected_temperatures, stage_heat
+from oed.campaigns.programme import Programme
+from oed.campaigns.stages import Stage
+from oed.campaigns.timetable import Slot
+from oed.exports import read_trajectory, write_trajectory
+from robots.common.errors import InputError
+from robots.common.files import existing_file, sha256, write_atomic
+from robots.loading import load_robot
+from robots.robot import Robot
+from robots.thermal import KnownThermal, SecondOrder
+from robots.version import VERSION
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+CAMPAIGN = "campaign.json"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Campaign:
+    """A whole experiment, from the cold robot to the warm one and back.
+
+    Attributes:
+        robot: what it is for.
+        programme: what was asked for.
+        home: pose (n,) at which every stage begins and ends [rad or m].
+        stages: the distinct stages.
+        slots: what runs when.
+        thermal: models of the joints; None where none are known.
+        ambient: temperature of the surroundings [degC].
+        cold_friction: friction of the cold robot over that of the description, for the expected temperatures.
+        torque_margin: share of the torque limits that friction and warm-up stages leave free.
+        notes: what a user should know: what was shortened, what could not be checked.
+    """
+
+    robot: Robot
+    programme: Programme
+    home: Array
+    stages: tuple[Stage, ...]
+    slots: tuple[Slot, ...]
+    thermal: KnownThermal | None
+    ambient: float
+    cold_friction: float
+    torque_margin: float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def stages_by_name(self) -> dict[str, Stage]:
+        """The stages by their names."""
+        return {stage.name: stage for stage in self.stages}
+
+    @property
+    def duration(self) -> float:
+        """Of the whole campaign [s]."""
+        return self.slots[-1].end
+
+    @property
+    def cycles(self) -> int:
+        """How many cycles there are, of all phases."""
+        return self.slots[-1].cycle
+
+    @property
+    def samples(self) -> int:
+        """How many samples are played."""
+        stages = self.stages_by_name
+        return sum(len(stages[slot.stage].motion) for slot in self.slots if slot.stage is not None)
+
+    @property
+    def success(self) -> bool:
+        """Whether all stages keep all limits."""
+        return not any(stage.violated for stage in self.stages)
+
+    @cached_property
+    def heat(self) -> dict[str, Array]:
+        """Heat of each stage by the described friction, (n,) [J]."""
+        return {stage.name: stage_heat(self.robot, stage) for stage in self.stages}
+
+    @cached_property
+    def cycle_heat(self) -> Array:
+        """Heat of each cycle by the described friction, (cycles, n) [J]."""
+        total = np.zeros((self.cycles, self.robot.n))
+        for slot in self.slots:
+            if slot.stage is not None:
+                total[slot.cycle - 1] += self.heat[slot.stage]
+        return total
+
+    @cached_property
+    def temperatures(self) -> Temperatures | None:
+        """Temperatures to expect; None where no thermal model is known."""
+        if self.thermal is None:
+            return None
+        return expected_temperatures(
+            self.robot, self.stages_by_name, self.slots, self.thermal, cold_friction=self.cold_friction
+        )
+
+    def check(self) -> tuple[Stage, ...]:
+        """Measures all stages anew by their samples.
+
+        Returns:
+            The stages with their margins.
+
+        Raises:
+            InfeasibleError: a stage that passes a limit or is not at rest at home at its ends.
+        """
+        torque = TorqueCheck(self.robot, self.torque_margin)
+        return tuple(checked(stage, self.robot, self.home, torque) for stage in self.stages)
+
+    def summary(self) -> str:
+        """Says in a few lines what runs, how hot it gets, and what to know."""
+        programme = self.programme
+        lines = [f"{self.robot.name}: {self.duration / 60:.1f} min, {self.cycles} cycles, {self.samples} samples"]
+        for stage in self.stages:
+            tightest = stage.tightest
+            left = (
+                ""
+                if tightest is None
+                else (
+                    f", tightest limit: {tightest.quantity} of joint {tightest.joint}, "
+                    f"{100 * tightest.slack_fraction:.2f} % left"
+                )
+            )
+            lines.append(f"  {stage.file:18} {stage.duration:8.3f} s{left}")
+        if programme.cycles:
+            heating = next(slot.cycle for slot in self.slots if slot.phase == "heating")
+            joules = ", ".join(f"{value / 1e3:.1f}" for value in self.cycle_heat[heating - 1])
+            lines.append(f"  friction heat of the first heating cycle, kJ a joint: {joules}")
+        if self.temperatures is not None:
+            peaks = ", ".join(f"{value:.0f}" for value in self.temperatures.T1.max(axis=0))
+            lines.append(f"  highest expected temperature, degC a joint: {peaks}")
+        lines += [f"  note: {note}" for note in self.notes]
+        return "\n".join(lines)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives the timetable: start, end, stage, cycle, run, phase, duty, file."""
+        import pandas as pd
+
+        return pd.DataFrame([slot.to_dict() for slot in self.slots])
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the expected temperatures where heat is produced; without a thermal model, the heat so far."""
+        from matplotlib.figure import Figure
+
+        axes = ax if ax is not None else Figure(figsize=(9, 4)).subplots()
+        temperatures = self.temperatures
+        if temperatures is not None:
+            t, values, label = temperatures.t, temperatures.T1, "expected temperature [degC]"
+        else:
+            t = np.array([0.0, *(slot.end for slot in self._last_slots())])
+            values = np.vstack([np.zeros(self.robot.n), self.cycle_heat.cumsum(axis=0) / 1e3])
+            label = "friction heat [kJ]"
+        for joint in range(self.robot.n):
+            axes.plot(t / 60.0, values[:, joint], label=f"joint {joint + 1}")
+        axes.set_xlabel("time [min]")
+        axes.set_ylabel(label)
+        axes.legend(ncols=3)
+        return axes
+
+    def to_dict(self, digests: Mapping[str, str] | None = None) -> dict[str, Any]:
+        """Writes everything but the samples as plain data for `campaign.json`.
+
+        Args:
+            digests: SHA-256 of each stage's file, by the stage's name, where the files are written.
+        """
+        per_cycle = self.cycle_heat
+        return {
+            "format": "robot-oed campaign",
+            "format_version": 1,
+            "tool_version": VERSION,
+            "robot": {"name": self.robot.name, "origin": self.robot.origin, "sha256": self.robot.digest},
+            "assumed": list(self.robot.assumed),
+            "period": self.robot.period,
+            "duration": self.duration,
+            "cycles": self.cycles,
+            "samples": self.samples,
+            "home": self.home.tolist(),
+            "programme": self.programme.to_dict(),
+            "torque_margin": self.torque_margin,
+            "stages": [
+                {
+                    **stage.to_dict(),
+                    "sha256": None if digests is None else digests[stage.name],
+                    "heat": self.heat[stage.name].tolist(),
+                }
+                for stage in self.stages
+            ],
+            "timetable": [slot.to_dict() for slot in self.slots],
+            "heat": {
+                "by": "friction of the robot's description",
+                "unit": "J",
+                "total": per_cycle.sum(axis=0).tolist(),
+                "per_cycle": per_cycle.tolist(),
+            },
+            "temperatures": self._temperature_data(),
+            "notes": list(self.notes),
+        }
+
+    def save(self, folder: str | PathLike[str], *, force: bool = False) -> None:
+        """Writes a CSV per stage and `campaign.json` into a folder that is there.
+
+        Raises:
+            InputError: a file is there, and force is not given.
+        """
+        folder = Path(folder)
+        digests = {}
+        for stage in self.stages:
+            metadata = {
+                "robot": self.robot.origin or self.robot.name,
+                "stage": stage.name,
+                "tool": f"robot-oed {VERSION}",
+            }
+            write_trajectory(folder / stage.file, stage.motion, metadata, force=force)
+            digests[stage.name] = sha256(folder / stage.file)
+        text = json.dumps(self.to_dict(digests), indent=2, allow_nan=False) + "\n"
+        write_atomic(folder / CAMPAIGN, text, force=force)
+
+    @classmethod
+    def load(cls, folder: str | PathLike[str], robot: Robot | None = None) -> Campaign:
+        """Reads a saved campaign, and makes sure that its files are what they were.
+
+        Args:
+            folder: where `save` wrote.
+            robot: the robot; by default the one that the campaign names.
+
+        Raises:
+            InputError: a missing, damaged or changed file, or another robot.
+        """
+        file = Path(folder) / CAMPAIGN
+        try:
+            data = json.loads(existing_file(file).read_text(encoding="utf-8"))
+            known = robot or load_robot(data["robot"]["origin"])
+            if known.name != data["robot"]["name"]:
+                raise InputError(f"the campaign is for {data['robot']['name']}, not for {known.name}", file=file)
+            stages = []
+            for entry in data["stages"]:
+                path = Path(folder) / entry["file"]
+                if sha256(path) != entry["sha256"]:
+                    raise InputError("is not the file that the campaign wrote", file=path, remedy="write it anew")
+                stages.append(Stage.from_dict(entry, read_trajectory(path, n=known.n)[0]))
+            expected = data["temperatures"]
+            thermal = None
+            if expected["models"] is not None:
+                models = tuple(SecondOrder(**model) for model in expected["models"])
+                thermal = KnownThermal(models=models, sources=tuple(expected["sources"]))
+            return cls(
+                robot=known,
+                programme=Programme(**data["programme"]),
+                home=np.array(data["home"]),
+                stages=tuple(stages),
+                slots=tuple(Slot.from_dict(slot) for slot in data["timetable"]),
+                thermal=thermal,
+                ambient=expected["ambient"],
+                cold_friction=expected["cold_friction"],
+                torque_margin=data["torque_margin"],
+                notes=tuple(data["notes"]),
+            )
+        except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
+            raise InputError(f"is no campaign file: {type(error).__name__} {error}", file=file) from error
+
+    def _last_slots(self) -> list[Slot]:
+        return list({slot.cycle: slot for slot in self.slots}.values())
+
+    def _temperature_data(self) -> dict[str, Any]:
+        data: dict[str, Any] = {
+            "unit": "degC",
+            "ambient": self.ambient,
+            "cold_friction": self.cold_friction,
+            "models": None,
+            "sources": None,
+        }
+        if self.thermal is None or self.temperatures is None:
+            return data
+        ends = [0.0, *(slot.end for slot in self.slots)]
+        T1, T2 = self.temperatures.at(ends)
+        return data | {
+            "models": [asdict(model) for model in self.thermal.models],
+            "sources": list(self.thermal.sources),
+            "t": ends,
+            "T1": T1.round(4).tolist(),
+            "T2": T2.round(4).tolist(),
+        }

@@ -1,0 +1,158 @@
+"""A given timing made faster, or feasible, without leaving its path: jerk, torque and friction included."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PPoly
+
+from oed.retiming.barrier import inside, shorten
+from oed.retiming.hermite import hermite_curve
+from oed.retiming.limits import limit_usage
+from oed.retiming.speed_law import SpeedGrid, SpeedLaw
+from oed.retiming.timing_problem import Friction, InverseDynamics, TimingProblem
+from robots.limits import Limits, finite_jerk
+from robots.signals import Motion
+
+Array = NDArray[np.float64]
+Torque = Callable[[Motion], Array | None]
+
+CELLS_PER_INTERVAL = 3
+"""Controller periods to an interval of the speed's spline, about: a phase of jerk lasts many times as long."""
+
+ORDERS = {"velocity": 1.0, "acceleration": 2.0, "jerk": 3.0, "torque": 2.0}
+"""The powers of speed with which quantities grow."""
+
+PASSED = 1.0005
+"""Use of a limit above which it is tightened; stretching mends the rest."""
+
+_TIGHTENINGS = 4
+
+
+def refine(
+    motion: Motion,
+    limits: Limits,
+    *,
+    period: float,
+    inverse_dynamics: InverseDynamics | None = None,
+    friction: Friction | None = None,
+) -> Motion | None:
+    """Changes the timing of a motion that rests without acceleration at both ends, as fast as the limits allow.
+
+    Begins with the motion's own timing, uniformly slowed until it fits, and only ever gets faster from there. Where
+    the samples that come out pass a limit that the grid did not see, that limit is tightened there; what is still left
+    over after some rounds is stretched.
+
+    Args:
+        motion: the path and a timing that is smooth: its jerk is finite.
+        limits: with finite velocity and acceleration.
+        period: the controller's period [s].
+        inverse_dynamics: torque without friction, if torque is limited.
+        friction: dq to the friction torque.
+
+    Returns:
+        The new motion, uniform at the period; None where no slower uniform timing keeps the limits.
+    """
+    curve = hermite_curve(motion)
+    length = float(curve.x[-1])
+
+    def torque(other: Motion) -> Array | None:
+        if inverse_dynamics is None:
+            return None
+        rigid = inverse_dynamics(other.q, other.dq, other.ddq)
+        return rigid if friction is None else rigid + friction(other.dq)
+
+    factor = _uniform_factor(curve, motion, limits, torque)
+    if factor is None:
+        return None
+    points = max(int(np.ceil(length / (period * factor))), 6)
+    grid = SpeedGrid(length=length, intervals=max(points // CELLS_PER_INTERVAL, 2))
+    problem = TimingProblem(curve, grid, points, limits, inverse_dynamics, friction)
+    best, weight = np.full(grid.size, factor**2), 1.0
+    result: Motion | None = None
+    for _ in range(1 + _TIGHTENINGS):
+        start = _interior(problem, best)
+        if start is None:
+            break
+        best = shorten(problem, start, first_weight=weight)
+        law, weight = SpeedLaw(grid=grid, coefficients=best), 200.0
+        shorter = _sampled(curve, law, limits, period, torque)
+        if shorter is not None and (result is None or shorter.duration < result.duration):
+            result = shorter
+        if not _tighten(problem, curve, law, limits, period, torque):
+            break
+    return result
+
+
+def _uniform_factor(curve: PPoly, motion: Motion, limits: Limits, torque: Torque) -> float | None:
+    """The speed-up, at most 1e3 and at least 1e-3, at which the motion's own samples come to a limit."""
+    usage = limit_usage(motion, limits, None)
+    factor = min(float(np.min(np.maximum(usage[name], 1e-9) ** (-1.0 / ORDERS[name]))) for name in usage)
+    factor = min(factor, 1e3)
+    for _ in range(80):
+        if factor < 1e-3:
+            return None
+        tau = torque(Motion(motion.t / factor, motion.q, motion.dq * factor, motion.ddq * factor**2))
+        if tau is None or np.all(np.abs(tau) <= limits.torque):
+            return factor
+        factor *= 0.9
+    return None
+
+
+def _interior(problem: TimingProblem, coefficients: Array) -> Array | None:
+    """The timing, slowed uniformly until it lies strictly within the limits."""
+    for slower in (0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.5, 0.7, 0.9, 0.97):
+        if inside(problem, coefficients * (1.0 - slower)):
+            return coefficients * (1.0 - slower)
+    return None
+
+
+def _run(curve: PPoly, law: SpeedLaw, count: int, period: float) -> tuple[Motion, Array]:
+    """The motion in `count` periods, and its path positions (count + 1,)."""
+    natural = float(law.knots[1][-1])
+    t = period * np.arange(count + 1, dtype=np.float64)
+    s, ds, dds = law.sample(t, count * period / natural)
+    slope, bend = curve(s, 1), curve(s, 2)
+    motion = Motion(t, curve(s), slope * ds[:, None], bend * ds[:, None] ** 2 + slope * dds[:, None])
+    return motion, s
+
+
+def _sampled(curve: PPoly, law: SpeedLaw, limits: Limits, period: float, torque: Torque) -> Motion | None:
+    """The motion at the controller's period, stretched until its own samples keep every limit."""
+    count = _count(law, period)
+    for _ in range(40):
+        motion, _ = _run(curve, law, count, period)
+        usage = limit_usage(motion, limits, torque(motion))
+        factor = max(float(usage[name].max()) ** (1.0 / ORDERS[name]) for name in usage)
+        if factor <= 1.0:
+            return motion
+        count = max(count + 1, int(np.ceil(count * min(factor, 2.0))))
+    return None
+
+
+def _tighten(
+    problem: TimingProblem, curve: PPoly, law: SpeedLaw, limits: Limits, period: float, torque: Torque
+) -> bool:
+    """Lowers limits around the samples that pass them; whether any did noticeably."""
+    motion, s = _run(curve, law, _count(law, period), period)
+    _, jerk = finite_jerk(motion)
+    jerk = np.maximum(np.vstack([np.abs(jerk), np.zeros(motion.n)]), np.vstack([np.zeros(motion.n), np.abs(jerk)]))
+    parts = [np.abs(motion.ddq) / limits.acceleration, (jerk / limits.jerk)[:, np.isfinite(limits.jerk)]]
+    if problem.torque is not None:
+        tau = torque(motion)
+        assert tau is not None
+        parts.append((np.abs(tau) / limits.torque)[:, problem.limited])
+    excess = np.hstack(parts)
+    share = np.ones_like(problem.allowed)
+    for row, column in np.argwhere(excess > PASSED):
+        low, high = s[max(row - 1, 0)], s[min(row + 1, len(s) - 1)]
+        near = slice(*np.searchsorted(problem.s, [low - problem.width, high + problem.width]))
+        share[near, column] = np.minimum(share[near, column], 0.998 / excess[row, column])
+    problem.allowed = np.maximum(problem.allowed * share, 0.3)
+    return bool(np.any(share < 1.0))
+
+
+def _count(law: SpeedLaw, period: float) -> int:
+    return max(int(np.ceil(float(law.knots[1][-1]) / period - 1e-9)), 1)

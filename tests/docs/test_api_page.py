@@ -1,0 +1,18 @@
+"""The page on Python lists what the packages offer."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+PAGE = (Path(__file__).parents[2] / "docs" / "api.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("package", ["oed", "estimation", "robots"])
+def test_public_names_are_documented(package):
+    """Every public name of a package is on the page, and nothing else is."""
+    documented = re.findall(rf"^\.\. auto\w+:: {package}\.(?:\w+\.)*(\w+)$", PAGE, flags=re.MULTILINE)
+    assert sorted(documented) == sorted(importlib.import_module(package).__all__)

@@ -1,0 +1,39 @@
+"""The command answers at once: heavy libraries load only where they are used."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+
+HEAVY = ("casadi", "pandas", "pinocchio", "matplotlib", "scipy", "plotly", "cvxpy", "ruckig", "toppra", "pyarrow", "numpy")
+
+
+def test_help_is_light() -> None:
+    """`oed --help` imports no numerical library."""
+    code = (
+        "import sys; sys.argv = ['oed', '--help']\n"
+        "from oed.cli import main\n"
+        "try: main()\n"
+        "except SystemExit as stop: assert not stop.code\n"
+        f"print('loaded:', *(set(sys.modules) & set({HEAVY})))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1].strip() == "loaded:"
+    for command in ("design", "retime", "export", "simulate", "identify", "predict"):
+        assert f"  {command} " in done.stdout
+
+
+def test_help_is_quick() -> None:
+    """`oed --help` takes less than half a second of the processor."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(
+        [sys.executable, "-c", "from oed.cli import main; main()", "--help"],
+        capture_output=True,
+        check=True,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": ""},
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    # Time of the processor, not of the wall: other tests may be running.
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 0.5
