@@ -9,11 +9,12 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.campaigns.checking import TorqueCheck, checked, closest_bodies
+from oed.campaigns.checking import TorqueCheck, checked
 from oed.campaigns.excitation import excitation_stage
 from oed.campaigns.fitting import fit_stages
-from oed.campaigns.planning import ALIGNED, Planner
+from oed.campaigns.planning import Planner
 from oed.campaigns.programme import Programme
+from oed.campaigns.remarks import remarks_on
 from oed.campaigns.result import Campaign
 from oed.campaigns.stages import Stage
 from oed.campaigns.timetable import make_timetable
@@ -123,7 +124,7 @@ def campaign(
             raise InputError(f"{len(known.models)} thermal models", allowed=f"{robot.n}, one per joint")
         if known is not None:
             known = replace(known, models=tuple(replace(model, ambient=ambient) for model in known.models))
-        notes += _remarks(robot, stages, torque, known)
+        notes += remarks_on(stages, planner, known)
     finally:
         listener.finish()
     return Campaign(
@@ -151,48 +152,3 @@ def _power_on_stage(plan: Programme, home: Array, period: float) -> Stage:
         motion=Posture(pose=home, duration=end).motion(period),
         segments=({"kind": "power_on", "start": 0.0, "end": end, "joint": None},),
     )
-
-
-def _remarks(robot: Robot, stages: list[Stage], torque: TorqueCheck, known: KnownThermal | None) -> list[str]:
-    notes = []
-    for stage in stages:
-        share = stage.details.get("acceleration_share", 1.0)
-        if share < 1.0:
-            notes.append(
-                f"The {stage.name} stage accelerates at {100 * share:g} % of the limits, to keep the torque limits."
-            )
-        tight = [m for m in stage.margins if m.quantity == "torque" and m.slack_fraction < torque.margin - 1e-9]
-        notes += [
-            f"The {stage.name} stage leaves {100 * m.slack_fraction:.1f} % of the torque limit of joint {m.joint}, "
-            f"less than the {100 * torque.margin:g} % that are asked for."
-            for m in tight
-        ]
-        slow = sorted({p["joint"] for p in stage.plateaus if abs(p["speed"]) < abs(p["asked"]) - 1e-9})
-        if slow:
-            joints = ", ".join(map(str, slow))
-            notes.append(f"The range of joint {joints} is too short for its highest speed in the friction stage.")
-        angles = stage.details.get("angle_to_no_gravity_deg", [])
-        loaded = [str(joint) for joint, angle in enumerate(angles, start=1) if angle > np.rad2deg(ALIGNED)]
-        if loaded:
-            notes.append(
-                f"The arm does not allow a pose in which gravity does no work on joint {', '.join(loaded)}: separate it "
-                "as in thesis eq. 84."
-            )
-        closest = closest_bodies(robot, stage.motion)
-        if closest is not None and closest[1] < 0.0:
-            notes.append(
-                f"COLLISION in the {stage.name} stage, by the shapes of the collision model: {closest[0]} overlap by "
-                f"{-1e3 * closest[1]:.0f} mm at {closest[2]:.1f} s. Check before playing."
-            )
-    if not torque.known:
-        notes.append("Torque was not checked: the description states no nominal dynamics or no torque limits.")
-    if not np.any(np.asarray(robot.friction)):
-        notes.append("The description states no friction: heat is unknown.")
-    if known is None:
-        notes.append("No thermal model of this robot is known: no temperatures are expected.")
-    elif robot.origin == "er3a":
-        notes.append(
-            "Expected temperatures are by the thesis' parameters of joint 4, assumed for the others, and by friction "
-            "alone: heat of the motors' windings is not in the model."
-        )
-    return notes

@@ -65,11 +65,11 @@ def fit_stages(planner: Planner, programme: Programme, excitation: Stage | None)
                 chosen, low = stage, middle
             else:
                 high = middle
+        wanted = (cycle - budget + len(longest.motion)) * period
         notes.append(
-            f"Excitation, friction at {programme.plateau:g} s a speed and warm-up take "
-            f"{(cycle - budget + len(longest.motion)) * period:.1f} s, more than the cycle of {programme.cycle_time:g} "
-            f"s: the friction stage was shortened from {longest.duration:.1f} s to {chosen.duration:.1f} s, with at most "
-            f"{low:.2f} s at each speed."
+            f"Excitation, friction at {programme.plateau:g} s a speed and warm-up take {wanted:.1f} s, more than the "
+            f"cycle of {programme.cycle_time:g} s: the friction stage was shortened from {longest.duration:.1f} s to "
+            f"{chosen.duration:.1f} s, with at most {low:.2f} s at each speed."
         )
     left = budget - len(chosen.motion)
     if left < 0:

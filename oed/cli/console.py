@@ -27,17 +27,26 @@ class Console:
 
     @contextmanager
     def working(self) -> Iterator[Progress]:
-        """Gives a progress bar on a terminal, silence in a pipe; notes come out once each, without a traceback."""
+        """Gives a progress bar on a terminal, silence in a pipe; notes come out once each, without a traceback.
+
+        Raises:
+            SystemExit: with code 130, on Ctrl-C.
+        """
         with warnings.catch_warnings(record=False):
             warnings.simplefilter("default")
-            warnings.showwarning = self._note  # type: ignore[assignment]
-            if self.quiet or self.json or not sys.stderr.isatty():
-                yield SILENT
-            else:
-                from oed.cli.progress import RichProgress
+            warnings.showwarning = self._note
+            try:
+                if self.quiet or self.json or not sys.stderr.isatty():
+                    yield SILENT
+                else:
+                    from oed.cli.progress import RichProgress
 
-                with RichProgress() as progress:
-                    yield progress
+                    with RichProgress() as progress:
+                        yield progress
+            except KeyboardInterrupt:
+                # Here, for typer would end without a word.
+                print("oed: interrupted; nothing was written", file=sys.stderr)
+                raise SystemExit(130) from None
 
     def _note(self, message: Warning | str, *_: object, **__: object) -> None:
         if not self.quiet:

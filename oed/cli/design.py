@@ -36,6 +36,10 @@ def design(
     velocity_fraction: Annotated[float, typer.Option(help="Share of the velocity limits to use.")] = 1.0,
     torque: Annotated[bool, typer.Option(help="Keep the torque limits, by the robot's nominal dynamics.")] = True,
     torque_margin: Annotated[float, typer.Option(help="Share of the torque limits kept in reserve.")] = 0.1,
+    collision: Annotated[
+        bool, typer.Option("--collision", help="Keep clear of the arm itself and of the obstacles in its file.")
+    ] = False,
+    clearance: Annotated[float, typer.Option(help="Clearance to keep [m].")] = 0.01,
     scaling: Annotated[str, typer.Option(help="Columns the criterion judges: none, nominal or unit.")] = "none",
     noise: Annotated[
         str | None, typer.Option(help="Torque noise of each joint [N m], separated by commas.", show_default=False)
@@ -84,6 +88,8 @@ def design(
                 velocity_fraction=velocity_fraction,
                 torque=torque,
                 torque_margin=torque_margin,
+                collision=collision,
+                clearance=clearance,
                 scaling=scaling,
                 noise=numbers("--noise", noise),
                 after=prior_from(after) if after else None,

@@ -34,7 +34,7 @@ class RichProgress:
     ) -> None:
         self._bars.stop()
 
-    def start(self, task: str, total: float | None) -> None:
+    def start(self, task: str, total: float | None = None) -> None:
         """Begins a task of `total` units, or of unknown length."""
         self.finish()
         self._task = self._bars.add_task(task, total=total, note="")

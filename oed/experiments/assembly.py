@@ -28,7 +28,7 @@ def home_pose(limits: Limits) -> Array:
 
 
 def assemble(
-    series: FourierSeries, limits: Limits, *, period: float, home: ArrayLike | None = None, strokes: bool = True
+    series: FourierSeries, limits: Limits, *, period: float, home: ArrayLike | None = None, strokes: bool | tuple[int, ...] = True
 ) -> Sequence:
     """Joins the parts of an excitation experiment; the robot rests at both ends.
 
@@ -40,7 +40,7 @@ def assemble(
         limits: that all parts keep.
         period: the controller's period [s].
         home: pose (n,) where it begins and ends; by default `home_pose`.
-        strokes: with the strokes.
+        strokes: with the strokes of all joints, of some (counted from 1), or of none.
 
     Returns:
         The experiment.
@@ -52,10 +52,10 @@ def assemble(
     """
     pose = rest_pose(limits, home)
     parts = [Segment(kind="fourier", trajectory=series)]
-    if strokes:
-        for joint in range(1, limits.n + 1):
-            stroke = velocity_reaching_stroke(limits, joint, pose, period=period)
-            parts.append(Segment(kind="sinusoid", trajectory=stroke, joint=joint))
+    joints = (tuple(range(1, limits.n + 1)) if strokes else ()) if isinstance(strokes, bool) else strokes
+    for joint in joints:
+        stroke = velocity_reaching_stroke(limits, joint, pose, period=period)
+        parts.append(Segment(kind="sinusoid", trajectory=stroke, joint=joint))
     segments: list[Segment] = []
     here = pose
     for number, part in enumerate(parts):

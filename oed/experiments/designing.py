@@ -10,18 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
-from oed.constraints import TorqueLimit
-from oed.criteria import SCALINGS, Criterion, Prior, Weighting, nominal_scale, task_transform
+from oed.criteria import Criterion, Prior
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.assembly import assemble, rest_pose
 from oed.experiments.board import Board
+from oed.experiments.judging import choose_weighting
 from oed.experiments.problem import FourierProblem
 from oed.experiments.result import Design, Outcome, design_model, measure, measured_margins
+from oed.experiments.safety import choose_safety, collision_data
 from oed.experiments.search import EFFORTS, Effort, Found, Island
 from oed.experiments.solver import Ipopt
 from oed.retiming import finite_limits
-from oed.trajectories import FourierSeries, Sequence, count_periods
-from robots.base_parameters import BaseParameters, base_parameters
+from oed.trajectories import FourierSeries, count_periods
+from robots.base_parameters import base_parameters
 from robots.common.errors import InfeasibleError, InputError
 from robots.common.parallel import one_blas_thread, parallel_map
 from robots.common.progress import SILENT, Progress
@@ -33,8 +34,6 @@ Array = NDArray[np.float64]
 
 # The controller interpolates between the file's samples; a hair of every limit is left to it.
 RESERVE = 0.9995
-# Shares of the limits of speed and its derivatives that strokes and moves try in turn to keep the torque limits.
-SLOWER = (1.0, 0.85, 0.7, 0.5, 0.35, 0.2)
 
 
 @one_blas_thread()
@@ -54,6 +53,8 @@ def design(
     velocity_fraction: float = 1.0,
     torque: bool = True,
     torque_margin: float = 0.1,
+    collision: bool = False,
+    clearance: float = 0.01,
     scaling: str = "none",
     noise: ArrayLike | None = None,
     after: Prior | None = None,
@@ -88,6 +89,9 @@ def design(
         velocity_fraction: of the velocity limits that may be used.
         torque: keep the torque limits by the robot's nominal dynamics, where both are described.
         torque_margin: share of the torque limits kept for what the nominal dynamics are wrong by.
+        collision: keep the arm clear of itself and of the obstacles in the robot's file; the whole experiment is then
+            proved free at all times.
+        clearance: to keep [m].
         scaling: of the columns that the criterion judges: ``none``, ``nominal`` (each by the size its parameter has in the
             robot's description) or ``unit`` (each to unit length).
         noise: torque noise of each joint (n,) [N m or N]: rows count by one over it; all alike by default.
@@ -125,6 +129,8 @@ def design(
         "home": None if home is None else np.asarray(home, dtype=float).tolist(),
         "velocity_fraction": velocity_fraction,
         "torque_margin": torque_margin if torque else None,
+        "collision": collision,
+        "clearance": clearance if collision else None,
         "scaling": scaling,
         "noise": None if noise is None else np.asarray(noise, dtype=float).tolist(),
         "after": after is not None,
@@ -135,9 +141,17 @@ def design(
     }
     limits = usable_limits(robot.limits, velocity_fraction)
     base = base_parameters(design_model(robot, settings))
-    weighting = _weighting(base, chosen, scaling, noise, after, task, periods / base_frequency / robot.period)
+    weighting = choose_weighting(base, chosen, scaling, noise, after, task, periods / base_frequency / robot.period)
     pose = rest_pose(limits, home)
-    torque_limit = _torque_limit(base, pose, torque_margin) if torque else None
+    safety = choose_safety(
+        robot,
+        base,
+        pose,
+        torque=torque,
+        torque_margin=torque_margin,
+        collision=collision,
+        clearance=clearance,
+    )
     problem = FourierProblem(
         base=base,
         criterion=chosen,
@@ -146,7 +160,7 @@ def design(
         base_frequency=base_frequency,
         samples=max(FourierProblem.samples, 20 * harmonics),
         limit_samples=max(FourierProblem.limit_samples, 50 * harmonics),
-        pointwise=() if torque_limit is None else (torque_limit,),
+        pointwise=safety.pointwise,
         home=pose,
         weighting=weighting,
     )
@@ -178,7 +192,7 @@ def design(
             "no motion found that excites all parameters", remedy="allow more motion, or fit fewer parameters"
         )
     series = problem.series(best.z, periods)
-    sequence = _within_torque(series, limits, pose, robot.period, strokes, torque_limit)
+    sequence, freedom, left_out = safety.assembled(series, limits, pose, robot.period, strokes)
     motion = sequence.motion()
     design = Design(
         robot=robot,
@@ -191,89 +205,15 @@ def design(
         islands=tuple(_outcome(found) for found in results),
         settings=settings,
         coefficients=series.coefficients,
+        freedom=None if freedom is None else collision_data(freedom),
+        strokes_left_out=left_out,
     )
-    parts = ["fourier", *(["sinusoid"] if strokes else [])]
+    parts = ["fourier", *(["sinusoid"] if any(s["kind"] == "sinusoid" for s in design.segments) else [])]
     qualities = [*(measure(part, base, design.part(part)) for part in parts), measure("whole", base, motion)]
     if not weighting.plain:
         one = series.motion(robot.period)
         qualities.insert(1, measure(f"fourier ({weighting.name})", base, one, weighting))
     return replace(design, qualities=tuple(qualities))
-
-
-def _weighting(
-    base: BaseParameters,
-    criterion: Criterion,
-    scaling: str,
-    noise: ArrayLike | None,
-    after: Prior | None,
-    task: Motion | None,
-    samples: float,
-) -> Weighting:
-    """Collects how rows and columns count, and what is known already."""
-    if scaling not in SCALINGS:
-        raise InputError(f"scaling {scaling!r}", allowed=", ".join(SCALINGS))
-    if (criterion.name == "i") != (task is not None):
-        raise InputError("criterion i and a task belong together", remedy="give both, or neither")
-    joints = base.model.robot.n
-    levels = after.noise if noise is None and after is not None else noise
-    rows = None
-    if levels is not None:
-        rows = 1 / np.asarray(levels, dtype=float)
-        if rows.shape != (joints,) or not (np.isfinite(rows) & (rows > 0)).all():
-            raise InputError(f"torque noise {levels}", allowed=f"{joints} positive numbers")
-    transform = nominal_scale(base) if scaling == "nominal" else None
-    if task is not None:
-        if task.n != joints:
-            raise InputError(f"a task of {task.n} joints", allowed=f"{joints}")
-        transform = task_transform(base, task.q, task.dq, task.ddq)
-    words = [
-        *([f"columns by {scaling}"] if scaling != "none" else []),
-        *(["rows by noise"] if rows is not None else []),
-        *(["after an earlier model"] if after is not None else []),
-        *(["for the task"] if task is not None else []),
-    ]
-    return Weighting(
-        rows=rows,
-        transform=transform,
-        unit_columns=scaling == "unit",
-        prior=None if after is None else after.information(base.names),
-        amount=samples / (after.colour**2 if after is not None else 1.0),
-        name=", ".join(words) or "none",
-    )
-
-
-def _torque_limit(base: BaseParameters, home: Array, margin: float) -> TorqueLimit | None:
-    """The torque limit by the nominal dynamics, or nothing where one of the two is not described."""
-    model = base.model
-    bound = np.asarray(model.robot.limits.torque)
-    if not (np.isfinite(model.nominal).all() and np.isfinite(bound).any()):
-        return None
-    limit = TorqueLimit(model, model.nominal, bound, margin=margin)
-    limit.check_holding(home)
-    return limit
-
-
-def _within_torque(
-    series: FourierSeries,
-    limits: Limits,
-    home: Array,
-    period: float,
-    strokes: bool,
-    torque: TorqueLimit | None,
-) -> Sequence:
-    """Assembles the experiment, its strokes and moves slower until they keep the torque limits, too."""
-    for factor in SLOWER:
-        gentle = limits.scaled(velocity=factor, acceleration=factor, jerk=factor)
-        sequence = assemble(series, gentle, period=period, home=home, strokes=strokes)
-        if torque is None:
-            return sequence
-        motion = sequence.motion()
-        if torque.excess(motion.q, motion.dq, motion.ddq).max() <= 0:
-            return sequence
-    raise InfeasibleError(
-        "the moves pass a torque limit however slow they are",
-        remedy="state another home pose, or leave out the strokes",
-    )
 
 
 def usable_limits(limits: Limits, velocity_fraction: float = 1.0) -> Limits:

@@ -110,6 +110,9 @@ class Design:
         islands: every search's outcome; the best one was taken.
         settings: everything that, with the seed, makes the same design again.
         coefficients: of the Fourier series, rows q0, a1..aN, b1..bN per joint (n, 2 N + 1).
+        freedom: of collisions: the smallest clearance [m], between what, when, and whether it is proved for all times;
+            None where it was not asked for.
+        strokes_left_out: joints without a stroke, for on it the arm would collide.
     """
 
     robot: Robot
@@ -122,6 +125,8 @@ class Design:
     islands: tuple[Outcome, ...]
     settings: Mapping[str, Any]
     coefficients: Array
+    freedom: Mapping[str, Any] | None = None
+    strokes_left_out: tuple[int, ...] = ()
 
     @property
     def fourier(self) -> Quality:
@@ -141,7 +146,8 @@ class Design:
     @property
     def success(self) -> bool:
         """Whether all limits hold and all parameters are excited."""
-        return not self.violated and self.fourier.to_dict()["cond_Y"] is not None
+        free = self.freedom is None or bool(self.freedom["certified"])
+        return free and not self.violated and self.fourier.to_dict()["cond_Y"] is not None
 
     def part(self, kind: str) -> Motion:
         """Cuts the samples of the segments of one kind out of the motion."""
@@ -184,6 +190,13 @@ class Design:
                 f"  tightest limit: {tightest.quantity} of joint {tightest.joint}, {100 * tightest.slack_fraction:.2f} % "
                 f"left at {tightest.time:.3f} s"
             )
+        if self.freedom is not None:
+            lines.append(
+                f"  closest bodies: {self.freedom['pair']}, {1e3 * self.freedom['clearance']:.0f} mm at "
+                f"{self.freedom['time']:.2f} s, {'proved' if self.freedom['certified'] else 'NOT proved'} at all times"
+            )
+        if self.strokes_left_out:
+            lines.append(f"  no stroke for joints {self.strokes_left_out}: the arm would collide")
         for margin in self.violated:
             lines.append(
                 f"  PASSED: {margin.quantity} of joint {margin.joint}: {margin.value:.4g} of {margin.limit:.4g} "
@@ -228,6 +241,8 @@ class Design:
             "segments": [dict(segment) for segment in self.segments],
             "duration": self.motion.duration,
             "period": self.robot.period,
+            "collision": None if self.freedom is None else dict(self.freedom),
+            "strokes_left_out": list(self.strokes_left_out),
             "smallest_margins": [margin_data(margin) for margin in self.margins],
             "solver": {"name": "ipopt", "islands": [island.to_dict() for island in self.islands]},
             "seed": self.settings["seed"],
@@ -285,6 +300,8 @@ class Design:
                 islands=tuple(Outcome.from_dict(island) for island in data["solver"]["islands"]),
                 settings=settings,
                 coefficients=np.array(data["fourier"]["coefficients"]),
+                freedom=data["collision"],
+                strokes_left_out=tuple(data["strokes_left_out"]),
             )
         except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
             raise InputError(f"is no design file: {type(error).__name__} {error}", file=file) from error

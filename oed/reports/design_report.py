@@ -157,7 +157,13 @@ def _warnings(design: Design) -> tuple[str, ...]:
         )
     if not any(margin.quantity == "torque" for margin in design.margins):
         warnings.append("Torque was not checked: the robot's description lacks nominal dynamics or torque limits.")
-    warnings.append("Collisions were not checked.")
+    if design.freedom is None:
+        warnings.append("Collisions were not checked.")
+    elif not design.freedom["certified"]:
+        warnings.append("Freedom of collisions is not proved at all times.")
+    if design.strokes_left_out:
+        joints = ", ".join(str(joint) for joint in design.strokes_left_out)
+        warnings.append(f"No stroke for joints {joints}: on it the arm would collide.")
     return tuple(warnings)
 
 

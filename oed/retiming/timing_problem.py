@@ -59,7 +59,7 @@ class TimingProblem:
     ) -> None:
         self.grid = grid
         self.width = grid.length / points
-        self.s = self.width * (np.arange(points) + 0.5)
+        self.s: Array = self.width * (np.arange(points, dtype=np.float64) + 0.5)
         self.cell, self.b0, self.b1, self.b2 = grid.basis(self.s)
         self.columns: Indices = self.cell[:, None] + np.arange(3)
         d1, d2 = curve.derivative(), curve.derivative(2)

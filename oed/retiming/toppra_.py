@@ -211,8 +211,25 @@ def _best_window(
         if motion is not None and (best is None or motion.duration < best.duration):
             best = motion
     if best is None:
-        raise InfeasibleError("no slower timing of this path keeps the limits", remedy="check the torque limits")
+        raise _too_weak(piece, limits, torque)
     return best
+
+
+def _too_weak(piece: PathPiece, limits: Limits, torque: Torque) -> InfeasibleError:
+    """Names the joint that cannot even hold the arm, if that is why."""
+    q = piece.spline(np.linspace(0.0, piece.length, 501))
+    held = torque(Motion(np.arange(501.0), q, np.zeros_like(q), np.zeros_like(q)))
+    if held is not None:
+        ratio = np.abs(held) / np.maximum(limits.torque, 1e-300)
+        row, column = np.unravel_index(int(ratio.argmax()), ratio.shape)
+        if ratio[row, column] > 1.0:
+            return InfeasibleError(
+                f"gravity alone needs {abs(held[row, column]):.4g} N m on the path",
+                joint=int(column) + 1,
+                allowed=f"{limits.torque[column]:.4g} N m",
+                remedy="choose a path through poses that the joint can hold, or correct the torque limit",
+            )
+    return InfeasibleError("no slower timing of this path keeps the limits", remedy="check the torque limits")
 
 
 def _stretched(

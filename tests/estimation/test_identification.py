@@ -24,7 +24,7 @@ def er3a():
 @pytest.fixture(scope="module")
 def experiment(er3a):
     """A quick design, played on a robot that is 10 % off its description; 20 logs, each identified."""
-    plan = oed.design(er3a, effort=Effort(islands=1, starts=1, hops=0, screened=20), periods=2, workers=1)
+    plan = oed.design(er3a, effort=Effort(islands=1, starts=1, hops=0, screened=20), periods=1, workers=1)
     plant = nominal_plant(er3a, spread=0.1, seed=1, sensors=Sensors(coloured_share=0.5, correlation_time=0.04))
     estimates = [identify(er3a, simulate(plant, plan.motion, seed=seed)) for seed in range(SEEDS)]
     truth = base_parameters(plant.model).from_standard(plant.parameters)
@@ -36,21 +36,21 @@ def experiment(er3a):
 def test_the_truth_lies_within_three_standard_errors_as_often_as_it_should(experiment):
     """Design, simulate, identify: the true parameters lie within 3 standard errors in 99.7 % of cases.
 
-    Of 20 seeds times 70 base parameters, 0.27 % or 3.8 are expected outside. Errors of one log are correlated: drawn
-    from the estimate's own correlation 100,000 times, with standard errors 3 % too small as the correction leaves them,
-    6 are expected, and more than 21 (the limit here: 98.5 % inside) in 1 of 4000 runs; a single parameter is outside in
-    3 or more seeds of 20 in 1 of 2000 runs; the mean of z^2 leaves 0.8 to 1.35 in less than 1 of 10,000. A wrong alarm
-    comes in some 1 of 1200 changes of the seeds; with fixed seeds, never without a change of the code.
+    Of 20 seeds times 70 base parameters, 0.27 % or 3.8 are expected outside; 5 with standard errors 3 % too small and
+    some per cent uncertain, as `benchmarks/coverage.py` finds them. Drawn 20,000 times from the estimate's own
+    correlation, more than 21 of 1400 (the limit of 1.5 %) are outside in 1 of 20,000 runs; one parameter is outside in
+    4 seeds of 20 in 1 of 15,000 (binomial, times 70); the mean of z^2 leaves 0.8 to 1.35, and the share within 1.96
+    leaves 90 to 97.5 %, in 1 of 10,000 each. Together a wrong alarm in 1 of 3000 choices of the seeds; with the seeds
+    fixed here, none without a change of the code.
     """
     _, errors, deviations = experiment
     z = errors / deviations
     outside = np.abs(z) > 3
     assert z.shape == (SEEDS, 70)
     assert outside.mean() <= 0.015
-    assert outside.sum(axis=0).max() <= 2
+    assert outside.sum(axis=0).max() <= 3
     assert 0.8 < np.mean(z**2) < 1.35
-    # The intervals people read: 95 % of them, correlated as above, within three points.
-    assert 0.92 < np.mean(np.abs(z) <= 1.96) < 0.98
+    assert 0.90 < np.mean(np.abs(z) <= 1.96) < 0.975
 
 
 def test_standard_errors_are_neither_too_wide_nor_biased(experiment):
@@ -59,8 +59,8 @@ def test_standard_errors_are_neither_too_wide_nor_biased(experiment):
     # The RMS of 20 numbers is known to 16 %; the median over 70 parameters, some dozens independent, to a few per cent.
     ratio = errors.std(axis=0, ddof=1) / np.sqrt(np.mean(deviations**2, axis=0))
     assert 0.85 < np.median(ratio) < 1.2
-    # A mean of 20 has a standard error of 0.22: four of them, at 70 parameters, fail in 1 of 200 draws of the seeds.
-    assert np.abs((errors / deviations).mean(axis=0)).max() < 4 * 1.06 / np.sqrt(SEEDS)
+    # A mean of 20 has a standard error of 0.24: the largest of 70 is beyond 1.1 in 1 of 10,000 choices of the seeds.
+    assert np.abs((errors / deviations).mean(axis=0)).max() < 1.1
 
 
 def test_white_noise_errors_would_be_too_small(experiment):
@@ -76,8 +76,8 @@ def test_a_good_experiment_is_a_success(experiment):
     """All joints are identified, and left-out torque is predicted to the 2 % of noise."""
     for estimate in experiment[0]:
         assert all(joint.identified for joint in estimate.joints)
-        # The least of joints, the wrist's, loses some to smoothing.
-        assert all(0.015 < joint.nrmse < 0.04 for joint in estimate.joints)
+        # A block with a joint's only stroke to full speed is predicted from slower ones: that may cost twice the noise.
+        assert all(0.015 < joint.nrmse < 0.06 for joint in estimate.joints)
         assert estimate.model.determined.mean() > 0.9
 
 

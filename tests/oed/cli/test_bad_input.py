@@ -214,7 +214,8 @@ def test_logs(command: str, fault: str, run, robot: Path, experiment: Path, out:
         "identify": ("identify", "--robot", robot, "--log", path, "--out", out),
         "predict": ("predict", "--model", experiment / "model.json", "--log", path, "--out", out / "p.csv"),
     }
-    if command == "predict" and fault == "no torque":
+    if command == "predict" and fault == "no torque":  # that is all a prediction needs
+        out.mkdir()
         assert run(*lines[command]).code == 0
         return
     refused(run(*lines[command]), out, *words)

@@ -1,0 +1,100 @@
+"""What a user must know of a campaign before playing it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from oed.campaigns.checking import closest_bodies
+from oed.campaigns.planning import ALIGNED, Planner
+from oed.campaigns.stages import Stage
+from robots.thermal import KnownThermal
+
+SMALLER_RANGES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
+"""Parts of the ranges that are tried in turn where a warm-up collides."""
+
+
+def remarks_on(stages: Sequence[Stage], planner: Planner, known: KnownThermal | None) -> tuple[str, ...]:
+    """Says what was changed, what could not be checked, and what the stages come too close to.
+
+    Args:
+        stages: the stages, with their margins.
+        planner: that planned them.
+        known: the thermal models, if there are any.
+
+    Returns:
+        Sentences, collisions first.
+    """
+    collisions = [remark for stage in stages for remark in _collisions(stage, planner)]
+    others = [remark for stage in stages for remark in _remarks(stage, planner)]
+    return (*collisions, *others, *_unknown(planner, known))
+
+
+def _collisions(stage: Stage, planner: Planner) -> Iterator[str]:
+    closest = closest_bodies(planner.robot, stage.motion)
+    if closest is None or closest[1] >= 0.0:
+        return
+    pair, clearance, time = closest
+    remedy = "Check before playing."
+    if stage.kind == "warm_up":
+        free = _free_range(stage, planner)
+        remedy = "No smaller range is free." if free is None else f"--warm-up-range {free:g} would be free."
+    yield (
+        f"COLLISION in the {stage.name} stage, by the shapes of the collision model: {pair} overlap by "
+        f"{-1e3 * clearance:.0f} mm at {time:.1f} s. {remedy}"
+    )
+
+
+def _free_range(stage: Stage, planner: Planner) -> float | None:
+    """The largest part of the ranges, in tenths, over which the warm-up is free of collisions."""
+    details = stage.details
+    for fraction in SMALLER_RANGES:
+        if fraction < details["range"]:
+            (smaller,) = planner.warm_up(details["time"], [details["duty"]], fraction)
+            closest = closest_bodies(planner.robot, smaller.motion)
+            if closest is None or closest[1] >= 0.0:
+                return fraction
+    return None
+
+
+def _remarks(stage: Stage, planner: Planner) -> Iterator[str]:
+    torque = planner.torque
+    share = stage.details.get("acceleration_share", 1.0)
+    if share < 1.0:
+        yield f"The {stage.name} stage accelerates at {100 * share:g} % of the limits, to keep the torque limits."
+    for margin in stage.margins:
+        if margin.quantity == "torque" and margin.slack_fraction < torque.margin - 1e-9:
+            yield (
+                f"The {stage.name} stage leaves {100 * margin.slack_fraction:.1f} % of the torque limit of joint "
+                f"{margin.joint}, less than the {100 * torque.margin:g} % that are asked for."
+            )
+    slow = sorted({p["joint"] for p in stage.plateaus if abs(p["speed"]) < abs(p["asked"]) - 1e-9})
+    if slow:
+        yield f"The range of joint {_listed(slow)} is too short for the highest speeds of the friction stage."
+    angles = stage.details.get("angle_to_no_gravity_deg", [])
+    loaded = [joint for joint, angle in enumerate(angles, start=1) if angle > np.rad2deg(ALIGNED)]
+    if loaded:
+        yield (
+            f"The arm does not allow a pose in which gravity does no work on joint {_listed(loaded)}: separate it by a "
+            "fit of sine and cosine (thesis eq. 84)."
+        )
+
+
+def _unknown(planner: Planner, known: KnownThermal | None) -> Iterator[str]:
+    robot = planner.robot
+    if not planner.torque.known:
+        yield "Torque was not checked: the description states no nominal dynamics or no torque limits."
+    if not np.any(np.asarray(robot.friction)):
+        yield "The description states no friction: heat is unknown."
+    if known is None:
+        yield "No thermal model of this robot is known: no temperatures are expected."
+    elif any("assumed" in source for source in known.sources):
+        yield (
+            "Expected temperatures are by the thesis' parameters of joint 4, assumed for the others, and by friction "
+            "alone: heat of the motors' windings is not in the model."
+        )
+
+
+def _listed(joints: Sequence[int]) -> str:
+    return ", ".join(map(str, joints))
