@@ -1,7 +1,7 @@
 """How often the stated 95 % intervals hold the truth, over many simulated experiments.
 
-Run it with ``python benchmarks/coverage.py [SEEDS [WORKERS]]``. Each case plays random Fourier motions on a virtual robot
-whose parameters are 10 % off its description, identifies it from the log, and counts how many of the true base
+Run it with ``python benchmarks/coverage.py [SEEDS [WORKERS]]``. Each case plays random Fourier motions on a virtual
+robot whose parameters are 10 % off its description, identifies it from the log, and counts how many of the true base
 parameters lie within 1.96 and within 3 standard errors. With honest standard errors that is 95 % and 99.7 %.
 """
 

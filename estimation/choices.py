@@ -69,9 +69,7 @@ class Choice:
         return float(np.log(np.clip(self.held_out / self.spread, EXACT, 1.0)).mean())
 
 
-def choose(
-    base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, candidates: Candidates
-) -> Choice:
+def choose(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, candidates: Candidates) -> Choice:
     """Compares all candidates by cross-validation over contiguous blocks.
 
     Args:

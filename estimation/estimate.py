@@ -102,7 +102,9 @@ class Estimate:
             )
         unknown = [name for name, known in zip(self.model.names, self.model.determined, strict=True) if not known]
         if unknown:
-            found.append(f"{len(unknown)} of {len(self.model.names)} parameters are not determined: {', '.join(unknown)}.")
+            found.append(
+                f"{len(unknown)} of {len(self.model.names)} parameters are not determined: {', '.join(unknown)}."
+            )
         if self.choice.ridge > 1e-6:
             found.append(
                 f"The data leave directions of the parameters open; a ridge of {self.choice.ridge:g} keeps predictions "
@@ -110,7 +112,8 @@ class Estimate:
             )
         if self.colour > COLOURED:
             found.append(
-                f"The residual is coloured: standard errors by white noise would be too small by {self.colour:.1f} times."
+                "The residual is coloured: standard errors by white noise would be too small by "
+                f"{self.colour:.1f} times."
             )
         if self.dropped_rows:
             found.append(f"{self.dropped_rows} rows repeated an old position and were left out.")
@@ -185,6 +188,6 @@ class Estimate:
 
 
 def colour_of(errors: Array, white: Array, determined: NDArray[np.bool_]) -> float:
-    """Gives the median ratio of honest to white-noise standard errors (b,) of the determined parameters; 1 without any."""
+    """Gives the median ratio of honest to white-noise errors (b,) of the determined parameters; 1 without any."""
     known = determined & (white > 0)
     return float(np.median(errors[known] / white[known])) if known.any() else 1.0

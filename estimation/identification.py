@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from estimation.choices import VELOCITY_SCALES, Candidates, Choice, choose
 from estimation.estimate import Estimate, JointFit, colour_of
-from estimation.estimators import Estimator, estimator as choose_estimator
+from estimation.estimators import Estimator
+from estimation.estimators import estimator as choose_estimator
 from estimation.model import Model
 from estimation.moments import Moments
 from estimation.preparation import Prepared, Rows, prepare
@@ -18,6 +19,7 @@ from estimation.uncertainty import Part, covariance, white_noise_covariance
 from robots.base_parameters import BaseParameters, base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.files import sha256
+from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.regressor import default_model
 from robots.robot import Robot
@@ -40,6 +42,7 @@ HOPELESS = 0.9
 ROUNDING = 1e-9
 
 
+@one_blas_thread()
 def identify(
     robot: Robot,
     logs: Log | Sequence[Log],

@@ -31,11 +31,13 @@ class Moments:
     def of(Y: Array, tau: Array, mask: Array) -> Moments:
         """Sums the rows of Y (N, n, p) and tau (N, n) where the mask (N, n) is one."""
         n, p = Y.shape[1:]
-        gram, cross = np.empty((n, p, p)), np.empty((n, p))
+        gram, cross = np.zeros((n, p, p)), np.zeros((n, p))
         for joint in range(n):
-            rows = Y[:, joint] * mask[:, joint, None]
-            gram[joint] = rows.T @ rows
-            cross[joint] = rows.T @ tau[:, joint]
+            # Most columns do not act on a joint: links before it, friction of others.
+            used = np.flatnonzero(Y[:, joint].any(axis=0))
+            rows = Y[:, joint][:, used] * mask[:, joint, None]
+            gram[joint][np.ix_(used, used)] = rows.T @ rows
+            cross[joint, used] = rows.T @ tau[:, joint]
         return Moments(gram, cross, (mask * tau**2).sum(axis=0), mask.sum(axis=0))
 
     def __add__(self, other: Moments) -> Moments:

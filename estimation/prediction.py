@@ -84,9 +84,7 @@ class Prediction:
         }
         return {
             "samples": len(self.motion),
-            **{
-                name: [float(v) if np.isfinite(v) else None for v in values] for name, values in quantities.items()
-            },
+            **{name: [float(v) if np.isfinite(v) else None for v in values] for name, values in quantities.items()},
         }
 
     def to_frame(self) -> pd.DataFrame:

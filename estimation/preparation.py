@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 # Below this share of a joint's RMS speed its friction is not known to have a sign: those rows are left out of its fit.
 SLOW = 0.01
-# A joint with less RMS speed than this [rad/s or m/s] stands: what is left is rounding, and all its rows count.
+# A joint with less RMS speed than this [rad/s or m/s] stands: what is left is rounding, not to be taken for motion.
 STANDING = 1e-9
 
 
@@ -63,8 +63,9 @@ class Prepared:
         inside = np.flatnonzero((t >= t[0] + edge) & (t <= t[-1] - edge))[::stride]
         dq = motion.dq[inside]
         speed = np.sqrt(np.mean(dq**2, axis=0))
-        fast = (np.abs(dq) >= SLOW * speed) | (speed < STANDING)
-        cut = Motion(t=t[inside], q=motion.q[inside], dq=dq, ddq=motion.ddq[inside])
+        moves = speed >= STANDING
+        fast = (np.abs(dq) >= SLOW * speed) | ~moves
+        cut = Motion(t=t[inside], q=motion.q[inside], dq=dq * moves, ddq=motion.ddq[inside] * moves)
         return Rows(cut, self.tau[inside], fast.astype(float))
 
 

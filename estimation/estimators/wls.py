@@ -12,9 +12,9 @@ from robots.common.errors import InputError
 class WeightedLeastSquares(Estimator):
     """min sum_j w_j ||tau_j - Y_j pi||^2 with w_j = sigma_j^(-2 temper), sigma_j the residual level of least squares.
 
-    With `temper` 1 this is the textbook's inverse variance (Swevers et al. 1997). On measured logs most of a residual is
-    what the model lacks, not noise: full weights would then hand the shared parameters to whichever joint happens to
-    be modelled best. Reweighted once, for the same reason.
+    With `temper` 1 this is the textbook's inverse variance (Swevers et al. 1997). On measured logs most of a residual
+    is what the model lacks, not noise: full weights would then hand the shared parameters to whichever joint happens
+    to be modelled best. Reweighted once, for the same reason.
 
     Args:
         temper: 0 (ordinary least squares) to 1.

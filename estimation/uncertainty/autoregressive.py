@@ -28,9 +28,7 @@ class Noise:
 
     def whitened(self, residual: Array) -> Array:
         """Filters residuals (N, n) to their innovations."""
-        columns = [
-            lfilter(np.concatenate([[1.0], -a]), [1.0], residual[:, j]) for j, a in enumerate(self.coefficients)
-        ]
+        columns = [lfilter(np.concatenate([[1.0], -a]), [1.0], residual[:, j]) for j, a in enumerate(self.coefficients)]
         return np.stack(columns, axis=1)
 
     def simulated(self, samples: int, rng: np.random.Generator, warm_up: int = 1500) -> Array:

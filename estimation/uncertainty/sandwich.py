@@ -65,7 +65,7 @@ def covariance(parts: Sequence[Part], weights: Array, inverse: Array, seed: int 
     model, robust = _meats(parts, weights, noise)
     scale = float(np.mean(np.diag(noise.covariance) / np.diag(plain.covariance)))
     first, second = inverse @ model @ inverse, scale * (inverse @ robust @ inverse)
-    errors = np.sqrt(np.diag(first))
+    errors = np.sqrt(np.maximum(np.diag(first), 0))
     safe = np.where(errors > 0, errors, 1.0)
     factor = np.maximum(1.0, np.sqrt(np.maximum(np.diag(second), 0)) / safe)
     return first * factor[:, None] * factor
@@ -91,9 +91,7 @@ def _noise(parts: Sequence[Part], correction: Array) -> Noise:
     return fit_noise(residual, counts, own + correction)
 
 
-def _corrected(
-    parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, rng: np.random.Generator
-) -> Noise:
+def _corrected(parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, rng: np.random.Generator) -> Noise:
     if sum(part.rows for part in parts) > MOST_CORRECTED:
         return noise
     for _ in range(ROUNDS):
@@ -101,9 +99,7 @@ def _corrected(
     return noise
 
 
-def _lost(
-    parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, rng: np.random.Generator
-) -> Array:
+def _lost(parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, rng: np.random.Generator) -> Array:
     """Autocovariance (n, lags + 1) that a fit takes out of noise of this model, by simulation."""
     joints = len(weights)
     counts = sum(part.mask.sum(axis=0) for part in parts)

@@ -40,6 +40,8 @@ def _collisions(stage: Stage, planner: Planner) -> Iterator[str]:
     if stage.kind == "warm_up":
         free = _free_range(stage, planner)
         remedy = "No smaller range is free." if free is None else f"--warm-up-range {free:g} would be free."
+    if stage.kind == "excitation":
+        remedy = "`oed design --collision` keeps clear."
     yield (
         f"COLLISION in the {stage.name} stage, by the shapes of the collision model: {pair} overlap by "
         f"{-1e3 * clearance:.0f} mm at {time:.1f} s. {remedy}"

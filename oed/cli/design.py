@@ -33,6 +33,9 @@ def design(
     base_frequency: Annotated[float, typer.Option(help="Frequency of the first harmonic [Hz].")] = 0.1,
     periods: Annotated[int, typer.Option(help="Repetitions of the Fourier series.")] = 3,
     strokes: Annotated[bool, typer.Option(help="One stroke a joint to its velocity bound, both ways.")] = True,
+    home: Annotated[
+        str | None, typer.Option(help="Pose at both ends [rad or m], separated by commas.", show_default=False)
+    ] = None,
     velocity_fraction: Annotated[float, typer.Option(help="Share of the velocity limits to use.")] = 1.0,
     torque: Annotated[bool, typer.Option(help="Keep the torque limits, by the robot's nominal dynamics.")] = True,
     torque_margin: Annotated[float, typer.Option(help="Share of the torque limits kept in reserve.")] = 0.1,
@@ -85,6 +88,7 @@ def design(
                 base_frequency=base_frequency,
                 periods=periods,
                 strokes=strokes,
+                home=numbers("--home", home),
                 velocity_fraction=velocity_fraction,
                 torque=torque,
                 torque_margin=torque_margin,

@@ -43,7 +43,8 @@ def identify(
     """Identifies parameters with uncertainties: model.json and report.html."""
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
-        from estimation import identify as run, read_logs
+        from estimation import identify as run
+        from estimation import read_logs
         from oed.reports import save_estimate_report
         from robots.common.files import ResultFolder
 

@@ -34,14 +34,13 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JS
 QuietOption = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
 SeedOption = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
 WorkersOption = Annotated[
-    int | None, typer.Option("--workers", min=1, help="Parallel processes; as many as cores by default.", show_default=False)
+    int | None,
+    typer.Option("--workers", min=1, help="Parallel processes; as many as cores by default.", show_default=False),
 ]
 PngOption = Annotated[bool, typer.Option("--png", help="Write the report's pictures as PNG files, too.")]
 
 
-def robot_from(
-    spec: str, tip: str | None = None, joints: str | None = None, lock: list[str] | None = None
-) -> Robot:
+def robot_from(spec: str, tip: str | None = None, joints: str | None = None, lock: list[str] | None = None) -> Robot:
     """Loads the robot that the options name.
 
     Raises:

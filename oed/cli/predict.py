@@ -22,7 +22,8 @@ def predict(
     """Predicts the torques of a log's motion, and their error where the log has torque."""
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
-        from estimation import load_model, predict as run, read_log
+        from estimation import load_model, read_log
+        from estimation import predict as run
 
         identified = load_model(model)
         recorded = read_log(log, n=identified.robot.n, torque=False)

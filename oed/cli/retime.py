@@ -43,7 +43,12 @@ def retime(
                 raise InputError("the file names no robot", file=trajectory, remedy="give --robot")
             progress.start(f"retiming by {method}", None)
             result = run(
-                robot_from(str(named)), motion, method=method, criterion=criterion, friction=friction, tolerance=tolerance
+                robot_from(str(named)),
+                motion,
+                method=method,
+                criterion=criterion,
+                friction=friction,
+                tolerance=tolerance,
             )
             result.save(folder.path("trajectory.csv").parent)
             save_retime_report(result, motion, folder, png=png)

@@ -22,6 +22,7 @@ from oed.cli.options import (
 
 
 def simulate(
+    context: typer.Context,
     robot: Annotated[
         str | None,
         typer.Option(
@@ -66,7 +67,7 @@ def simulate(
         from robots.plants import simulate as run
 
         if (trajectory is None) == (campaign is None):
-            raise InputError("simulate plays one thing", allowed="either --trajectory or --campaign")
+            raise typer.BadParameter("give either --trajectory or --campaign", ctx=context)
         given = robot_from(robot, tip, joints, lock) if robot else None
         if campaign is not None:
             planned = Campaign.load(campaign, given)

@@ -28,7 +28,8 @@ class CondDeterminant(Criterion):
 
     def value(self, eigenvalues: Array) -> float:
         """Gives the weighted sum."""
-        return float(np.log(self._cond.value(eigenvalues))) + self.weight * self._determinant.surrogate(eigenvalues, 1)[0]
+        volume, _ = self._determinant.surrogate(eigenvalues, 1.0)
+        return float(np.log(self._cond.value(eigenvalues))) + self.weight * volume
 
     def surrogate(self, eigenvalues: Array, sharpness: float) -> tuple[float, Array]:
         """Replaces the condition number by its stand-in."""

@@ -53,8 +53,7 @@ class Information:
         adjoint = (self._Y.reshape(-1, self.size) @ (2 * weights)).reshape(samples, self._joints, -1)
         if self._rows is not None:
             adjoint *= self._rows
-        adjoint = adjoint.reshape(samples, -1)
-        q, dq, ddq = self._reverse(*self._motion, adjoint)
+        q, dq, ddq = self._reverse(*self._motion, adjoint.reshape(samples, -1))
         shape = (samples, self._joints)
         return q.reshape(shape), dq.reshape(shape), ddq.reshape(shape)
 
@@ -75,16 +74,17 @@ def triangle(
         rows: weights (n,) of the joints' rows.
     """
     size = len(columns)
-    reduced = np.zeros((0, size))
+    reduced: Array = np.zeros((0, size))
     for start in range(0, len(q), 2000):
         chunk = slice(start, start + 2000)
         Y = model.regressor(q[chunk], dq[chunk], ddq[chunk], columns=columns)
         if rows is not None:
             Y *= np.asarray(rows)[:, None]
-        reduced = np.linalg.qr(np.vstack([reduced, Y.reshape(-1, size)]), mode="r")
+        reduced = np.asarray(np.linalg.qr(np.vstack([reduced, Y.reshape(-1, size)]), mode="r"), dtype=np.float64)
     return np.vstack([reduced, np.zeros((size - len(reduced), size))])
 
 
 def singular_values(model: TorqueModel, columns: Sequence[int], q: Array, dq: Array, ddq: Array) -> Array:
     """Computes the singular values (m,) of Y on samples (N, n), ascending."""
-    return np.linalg.svd(triangle(model, columns, q, dq, ddq), compute_uv=False)[::-1]
+    values = np.linalg.svd(triangle(model, columns, q, dq, ddq), compute_uv=False)
+    return np.asarray(values[::-1], dtype=np.float64)

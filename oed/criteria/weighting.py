@@ -80,7 +80,7 @@ class Weighting:
         if self.unit_columns:
             length = np.linalg.norm(stacked, axis=0)
             stacked = stacked / np.where(length > 0, length, 1.0)
-        return np.linalg.svd(stacked, compute_uv=False)[::-1]
+        return np.asarray(np.linalg.svd(stacked, compute_uv=False)[::-1], dtype=np.float64)
 
     def _linear(self, gram: Array) -> Array:
         matrix = gram if self.prior is None else self.amount * gram + self.prior

@@ -28,7 +28,12 @@ def home_pose(limits: Limits) -> Array:
 
 
 def assemble(
-    series: FourierSeries, limits: Limits, *, period: float, home: ArrayLike | None = None, strokes: bool | tuple[int, ...] = True
+    series: FourierSeries,
+    limits: Limits,
+    *,
+    period: float,
+    home: ArrayLike | None = None,
+    strokes: bool | tuple[int, ...] = True,
 ) -> Sequence:
     """Joins the parts of an excitation experiment; the robot rests at both ends.
 

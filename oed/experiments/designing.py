@@ -85,15 +85,15 @@ def design(
         base_frequency: of the first harmonic [Hz].
         periods: how often the series is repeated.
         strokes: with the strokes to the velocity bounds.
-        home: pose (n,) at both ends [rad or m].
+        home: pose (n,) at both ends [rad or m]; by default zero, or the nearest pose free of collisions.
         velocity_fraction: of the velocity limits that may be used.
         torque: keep the torque limits by the robot's nominal dynamics, where both are described.
         torque_margin: share of the torque limits kept for what the nominal dynamics are wrong by.
         collision: keep the arm clear of itself and of the obstacles in the robot's file; the whole experiment is then
             proved free at all times.
         clearance: to keep [m].
-        scaling: of the columns that the criterion judges: ``none``, ``nominal`` (each by the size its parameter has in the
-            robot's description) or ``unit`` (each to unit length).
+        scaling: of the columns that the criterion judges: ``none``, ``nominal`` (each by the size its parameter has in
+            the robot's description) or ``unit`` (each to unit length).
         noise: torque noise of each joint (n,) [N m or N]: rows count by one over it; all alike by default.
         after: what an earlier identification knows: the design adds what that lacks.
         task: with criterion ``i``, the motion whose torques are to be predicted.
@@ -147,6 +147,7 @@ def design(
         robot,
         base,
         pose,
+        movable=home is None,
         torque=torque,
         torque_margin=torque_margin,
         collision=collision,
@@ -161,13 +162,13 @@ def design(
         samples=max(FourierProblem.samples, 20 * harmonics),
         limit_samples=max(FourierProblem.limit_samples, 50 * harmonics),
         pointwise=safety.pointwise,
-        home=pose,
+        home=safety.home,
         weighting=weighting,
     )
     # The experiment's frame is laid out first: whatever is wrong with a limit or a pose shows before the long work.
     rest = FourierSeries.from_coefficients(np.zeros((robot.n, 2 * harmonics + 1)), base_frequency)
     rest = replace(rest, offsets=problem.centre)
-    assemble(rest, limits, period=robot.period, home=pose, strokes=strokes)
+    assemble(rest, limits, period=robot.period, home=safety.home, strokes=strokes)
     problem.cost(np.zeros(problem.size))  # compiles, once for all processes
     sign = -1.0 if chosen.larger_is_better else 1.0
     work_name = f"designing for {robot.name}"
@@ -192,7 +193,7 @@ def design(
             "no motion found that excites all parameters", remedy="allow more motion, or fit fewer parameters"
         )
     series = problem.series(best.z, periods)
-    sequence, freedom, left_out = safety.assembled(series, limits, pose, robot.period, strokes)
+    sequence, freedom, left_out = safety.assembled(series, limits, robot.period, strokes)
     motion = sequence.motion()
     design = Design(
         robot=robot,
@@ -280,9 +281,7 @@ class _Task:
 @one_blas_thread()
 def _search(task: _Task) -> Found:
     tell = task.board.teller(task.number)
-    island = Island(
-        task.problem, task.effort, task.solver, task.seed, task.number, tell=tell, deadline=task.deadline
-    )
+    island = Island(task.problem, task.effort, task.solver, task.seed, task.number, tell=tell, deadline=task.deadline)
     # Threads inside small matrix products cost more than they bring, and would make the result depend on their number.
     with threadpool_limits(limits=1):
         return island.search()

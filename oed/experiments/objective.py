@@ -1,5 +1,7 @@
 """A design problem's criterion as CasADi functions, with exact gradients and no conversion of large arrays."""
 
+# ruff: noqa: D102 -- CasADi prescribes the callbacks' methods
+
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

@@ -1,5 +1,7 @@
 """The pointwise limits as rows of the solver: only where a motion comes near them."""
 
+# ruff: noqa: D102 -- CasADi prescribes the callbacks' methods
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -25,7 +27,7 @@ class PointwiseRows:
         near: how close to a bound, in its own scale, a peak must come to be chosen.
     """
 
-    def __init__(self, problem: FourierProblem, near: float = 0.05) -> None:
+    def __init__(self, problem: FourierProblem, near: float = 0.01) -> None:
         self._problem, self._near = problem, near
         count = sum(len(limit.labels) for limit in problem.pointwise)
         self._chosen = np.zeros((problem.limit_samples, count), dtype=bool)
@@ -36,14 +38,14 @@ class PointwiseRows:
         return int(self._chosen.sum())
 
     def add_peaks(self, z: Array, tolerance: float) -> bool:
-        """Adds the samples around each near peak; tells whether one passed its bound by more than the tolerance."""
+        """Adds the sample of each near peak; tells whether one passed its bound by more than the tolerance."""
         if not self._problem.pointwise:
             return False
         excess = self._problem.pointwise_excess(z)
         peak = (excess >= np.roll(excess, 1, 0)) & (excess > np.roll(excess, -1, 0)) & (excess > -self._near)
-        around = peak | np.roll(peak, 1, 0) | np.roll(peak, -1, 0)
-        passed = bool((excess[around & ~self._chosen] > tolerance).any())
-        self._chosen |= around
+        # One row a peak at first: each costs IPOPT a dense row. Where a peak returns beside a chosen row, its place wanders.
+        passed = bool((excess[peak & ~self._chosen] > tolerance).any())
+        self._chosen |= peak
         return passed
 
     def bounds(self) -> tuple[Array, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
@@ -48,7 +48,7 @@ class FourierProblem:
     limit_samples: int = 250
     pointwise: tuple[PointwiseLimit, ...] = ()
     home: Array | None = None
-    weighting: Weighting = Weighting()
+    weighting: Weighting = field(default_factory=Weighting)
 
     def __getstate__(self) -> dict[str, object]:
         # What is derived, compiled code above all, is rebuilt in the process that needs it.
@@ -83,7 +83,7 @@ class FourierProblem:
 
     @cached_property
     def centre(self) -> Array:
-        """(n,): the pose of z = 0: the middle of each range (zero where it has none), or home if that keeps more limits.
+        """(n,): the pose of z = 0: the middle of each range (zero where it has none), or home if only that is allowed.
 
         Raises:
             InfeasibleError: neither keeps the pointwise limits, so that no motion around it does.
@@ -159,7 +159,8 @@ class FourierProblem:
 
     def cost(self, z: Array) -> float:
         """Evaluates the criterion itself on the samples, smaller being better."""
-        return self.criterion.cost(np.linalg.eigvalsh(self.weighting.apply(self.gram(z))))
+        eigenvalues: Array = np.asarray(np.linalg.eigvalsh(self.weighting.apply(self.gram(z))), dtype=np.float64)
+        return self.criterion.cost(eigenvalues)
 
     @cached_property
     def limit_bases(self) -> Kinematics:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.criteria import Criterion, Weighting, criterion as choose_criterion, triangle
+from oed.criteria import Criterion, Weighting, triangle
+from oed.criteria import criterion as choose_criterion
 from oed.experiments.views import motion_frame, plot_velocities
 from oed.exports import read_trajectory, write_trajectory
 from robots.base_parameters import BaseParameters, base_parameters
@@ -92,7 +93,8 @@ class Outcome:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Outcome:
         """Reads what `to_dict` wrote."""
-        return cls(**{name: np.nan if value is None else value for name, value in data.items()})
+        values: dict[str, Any] = {name: np.nan if value is None else value for name, value in data.items()}
+        return cls(**values)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,8 +189,8 @@ class Design:
         tightest = min((m for m in self.margins if np.isfinite(m.limit)), key=lambda m: m.slack_fraction, default=None)
         if tightest is not None:
             lines.append(
-                f"  tightest limit: {tightest.quantity} of joint {tightest.joint}, {100 * tightest.slack_fraction:.2f} % "
-                f"left at {tightest.time:.3f} s"
+                f"  tightest limit: {tightest.quantity} of joint {tightest.joint}, "
+                f"{100 * tightest.slack_fraction:.2f} % left at {tightest.time:.3f} s"
             )
         if self.freedom is not None:
             lines.append(
@@ -259,9 +261,7 @@ class Design:
         write_atomic(Path(folder) / DESIGN, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
 
     @classmethod
-    def load(
-        cls, folder: str | Path, robot: Robot | None = None, criterion: str | Criterion | None = None
-    ) -> Design:
+    def load(cls, folder: str | Path, robot: Robot | None = None, criterion: str | Criterion | None = None) -> Design:
         """Reads a saved design.
 
         Args:

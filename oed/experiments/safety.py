@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.constraints import PointwiseLimit, TorqueLimit
-from oed.constraints.feasibility import check_feasible
+from oed.constraints.feasibility import check_feasible, nearest_feasible
 from oed.constraints.geometric import CollisionLimit, GeometricLimits
 from oed.experiments.assembly import assemble
 from oed.trajectories import FourierSeries, Sequence
@@ -33,13 +33,13 @@ class Safety:
         torque: the torque limit, where it is known.
         collision: bodies and obstacles, where they are to be watched.
         spatial: the same as rows for the solver.
-        margin: clearance to keep [m].
+        home: pose (n,) at both ends.
     """
 
+    home: Array
     torque: TorqueLimit | None = None
     collision: CollisionModel | None = None
     spatial: GeometricLimits | None = None
-    margin: float = 0.0
 
     @property
     def pointwise(self) -> tuple[PointwiseLimit, ...]:
@@ -51,7 +51,7 @@ class Safety:
         return None if self.collision is None else check_motion(self.collision, motion, confirm=False)
 
     def assembled(
-        self, series: FourierSeries, limits: Limits, home: Array, period: float, strokes: bool
+        self, series: FourierSeries, limits: Limits, period: float, strokes: bool
     ) -> tuple[Sequence, CollisionReport | None, tuple[int, ...]]:
         """Assembles an experiment that keeps these limits.
 
@@ -70,7 +70,7 @@ class Safety:
             gentle = limits.scaled(velocity=factor, acceleration=factor, jerk=factor)
             while True:
                 kept = tuple(joint for joint in joints if joint not in left_out)
-                sequence = assemble(series, gentle, period=period, home=home, strokes=kept)
+                sequence = assemble(series, gentle, period=period, home=self.home, strokes=kept)
                 motion = sequence.motion()
                 report = self.report(motion)
                 if report is None or not report.collides:
@@ -116,6 +116,7 @@ def choose_safety(
     base: BaseParameters,
     home: Array,
     *,
+    movable: bool,
     torque: bool,
     torque_margin: float,
     collision: bool,
@@ -127,6 +128,7 @@ def choose_safety(
         robot: the robot.
         base: whose model gives the torques.
         home: pose (n,) at both ends.
+        movable: whether another home pose may be taken where this one is in collision.
         torque: keep torque limits, where they and the nominal dynamics are described.
         torque_margin: share of them kept in reserve.
         collision: watch the arm's own bodies, and the obstacles of the robot's file.
@@ -135,14 +137,20 @@ def choose_safety(
     Raises:
         InfeasibleError: a home pose that cannot be held, or is in collision.
     """
+    model = spatial = None
+    if collision:
+        model = collision_model(robot)
+        spatial = GeometricLimits(robot=robot, limits=(CollisionLimit(model=model, margin=clearance),))
+        try:
+            check_feasible(robot, spatial, home)
+        except InfeasibleError:
+            nearest = nearest_feasible(spatial, home) if movable else None
+            if nearest is None:
+                raise
+            home = nearest
     limit = None
     bound = np.asarray(robot.limits.torque)
     if torque and np.isfinite(base.model.nominal).all() and np.isfinite(bound).any():
         limit = TorqueLimit(base.model, base.model.nominal, bound, margin=torque_margin)
         limit.check_holding(home)
-    if not collision:
-        return Safety(torque=limit)
-    model = collision_model(robot)
-    spatial = GeometricLimits(robot=robot, limits=(CollisionLimit(model=model, margin=clearance),))
-    check_feasible(robot, spatial, home)
-    return Safety(torque=limit, collision=model, spatial=spatial, margin=clearance)
+    return Safety(home=home, torque=limit, collision=model, spatial=spatial)

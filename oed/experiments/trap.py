@@ -9,7 +9,7 @@ Result = TypeVar("Result")
 
 
 class Trap:
-    """Catches the first exception in the callbacks of one solver, Ctrl-C above all, and holds it until the solver is out.
+    """Catches the first exception in a solver's callbacks, Ctrl-C above all, and holds it until the solver is out.
 
     Attributes:
         caught: the exception, if there was one.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from oed.experiments import Design
 from oed.experiments.result import Quality, missing_limits
@@ -12,6 +13,8 @@ from oed.reports.significant import significant
 from oed.reports.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
 from robots.common.files import ResultFolder
 from robots.limits import Margin
+
+Array = NDArray[np.float64]
 
 
 def save_design_report(design: Design, folder: ResultFolder, *, png: bool = False) -> None:
@@ -40,8 +43,8 @@ def design_page(design: Design) -> Page:
             Section(
                 title="Motion",
                 paragraphs=(
-                    "Each joint within its limits. The shaded parts are the segments: the optimised Fourier series, one "
-                    "stroke a joint to its velocity bound both ways, and jerk-limited moves in between.",
+                    "Each joint within its limits. The shaded parts are the segments: the optimised Fourier series, "
+                    "one stroke a joint to its velocity bound both ways, and jerk-limited moves in between.",
                 ),
                 pictures=(
                     trajectory_picture(
@@ -93,9 +96,15 @@ def quality_section(qualities: tuple[Quality, ...]) -> Section:
             "singular value says how well the worst-determined direction is seen: its standard error is the torque "
             "noise over it.",
         ),
-        pictures=(spectrum_picture({quality.part: quality.singular_values for quality in qualities}),),
+        pictures=(spectrum_picture({quality.part: _shown(quality) for quality in qualities}),),
         tables=(table,),
     )
+
+
+def _shown(quality: Quality) -> Array:
+    """The singular values (m,), those that are zero but for rounding as zero."""
+    values = np.array(quality.singular_values)
+    return np.where(values > 1e-10 * values.max(), values, 0.0)
 
 
 def margins_section(margins: tuple[Margin, ...], joint_names: tuple[str, ...]) -> Section:
@@ -162,8 +171,8 @@ def _warnings(design: Design) -> tuple[str, ...]:
     elif not design.freedom["certified"]:
         warnings.append("Freedom of collisions is not proved at all times.")
     if design.strokes_left_out:
-        joints = ", ".join(str(joint) for joint in design.strokes_left_out)
-        warnings.append(f"No stroke for joints {joints}: on it the arm would collide.")
+        left_out = ", ".join(str(joint) for joint in design.strokes_left_out)
+        warnings.append(f"No stroke for joints {left_out}: on it the arm would collide.")
     return tuple(warnings)
 
 
@@ -178,11 +187,12 @@ def _segments(design: Design) -> Table:
 
 
 def _search_text(design: Design) -> str:
-    settings = design.settings
+    settings, count = design.settings, len(design.islands)
+    searches = "One search" if count == 1 else f"{count} independent searches"
     return (
-        f"{len(design.islands)} independent searches from seed {settings['seed']}, each with {settings['effort']['starts']} "
-        f"screened starts and {settings['effort']['hops']} hops, solved by IPOPT with exact gradients. The limits were "
-        "imposed so that they hold between the samples, too."
+        f"{searches} from seed {settings['seed']}, {'' if count == 1 else 'each '}with "
+        f"{settings['effort']['starts']} screened starts and {settings['effort']['hops']} hops, solved by IPOPT with "
+        "exact gradients. The limits were imposed so that they hold between the samples, too."
     )
 
 

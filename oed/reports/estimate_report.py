@@ -59,10 +59,10 @@ def estimate_page(estimate: Estimate) -> Page:
         Section(
             title="How it was made",
             paragraphs=(
-                f"Method {model.provenance['method']}; positions smoothed at {estimate.choice.cutoff:g} Hz without phase "
-                f"lag; ridge {estimate.choice.ridge:g} on the Gram matrix with unit columns; both chosen by predicting "
-                "contiguous blocks of the logs from the rest. Standard errors come from a sandwich with an autoregressive "
-                "model of the residual, joints correlated.",
+                f"Method {model.provenance['method']}; positions smoothed at {estimate.choice.cutoff:g} Hz without "
+                f"phase lag; ridge {estimate.choice.ridge:g} on the Gram matrix with unit columns; both chosen by "
+                "predicting contiguous blocks of the logs from the rest. Standard errors come from a sandwich with an "
+                "autoregressive model of the residual, joints correlated.",
             ),
             tables=(_logs(estimate),),
             folded=True,
@@ -91,7 +91,8 @@ def estimate_page(estimate: Estimate) -> Page:
 
 def _errors(estimate: Estimate) -> Picture:
     def shares(name: str) -> Array:
-        return np.array([getattr(joint, name) / joint.torque_rms if joint.torque_rms else np.nan for joint in estimate.joints])
+        pairs = [(getattr(joint, name), joint.torque_rms) for joint in estimate.joints]
+        return np.array([error / scale if scale else np.nan for error, scale in pairs])
 
     errors = {"fitted": shares("residual_rms"), "left out": shares("held_out_rms"), "constant": shares("torque_spread")}
     nominal = shares("nominal_rms")
@@ -135,7 +136,8 @@ def _parameters(estimate: Estimate) -> Table:
     ):
         if known:
             percent = significant(100 * error / abs(value), digits=2) if value else "–"
-            rows.append((column.name, significant(value, error), significant_error(error), percent, column.unit, formula))
+            shown = (significant(value, error), significant_error(error), percent)
+            rows.append((column.name, *shown, column.unit, formula))
         else:
             rows.append((column.name, "not determined", "–", "–", column.unit, formula))
     return Table(

@@ -140,7 +140,7 @@ def spectrum_picture(parts: Mapping[str, ArrayLike], *, name: str = "spectrum") 
     dots = [Series(x=item.x, y=item.y, name=item.name, kind="markers", role=item.role) for item in series]
     panel = Panel(
         x_label="direction, strongest first",
-        y_label="singular value of the scaled regressor",
+        y_label="singular value of the regressor",
         series=(*series, *dots),
         y_log=True,
     )

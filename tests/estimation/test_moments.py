@@ -34,9 +34,7 @@ def test_the_inverse_is_that_of_the_weighted_gram_matrix(problem):
     Y, tau, mask = problem
     weights = np.array([1.0, 4.0, 0.25])
     rows = (Y * (np.sqrt(weights) * mask)[:, :, None]).reshape(-1, COLUMNS)
-    np.testing.assert_allclose(
-        Moments.of(Y, tau, mask).inverse(weights, 0.0), np.linalg.inv(rows.T @ rows), rtol=1e-8
-    )
+    np.testing.assert_allclose(Moments.of(Y, tau, mask).inverse(weights, 0.0), np.linalg.inv(rows.T @ rows), rtol=1e-8)
 
 
 def test_the_ridge_acts_on_columns_of_unit_length(problem):

@@ -37,9 +37,7 @@ def test_coefficients_are_recovered(truth):
 @pytest.mark.parametrize(("truth", "order"), [([], 0), ([0.9], 1), ([1.2, -0.5], 2)])
 def test_the_order_is_not_too_low_and_rarely_too_high(truth, order):
     """Akaike's order is the true one or more, and in the median of 30 processes at most one above."""
-    orders = [
-        len(fitted(process(truth, samples=4000, seed=seed)[:, None]).coefficients[0]) for seed in range(30)
-    ]
+    orders = [len(fitted(process(truth, samples=4000, seed=seed)[:, None]).coefficients[0]) for seed in range(30)]
     assert min(orders) >= order
     # Akaike keeps one coefficient too many in 16 % of cases, and more in some; the median stays.
     assert np.median(orders) <= order + 1

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import pandas as pd
 import pytest
+
+from robots.common.errors import InputError
 
 
 def refused(done, out: Path, *words: str, code: int = 2) -> None:
@@ -88,7 +89,6 @@ def test_robot_files(change, words: tuple, run, robot: Path, out: Path, tmp_path
         ("design", "--robot", "er3a", "--seed", "-1"),
         ("design", "--robot", "er3a", "--seed", "x"),
         ("design", "--robot", "er3a", "--workers", "0"),
-        ("simulate", "--robot", "er3a"),
         ("identify", "--robot", "er3a"),
         ("dance",),
         ("--colour",),
@@ -123,7 +123,9 @@ def spoilt(table: pd.DataFrame, fault: str) -> tuple[pd.DataFrame, tuple[str, ..
 
 @pytest.mark.parametrize("fault", ["nan", "backward", "column", "joints", "empty"])
 @pytest.mark.parametrize("command", ["simulate", "retime", "export"])
-def test_trajectories(command: str, fault: str, run, robot: Path, trajectory: pd.DataFrame, out: Path, tmp_path: Path) -> None:
+def test_trajectories(
+    command: str, fault: str, run, robot: Path, trajectory: pd.DataFrame, out: Path, tmp_path: Path
+) -> None:
     """A spoilt trajectory is refused by file, column and row."""
     path = tmp_path / "spoilt.csv"
     table, words = spoilt(trajectory, fault)
@@ -148,6 +150,14 @@ def test_missing_trajectory(command: str, run, robot: Path, out: Path) -> None:
         "export": ("export", "nowhere.csv", "--out", out / "log.csv"),
     }
     refused(run(*lines[command]), out, "nowhere.csv")
+
+
+def test_simulate_needs_a_motion(run, robot: Path, out: Path) -> None:
+    """A simulation without a motion asks for one."""
+    done = run("simulate", "--robot", robot, "--out", out / "log.csv")
+    assert done.code == 2
+    assert "--trajectory" in done.err
+    assert not out.exists()
 
 
 def test_retime_without_a_robot(run, trajectory: pd.DataFrame, out: Path, tmp_path: Path) -> None:
@@ -244,11 +254,8 @@ def test_a_file_where_the_folder_should_be(run, robot: Path, tmp_path: Path) -> 
 def test_a_full_disk_leaves_nothing(run, robot: Path, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """When the last file cannot be written, none is."""
 
-    def full(*_: object, **__: object) -> None:
-        raise OSError(28, "No space left on device")
+    def full(path: Path, *_: object) -> None:
+        raise InputError("cannot be written (no space left on device)", file=path)
 
-    monkeypatch.setattr(shutil, "disk_usage", full)
     monkeypatch.setattr("oed.reports.saving.write_atomic", full)
-    with pytest.raises(OSError, match="No space"):
-        run(*DESIGN, out, "--robot", robot)
-    assert not out.exists()
+    refused(run(*DESIGN, out, "--robot", robot), out, "report.html", "no space left")

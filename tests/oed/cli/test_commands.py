@@ -32,7 +32,14 @@ def arguments(robot: Path, experiment: Path, tmp_path: Path):
         "export": [experiment / "trajectory.csv", "--out", tmp_path / "out.csv"],
         "simulate": ["--robot", robot, "--trajectory", experiment / "trajectory.csv", "--out", tmp_path / "out.csv"],
         "identify": ["--robot", robot, "--log", experiment / "log.csv", "--out", tmp_path],
-        "predict": ["--model", experiment / "model.json", "--log", experiment / "log.csv", "--out", tmp_path / "out.csv"],
+        "predict": [
+            "--model",
+            experiment / "model.json",
+            "--log",
+            experiment / "log.csv",
+            "--out",
+            tmp_path / "out.csv",
+        ],
     }
     return lambda command: [command, *lines[command]]
 

@@ -7,7 +7,19 @@ import resource
 import subprocess
 import sys
 
-HEAVY = ("casadi", "pandas", "pinocchio", "matplotlib", "scipy", "plotly", "cvxpy", "ruckig", "toppra", "pyarrow", "numpy")
+HEAVY = (
+    "casadi",
+    "pandas",
+    "pinocchio",
+    "matplotlib",
+    "scipy",
+    "plotly",
+    "cvxpy",
+    "ruckig",
+    "toppra",
+    "pyarrow",
+    "numpy",
+)
 
 
 def test_help_is_light() -> None:

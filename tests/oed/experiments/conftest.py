@@ -28,7 +28,7 @@ def _turned(alpha: float) -> Array:
 
 
 def _made(kinds: str, name: str, **changes: Array) -> Robot:
-    """A chain of revolute (R) and prismatic (P) joints, each axis square to the one before, without nominal dynamics."""
+    """A chain of revolute (R) and prismatic (P) joints, each square to the one before, without nominal dynamics."""
     joints = tuple(
         Joint(
             f"j{i + 1}",

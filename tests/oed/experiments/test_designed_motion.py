@@ -82,7 +82,7 @@ def test_segments(design: Design) -> None:
 
 
 def test_strokes_reach_the_velocity_bound(design: Design) -> None:
-    """In its stroke each joint alone moves, to its velocity bound both ways, or over its whole range if that is short."""
+    """In its stroke each joint alone moves, to its velocity bound both ways, or over all of a range that is short."""
     motion, limits = design.motion, design.robot.limits
     for segment in (s for s in design.segments if s["kind"] == "sinusoid"):
         inside = (motion.t > segment["start"] - 1e-9) & (motion.t < segment["end"] + 1e-9)
@@ -109,7 +109,9 @@ def pinocchio_columns(robot: Robot, q: np.ndarray, dq: np.ndarray, ddq: np.ndarr
         placement = pin.SE3(np.array(joint.rotation), np.array(joint.translation))
         parent = model.addJoint(parent, kinds[joint.kind](np.array(joint.axis)), placement, joint.name)
     data, n = model.createData(), robot.n
-    rigid = np.reshape([pin.computeJointTorqueRegressor(model, data, *s) for s in zip(q, dq, ddq, strict=True)], (-1, 10 * n))
+    rigid = np.reshape(
+        [pin.computeJointTorqueRegressor(model, data, *s) for s in zip(q, dq, ddq, strict=True)], (-1, 10 * n)
+    )
     order = ["m", "mPx", "mPy", "mPz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz"]
     shapes = {"f1": np.tanh(dq / SCALE), "f2": dq, "f3": dq * np.abs(dq), "f4": dq**3, "Im": ddq}
     columns = []
@@ -211,7 +213,7 @@ def test_frame_and_plot(design: Design) -> None:
 def test_no_room_to_move(robot_named, make_robot, tiny, brief) -> None:
     """A velocity limit of zero is infeasible, and the joint is named."""
     robot = make_robot("RRR", "stuck", velocity=np.array([1.0, 0.0, 1.0]))
-    with pytest.raises(InfeasibleError, match="joint 2.*velocity limit") as caught:
+    with pytest.raises(InfeasibleError, match=r"joint 2.*velocity limit") as caught:
         oed.design(robot, effort=tiny, solver=brief, workers=1)
     assert caught.value.joint == 2
 

@@ -36,7 +36,9 @@ def shares(problem: FourierProblem, z: np.ndarray, t: np.ndarray) -> np.ndarray:
     q, dq, ddq, dddq = problem.series(z).sample(t)
     half, middle = (limits.upper - limits.lower) / 2, (limits.upper + limits.lower) / 2
     bounds = (half, limits.velocity, limits.acceleration, limits.jerk)
-    return np.array([np.abs(x).max(axis=0) / bound for x, bound in zip((q - middle, dq, ddq, dddq), bounds, strict=True)])
+    return np.array(
+        [np.abs(x).max(axis=0) / bound for x, bound in zip((q - middle, dq, ddq, dddq), bounds, strict=True)]
+    )
 
 
 def test_rest_at_both_ends(problem: FourierProblem) -> None:
@@ -71,7 +73,7 @@ def test_shrinking(problem: FourierProblem) -> None:
 
 
 def test_scaling(problem: FourierProblem) -> None:
-    """z = 0 rests in the middle of the ranges; an offset of one is half a range."""
+    """Z = 0 rests in the middle of the ranges; an offset of one is half a range."""
     limits = problem.limits
     still = problem.series(np.zeros(problem.size)).sample(np.linspace(0, 10, 7))
     np.testing.assert_allclose(still.q, np.tile((limits.lower + limits.upper) / 2, (7, 1)), atol=1e-12)

@@ -92,7 +92,9 @@ def test_criteria_pull_apart(designed) -> None:
     """Each criterion's design is the best by its own measure: they are no copies of each other."""
     names = ("cond", "d", "e")
     designs = {name: designed("er3a", criterion=name) for name in names}
-    cost = {(by, of): criterion(by).cost(np.square(designs[of].fourier.singular_values)) for by in names for of in names}
+    cost = {
+        (by, of): criterion(by).cost(np.square(designs[of].fourier.singular_values)) for by in names for of in names
+    }
     for by in ("cond", "d"):
         assert min(names, key=lambda of, by=by: cost[by, of]) == by
 

@@ -52,10 +52,14 @@ def test_tells_every_parameter(estimate: Estimate, html: str) -> None:
     model = estimate.model
     rows = {
         cells[0]: cells
-        for cells in (re.findall(r"<td[^>]*>\s*(.*?)\s*</td>", row, re.S) for row in re.findall(r"<tr>.*?</tr>", html, re.S))
+        for cells in (
+            re.findall(r"<td[^>]*>\s*(.*?)\s*</td>", row, re.S) for row in re.findall(r"<tr>.*?</tr>", html, re.S)
+        )
         if cells
     }
-    for name, value, error, known in zip(model.names, model.values, model.standard_errors, model.determined, strict=True):
+    for name, value, error, known in zip(
+        model.names, model.values, model.standard_errors, model.determined, strict=True
+    ):
         if known:
             assert rows[name][1:3] == [significant(value, error), significant_error(error)]
         else:
