@@ -52,15 +52,20 @@ def to_plotly(picture: Picture, *, points: int = POINTS) -> Figure:
     for annotation in figure.layout.annotations:
         annotation.update(font={"size": 13, "color": INK}, x=annotation.x, yshift=2)
     named: set[str] = set()
+    # Handed over all at once: plotly copies and checks everything that is there with each single one.
+    shapes: list[dict[str, Any]] = []
+    notes: list[Any] = list(figure.layout.annotations)
     for index, panel in enumerate(picture.panels):
         row, column = (number + 1 for number in picture.place(index))
         for series in panel.series:
             for trace in _traces(series, panel, points, named):
                 figure.add_trace(trace, row=row, col=column)
-        _decorate(figure, panel, row, column, named)
+        _decorate(figure, panel, row, column, named, shapes, notes)
         _axes(figure, picture, index, row, column)
     has_legend = bool(named)
     figure.update_layout(
+        shapes=shapes,
+        annotations=notes,
         height=height + (30 if has_legend else 0),
         margin=MARGINS | {"t": MARGINS["t"] + (30 if has_legend else 0)},
         paper_bgcolor="rgba(0,0,0,0)",
@@ -143,14 +148,24 @@ def _legend(name: str, named: set[str]) -> dict[str, Any]:
     return {"name": _escape(name), "legendgroup": name, "showlegend": first}
 
 
-def _decorate(figure: Any, panel: Panel, row: int, column: int, named: set[str]) -> None:
-    place = {"row": row, "col": column, "exclude_empty_subplots": False}
+def _decorate(
+    figure: Any,
+    panel: Panel,
+    row: int,
+    column: int,
+    named: set[str],
+    shapes: list[dict[str, Any]],
+    notes: list[Any],
+) -> None:
+    x_axis, y_axis = _axis_names(figure, row, column)
+    upright = {"xref": x_axis, "yref": f"{y_axis} domain", "y0": 0, "y1": 1}
+    level = {"xref": f"{x_axis} domain", "yref": y_axis, "x0": 0, "x1": 1}
+    plain = {"type": "rect", "line": {"width": 0}}
     for span in panel.spans:
-        figure.add_vrect(
-            x0=span.start, x1=span.end, fillcolor=translucent(span.role, 0.13), line_width=0, layer="below", **place
-        )
+        fill = {"fillcolor": translucent(span.role, 0.13), "layer": "below"}
+        shapes.append(plain | upright | fill | {"x0": span.start, "x1": span.end})
     for band in panel.bands:
-        figure.add_hrect(y0=band.low, y1=band.high, fillcolor=translucent(band.role, 0.2), line_width=0, **place)
+        shapes.append(plain | level | {"fillcolor": translucent(band.role, 0.2), "y0": band.low, "y1": band.high})
     stripes: list[Span | Band] = [*panel.spans, *panel.bands]
     for stripe in stripes:
         if stripe.label and stripe.label not in named:
@@ -159,29 +174,35 @@ def _decorate(figure: Any, panel: Panel, row: int, column: int, named: set[str])
             figure.add_trace({"type": "scatter", "x": [None], "y": [None]} | entry, row=row, col=column)
     for line in panel.lines:
         stroke = {"color": colour(line.role), "width": 1.2, "dash": line.dash}
-        figure.add_hline(y=line.value, line=stroke, **place)
+        shapes.append({"type": "line", "line": stroke} | level | {"y0": line.value, "y1": line.value})
         if line.label and _inside(line.value, panel.y_range):
-            figure.add_annotation(
-                **_corner(panel, line.value, figure, row, column),
-                text=_escape(line.label),
-                font={"size": LABEL_SIZE, "color": colour(line.role)},
-                showarrow=False,
-                xanchor="right",
-                yanchor="bottom" if _labels_above(line.value, panel) else "top",
-                borderpad=0,
+            notes.append(
+                {
+                    "xref": f"{x_axis} domain",
+                    "yref": y_axis,
+                    "x": 1.0,
+                    "y": np.log10(line.value) if panel.y_log else line.value,
+                    "text": _escape(line.label),
+                    "font": {"size": LABEL_SIZE, "color": colour(line.role)},
+                    "showarrow": False,
+                    "xanchor": "right",
+                    "yanchor": "bottom" if _labels_above(line.value, panel) else "top",
+                    "borderpad": 0,
+                }
             )
     if panel.note:
-        x_axis, y_axis = _axis_names(figure, row, column)
-        figure.add_annotation(
-            xref=f"{x_axis} domain",
-            yref=f"{y_axis} domain",
-            x=1.0,
-            y=1.0,
-            xanchor="right",
-            yanchor="top",
-            text=_escape(panel.note),
-            showarrow=False,
-            font={"size": LABEL_SIZE, "color": INK},
+        notes.append(
+            {
+                "xref": f"{x_axis} domain",
+                "yref": f"{y_axis} domain",
+                "x": 1.0,
+                "y": 1.0,
+                "xanchor": "right",
+                "yanchor": "top",
+                "text": _escape(panel.note),
+                "showarrow": False,
+                "font": {"size": LABEL_SIZE, "color": INK},
+            }
         )
 
 
@@ -192,11 +213,6 @@ def _labels_above(value: float, panel: Panel) -> bool:
 
 def _inside(value: float, limits: tuple[float, float] | None) -> bool:
     return limits is None or limits[0] <= value <= limits[1]
-
-
-def _corner(panel: Panel, value: float, figure: Any, row: int, column: int) -> dict[str, Any]:
-    x_axis, y_axis = _axis_names(figure, row, column)
-    return {"xref": f"{x_axis} domain", "yref": y_axis, "x": 1.0, "y": np.log10(value) if panel.y_log else value}
 
 
 def _axis_names(figure: Any, row: int, column: int) -> tuple[str, str]:
