@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from estimation import identify
 from robots import load_robot, nominal_plant, simulate
-from robots.base_parameters import base_parameters
+from robots.base_parameters import find_base_parameters
 from robots.common.errors import AssumedValueWarning
 from robots.common.parallel import parallel_map
 from robots.plants import Plant, Sensors
@@ -98,7 +98,7 @@ def run(task: tuple[Case, int]) -> Run:
     plant = plant_of(case)
     log = simulate(plant, fourier_motion(plant.robot, seed % MOTIONS), seed=seed)
     model = identify(plant.robot, log).model
-    error = model.values - base_parameters(plant.model).from_standard(plant.parameters)
+    error = model.values - find_base_parameters(plant.model).from_standard(plant.parameters)
     scale = np.sqrt(np.diag(model.covariance))
     z = error / scale
     correlation = model.covariance / scale[:, None] / scale
@@ -111,7 +111,7 @@ def table(case: Case, seeds: range, workers: int | None = None) -> str:
     runs = parallel_map(run, [(case, seed) for seed in seeds], workers=workers)
     z = np.array([result.z for result in runs])
     determined = np.array([result.determined for result in runs])
-    columns = base_parameters(plant_of(case).model).columns
+    columns = find_base_parameters(plant_of(case).model).columns
     kinds = np.array([CLASSES.get(column.symbol, "inertial") for column in columns])
     inside, near = np.abs(z) <= NORMAL_95, np.abs(z) <= 3
     lines = [

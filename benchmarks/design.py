@@ -36,7 +36,7 @@ from oed.experiments import EFFORTS, Ipopt, usable_limits
 from oed.experiments.problem import FourierProblem
 from oed.experiments.search import Island
 from oed.experiments.working_set import WorkingSet
-from robots.base_parameters import base_parameters
+from robots.base_parameters import find_base_parameters
 from robots.common.errors import AssumedValueWarning
 from robots.common.parallel import available_cores, parallel_map
 from robots.loading import load_robot
@@ -96,7 +96,7 @@ class Task:
 def problem_of(columns: int) -> FourierProblem:
     """The ER3A's Fourier part: 5 harmonics, 0.1 Hz, 36 base, 4 rotor and 12 or 24 friction columns, unscaled."""
     robot = load_robot("er3a")
-    base = base_parameters(default_model(robot, friction=FRICTION[columns], velocity_scale=0.02, offset=False))
+    base = find_base_parameters(default_model(robot, friction=FRICTION[columns], velocity_scale=0.02, offset=False))
     if base.size != columns:
         raise SystemExit(f"{base.size} columns instead of {columns}")
     return FourierProblem(base=base, criterion=criterion("cond"), limits=usable_limits(robot.limits))

@@ -116,7 +116,8 @@ class Estimate:
                 f"{self.colour:.1f} times."
             )
         if self.dropped_rows:
-            found.append(f"{self.dropped_rows} rows repeated an old position and were left out.")
+            rows = "row repeats" if self.dropped_rows == 1 else "rows repeat"
+            found.append(f"{self.dropped_rows} {rows} an old position: left out.")
         return tuple(found)
 
     def summary(self) -> str:

@@ -16,7 +16,7 @@ from estimation.model import Model
 from estimation.moments import Moments
 from estimation.preparation import Prepared, Rows, prepare
 from estimation.uncertainty import Part, covariance, white_noise_covariance
-from robots.base_parameters import BaseParameters, base_parameters
+from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.files import sha256
 from robots.common.parallel import one_blas_thread
@@ -87,7 +87,7 @@ def identify(
     bar.start("identifying", 4.0)
     prepared = [prepare(robot, log) for log in data]
     sharp = default_model(robot, friction=friction, velocity_scale=VELOCITY_SCALES[0], rotor=rotor, offset=offset)
-    base = base_parameters(sharp)
+    base = find_base_parameters(sharp)
     bar.update(1.0, "choosing smoothing and regularisation")
     choice = choose(base, prepared, chosen, candidates or Candidates())
     predictable = _predictable(prepared, choice)

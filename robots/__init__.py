@@ -19,7 +19,7 @@ _EXPORTS = {
     "Sensors": "robots.plants",
     "SolverError": "robots.common.errors",
     "TorqueModel": "robots.regressor",
-    "base_parameters": "robots.base_parameters",
+    "find_base_parameters": "robots.base_parameters",
     "default_model": "robots.regressor",
     "load_robot": "robots.loading",
     "nominal_plant": "robots.plants",

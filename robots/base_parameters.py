@@ -113,7 +113,7 @@ class BaseParameters:
         return tuple(int(i) for i in np.flatnonzero((share >= threshold).any(axis=0)))
 
 
-def base_parameters(
+def find_base_parameters(
     model: TorqueModel, *, samples: int = 400, seed: int = 0, tolerance: float = 1e-4
 ) -> BaseParameters:
     """Finds the base parameters by a QR factorisation that walks the columns from left to right.

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +12,6 @@ from robots.geometry.chain import Chain
 from robots.limits import Limits
 
 Array = NDArray[np.float64]
-
-
-class _Term(Protocol):
-    def nominal(self, robot: Any, /) -> Array: ...
-
-
-class _Model(Protocol):
-    @property
-    def terms(self) -> Sequence[_Term]: ...
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,14 +112,3 @@ class Robot:
     def has_inertia(self) -> bool:
         """Whether the inertial parameters of every link are known."""
         return bool(np.isfinite(self.inertia).all())
-
-    def nominal(self, model: _Model) -> Array:
-        """Parameters of a torque model as far as this description knows them.
-
-        Args:
-            model: a ``TorqueModel``; its terms give their parameters in the order of its columns.
-
-        Returns:
-            (p,) in the columns' units; NaN or 0 where the description knows nothing, as each term says.
-        """
-        return np.concatenate([np.asarray(term.nominal(self), dtype=np.float64) for term in model.terms])

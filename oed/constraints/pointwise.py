@@ -1,4 +1,4 @@
-"""Limits on what happens at each instant: functions of position, velocity and acceleration that are not linear in them."""
+"""Limits at each instant: functions of position, velocity and acceleration that are not linear in them."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from oed.experiments.search import EFFORTS, Effort, Found, Island
 from oed.experiments.solver import Ipopt
 from oed.retiming import finite_limits
 from oed.trajectories import FourierSeries, count_periods
-from robots.base_parameters import base_parameters
+from robots.base_parameters import find_base_parameters
 from robots.common.errors import InfeasibleError, InputError
 from robots.common.parallel import one_blas_thread, parallel_map
 from robots.common.progress import SILENT, Progress
@@ -140,7 +140,7 @@ def design(
         "ipopt": asdict(solver or Ipopt()),
     }
     limits = usable_limits(robot.limits, velocity_fraction)
-    base = base_parameters(design_model(robot, settings))
+    base = find_base_parameters(design_model(robot, settings))
     weighting = choose_weighting(base, chosen, scaling, noise, after, task, periods / base_frequency / robot.period)
     pose = rest_pose(limits, home)
     safety = choose_safety(

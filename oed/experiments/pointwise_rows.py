@@ -43,7 +43,7 @@ class PointwiseRows:
             return False
         excess = self._problem.pointwise_excess(z)
         peak = (excess >= np.roll(excess, 1, 0)) & (excess > np.roll(excess, -1, 0)) & (excess > -self._near)
-        # One row a peak at first: each costs IPOPT a dense row. Where a peak returns beside a chosen row, its place wanders.
+        # One row a peak: each costs IPOPT a dense one.
         passed = bool((excess[peak & ~self._chosen] > tolerance).any())
         self._chosen |= peak
         return passed

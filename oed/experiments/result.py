@@ -15,7 +15,7 @@ from oed.criteria import Criterion, Weighting, triangle
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.views import motion_frame, plot_velocities
 from oed.exports import read_trajectory, write_trajectory
-from robots.base_parameters import BaseParameters, base_parameters
+from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InputError
 from robots.common.files import existing_file, write_atomic
 from robots.common.parallel import one_blas_thread
@@ -278,7 +278,7 @@ class Design:
             data = json.loads(existing_file(file).read_text(encoding="utf-8"))
             known = robot or load_robot(data["robot"]["origin"])
             settings = data["settings"]
-            base = base_parameters(design_model(known, settings))
+            base = find_base_parameters(design_model(known, settings))
             if list(base.names) != data["model"]["columns"]:
                 raise InputError(f"the design is for {data['robot']['name']}, not for {known.name}", file=file)
             qualities = tuple(

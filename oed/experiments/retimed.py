@@ -16,7 +16,7 @@ from oed.experiments.result import DESIGN, TRAJECTORY, Quality, design_model, ma
 from oed.experiments.views import motion_frame, plot_velocities
 from oed.exports import read_trajectory, write_trajectory
 from oed.retiming import Retimed
-from robots.base_parameters import BaseParameters, base_parameters
+from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InputError
 from robots.common.files import existing_file, write_atomic
 from robots.limits import Margin
@@ -187,7 +187,7 @@ class RetimedExperiment:
         try:
             data = json.loads(existing_file(file).read_text(encoding="utf-8"))
             known = robot or load_robot(data["robot"]["origin"])
-            base = base_parameters(design_model(known, data["settings"]))
+            base = find_base_parameters(design_model(known, data["settings"]))
             if list(base.names) != data["model"]["columns"]:
                 raise InputError(f"the experiment is for {data['robot']['name']}, not for {known.name}", file=file)
             before, after = (

@@ -15,7 +15,7 @@ from oed.experiments.result import design_model, measure, measured_margins
 from oed.experiments.retimed import RetimedExperiment, torque_use
 from oed.retiming import retime as retime_by_toppra
 from oed.retiming import retime_with_stops
-from robots.base_parameters import base_parameters
+from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError
 from robots.regressor import TorqueModel
 from robots.robot import Robot
@@ -62,7 +62,7 @@ def retime(
     chosen = choose_criterion(criterion)
     settings: dict[str, Any] = {"friction": friction, "velocity_scale": velocity_scale, "rotor": True, "offset": False}
     model = design_model(robot, settings)
-    base = base_parameters(model)
+    base = find_base_parameters(model)
     # The path may go to the ends of the ranges; speed and its derivatives keep the reserve of a design.
     limits = replace(usable_limits(robot.limits), lower=robot.limits.lower, upper=robot.limits.upper)
     if method == "toppra":

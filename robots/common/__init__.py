@@ -1,0 +1,1 @@
+"""What every package needs: errors, files, tables, configuration, parallel work, progress."""

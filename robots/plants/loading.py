@@ -34,9 +34,9 @@ class _Plant(Config):
 def load_plant(path: str | PathLike[str], robot: Robot) -> Plant:
     """Reads a plant YAML.
 
-    Keys, all optional: ``friction`` (polynomial, coulomb-viscous) with ``velocity_scale``, ``spread`` (relative difference of the truth from
-    the robot's description) with ``spread_seed``, ``parameters`` (standard parameters by name, such as ``f1_3: 7.5``),
-    and ``sensors`` (see `Sensors`).
+    Keys, all optional: ``friction`` (polynomial, coulomb-viscous) with ``velocity_scale``, ``spread`` (relative
+    difference of the truth from the robot's description) with ``spread_seed``, ``parameters`` (standard parameters by
+    name, such as ``f1_3: 7.5``), and ``sensors`` (see `Sensors`).
 
     Raises:
         InputError: a missing file, an unknown key or parameter, a value out of range.

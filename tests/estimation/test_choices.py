@@ -6,13 +6,13 @@ import pytest
 from estimation.choices import VELOCITY_SCALES, Candidates, choose
 from estimation.estimators import WeightedLeastSquares
 from estimation.preparation import prepare
-from robots.base_parameters import base_parameters
+from robots.base_parameters import find_base_parameters
 from robots.regressor import default_model
 
 
 @pytest.fixture(scope="module")
 def base(arm):
-    return base_parameters(default_model(arm, velocity_scale=VELOCITY_SCALES[0]))
+    return find_base_parameters(default_model(arm, velocity_scale=VELOCITY_SCALES[0]))
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from estimation import identify
 from estimation.estimators import OrdinaryLeastSquares
 from oed.experiments.search import Effort
 from robots import load_robot, nominal_plant, simulate
-from robots.base_parameters import base_parameters
+from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.plants import Sensors
 from robots.signals import Log
@@ -27,7 +27,7 @@ def experiment(er3a):
     plan = oed.design(er3a, effort=Effort(islands=1, starts=1, hops=0, screened=20), periods=1, workers=1)
     plant = nominal_plant(er3a, spread=0.1, seed=1, sensors=Sensors(coloured_share=0.5, correlation_time=0.04))
     estimates = [identify(er3a, simulate(plant, plan.motion, seed=seed)) for seed in range(SEEDS)]
-    truth = base_parameters(plant.model).from_standard(plant.parameters)
+    truth = find_base_parameters(plant.model).from_standard(plant.parameters)
     errors = np.array([estimate.model.values for estimate in estimates]) - truth
     deviations = np.array([np.sqrt(np.diag(estimate.model.covariance)) for estimate in estimates])
     return estimates, errors, deviations
@@ -92,7 +92,7 @@ def test_the_same_log_gives_the_same_model(arm, arm_log):
 def test_ideal_sensors_give_the_truth(arm, arm_plant, arm_log):
     """Without noise and encoder steps, parameters come back to the filter's accuracy."""
     plant = arm_plant(encoder_counts=0.0, torque_noise=0.0)
-    truth = base_parameters(plant.model).from_standard(plant.parameters)
+    truth = find_base_parameters(plant.model).from_standard(plant.parameters)
     log = arm_log(encoder_counts=0.0, torque_noise=0.0)
     values = identify(arm, log).model.values
     # In units of what each parameter would do with 1 % noise it is nothing; relative to the largest of its kind, 1 %.

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from robots.base_parameters import base_parameters
+from robots.base_parameters import find_base_parameters
 from robots.common.errors import NotIdentifiableError
 from robots.geometry.chain import Chain, Joint, rotation_from_rpy
 from robots.regressor import TorqueModel, default_model
@@ -51,7 +51,7 @@ def regroups(base, state):
 
 def test_the_er3a_has_the_thesis_choice(catalogue_robot):
     """The ER3A's base parameters are those of the thesis' table 3: 36 inertial, 24 of friction, 4 rotors."""
-    base = base_parameters(default_model(catalogue_robot("er3a"), offset=False))
+    base = find_base_parameters(default_model(catalogue_robot("er3a"), offset=False))
     expected = ["Izz_1"]
     expected += [f"{s}_{j}" for j in range(2, 7) for s in ("mPx", "mPy", "Ixx", "Ixy", "Ixz", "Iyz", "Izz")]
     expected += [f"f{power}_{j}" for j in range(1, 7) for power in range(1, 5)]
@@ -63,7 +63,7 @@ def test_the_er3a_has_the_thesis_choice(catalogue_robot):
 
 def test_the_er3as_regrouping(catalogue_robot):
     """The ER3A's regrouping is the closed form of Gautier and Khalil (1990), by its Denavit-Hartenberg table."""
-    base = base_parameters(default_model(catalogue_robot("er3a"), friction="coulomb-viscous"))
+    base = find_base_parameters(default_model(catalogue_robot("er3a"), friction="coulomb-viscous"))
     formulas = dict(zip(base.names, base.formulas(), strict=True))
     # d5 = d3 = 0, a3 = 0.27, a4 = 0.07, d4 = 0.299, d6 = 0.078
     assert formulas["mPx_3"] == "mPx_3 + 0.07 m_4 + 0.07 m_5 + 0.07 m_6"
@@ -79,14 +79,14 @@ def test_the_number_is_the_rank(name, catalogue_robot, twin, states):
     """There are as many inertial base parameters as pinocchio's regressor has rank."""
     robot = catalogue_robot(name)
     Y = twin(robot).regressor(*states(robot, 200)).reshape(-1, 10 * robot.n)
-    assert base_parameters(rigid(robot)).size == 10 * robot.n - nullspace(Y).shape[1]
+    assert find_base_parameters(rigid(robot)).size == 10 * robot.n - nullspace(Y).shape[1]
 
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_regrouping_keeps_the_torque(name, catalogue_robot, states):
     """Base parameters give the torque of the standard parameters that they regroup, on states not seen before."""
     robot = catalogue_robot(name)
-    regroups(base_parameters(default_model(robot)), states(robot, 50, seed=77))
+    regroups(find_base_parameters(default_model(robot)), states(robot, 50, seed=77))
 
 
 @settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -94,9 +94,9 @@ def test_regrouping_keeps_the_torque(name, catalogue_robot, states):
 def test_any_chain(seed, n, random_robot, twin, states):
     """On any chain the number is the rank, regrouping keeps the torque, and the classes are those of the nullspace."""
     robot = random_robot(seed, n)
-    base = base_parameters(default_model(robot, friction="coulomb-viscous"), samples=200)
+    base = find_base_parameters(default_model(robot, friction="coulomb-viscous"), samples=200)
     regroups(base, states(robot, 20, seed + 1))
-    inertial = base_parameters(rigid(robot), samples=200)
+    inertial = find_base_parameters(rigid(robot), samples=200)
     Y = twin(robot).regressor(*states(robot, 60 * n, seed)).reshape(-1, 10 * n)
     assert inertial.size == 10 * n - nullspace(Y).shape[1]
     assert inertial.classes == classes(Y)
@@ -121,12 +121,12 @@ def test_classes_follow_the_nullspace(name, catalogue_robot, states):
     """
     model = default_model(catalogue_robot(name))
     Y = model.regressor(*states(model.robot, 300)).reshape(-1, model.size)
-    assert base_parameters(model).classes == classes(Y)
+    assert find_base_parameters(model).classes == classes(Y)
 
 
 def test_classes_of_the_er3a(catalogue_robot):
     """On the ER3A m_1 is unidentifiable, Ixy_2 identifiable, and Im_2 in combination, with Izz_2."""
-    base = base_parameters(default_model(catalogue_robot("er3a")))
+    base = find_base_parameters(default_model(catalogue_robot("er3a")))
     of = dict(zip(base.model.names, base.classes, strict=True))
     assert [of[name] for name in ("m_1", "Ixx_1", "mPz_3")] == ["unidentifiable"] * 2 + ["in combination"]
     assert [of[name] for name in ("Ixy_2", "Izz_6", "f1_1", "Im_3")] == ["identifiable"] * 2 + ["identifiable"] * 2
@@ -140,14 +140,14 @@ def planar(made_robot, gravity):
 
 def test_a_planar_arm(made_robot):
     """A two-link arm in a vertical plane has mPx_1 + a m_2, mPy_1, Izz_1 + a^2 m_2, and mPx, mPy, Izz of link 2."""
-    base = base_parameters(rigid(planar(made_robot, (0.0, -9.81, 0.0))))
+    base = find_base_parameters(rigid(planar(made_robot, (0.0, -9.81, 0.0))))
     second = ("mPx_2", "mPy_2", "Izz_2")
     assert base.formulas() == ("mPx_1 + 0.4 m_2", "mPy_1", "Izz_1 + 0.16 m_2", *second)
 
 
 def test_a_horizontal_planar_arm(made_robot):
     """In a horizontal plane gravity shows nothing: mPx_1 and mPy_1 are lost."""
-    base = base_parameters(rigid(planar(made_robot, (0.0, 0.0, -9.81))))
+    base = find_base_parameters(rigid(planar(made_robot, (0.0, 0.0, -9.81))))
     assert base.formulas() == ("Izz_1 + 0.16 m_2", "mPx_2", "mPy_2", "Izz_2")
 
 
@@ -155,7 +155,7 @@ def test_a_tilted_base_shows_more(catalogue_robot, states):
     """On a tilted base joint 1 bears weight: mPx_1 and mPy_1 join the ER3A's 36 inertial base parameters."""
     robot = catalogue_robot("er3a")
     robot = replace(robot, chain=Chain(robot.chain.joints, gravity=np.array(TILTED)))
-    base = base_parameters(default_model(robot))
+    base = find_base_parameters(default_model(robot))
     assert base.names[:3] == ("mPx_1", "mPy_1", "Izz_1")
     assert sum(column.term == "rigid_body" for column in base.columns) == 38
     regroups(base, states(robot, 20, 5))
@@ -164,24 +164,24 @@ def test_a_tilted_base_shows_more(catalogue_robot, states):
 def test_one_turning_joint(made_robot):
     """One horizontal axis shows mPx, mPy and Izz of its link, its rotor only in sum with Izz."""
     robot = made_robot([Joint("j", "revolute", EYE, np.zeros(3))], (0.0, -9.81, 0.0))
-    base = base_parameters(TorqueModel(robot, (RigidBody(), RotorInertia())))
+    base = find_base_parameters(TorqueModel(robot, (RigidBody(), RotorInertia())))
     assert base.formulas() == ("mPx_1", "mPy_1", "Izz_1 + Im_1")
 
 
 def test_one_sliding_joint(made_robot):
     """On a vertical sliding joint mass, rotor and offset are two parameters: weight hides behind the offset."""
     robot = made_robot([Joint("j", "prismatic", EYE, np.zeros(3))])
-    base = base_parameters(TorqueModel(robot, (RigidBody(), RotorInertia(), TorqueOffset())))
+    base = find_base_parameters(TorqueModel(robot, (RigidBody(), RotorInertia(), TorqueOffset())))
     assert base.names == ("m_1", "Im_1")
     np.testing.assert_allclose(base.grouping[:, 11], [1 / 9.81, -1 / 9.81], rtol=1e-9)  # ddq offset = g (m - Im)
     level = replace(robot, chain=Chain(robot.chain.joints, gravity=np.array([9.81, 0.0, 0.0])))
-    assert base_parameters(TorqueModel(level, base.model.terms)).formulas() == ("m_1 + Im_1", "offset_1")
+    assert find_base_parameters(TorqueModel(level, base.model.terms)).formulas() == ("m_1 + Im_1", "offset_1")
 
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_formulas_say_the_grouping(name, catalogue_robot):
     """The formulas, read back, are the grouping, to the six digits that they show."""
-    base = base_parameters(default_model(catalogue_robot(name)))
+    base = find_base_parameters(default_model(catalogue_robot(name)))
     for text, row in zip(base.formulas(), base.grouping, strict=True):
         read = np.zeros(base.model.size)
         for sign, factor, symbol in re.findall(r"(?:^|([+-]) )(?:([\d.e-]+) )?([A-Za-z]\w*_\d+)", text):
@@ -192,7 +192,7 @@ def test_formulas_say_the_grouping(name, catalogue_robot):
 def test_the_seed_does_not_matter(catalogue_robot):
     """Other random states give the same parameters and the same regrouping."""
     model = default_model(catalogue_robot("panda"))
-    first, second = base_parameters(model, seed=0), base_parameters(model, seed=1)
+    first, second = find_base_parameters(model, seed=0), find_base_parameters(model, seed=1)
     assert first.independent == second.independent
     np.testing.assert_allclose(first.grouping, second.grouping, atol=1e-9)  # least squares of a conditioning near 100
 
@@ -218,8 +218,8 @@ def test_rounded_right_angles_change_nothing(digits, catalogue_robot, states):
 
     Regrouping loses no more than is stated as neglected.
     """
-    exact = base_parameters(default_model(catalogue_robot("er3a")))
-    base = base_parameters(default_model(rounded(exact.model.robot, digits)))
+    exact = find_base_parameters(default_model(catalogue_robot("er3a")))
+    base = find_base_parameters(default_model(rounded(exact.model.robot, digits)))
     assert base.names == exact.names
     assert base.neglected < 1e-6  # 1.57 is off by 8e-4; what it hides behind is of second order
     state = states(exact.model.robot, 50, 6)
@@ -247,10 +247,10 @@ def test_nearly_right_angles_are_no_failure(size, catalogue_robot, states, caplo
     ]
     model = default_model(replace(robot, chain=Chain(tuple(joints))))
     with caplog.at_level(logging.WARNING):
-        base = base_parameters(model)
+        base = find_base_parameters(model)
     assert 70 <= base.size <= 73  # 64 and six offsets; a leaning first axis shows mPx_1, mPy_1 and Im_2 too
     assert ("close to a special geometry" in caplog.text) == (base.neglected > 1e-9)
-    assert base_parameters(model, seed=3).size == base.size
+    assert find_base_parameters(model, seed=3).size == base.size
     state, pi = states(robot, 50), np.abs(model.nominal)
     error = base.torque(*state, base.from_standard(pi)) - model.torque(*state, pi)
     assert np.abs(error).max() < 1e4 * max(base.neglected, 1e-9)  # as above
@@ -259,13 +259,13 @@ def test_nearly_right_angles_are_no_failure(size, catalogue_robot, states, caplo
 def test_a_tolerance_below_rounding_is_refused(catalogue_robot):
     """Where the singular values show a lower rank than the columns kept, the error says to state a larger tolerance."""
     with pytest.raises(NotIdentifiableError, match=r"by QR, \d+ by SVD.*state a larger tolerance"):
-        base_parameters(rigid(catalogue_robot("ur10")), tolerance=1e-18)
+        find_base_parameters(rigid(catalogue_robot("ur10")), tolerance=1e-18)
 
 
 def test_essential_parameters(made_robot, states):
     """A base parameter is essential if its torque's RMS is the threshold's share of the torque's RMS or more."""
     robot = made_robot([Joint("j", "revolute", EYE, np.zeros(3))], (0.0, -10.0, 0.0))
-    base = base_parameters(TorqueModel(robot, (RigidBody(),)))
+    base = find_base_parameters(TorqueModel(robot, (RigidBody(),)))
     q = np.linspace(0, 2 * np.pi, 1000, endpoint=False)[:, None]
     still = np.zeros_like(q)
     # Over a turn 10 mPx cos(q) and 10 mPy sin(q) have the RMS of 10 / sqrt(2) times mPx and mPy; Izz shows nothing.
@@ -276,13 +276,13 @@ def test_essential_parameters(made_robot, states):
 
 def test_units_and_descriptions(catalogue_robot):
     """A base parameter bears the name, joint and unit of the column it stands for."""
-    base = base_parameters(default_model(catalogue_robot("er3a")))
+    base = find_base_parameters(default_model(catalogue_robot("er3a")))
     assert [(c.name, c.joint, c.unit) for c in base.columns[:2]] == [("Izz_1", 1, "kg m2"), ("mPx_2", 2, "kg m")]
 
 
 def test_base_parameters_cross_process_borders(catalogue_robot, states):
     """Base parameters pickle, after use too, and give the same torques afterwards."""
-    base = base_parameters(default_model(catalogue_robot("er3a")))
+    base = find_base_parameters(default_model(catalogue_robot("er3a")))
     state, pi = states(base.model.robot, 3), np.arange(float(base.size))
     before = base.torque(*state, pi)
     copy = pickle.loads(pickle.dumps(base))

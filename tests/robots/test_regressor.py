@@ -23,7 +23,8 @@ def test_the_default_model(model):
     assert model.names[:2] == ("m_1", "mPx_1")
     assert model.names[60:66] == ("f1_1", "f2_1", "f3_1", "f4_1", "f1_2", "f2_2")
     assert model.names[84:92] == ("Im_1", "Im_2", "Im_3", "Im_4", "Im_5", "Im_6", "offset_1", "offset_2")
-    np.testing.assert_array_equal(model.nominal, model.robot.nominal(model))
+    np.testing.assert_array_equal(model.nominal[:60].reshape(6, 10), model.robot.inertia)
+    np.testing.assert_array_equal(model.nominal[60:84].reshape(6, 4), model.robot.friction)
 
 
 def test_parts_can_be_left_out(model):

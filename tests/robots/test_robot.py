@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
@@ -41,23 +39,6 @@ def test_arrays_are_copies_that_cannot_be_changed():
     assert made.friction[0, 0] == 1.0
     with pytest.raises(ValueError, match="read-only"):
         made.friction[0, 0] = 2.0
-
-
-def test_nominal_parameters_follow_the_terms():
-    """The nominal parameters of a model are those of its terms, one after the other."""
-
-    @dataclass
-    class Term:
-        value: float
-
-        def nominal(self, made):
-            return np.full(made.n, self.value)
-
-    @dataclass
-    class Model:
-        terms: tuple[Term, ...]
-
-    np.testing.assert_array_equal(robot().nominal(Model((Term(1.0), Term(2.0)))), [1.0, 1.0, 2.0, 2.0])
 
 
 @pytest.mark.parametrize(

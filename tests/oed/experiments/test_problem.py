@@ -10,7 +10,7 @@ import pytest
 from oed.criteria import criterion
 from oed.experiments.designing import usable_limits
 from oed.experiments.problem import FourierProblem
-from robots.base_parameters import base_parameters
+from robots.base_parameters import find_base_parameters
 from robots.limits import Limits
 from robots.regressor import default_model
 
@@ -22,7 +22,7 @@ def problem(request, robot_named) -> FourierProblem:
     robot = robot_named(request.param)
     model = default_model(robot, friction="coulomb-viscous", velocity_scale=0.02, offset=False)
     return FourierProblem(
-        base=base_parameters(model), criterion=criterion("cond"), limits=usable_limits(robot.limits), samples=60
+        base=find_base_parameters(model), criterion=criterion("cond"), limits=usable_limits(robot.limits), samples=60
     )
 
 
