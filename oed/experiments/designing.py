@@ -212,8 +212,7 @@ def design(
     parts = ["fourier", *(["sinusoid"] if any(s["kind"] == "sinusoid" for s in design.segments) else [])]
     qualities = [*(measure(part, base, design.part(part)) for part in parts), measure("whole", base, motion)]
     if not weighting.plain:
-        one = series.motion(robot.period)
-        qualities.insert(1, measure(f"fourier ({weighting.name})", base, one, weighting))
+        qualities.insert(1, measure(f"fourier ({weighting.name})", base, design.part("fourier"), weighting))
     return replace(design, qualities=tuple(qualities))
 
 

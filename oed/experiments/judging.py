@@ -42,9 +42,10 @@ def choose_weighting(
     levels = after.noise if noise is None and after is not None else noise
     rows = None
     if levels is not None:
-        rows = 1 / np.asarray(levels, dtype=float)
-        if rows.shape != (joints,) or not (np.isfinite(rows) & (rows > 0)).all():
+        sizes = np.asarray(levels, dtype=float)
+        if sizes.shape != (joints,) or not (np.isfinite(sizes) & (sizes > 0)).all():
             raise InputError(f"torque noise {levels}", allowed=f"{joints} positive numbers")
+        rows = 1 / sizes
     transform = nominal_scale(base) if scaling == "nominal" else None
     if task is not None:
         if task.n != joints:

@@ -1,0 +1,141 @@
+"""Designs whose torque, clearance, prior knowledge or task is what decides."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import oed
+from oed.criteria import Prior
+from oed.experiments import Effort, Ipopt
+from robots.collision import check_motion, collision_model
+from robots.common.errors import InfeasibleError, InputError
+from robots.loading import load_robot
+
+TINY = Effort(islands=1, starts=1, screened=10, hops=0, finish_samples=100)
+BRIEF = Ipopt(max_iter=15, finish_iter=10)
+
+
+def design(robot, **options):
+    settings = {"friction": "coulomb-viscous", "effort": TINY, "solver": BRIEF, "strokes": False, "workers": 1}
+    return oed.design(robot, **{**settings, **options})
+
+
+@pytest.fixture(scope="module")
+def er3a():
+    return load_robot("er3a")
+
+
+def weaker(robot, share):
+    return replace(robot, limits=replace(robot.limits, torque=np.asarray(robot.limits.torque) * share))
+
+
+def pinocchio_torque(robot, motion):
+    """Torque (N, n) of the description's links, rotors and friction, by pinocchio and closed forms."""
+    model, parent = pin.Model(), 0
+    for joint, row in zip(robot.chain.joints, robot.inertia, strict=True):
+        placement = pin.SE3(np.array(joint.rotation), np.array(joint.translation))
+        parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(np.array(joint.axis)), placement, joint.name)
+        order = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]  # pinocchio lists Iyy before Ixz
+        model.appendBodyToJoint(parent, pin.Inertia.FromDynamicParameters(row[order]), pin.SE3.Identity())
+    data = model.createData()
+    states = zip(motion.q, motion.dq, motion.ddq, strict=True)
+    rigid = np.array([pin.rnea(model, data, *state) for state in states])
+    friction = robot.friction[:, 0] * np.tanh(motion.dq / 0.02) + robot.friction[:, 1] * motion.dq
+    return rigid + friction + robot.rotor_inertia * motion.ddq
+
+
+def test_the_torque_limit_decides(er3a):
+    """On a robot too weak for the free design, the limited one stays below 90 % of the limit, by pinocchio, and close to
+    it: without the limit it would pass.
+    """
+    weak = weaker(er3a, 0.3)
+    free = design(weak, torque=False)
+    kept = design(weak)
+    bound = np.asarray(weak.limits.torque)
+    used = np.abs(pinocchio_torque(weak, free.part("fourier"))).max(axis=0) / bound
+    assert used.max() > 0.95
+    tight = np.abs(pinocchio_torque(weak, kept.motion)).max(axis=0) / bound
+    # 10 % are kept for what the description is wrong by; the samples of the solver are not those of the file
+    assert 0.8 < tight.max() < 0.905
+    assert not kept.violated
+
+
+def test_a_limit_below_gravity_is_told_first(er3a):
+    """A joint that cannot hold the home pose is named, with the torque that would do, before any search."""
+    with pytest.raises(InfeasibleError, match=r"joint \d: holding the pose takes .* or more"):
+        design(weaker(er3a, 0.05))
+
+
+def test_clearance_decides_and_is_proved(er3a):
+    """A design that watches collisions keeps its clearance at all times; without, the same seed collides."""
+    model = collision_model(er3a)
+    free = design(er3a)
+    assert check_motion(model, free.motion, confirm=False).collides
+    kept = design(er3a, collision=True)
+    report = check_motion(model, kept.motion)
+    assert report.certified
+    assert report.confirmed
+    assert kept.freedom is not None
+    assert kept.freedom["certified"]
+    assert "proved at all times" in kept.summary()
+    assert kept.success
+
+
+def test_strokes_that_would_collide_are_left_out_or_free():
+    """With strokes the whole experiment is still free; joints without a stroke are named."""
+    robot = load_robot("panda")
+    kept = design(robot, collision=True, strokes=True)
+    assert check_motion(collision_model(robot), kept.motion, confirm=False).certified
+    stroked = {segment["joint"] for segment in kept.segments if segment["kind"] == "sinusoid"}
+    assert stroked | set(kept.strokes_left_out) == set(range(1, 8))
+    assert stroked.isdisjoint(kept.strokes_left_out)
+
+
+def test_a_home_in_collision_is_refused(er3a):
+    """A start pose that the user states and that collides is told with the pair and the depth."""
+    motion = design(er3a).motion
+    report = check_motion(collision_model(er3a), motion, confirm=False)
+    home = motion.q[np.argmin(np.abs(motion.t - report.time[report.worst]))]
+    with pytest.raises(InfeasibleError, match="mm"):
+        design(er3a, collision=True, home=home)
+
+
+def test_a_second_experiment_adds_what_the_first_lacks(er3a):
+    """After a model that knows all but one joint's friction, D-optimality gains more from that joint's motion."""
+    first = design(er3a, criterion="d")
+    names = first.base.names
+    known = np.diag(np.where([name in ("f1_6", "f2_6") for name in names], 1e6, 1e-6))
+    prior = Prior(names=names, covariance=known, noise=np.ones(6))
+    second = design(er3a, criterion="d", after=prior)
+    part = second.qualities[1]
+    assert "after an earlier model" in part.part
+    assert part.value("d") > first.fourier.value("d")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"scaling": "odd"}, "none, nominal, unit"),
+        ({"noise": [1.0, 2.0]}, "6 positive numbers"),
+        ({"noise": [1.0, 1.0, 1.0, 1.0, 1.0, 0.0]}, "6 positive numbers"),
+        ({"criterion": "i"}, "belong together"),
+        ({"torque_margin": 1.0}, "0 to below 1"),
+    ],
+)
+def test_options_out_of_range_are_refused(er3a, options, message):
+    """Each wrong option is told with what is allowed."""
+    with pytest.raises(InputError, match=message):
+        design(er3a, **options)
+
+
+@pytest.mark.parametrize("scaling", ["nominal", "unit"])
+def test_scaling_is_reported_beside_the_plain_numbers(er3a, scaling):
+    """A scaled design says both: the plain regressor's numbers and those that it was optimised for."""
+    made = design(er3a, scaling=scaling, noise=[1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
+    assert made.qualities[1].part == f"fourier (columns by {scaling}, rows by noise)"
+    assert made.qualities[1].value("cond") != pytest.approx(made.fourier.value("cond"))
+    assert made.islands[0].final == pytest.approx(made.qualities[1].value("cond"), rel=1e-6)
