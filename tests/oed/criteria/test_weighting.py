@@ -34,9 +34,7 @@ def weightings(rng):
 
 @pytest.mark.parametrize("name", ["plain", "columns", "directions", "unit", "prior", "all"])
 def test_the_gradient_goes_through_the_weighting(name, gram):
-    """The pullback is the derivative of the criterion by the unweighted information, by central differences of numpy's
-    own eigenvalues.
-    """
+    """The pullback is the derivative of the criterion by the unweighted information, by central differences."""
     rng = np.random.default_rng(2)
     weighting, cond = weightings(rng)[name], criterion("cond")
 
@@ -87,7 +85,7 @@ def test_the_task_turns_a_into_i(base):
 
 
 def test_nominal_sizes_make_torques(base):
-    """A column times its nominal size is a torque; sizes are positive, and a vanishing one is replaced by a small one."""
+    """A column times its nominal size is a torque; sizes are positive, a vanishing one is replaced by a small one."""
     scale = nominal_scale(base)
     nominal = np.abs(base.from_standard(base.model.nominal))
     assert (scale > 0).all()

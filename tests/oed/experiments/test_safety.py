@@ -49,9 +49,7 @@ def pinocchio_torque(robot, motion):
 
 
 def test_the_torque_limit_decides(er3a):
-    """On a robot too weak for the free design, the limited one stays below 90 % of the limit, by pinocchio, and close to
-    it: without the limit it would pass.
-    """
+    """Where the free design would pass the torque limit, the limited one stays below 90 % of it, by pinocchio."""
     weak = weaker(er3a, 0.3)
     free = design(weak, torque=False)
     kept = design(weak)
