@@ -16,7 +16,7 @@ from robots.signals import Log, Motion
 Array = NDArray[np.float64]
 
 # Below this share of a joint's RMS speed its friction is not known to have a sign: those rows are left out of its fit.
-SLOW = 0.01
+SLOW = 0.008
 # A joint with less RMS speed than this [rad/s or m/s] stands: what is left is rounding, not to be taken for motion.
 STANDING = 1e-9
 
