@@ -32,8 +32,8 @@ class JointFit:
         name: the joint's name.
         torque_rms: of the measured torque [N m or N].
         torque_spread: its standard deviation: the error of the best constant.
-        residual_rms: error on the data that were fitted.
-        held_out_rms: error on blocks that were left out of the fit.
+        residual_rms: error on the fitted rows in which the joint is not almost at rest.
+        held_out_rms: error on such rows of blocks that were left out of the fit.
         nominal_rms: error of the robot description's own parameters; NaN where it has none.
         identified: whether the left-out error is clearly below that of a constant.
     """

@@ -125,7 +125,11 @@ def _joints(estimate: Estimate) -> Table:
         "description [%]",
         "identified",
     )
-    return Table(headings=headings, rows=tuple(rows), caption="Errors as shares of each joint's torque RMS.")
+    return Table(
+        headings=headings,
+        rows=tuple(rows),
+        caption="Shares of each joint's torque RMS; fitted and left out where the joint is not almost at rest.",
+    )
 
 
 def _parameters(estimate: Estimate) -> Table:
