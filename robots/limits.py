@@ -94,6 +94,14 @@ class Limits:
         """The number of joints."""
         return len(self.lower)
 
+    @property
+    def home(self) -> FloatArray:
+        """A pose within the limits (n,): zero, or the middle of a range without zero, or its one end."""
+        ranged = np.isfinite(self.lower) & np.isfinite(self.upper)
+        middle = np.where(ranged, (np.where(ranged, self.lower, 0.0) + np.where(ranged, self.upper, 0.0)) / 2.0, 0.0)
+        zero = (self.lower <= 0.0) & (self.upper >= 0.0)
+        return np.clip(np.where(zero, 0.0, middle), self.lower, self.upper)
+
     def scaled(
         self, *, velocity: float = 1.0, acceleration: float = 1.0, jerk: float = 1.0, torque: float = 1.0
     ) -> Limits:

@@ -20,7 +20,6 @@ from oed.campaigns.stages import Stage
 from oed.campaigns.timetable import make_timetable
 from oed.experiments import Design, usable_limits
 from oed.experiments import design as design_experiment
-from oed.experiments.assembly import home_pose
 from oed.trajectories import Posture
 from robots.common.errors import InputError
 from robots.common.parallel import one_blas_thread
@@ -89,7 +88,7 @@ def campaign(
     torque = TorqueCheck(robot, torque_margin)
     listener = progress or SILENT
     notes: list[str] = []
-    excitation, home = None, home_pose(limits)
+    excitation, home = None, limits.home
     if plan.cycles:
         if design is None:
             design = design_experiment(

@@ -72,11 +72,22 @@ class KinematicRows:
         Returns:
             The factor; infinite where no limit is met, 0 where `free` is already at a bound that lies ahead.
         """
+        return max(0.0, float(self.room(free, direction).min()))
+
+    def room(self, free: Array, direction: Array) -> Array:
+        """The largest factor of each joint's own direction that keeps its rows.
+
+        Args:
+            free: free coefficients that keep every row, (n, K).
+            direction: (n, K).
+
+        Returns:
+            (n,); infinite where a joint meets no limit.
+        """
         values, slope = free @ self.matrix.T, direction @ self.matrix.T
         with np.errstate(divide="ignore", invalid="ignore"):
             room = np.where(slope > 0.0, self.upper - values, self.lower - values) / slope
-        room = np.where(slope == 0.0, np.inf, room)
-        return max(0.0, float(room.min()))
+        return np.where(slope == 0.0, np.inf, room).min(axis=1, initial=np.inf)
 
 
 def kinematic_rows(

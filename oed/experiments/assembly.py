@@ -20,13 +20,6 @@ QUINTIC_JERK = 1.75
 QUINTIC_ACCELERATION = 0.024
 
 
-def home_pose(limits: Limits) -> Array:
-    """Gives the pose (n,) where an experiment begins and ends: zero, or the middle of a range without zero."""
-    middle = (limits.lower + limits.upper) / 2
-    inside = (limits.lower <= 0) & (limits.upper >= 0)
-    return np.where(inside, 0.0, np.where(np.isfinite(middle), middle, 0.0))
-
-
 def assemble(
     series: FourierSeries,
     limits: Limits,
@@ -44,7 +37,7 @@ def assemble(
         series: the excitation; at rest at its ends.
         limits: that all parts keep.
         period: the controller's period [s].
-        home: pose (n,) where it begins and ends; by default `home_pose`.
+        home: pose (n,) where it begins and ends; by default `Limits.home`.
         strokes: with the strokes of all joints, of some (counted from 1), or of none.
 
     Returns:
@@ -73,12 +66,12 @@ def assemble(
 
 
 def rest_pose(limits: Limits, home: ArrayLike | None) -> Array:
-    """Checks a home pose (n,); without one, chooses `home_pose`.
+    """Checks a home pose (n,); without one, takes `Limits.home`.
 
     Raises:
         InputError: a pose of another shape, or outside the limits.
     """
-    pose = home_pose(limits) if home is None else np.asarray(home, dtype=float)
+    pose = limits.home if home is None else np.asarray(home, dtype=float)
     if pose.shape != limits.lower.shape:
         raise InputError(f"a home pose of shape {pose.shape}", allowed=f"{limits.lower.shape}")
     outside = ~((pose >= limits.lower) & (pose <= limits.upper))

@@ -186,11 +186,7 @@ class FourierProblem:
             fraction: of the way to the limits that it may go.
         """
         still = self.free(np.zeros(self.size))
-        direction = self.free(z) - still
-        values, slope = still @ self.rows.matrix.T, direction @ self.rows.matrix.T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            room = np.where(slope > 0, self.rows.upper - values, self.rows.lower - values) / slope
-        room = np.where(slope == 0, np.inf, room).min(axis=1, initial=np.inf)  # (n,)
+        room = self.rows.room(still, self.free(z) - still)
         kept = (z.reshape(self.joints, -1) * np.minimum(1.0, fraction * room)[:, None]).reshape(-1)
         return self._inside(kept) if self.pointwise else kept
 

@@ -84,7 +84,7 @@ def vertical_axis_pose(
     down = frozen(chain.gravity if gravity is None else gravity, "gravity", 1)
     if down.shape != (3,) or not np.linalg.norm(down) > 0.0:
         raise InputError(f"found the gravity {down} m/s^2", allowed="three numbers, not all zero")
-    start = checked_pose(limits, _home(limits) if home is None else home, "home pose")
+    start = checked_pose(limits, limits.home if home is None else home, "home pose")
     search = _Search(chain, joint - 1, down / np.linalg.norm(down), start, limits)
     return search.best()
 
@@ -156,9 +156,3 @@ class _Search:
         turned = np.cross(axes[self._free], axes[self._index])  # d axis / d q_k, (K, 3)
         miss = (turned @ self._down)[None] if self._linear else np.cross(turned, self._down).T
         return np.vstack([miss, SIDE * np.eye(self._free.size)])
-
-
-def _home(limits: Limits) -> Array:
-    ranged = np.isfinite(limits.lower) & np.isfinite(limits.upper)
-    middle = np.where(ranged, (np.where(ranged, limits.lower, 0.0) + np.where(ranged, limits.upper, 0.0)) / 2.0, 0.0)
-    return np.clip(np.where((limits.lower <= 0.0) & (limits.upper >= 0.0), 0.0, middle), limits.lower, limits.upper)

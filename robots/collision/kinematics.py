@@ -8,7 +8,8 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.geometry.chain import Chain, Joint
+from robots.geometry.chain import Chain
+from robots.geometry.symbolic import cleaned, symbolic_placement
 
 Array = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ class Frames:
 
     def point(self, link: int, position: Array) -> casadi.SX:
         """Places a point (3,) [m] that is fixed in a link's frame (0: the base) in the base frame."""
-        return self.origins[link] + self.rotations[link] @ casadi.sparsify(casadi.SX(_clean(position)))
+        return self.origins[link] + self.rotations[link] @ casadi.sparsify(casadi.SX(cleaned(position)))
 
     def flange_point(self, position: Array) -> casadi.SX:
         """Places a point (3,) [m] that is fixed in the flange's frame in the base frame."""
@@ -53,27 +54,8 @@ def symbolic_frames(chain: Chain) -> Frames:
     q = casadi.SX.sym("q", chain.n)
     rotations, origins, axes = [casadi.SX.eye(3)], [casadi.SX(3, 1)], []
     for i, joint in enumerate(chain.joints):
-        rotation, origin = _placement(joint, q[i])
+        rotation, origin = symbolic_placement(joint, q[i])
         origins.append(origins[-1] + rotations[-1] @ origin)
         rotations.append(casadi.sparsify(rotations[-1] @ rotation))
-        axes.append(rotations[-1] @ casadi.sparsify(casadi.SX(_clean(joint.axis))))
+        axes.append(rotations[-1] @ casadi.sparsify(casadi.SX(cleaned(joint.axis))))
     return Frames(chain, q, tuple(rotations), tuple(origins), tuple(axes))
-
-
-def _placement(joint: Joint, q: casadi.SX) -> tuple[casadi.SX, casadi.SX]:
-    rotation = casadi.sparsify(casadi.SX(_clean(joint.rotation)))
-    origin = casadi.sparsify(casadi.SX(_clean(joint.translation)))
-    axis = _clean(joint.axis)
-    if joint.kind == "prismatic":
-        return rotation, origin + rotation @ casadi.sparsify(casadi.SX(axis)) * q
-    along = np.outer(axis, axis)
-    # Rodrigues' formula, sorted so that a coordinate axis leaves no 1 - cos(q) behind.
-    turn = casadi.SX(along) + casadi.cos(q) * casadi.SX(_clean(np.eye(3) - along))
-    turn += casadi.sin(q) * casadi.skew(casadi.SX(axis))
-    return casadi.sparsify(rotation @ casadi.sparsify(turn)), origin
-
-
-def _clean(values: Array) -> Array:
-    # cos(pi / 2) is 6e-17: left in, it hides exact zeros and ones from the symbolic simplifier.
-    rounded = np.round(values)
-    return np.where(np.abs(values - rounded) < 1e-15, rounded, values)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.geometry.chain import Joint
+from robots.geometry.symbolic import cleaned, symbolic_placement
 from robots.terms.base import Column, Term
 
 if TYPE_CHECKING:
@@ -39,7 +40,9 @@ class RigidBody(Term):
     def regressor(self, robot: Robot, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX) -> casadi.SX:
         """Builds Y (n, 10 n): joint k feels the links from k outwards, so Y is block upper triangular."""
         chain = robot.chain
-        rotations, translations = zip(*(_placement(joint, q[i]) for i, joint in enumerate(chain.joints)), strict=True)
+        rotations, translations = zip(
+            *(symbolic_placement(joint, q[i]) for i, joint in enumerate(chain.joints)), strict=True
+        )
         blocks = _link_wrenches(chain.joints, rotations, translations, chain.gravity, dq, ddq)
         Y = casadi.SX(chain.n, 10 * chain.n)
         for link, block in enumerate(blocks):
@@ -47,7 +50,7 @@ class RigidBody(Term):
             for k in range(link, -1, -1):
                 joint = chain.joints[k]
                 part = wrench[3:, :] if joint.kind == "revolute" else wrench[:3, :]
-                Y[k, 10 * link : 10 * link + 10] = casadi.sparsify(casadi.SX(_clean(joint.axis)).T @ part)
+                Y[k, 10 * link : 10 * link + 10] = casadi.sparsify(casadi.SX(cleaned(joint.axis)).T @ part)
                 if k:
                     force = rotations[k] @ wrench[:3, :]
                     moment = rotations[k] @ wrench[3:, :] + casadi.skew(translations[k]) @ force
@@ -57,25 +60,6 @@ class RigidBody(Term):
     def nominal(self, robot: Robot) -> NDArray[np.float64]:
         """Gives the described inertial parameters, link after link (10 n,)."""
         return np.asarray(robot.inertia, dtype=float).reshape(-1)
-
-
-def _clean(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    # cos(pi / 2) is 6e-17: left in, it hides exact zeros and ones from the symbolic simplifier.
-    rounded = np.round(values)
-    return np.where(np.abs(values - rounded) < 1e-15, rounded, values)
-
-
-def _placement(joint: Joint, q: casadi.SX) -> tuple[casadi.SX, casadi.SX]:
-    """Pose of the moved joint frame in its parent: rotation (3, 3) and origin (3,) [m]."""
-    rotation, translation = casadi.SX(_clean(joint.rotation)), casadi.SX(_clean(joint.translation))
-    axis = _clean(joint.axis)
-    if joint.kind == "prismatic":
-        return casadi.sparsify(rotation), translation + rotation @ casadi.SX(axis) * q
-    cross = casadi.skew(casadi.SX(axis))
-    outer = casadi.SX(axis) @ casadi.SX(axis).T
-    # Rodrigues, written so that a coordinate axis leaves no 1 - cos(q) behind.
-    turn = outer + casadi.cos(q) * (casadi.SX(_clean(np.eye(3) - np.outer(axis, axis)))) + casadi.sin(q) * cross
-    return casadi.sparsify(rotation @ turn), translation
 
 
 def _link_wrenches(
@@ -88,10 +72,10 @@ def _link_wrenches(
 ) -> list[casadi.SX]:
     """Forward recursion (eq. 4 to 7): per link the (6, 10) map from its parameters to its inertial wrench (eq. 23)."""
     omega, alpha = casadi.SX(3, 1), casadi.SX(3, 1)
-    acceleration = casadi.SX(-_clean(np.asarray(gravity, dtype=float)))
+    acceleration = casadi.SX(-cleaned(np.asarray(gravity, dtype=float)))
     blocks = []
     for i, joint in enumerate(joints):
-        back, offset, axis = rotations[i].T, translations[i], casadi.SX(_clean(joint.axis))
+        back, offset, axis = rotations[i].T, translations[i], casadi.SX(cleaned(joint.axis))
         acceleration = back @ (
             acceleration + casadi.cross(alpha, offset) + casadi.cross(omega, casadi.cross(omega, offset))
         )
