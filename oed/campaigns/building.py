@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.campaigns.checking import TorqueCheck, checked
+from oed.campaigns.clearing import Clearing
 from oed.campaigns.excitation import excitation_stage
 from oed.campaigns.fitting import fit_stages
 from oed.campaigns.planning import Planner
@@ -21,6 +22,7 @@ from oed.campaigns.timetable import make_timetable
 from oed.experiments import Design, usable_limits
 from oed.experiments import design as design_experiment
 from oed.trajectories import Posture
+from robots.collision import collision_model
 from robots.common.errors import InputError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
@@ -38,6 +40,7 @@ def campaign(
     design: Design | str | PathLike[str] | None = None,
     velocity_fraction: float = 1.0,
     torque_margin: float = 0.1,
+    collision: bool = True,
     ambient: float = 20.0,
     cold_friction: float = 1.0,
     thermal: KnownThermal | None = None,
@@ -60,6 +63,9 @@ def campaign(
         design: the excitation, or its folder; a quick one is designed by default. Its first pose is home.
         velocity_fraction: of the velocity limits that may be used.
         torque_margin: share of the torque limits kept for what the nominal dynamics are wrong by.
+        collision: keep the stages free of collisions, where the robot's bodies are described: the quick excitation is
+            designed so, the warm-up drives only as much of its range as is free, friction sweeps stay in the free
+            stretch of their joint, and moves go around.
         ambient: temperature of the surroundings [degC].
         cold_friction: friction of the cold robot over that of the description, for the expected temperatures: above 1
             where the description is of the warm robot.
@@ -89,6 +95,7 @@ def campaign(
     listener = progress or SILENT
     notes: list[str] = []
     excitation, home = None, limits.home
+    bodies = collision_model(robot) if collision else None
     if plan.cycles:
         if design is None:
             design = design_experiment(
@@ -96,6 +103,7 @@ def campaign(
                 effort="quick",
                 velocity_fraction=velocity_fraction,
                 torque_margin=torque_margin,
+                collision=bodies is not None and bool(bodies.pairs),
                 seed=seed,
                 workers=workers,
                 executor=executor,
@@ -108,7 +116,12 @@ def campaign(
         excitation = checked(excitation, robot, home, torque)
     listener.start(f"planning a campaign for {robot.name}", None)
     try:
-        planner = Planner(robot=robot, limits=limits, home=home, torque=torque)
+        clearing = Clearing(bodies, home) if bodies is not None else None
+        if clearing is not None and not clearing.possible:
+            if bodies is not None and bodies.pairs:
+                notes.append("Home touches by the shapes of the collision model: stages were not kept clear of bodies.")
+            clearing = None
+        planner = Planner(robot=robot, limits=limits, home=home, torque=torque, clearing=clearing)
         stages = [_power_on_stage(plan, home, robot.period)] if plan.power_on else []
         if excitation is not None:
             stages.append(excitation)

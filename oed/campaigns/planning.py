@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Sequence as Many
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from oed.campaigns.checking import TorqueCheck
+from oed.campaigns.clearing import Clearing
 from oed.campaigns.programme import duty_name
 from oed.campaigns.stages import Stage
 from oed.retiming import plan_move
@@ -47,19 +50,33 @@ class Planner:
         limits: that all motions keep.
         home: pose at both ends of each stage, (n,) [rad or m].
         torque: the torque limits.
+        clearing: keeps motions free of collisions, where the robot's bodies are known.
     """
 
     robot: Robot
     limits: Limits
     home: Array
     torque: TorqueCheck
+    clearing: Clearing | None = None
 
     def poses(self) -> tuple[tuple[Array, float], ...]:
         """Chooses for each joint a pose in which gravity does no work on it, and the angle that is left [rad]."""
         return tuple(
-            tuple(vertical_axis_pose(self.robot.chain, joint, self.limits, home=self.home))  # type: ignore[misc]
+            tuple(vertical_axis_pose(self.robot.chain, joint, self.limits, home=self.home, room=self._room(joint)))  # type: ignore[misc]
             for joint in range(1, self.robot.n + 1)
         )
+
+    def _room(self, joint: int) -> Callable[[Array], float] | None:
+        """Measures how far a joint can go from a pose before bodies meet."""
+        clearing = self.clearing
+        if clearing is None:
+            return None
+
+        def room(pose: Array) -> float:
+            low, high = clearing.stretch(self.limits, joint, pose)
+            return high - low
+
+        return room
 
     def friction(self, poses: Many[tuple[Array, float]], levels: Many[float], longest: float) -> Stage:
         """Sweeps every joint at every level; the time at a level is the same for all levels of a joint.
@@ -126,9 +143,8 @@ class Planner:
         for duty in duties:
 
             def build(limits: Limits, duty: float = duty) -> Sequence:
-                warm_up = plan_warm_up(
-                    limits, duration=rounded, period=period, fraction=fraction, duty=duty, centre=self.home
-                )
+                box, part = (limits, fraction) if self.clearing is None else (self._box(limits, fraction), 1.0)
+                warm_up = plan_warm_up(box, duration=rounded, period=period, fraction=part, duty=duty, centre=self.home)
                 return self._joined(limits, [Segment(kind="warm_up", trajectory=warm_up)])
 
             sequence, motion, share = self._softest(build, duty_name(duty))
@@ -143,6 +159,7 @@ class Planner:
                         "duty": duty,
                         "time": rounded,
                         "range": fraction,
+                        "ranges": self._ranges(fraction),
                         "busy": busy.tolist(),
                         "acceleration_share": share,
                     },
@@ -150,8 +167,38 @@ class Planner:
             )
         return tuple(stages)
 
+    def _box(self, limits: Limits, fraction: float) -> Limits:
+        """Gives limits the ranges in which the arm cannot meet itself or its surroundings."""
+        assert self.clearing is not None
+        if fraction not in self._boxes:
+            self._boxes[fraction] = self.clearing.box(self.limits, fraction)
+        box = self._boxes[fraction]
+        return replace(limits, lower=box.lower, upper=box.upper)
+
+    @cached_property
+    def _boxes(self) -> dict[float, Limits]:
+        return {}
+
+    def _ranges(self, fraction: float) -> list[float]:
+        """Tells which part of each joint's range a warm-up drives (n,)."""
+        if self.clearing is None:
+            return [fraction] * self.robot.n
+        box, span = self._box(self.limits, fraction), self.limits.upper - self.limits.lower
+        return np.where(
+            np.isfinite(span), (box.upper - box.lower) / np.where(np.isfinite(span), span, 1.0), fraction
+        ).tolist()
+
     def _sweep(self, limits: Limits, joint: int, pose: Array, levels: Many[float], longest: float) -> Sweep:
         period = self.robot.period
+        if self.clearing is not None:
+            lower, upper = limits.lower.copy(), limits.upper.copy()
+            low, high = self.clearing.stretch(self.limits, joint, pose)
+            # With no room there, the sweep is planned regardless, and the remarks say where it collides.
+            if high > low:
+                lower[joint - 1], upper[joint - 1] = low, high
+                pose = pose.copy()
+                pose[joint - 1] = np.clip(pose[joint - 1], low, high)
+                limits = replace(limits, lower=lower, upper=upper)
         free = friction_sweep(limits, joint, pose, period=period, levels=levels)
         common = min(plateau.duration for plateau in free.plateaus)
         # Where a joint's range allows no longer time at its highest speed, its other levels get the same.
@@ -182,16 +229,31 @@ class Planner:
         here = self.home
         for part in parts:
             ends = part.trajectory.sample([0.0, part.trajectory.duration]).q
-            segments += [*self._move(limits, here, ends[0]), part]
+            segments += [*self.move(limits, here, ends[0]), part]
             here = ends[1]
-        return Sequence(segments=(*segments, *self._move(limits, here, self.home)), period=self.robot.period)
+        return Sequence(segments=(*segments, *self.move(limits, here, self.home)), period=self.robot.period)
 
-    def _move(self, limits: Limits, start: Array, end: Array) -> list[Segment]:
-        planned = plan_move(limits, start, end, period=self.robot.period)
-        if planned is None:
-            return []
-        pieces = PiecewisePolynomial(breakpoints=planned.breakpoints, coefficients=planned.coefficients)
-        return [Segment(kind="move", trajectory=pieces)]
+    def move(self, limits: Limits, start: Array, end: Array) -> list[Segment]:
+        """Moves from one pose to another, straight or, where bodies are in the way, around them if a way is found."""
+        straight = self.stops(limits, (start, end))
+        if self.clearing is None or not straight:
+            return straight
+        for poses in self.clearing.ways(start, end):
+            segments = self.stops(limits, poses)
+            motions = [segment.trajectory.motion(self.robot.period) for segment in segments]
+            if all(self.clearing.free(motion) for motion in motions):
+                return segments
+        return straight
+
+    def stops(self, limits: Limits, poses: Many[Array]) -> list[Segment]:
+        """Moves from pose to pose, at rest at each."""
+        segments = []
+        for start, end in pairwise(poses):
+            planned = plan_move(limits, start, end, period=self.robot.period)
+            if planned is not None:
+                pieces = PiecewisePolynomial(breakpoints=planned.breakpoints, coefficients=planned.coefficients)
+                segments.append(Segment(kind="move", trajectory=pieces))
+        return segments
 
 
 def _plateau_data(plateau: Plateau, start: float) -> dict[str, float | int | bool]:

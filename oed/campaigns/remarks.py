@@ -11,8 +11,8 @@ from oed.campaigns.planning import ALIGNED, Planner
 from oed.campaigns.stages import Stage
 from robots.thermal import KnownThermal
 
-SMALLER_RANGES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
-"""Parts of the ranges that are tried in turn where a warm-up collides."""
+NARROWED = 0.99
+"""Part of what was asked below which a joint's warm-up range counts as narrowed."""
 
 
 def remarks_on(stages: Sequence[Stage], planner: Planner, known: KnownThermal | None) -> tuple[str, ...]:
@@ -37,27 +37,12 @@ def _collisions(stage: Stage, planner: Planner) -> Iterator[str]:
         return
     pair, clearance, time = closest
     remedy = "Check before playing."
-    if stage.kind == "warm_up":
-        free = _free_range(stage, planner)
-        remedy = "No smaller range is free." if free is None else f"--warm-up-range {free:g} would be free."
     if stage.kind == "excitation":
         remedy = "`oed design --collision` keeps clear."
     yield (
         f"COLLISION in the {stage.name} stage, by the shapes of the collision model: {pair} overlap by "
         f"{-1e3 * clearance:.0f} mm at {time:.1f} s. {remedy}"
     )
-
-
-def _free_range(stage: Stage, planner: Planner) -> float | None:
-    """The largest part of the ranges, in tenths, over which the warm-up is free of collisions."""
-    details = stage.details
-    for fraction in SMALLER_RANGES:
-        if fraction < details["range"]:
-            (smaller,) = planner.warm_up(details["time"], [details["duty"]], fraction)
-            closest = closest_bodies(planner.robot, smaller.motion)
-            if closest is None or closest[1] >= 0.0:
-                return fraction
-    return None
 
 
 def _remarks(stage: Stage, planner: Planner) -> Iterator[str]:
@@ -71,6 +56,14 @@ def _remarks(stage: Stage, planner: Planner) -> Iterator[str]:
                 f"The {stage.name} stage leaves {100 * margin.slack_fraction:.1f} % of the torque limit of joint "
                 f"{margin.joint}, less than the {100 * torque.margin:g} % that are asked for."
             )
+    asked = stage.details.get("range", 0.0)
+    narrow = [j for j, part in enumerate(stage.details.get("ranges", []), start=1) if part < NARROWED * asked]
+    if narrow:
+        parts = ", ".join(f"{100 * stage.details['ranges'][j - 1]:.0f} %" for j in narrow)
+        yield (
+            f"To stay clear of bodies, the {stage.name} stage drives joint {_listed(narrow)} over {parts} of the range "
+            f"instead of {100 * asked:g} %."
+        )
     slow = sorted({p["joint"] for p in stage.plateaus if abs(p["speed"]) < abs(p["asked"]) - 1e-9})
     if slow:
         yield f"The range of joint {_listed(slow)} is too short for the highest speeds of the friction stage."

@@ -42,6 +42,9 @@ def campaign(
     ] = None,
     velocity_fraction: Annotated[float, typer.Option(help="Share of the velocity limits to use.")] = 1.0,
     torque_margin: Annotated[float, typer.Option(help="Share of the torque limits kept in reserve.")] = 0.1,
+    collision: Annotated[
+        bool, typer.Option(help="Keep stages clear of the arm itself and of the obstacles in its file.")
+    ] = True,
     ambient: Annotated[float, typer.Option(help="Temperature of the surroundings [degC].")] = 20.0,
     cold_friction: Annotated[
         float, typer.Option(help="Friction of the cold robot over that of its description, for the temperatures.")
@@ -82,6 +85,7 @@ def campaign(
                 design=design,
                 velocity_fraction=velocity_fraction,
                 torque_margin=torque_margin,
+                collision=collision,
                 ambient=ambient,
                 cold_friction=cold_friction,
                 seed=seed,

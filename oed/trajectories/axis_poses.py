@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,9 @@ MOVED = np.deg2rad(1.0)
 PROXIMAL = 0.01
 """Extra weight of a joint's way for each joint after it: a wrist sweeps less room than a shoulder."""
 
+ROOM = 0.5
+"""Part of the most room that a pose must leave the joint."""
+
 ALIGNED = 1e-6
 """Misalignment that makes no difference [rad]: a millionth of the weight is left to act on the joint."""
 
@@ -55,6 +59,7 @@ def vertical_axis_pose(
     gravity: ArrayLike | None = None,
     *,
     home: ArrayLike | None = None,
+    room: Callable[[Array], float] | None = None,
 ) -> AxisPose:
     """Poses the other joints so that gravity does no work on one joint, as far as the arm allows.
 
@@ -70,6 +75,8 @@ def vertical_axis_pose(
         limits: bounds of all joints; only positions count.
         gravity: (3,) [m/s^2] in the base frame; the chain's by default.
         home: (n,) preferred pose [rad]; by default zero, or the middle of a range without zero.
+        room: how far the joint can go from a pose (n,) without meeting anything [rad or m]; poses that leave it less
+            than `ROOM` of the most that any leaves are not taken.
 
     Returns:
         The pose and the angle that is left: 0 where gravity has no effect, pi/2 where the axis can only lie.
@@ -86,7 +93,7 @@ def vertical_axis_pose(
         raise InputError(f"found the gravity {down} m/s^2", allowed="three numbers, not all zero")
     start = checked_pose(limits, limits.home if home is None else home, "home pose")
     search = _Search(chain, joint - 1, down / np.linalg.norm(down), start, limits)
-    return search.best()
+    return search.best(room)
 
 
 class _Search:
@@ -99,11 +106,14 @@ class _Search:
         self._weights = 1.0 + PROXIMAL * np.arange(chain.n - 1, -1, -1)
         self._linear = chain.kinds[index] == "prismatic"
 
-    def best(self) -> AxisPose:
+    def best(self, room: Callable[[Array], float] | None) -> AxisPose:
         candidates = [self._home[self._free]]
         if self._free.size:
             candidates += [self._polished(start) for start in self._scanned()]
         poses = self._poses(np.array(candidates))
+        if room is not None:
+            rooms = np.array([room(pose) for pose in poses])
+            poses = poses[rooms >= ROOM * rooms.max()]
         angles = self._angles(poses)
         ways = np.abs(poses - self._home)
         moved = (ways > MOVED).sum(axis=1)

@@ -242,10 +242,3 @@ def test_bad_options_are_refused(two: Robot) -> None:
     with pytest.raises(InfeasibleError) as told:
         oed.campaign(stuck, programme=cooling)
     assert told.value.joint == 2
-
-
-def test_collisions_are_said_first(thesis_campaign: Campaign) -> None:
-    """A warm-up that lets bodies of the collision model overlap says so, and names a range that would be free."""
-    (note,) = [note for note in thesis_campaign.notes if "COLLISION in the warm_up" in note]
-    free = float(note.split("--warm-up-range ")[1].split()[0])
-    assert 0.0 < free < 0.8
