@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from robots.common.config import read_config
 from robots.common.errors import InputError
-from robots.description import UNITS, Bounds, Geometry, Pose, Range, RobotDescription, Values
+from robots.description import MOTOR_UNITS, UNITS, Bounds, Geometry, Pose, Range, RobotDescription, Values
 from robots.geometry.chain import Chain, homogeneous, rotation_from_rpy
 from robots.geometry.dh import DhRow, chain_from_dh, dh_frames
 from robots.geometry.inertia import SIZE, check_body, inertial_parameters, symmetric
@@ -96,7 +96,7 @@ def robot_from_yaml(
         entries = _PerJoint(str(path), chain, tree.chain(*own).names if chosen else names)
         friction = tree.friction(names)
         digest = _digest(content, tree.digest, *([choice] if chosen else []))
-    ratio, rotor, constant = _drives(text, entries)
+    ratio, rotor, constant, speed = _drives(text, entries)
     return Robot(
         name=text.name,
         title=text.title,
@@ -107,6 +107,7 @@ def robot_from_yaml(
         friction=_friction(text, entries, friction),
         gear_ratio=ratio,
         torque_constant=constant,
+        motor_speed=speed,
         period=text.period,
         assumed=tuple(text.assumed()),
         origin=origin,
@@ -226,12 +227,12 @@ def _limits(text: RobotDescription, entries: _PerJoint, known: Limits | None) ->
             scale = entries.scale(position.unit, "limits.position.unit", "position")
             key = f"limits.position.{quantity}"
             bounds[quantity] = entries.place(getattr(position, quantity), key, default(quantity), scale)
-    for quantity in ("velocity", "acceleration", "jerk", "torque"):
+    for quantity in ("velocity", "acceleration", "jerk", "torque", "torque_rms"):
         stated: Bounds | None = getattr(text.limits, quantity)
         if stated is None:
             bounds[quantity] = np.broadcast_to(np.asarray(default(quantity)), (entries.chain.n,))
         else:
-            scale = entries.scale(stated.unit, f"limits.{quantity}.unit", quantity)
+            scale = entries.scale(stated.unit, f"limits.{quantity}.unit", quantity.removesuffix("_rms"))
             bounds[quantity] = entries.place(stated.values, f"limits.{quantity}.values", default(quantity), scale)
     try:
         return Limits(**bounds)
@@ -252,18 +253,22 @@ def _values(stated: Values | None, entries: _PerJoint, key: str, default: ArrayL
     return entries.place(stated.values, f"{key}.values", default)
 
 
-def _drives(text: RobotDescription, entries: _PerJoint) -> tuple[Array, Array, Array]:
-    """Gear ratio, then rotor inertia and torque constant as felt at the joint."""
+def _drives(text: RobotDescription, entries: _PerJoint) -> tuple[Array, Array, Array, Array]:
+    """Gear ratio, then rotor inertia and torque constant as felt at the joint, then the motor's highest speed."""
     drives = text.dynamics.drives
-    if drives.gear_ratio is None and (drives.rotor_inertia is not None or drives.torque_constant is not None):
-        given = "rotor_inertia" if drives.rotor_inertia is not None else "torque_constant"
-        problem = f"{given} is that of the motor; without gear_ratio it says nothing of the joint"
+    at_motor = [name for name in ("rotor_inertia", "torque_constant", "motor_speed") if getattr(drives, name)]
+    if drives.gear_ratio is None and at_motor:
+        problem = f"{at_motor[0]} is that of the motor; without gear_ratio it says nothing of the joint"
         raise InputError(problem, file=entries.file, column="dynamics.drives", remedy="state gear_ratio")
     key = "dynamics.drives"
     ratio = _values(drives.gear_ratio, entries, f"{key}.gear_ratio", 1.0)
     rotor = _values(drives.rotor_inertia, entries, f"{key}.rotor_inertia", 0.0)
     constant = _values(drives.torque_constant, entries, f"{key}.torque_constant", np.nan)
-    return ratio, ratio**2 * rotor, ratio * constant
+    speed = np.full(entries.chain.n, np.inf)
+    if drives.motor_speed is not None:
+        unit = MOTOR_UNITS[drives.motor_speed.unit]
+        speed = entries.place(drives.motor_speed.values, f"{key}.motor_speed.values", np.inf, unit)
+    return ratio, ratio**2 * rotor, ratio * constant, speed
 
 
 def _friction(text: RobotDescription, entries: _PerJoint, known: Array | None) -> Array:

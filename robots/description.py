@@ -29,6 +29,9 @@ UNITS: dict[str, tuple[float, str, str]] = {
 } | {"N m": (1.0, "revolute", "torque"), "N": (1.0, "prismatic", "torque")}
 
 
+MOTOR_UNITS = {"rad/s": 1.0, "deg/s": 0.017453292519943295, "rpm": 0.10471975511965977}
+
+
 class Sourced(Config):
     """Anything that may say where it comes from; ``assumed`` means that no source exists."""
 
@@ -49,6 +52,13 @@ class Bounds(Sourced):
     unit: str | list[str]
 
 
+class MotorSpeed(Sourced):
+    """One highest speed a motor, before its gear; .inf where there is none."""
+
+    values: list[Number]
+    unit: Literal["rad/s", "deg/s", "rpm"] = "rad/s"
+
+
 class Range(Sourced):
     """A lowest and a highest position a joint."""
 
@@ -58,13 +68,17 @@ class Range(Sourced):
 
 
 class LimitsDescription(Config):
-    """Limits of the joints; a quantity left out is unlimited, or as the URDF states it."""
+    """Limits of the joints; a quantity left out is unlimited, or as the URDF states it.
+
+    ``torque`` bounds the peak, ``torque_rms`` the root mean square over an experiment (a drive's continuous torque).
+    """
 
     position: Range | None = None
     velocity: Bounds | None = None
     acceleration: Bounds | None = None
     jerk: Bounds | None = None
     torque: Bounds | None = None
+    torque_rms: Bounds | None = None
 
 
 class Pose(Config):
@@ -111,11 +125,12 @@ class FrictionDescription(Config):
 
 
 class Drives(Config):
-    """Drives: motor turns per joint turn, rotor inertia [kg m2] and torque constant [N m/A] at the motor."""
+    """Drives: motor turns per joint turn; rotor inertia [kg m2], torque constant [N m/A] and speed at the motor."""
 
     gear_ratio: Values | None = None
     rotor_inertia: Values | None = None
     torque_constant: Values | None = None
+    motor_speed: MotorSpeed | None = None
 
 
 class Dynamics(Config):

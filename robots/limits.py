@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,7 @@ class Limits:
         acceleration: highest accelerations [rad/s^2], (n,).
         jerk: highest jerks [rad/s^3], (n,).
         torque: highest joint torques [N m], (n,).
+        torque_rms: highest root mean square of the joint torques over a motion [N m], (n,); infinite by default.
 
     Raises:
         InputError: arrays of different lengths, NaN, ``lower`` not below ``upper``, or a negative bound.
@@ -69,8 +70,11 @@ class Limits:
     acceleration: FloatArray
     jerk: FloatArray
     torque: FloatArray
+    torque_rms: FloatArray = field(default_factory=lambda: np.array(np.inf))
 
     def __post_init__(self) -> None:
+        if np.ndim(self.torque_rms) == 0:
+            object.__setattr__(self, "torque_rms", np.full(len(np.atleast_1d(self.lower)), float(self.torque_rms)))
         for item in fields(self):
             array = _bound(item.name, getattr(self, item.name))
             if len(array) != len(np.atleast_1d(self.lower)):
@@ -111,7 +115,7 @@ class Limits:
             velocity: factor of the velocity limits.
             acceleration: factor of the acceleration limits.
             jerk: factor of the jerk limits.
-            torque: factor of the torque limits.
+            torque: factor of the torque limits, peak and root mean square.
 
         Raises:
             InputError: a factor that is not a positive number.
@@ -120,7 +124,8 @@ class Limits:
         for name, factor in factors.items():
             if not (np.isfinite(factor) and factor > 0.0):
                 raise InputError(f"a factor of {factor}", column=name, allowed="a positive number")
-        return Limits(self.lower, self.upper, *(getattr(self, name) * factor for name, factor in factors.items()))
+        scaled = {name: getattr(self, name) * factor for name, factor in factors.items()}
+        return replace(self, **scaled, torque_rms=self.torque_rms * torque)
 
     def margins(self, motion: Motion) -> list[Margin]:
         """Returns the smallest margin of each quantity and joint, quantity by quantity.

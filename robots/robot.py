@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,8 @@ class Robot:
             [N m, N m s/rad, N m s2/rad2, N m s3/rad3]; 0 where unknown.
         gear_ratio: (n,) motor turns per joint turn; 1 where unknown.
         torque_constant: (n,) joint torque per motor current, ``gear_ratio k_motor`` [N m/A]; NaN where unknown.
+        motor_speed: (n,) highest speed of each motor [rad/s]; infinite where unknown. The joint's velocity limit is
+            lowered to what the gear makes of it.
         period: sample period of the controller [s].
         assumed: the quantities that no source backs, such as "limits.jerk".
         origin: the catalogue name, or the file it was read from.
@@ -51,6 +53,7 @@ class Robot:
     friction: Array = None  # type: ignore[assignment]
     gear_ratio: Array = None  # type: ignore[assignment]
     torque_constant: Array = None  # type: ignore[assignment]
+    motor_speed: Array = None  # type: ignore[assignment]
     period: float = 0.004
     assumed: tuple[str, ...] = ()
     origin: str = ""
@@ -80,6 +83,12 @@ class Robot:
         self._require(np.isfinite(self.gear_ratio) & (self.gear_ratio != 0.0), "gear_ratio", "finite and not zero")
         usable = np.isnan(self.torque_constant) | (np.isfinite(self.torque_constant) & (self.torque_constant != 0.0))
         self._require(usable, "torque_constant", "finite and not zero, or NaN where unknown")
+        self._freeze("motor_speed", (n,), np.inf)
+        self._require(self.motor_speed > 0.0, "motor_speed", "above zero")
+        reachable = self.motor_speed / np.abs(self.gear_ratio)
+        if (reachable < self.limits.velocity).any():
+            lowered = np.minimum(self.limits.velocity, reachable)
+            object.__setattr__(self, "limits", replace(self.limits, velocity=lowered))
         object.__setattr__(self, "assumed", tuple(self.assumed))
 
     def _freeze(self, quantity: str, shape: tuple[int, ...], unknown: float) -> None:

@@ -7,7 +7,8 @@ from os import PathLike
 from pathlib import Path
 
 from oed.campaigns.stages import Stage
-from oed.experiments.result import DESIGN, TRAJECTORY, Design
+from oed.experiments.design_file import DESIGN, TRAJECTORY
+from oed.experiments.result import Design
 from oed.exports import read_trajectory
 from robots.common.errors import InputError
 from robots.common.files import existing_file

@@ -12,6 +12,7 @@ from oed.campaigns.stages import Stage
 from oed.campaigns.timetable import Slot
 from robots.robot import Robot
 from robots.thermal import KnownThermal
+from robots.thermal import friction_power as power_of
 
 Array = NDArray[np.float64]
 
@@ -29,9 +30,7 @@ def friction_power(robot: Robot, dq: ArrayLike) -> Array:
     Returns:
         (N, n) [W].
     """
-    speed = np.abs(np.asarray(dq, dtype=np.float64))
-    f1, f2, f3, f4 = np.asarray(robot.friction).T
-    return speed * (f1 + speed * (f2 + speed * (f3 + speed * f4)))
+    return power_of(dq, robot.friction)
 
 
 def stage_heat(robot: Robot, stage: Stage) -> Array:

@@ -8,8 +8,10 @@ import typer
 
 from oed.cli.campaign import campaign
 from oed.cli.design import design
+from oed.cli.diagnose import diagnose
 from oed.cli.export import export
 from oed.cli.identify import identify
+from oed.cli.pareto import pareto
 from oed.cli.predict import predict
 from oed.cli.retime import retime
 from oed.cli.simulate import simulate
@@ -22,7 +24,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (design, retime, export, campaign, simulate, identify, predict):
+for command in (design, pareto, retime, export, campaign, simulate, identify, diagnose, predict):
     app.command()(command)
 
 

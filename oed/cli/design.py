@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -43,6 +44,20 @@ def design(
         bool, typer.Option("--collision", help="Keep clear of the arm itself and of the obstacles in its file.")
     ] = False,
     clearance: Annotated[float, typer.Option(help="Clearance to keep [m].")] = 0.01,
+    tool_box: Annotated[
+        str | None,
+        typer.Option(
+            help="Where the flange stays in the base frame: x from, to, y from, to, z from, to [m]; inf for no bound.",
+            show_default=False,
+        ),
+    ] = None,
+    singularity: Annotated[
+        float | None,
+        typer.Option(help="Smallest singular value of the flange's scaled Jacobian to keep.", show_default=False),
+    ] = None,
+    essential: Annotated[
+        float, typer.Option(help="Leave out parameters whose torque stays below this share of each joint's.")
+    ] = 0.0,
     scaling: Annotated[str, typer.Option(help="Columns the criterion judges: none, nominal or unit.")] = "none",
     noise: Annotated[
         str | None, typer.Option(help="Torque noise of each joint [N m], separated by commas.", show_default=False)
@@ -72,6 +87,7 @@ def design(
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         from oed.cli.priors import prior_from
+        from oed.cli.spaces import spaces_from
         from oed.experiments import design as run
         from oed.exports import read_trajectory
         from oed.reports import save_design_report
@@ -94,12 +110,15 @@ def design(
                 torque_margin=torque_margin,
                 collision=collision,
                 clearance=clearance,
+                space=spaces_from(tool_box, singularity),
+                essential=essential,
                 scaling=scaling,
                 noise=numbers("--noise", noise),
                 after=prior_from(after) if after else None,
                 task=read_trajectory(task, n=described.n)[0] if task else None,
                 effort=effort,
                 time_limit=float("inf") if time_limit is None else time_limit,
+                keep_on_interrupt=True,
                 seed=seed,
                 workers=workers,
                 progress=progress,
@@ -109,3 +128,6 @@ def design(
     data = result.to_dict()
     del data["segments"], data["fourier"]
     console.result(f"{result.summary()}\nwritten to {out.resolve()}", data)
+    if result.interrupted:
+        print("oed: interrupted; the best design so far was written", file=sys.stderr)
+        raise SystemExit(130)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -14,6 +14,7 @@ from oed.cli.options import (
     JsonOption,
     LockOption,
     LogOption,
+    MappingOption,
     PngOption,
     QuietOption,
     RobotOption,
@@ -26,12 +27,19 @@ from oed.cli.options import (
 def identify(
     robot: RobotOption,
     log: LogOption,
-    method: Annotated[str, typer.Option(help="wls or ols.")] = "wls",
+    mapping: MappingOption = None,
+    method: Annotated[str, typer.Option(help="An estimator, or all to compare them.")] = "wls",
     friction: Annotated[str, typer.Option(help="polynomial or coulomb-viscous.")] = "polynomial",
     rotor: Annotated[bool, typer.Option(help="With rotor inertias.")] = True,
     offset: Annotated[bool, typer.Option(help="With a torque offset on each joint.")] = True,
     seed: SeedOption = 0,
     out: Annotated[Path, typer.Option("--out", help="Folder for the results.")] = Path("identified"),
+    urdf: Annotated[
+        Path | None, typer.Option("--urdf", help="Also write a URDF with the identified bodies.", show_default=False)
+    ] = None,
+    c_code: Annotated[
+        Path | None, typer.Option("--c-code", help="Also write torque and gravity as C.", show_default=False)
+    ] = None,
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
@@ -45,22 +53,43 @@ def identify(
     with console.working() as progress:
         from estimation import identify as run
         from estimation import read_logs
+        from estimation.exports import export_c, export_urdf
+        from estimation.method_table import compare_methods
         from oed.reports import save_estimate_report
         from robots.common.files import ResultFolder
 
         with ResultFolder(out, force, names=["model.json", "report.html"]) as folder:
             described = robot_from(robot, tip, joints, lock)
-            logs = read_logs(log, n=described.n)
-            result = run(
-                described,
-                logs,
-                method=method,
-                friction=friction,
-                rotor=rotor,
-                offset=offset,
-                seed=seed,
-                progress=progress,
-            )
+            logs = read_logs(log, n=described.n, mapping=mapping, joints=described.joint_names)
+            options: dict[str, Any] = {
+                "friction": friction,
+                "rotor": rotor,
+                "offset": offset,
+                "seed": seed,
+                "progress": progress,
+            }
+            table = compare_methods(described, logs, **options) if method == "all" else None
+            chosen = method if table is None else table.rows[0].method
+            result = run(described, logs, method=chosen, **options)
             result.save(folder.path("model.json").parent)
-            save_estimate_report(result, folder, png=png)
-    console.result(f"{result.summary()}\nwritten to {out.resolve()}", result.to_dict())
+            save_estimate_report(result, folder, png=png, methods=table)
+            if urdf is not None:
+                export_urdf(result.model, urdf, robot=described, force=force)
+            if c_code is not None:
+                export_c(result.model, c_code, force=force)
+    found = "\n".join(gate.summary() for gate in result.gates if gate.findings)
+    console.result(
+        "\n".join(
+            [
+                *([found] if found else []),
+                *([table.summary()] if table else []),
+                result.summary(),
+                *(f"written to {path.resolve()}" for path in (out, urdf, c_code) if path is not None),
+            ]
+        ),
+        {
+            **result.to_dict(),
+            "gate": [gate.to_dict() for gate in result.gates],
+            "methods": table.to_dict() if table else None,
+        },
+    )

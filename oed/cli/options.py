@@ -27,7 +27,11 @@ LockOption = Annotated[
     typer.Option("--lock", help="A joint held at a value [rad or m], as name=value.", show_default=False),
 ]
 LogOption = Annotated[
-    list[Path], typer.Option("--log", help="A log (CSV or Parquet); may be given again.", show_default=False)
+    list[Path], typer.Option("--log", help="A log, or a folder of logs; may be given again.", show_default=False)
+]
+MappingOption = Annotated[
+    Path | None,
+    typer.Option("--mapping", help="A YAML file: names, units, signs and order of the columns.", show_default=False),
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite results that are there.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]

@@ -8,13 +8,15 @@ from typing import Annotated
 import typer
 
 from oed.cli.console import Console
-from oed.cli.options import ForceOption, JsonOption, QuietOption
+from oed.cli.options import ForceOption, JsonOption, MappingOption, QuietOption
 
 
 def predict(
     model: Annotated[Path, typer.Option("--model", help="A model.json, or its folder.", show_default=False)],
     log: Annotated[Path, typer.Option("--log", help="A log of the motion.", show_default=False)],
+    mapping: MappingOption = None,
     out: Annotated[Path, typer.Option("--out", help="The table to write: t, tau1..taun.")] = Path("predicted.csv"),
+    band: Annotated[bool, typer.Option("--band", help="Also write band1..bandn, half-widths of 95 %.")] = False,
     force: ForceOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
@@ -26,8 +28,9 @@ def predict(
         from estimation import predict as run
 
         identified = load_model(model)
-        recorded = read_log(log, n=identified.robot.n, torque=False)
+        robot = identified.robot
+        recorded = read_log(log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names)
         progress.start("predicting", None)
         result = run(identified, recorded)
-        result.save(out, force=force)
+        result.save(out, band=band, force=force)
     console.result(f"{result.summary()}\nwritten to {out}", {"file": str(out), **result.to_dict()})

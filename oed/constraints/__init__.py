@@ -15,6 +15,7 @@ from oed.constraints.kinematic import QUANTITIES, KinematicRows, kinematic_rows
 from oed.constraints.pointwise import PointwiseLimit
 from oed.constraints.spline import hull_matrices, spline_extremes, spline_rows
 from oed.constraints.torque import TorqueLimit
+from oed.constraints.torque_rms import TorqueRms
 
 __all__ = [
     "QUANTITIES",
@@ -22,6 +23,7 @@ __all__ = [
     "KinematicRows",
     "PointwiseLimit",
     "TorqueLimit",
+    "TorqueRms",
     "TrigonometricPolynomial",
     "certified_extremes",
     "exact_extremes",

@@ -110,13 +110,14 @@ def _advice(pose: Array | None) -> str:
     return f"the nearest pose found that keeps all limits is {', '.join(f'{x:.3f}' for x in pose)} rad"
 
 
-def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0) -> Array | None:
+def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0, room: float = 0.0) -> Array | None:
     """Looks for the pose nearest to a given one that keeps all limits.
 
     Args:
         limits: the limits.
         home: (n,) [rad or m].
         seed: of the further starts, for where bodies are deep in each other no direction leads out.
+        room: to keep from every bound, in its own scale.
 
     Returns:
         The first local solution found (n,), sought from that pose first; None where none was found.
@@ -126,7 +127,7 @@ def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0)
     function, random = limits.symbolic(), np.random.default_rng(seed)
 
     def values(x: Array) -> Array:
-        return np.array(function(x)[0])[:, 0]
+        return np.array(function(x)[0])[:, 0] - room
 
     rows = {"type": "ineq", "fun": values, "jac": lambda x: np.array(function(x)[1])}
     for attempt in range(STARTS):

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from oed.criteria.base import Criterion
+from oed.criteria.blend import Blend
 from oed.criteria.combined import CondDeterminant
 from oed.criteria.cond import Cond
 from oed.criteria.determinant import Determinant
@@ -19,21 +22,36 @@ CRITERIA: dict[str, type[Criterion]] = {
 
 
 def criterion(choice: str | Criterion) -> Criterion:
-    """Gives the criterion of that name, or the one given.
+    """Gives the criterion of that name, the one given, or a blend such as ``0.5*cond+0.5*d``.
 
     Raises:
-        InputError: an unknown name.
+        InputError: an unknown name, or weights that are not numbers.
     """
     if isinstance(choice, Criterion):
         return choice
-    if choice not in CRITERIA:
-        raise InputError(f"criterion {choice!r}", allowed=", ".join(CRITERIA))
-    return CRITERIA[choice]()
+    if choice in CRITERIA:
+        return CRITERIA[choice]()
+    parts: dict[Criterion, float] = {}
+    for item in choice.split("+"):
+        weight, star, name = item.partition("*")
+        if not star or name.strip() not in CRITERIA or not _is_number(weight):
+            blends = "or a sum of weight*criterion such as 0.5*cond+0.5*d"
+            raise InputError(f"criterion {choice!r}", allowed=f"{', '.join(CRITERIA)}, {blends}")
+        parts[CRITERIA[name.strip()]()] = float(weight)
+    return Blend(parts)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return bool(np.isfinite(float(text)))
+    except ValueError:
+        return False
 
 
 __all__ = [
     "CRITERIA",
     "SCALINGS",
+    "Blend",
     "Cond",
     "CondDeterminant",
     "Criterion",

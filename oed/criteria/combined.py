@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from oed.criteria.base import Array, Criterion
+from oed.criteria.blend import Blend
 from oed.criteria.cond import Cond
 from oed.criteria.determinant import Determinant
 
 
-class CondDeterminant(Criterion):
+class CondDeterminant(Blend):
     """log cond(Y) - weight log det(Y'Y) / (2 m), to be minimised (thesis section 2.3: both, with weights).
 
     Args:
@@ -18,21 +16,8 @@ class CondDeterminant(Criterion):
     """
 
     name = "cond-d"
-    stages = (16.0, 64.0)
-    finish = (64.0, 256.0, 1024.0)
 
     def __init__(self, weight: float = 1.0) -> None:
-        self.weight = weight
+        super().__init__({Cond(): 1.0, Determinant(): weight})
+        self.name, self.weight = CondDeterminant.name, weight
         self.label = f"log cond(Y) - {weight:g} log det(Y'Y) / 2m"
-        self._cond, self._determinant = Cond(), Determinant()
-
-    def value(self, eigenvalues: Array) -> float:
-        """Gives the weighted sum."""
-        volume, _ = self._determinant.surrogate(eigenvalues, 1.0)
-        return float(np.log(self._cond.value(eigenvalues))) + self.weight * volume
-
-    def surrogate(self, eigenvalues: Array, sharpness: float) -> tuple[float, Array]:
-        """Replaces the condition number by its stand-in."""
-        cond, cond_gradient = self._cond.surrogate(eigenvalues, sharpness)
-        volume, volume_gradient = self._determinant.surrogate(eigenvalues, sharpness)
-        return cond + self.weight * volume, cond_gradient + self.weight * volume_gradient

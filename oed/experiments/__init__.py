@@ -1,23 +1,29 @@
 """Experiments: the design problem, its solver, and the verb that puts them together."""
 
 from oed.experiments.designing import design, usable_limits
-from oed.experiments.result import Design, Outcome, Quality
+from oed.experiments.pareto import ParetoFront, pareto
+from oed.experiments.quality import Quality
+from oed.experiments.result import Design, Outcome
 from oed.experiments.retimed import RetimedExperiment, TorqueUse
 from oed.experiments.retiming import METHODS, retime
 from oed.experiments.search import EFFORTS, Effort
-from oed.experiments.solver import Ipopt
+from oed.experiments.solvers import InteriorPoint, Ipopt, Solver
 
 __all__ = [
     "METHODS",
     "EFFORTS",
     "Design",
     "Effort",
+    "InteriorPoint",
     "Ipopt",
     "Outcome",
+    "ParetoFront",
     "Quality",
     "RetimedExperiment",
+    "Solver",
     "TorqueUse",
     "design",
+    "pareto",
     "retime",
     "usable_limits",
 ]

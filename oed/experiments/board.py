@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+import multiprocessing
 import os
+import signal
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 
 from robots.common.progress import Progress
 
 # Often enough for a bar that looks alive.
 INTERVAL = 0.25
+STOP = "stop"
 
 
 @dataclass(frozen=True)
@@ -40,11 +44,20 @@ class Board:
 
         return tell
 
+    def stop(self) -> None:
+        """Asks all searches to end with what they have."""
+        (self.folder / STOP).touch()
+
+    @property
+    def stopped(self) -> bool:
+        """Whether they are to end."""
+        return os.path.exists(self.folder / STOP)
+
     def read(self) -> tuple[int, float]:
         """Sums the steps, and finds the best value."""
         done, best = 0, math.inf
         for file in self.folder.iterdir():
-            if file.suffix != ".new":
+            if file.suffix != ".new" and file.name != STOP:
                 steps, value = file.read_text(encoding="ascii").split()
                 done, best = done + int(steps), min(best, float(value))
         return done, best
@@ -78,3 +91,31 @@ class Board:
                 over.set()
                 thread.join()
                 progress.finish()
+
+
+@contextmanager
+def stopped_by_interrupt(board: Board, *, wanted: bool) -> Iterator[None]:
+    """Lets the first Ctrl-C meanwhile end the searches with what they have; the second is one as always.
+
+    Only the main thread hears of signals: in another, and where it is not wanted, nothing changes.
+    """
+    if not wanted or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def first(_number: int, _frame: FrameType | None) -> None:
+        signal.signal(signal.SIGINT, before)
+        board.stop()
+
+    signal.signal(signal.SIGINT, first)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def outlive_interrupts() -> None:
+    """Makes a worker process deaf to Ctrl-C, which a terminal sends to the whole group: the board tells it to stop."""
+    if multiprocessing.parent_process() is not None and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, replace
 
@@ -10,20 +11,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
+from oed.constraints.geometric import GeometricLimit
 from oed.criteria import Criterion, Prior
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.assembly import assemble, rest_pose
-from oed.experiments.board import Board
+from oed.experiments.board import Board, outlive_interrupts, stopped_by_interrupt
+from oed.experiments.checks import check_options, check_period
+from oed.experiments.essential import essential_part
 from oed.experiments.judging import choose_weighting
+from oed.experiments.margins import measured_margins
 from oed.experiments.problem import FourierProblem
-from oed.experiments.result import Design, Outcome, design_model, measure, measured_margins
+from oed.experiments.quality import design_model, measure
+from oed.experiments.result import Design, Outcome
 from oed.experiments.safety import choose_safety, collision_data
 from oed.experiments.search import EFFORTS, Effort, Found, Island
-from oed.experiments.solver import Ipopt
+from oed.experiments.solvers import InteriorPoint, Solver
 from oed.retiming import finite_limits
 from oed.trajectories import FourierSeries, count_periods
 from robots.base_parameters import find_base_parameters
-from robots.common.errors import InfeasibleError, InputError
+from robots.common.errors import InfeasibleError, InputError, OedError
 from robots.common.parallel import one_blas_thread, parallel_map
 from robots.common.progress import SILENT, Progress
 from robots.limits import Limits
@@ -44,6 +50,7 @@ def design(
     friction: str = "polynomial",
     offset: bool = False,
     rotor: bool = True,
+    essential: float = 0.0,
     velocity_scale: float = 0.02,
     harmonics: int = 5,
     base_frequency: float = 0.1,
@@ -55,14 +62,16 @@ def design(
     torque_margin: float = 0.1,
     collision: bool = False,
     clearance: float = 0.01,
+    space: Sequence[GeometricLimit] = (),
     scaling: str = "none",
     noise: ArrayLike | None = None,
     after: Prior | None = None,
     task: Motion | None = None,
     effort: str | Effort = "standard",
     time_limit: float = np.inf,
+    keep_on_interrupt: bool = False,
     seed: int = 0,
-    solver: Ipopt | None = None,
+    solver: Solver | None = None,
     workers: int | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
@@ -70,9 +79,9 @@ def design(
     """Designs an excitation experiment that is optimal for the model which will be fitted.
 
     A finite Fourier series per joint, at rest at both ends (thesis eq. 78 to 80), minimises the criterion of the base
-    regressor under the limits of position, velocity, acceleration and jerk, by IPOPT with exact derivatives from
-    screened starts and hops. One stroke per joint to its velocity bound (eq. 81 to 83) and jerk-limited moves complete
-    it.
+    regressor under the limits of position, velocity, acceleration and jerk, by an interior-point method with exact
+    derivatives from screened starts and hops. One stroke per joint to its velocity bound (eq. 81 to 83) and
+    jerk-limited moves complete it.
 
     Args:
         robot: the robot.
@@ -80,6 +89,8 @@ def design(
         friction: ``polynomial`` or ``coulomb-viscous``, as it will be fitted.
         offset: with torque offset columns.
         rotor: with rotor inertia columns.
+        essential: leaves out base parameters whose torque, by the robot's description, stays below this share of each
+            joint's on random motions; 0 keeps all.
         velocity_scale: of the Coulomb column tanh(dq / scale) [rad/s].
         harmonics: of the series.
         base_frequency: of the first harmonic [Hz].
@@ -92,6 +103,7 @@ def design(
         collision: keep the arm clear of itself and of the obstacles in the robot's file; the whole experiment is then
             proved free at all times.
         clearance: to keep [m].
+        space: further limits in space, such as `ToolBox`, `PlaneLimit` and `SingularityLimit`.
         scaling: of the columns that the criterion judges: ``none``, ``nominal`` (each by the size its parameter has in
             the robot's description) or ``unit`` (each to unit length).
         noise: torque noise of each joint (n,) [N m or N]: rows count by one over it; all alike by default.
@@ -100,8 +112,9 @@ def design(
         effort: ``quick``, ``standard``, ``thorough``, or counts of one's own.
         time_limit: for the search [s]; past it the best design so far is kept. Without it the same seed gives the same
             design on a fast and on a slow machine.
+        keep_on_interrupt: on Ctrl-C during the search, end it and keep the best design so far; a second one ends all.
         seed: of everything random: the same seed gives the same design.
-        solver: settings of IPOPT.
+        solver: the local solver: `InteriorPoint` by default, or `Ipopt`.
         workers: processes; as many as cores by default.
         executor: runs the starts instead of processes of its own.
         progress: is told how far it is.
@@ -114,13 +127,14 @@ def design(
         InfeasibleError: a limit of zero, or no start that keeps the limits and excites all parameters.
     """
     chosen = choose_criterion(criterion)
-    _check(harmonics, base_frequency, periods, velocity_fraction, time_limit, seed)
-    work = _effort(effort)
+    check_options(harmonics, base_frequency, periods, velocity_fraction, time_limit, seed)
+    work, local = _effort(effort), solver or InteriorPoint()
     count_periods(1 / base_frequency, robot.period)
     settings = {
         "friction": friction,
         "offset": offset,
         "rotor": rotor,
+        "essential": essential,
         "velocity_scale": velocity_scale,
         "harmonics": harmonics,
         "base_frequency": base_frequency,
@@ -131,16 +145,23 @@ def design(
         "torque_margin": torque_margin if torque else None,
         "collision": collision,
         "clearance": clearance if collision else None,
+        "space": [repr(limit) for limit in space],
         "scaling": scaling,
         "noise": None if noise is None else np.asarray(noise, dtype=float).tolist(),
         "after": after is not None,
         "seed": seed,
         "effort": asdict(work),
         "time_limit": time_limit if np.isfinite(time_limit) else None,
-        "ipopt": asdict(solver or Ipopt()),
+        "solver": {"name": local.name, **asdict(local)},
     }
     limits = usable_limits(robot.limits, velocity_fraction)
+    check_period(limits, base_frequency)
     base = find_base_parameters(design_model(robot, settings))
+    if essential:
+        free = FourierProblem(
+            base=base, criterion=chosen, limits=limits, harmonics=harmonics, base_frequency=base_frequency
+        )
+        base = essential_part(free, essential)
     weighting = choose_weighting(base, chosen, scaling, noise, after, task, periods / base_frequency / robot.period)
     pose = rest_pose(limits, home)
     safety = choose_safety(
@@ -152,6 +173,7 @@ def design(
         torque_margin=torque_margin,
         collision=collision,
         clearance=clearance,
+        space=space,
     )
     problem = FourierProblem(
         base=base,
@@ -162,6 +184,7 @@ def design(
         samples=max(FourierProblem.samples, 20 * harmonics),
         limit_samples=max(FourierProblem.limit_samples, 50 * harmonics),
         pointwise=safety.pointwise,
+        averaged=safety.averaged,
         home=safety.home,
         weighting=weighting,
     )
@@ -172,21 +195,30 @@ def design(
     problem.cost(np.zeros(problem.size))  # compiles, once for all processes
     sign = -1.0 if chosen.larger_is_better else 1.0
     work_name = f"designing for {robot.name}"
-    with Board.watched(work.islands, work.steps, progress or SILENT, work_name, sign) as board:
+    with (
+        Board.watched(work.islands, work.steps, progress or SILENT, work_name, sign) as board,
+        stopped_by_interrupt(board, wanted=keep_on_interrupt),
+    ):
         deadline = time.time() + time_limit
         tasks = [
             _Task(
                 problem=problem,
                 effort=work,
-                solver=solver or Ipopt(),
+                solver=local,
                 seed=seed,
                 number=number,
                 deadline=deadline,
                 board=board,
+                outlive=keep_on_interrupt,
             )
             for number in range(work.islands)
         ]
-        results = parallel_map(_search, tasks, executor=executor, workers=workers)
+        try:
+            results = parallel_map(_search, tasks, executor=executor, workers=workers)
+        except OedError as error:
+            if board.stopped:  # by a Ctrl-C that met workers which had not begun
+                raise KeyboardInterrupt from error
+            raise
     best = min(results, key=lambda found: found.cost)
     if not np.isfinite(best.cost):
         raise InfeasibleError(
@@ -206,6 +238,9 @@ def design(
         islands=tuple(_outcome(found) for found in results),
         settings=settings,
         coefficients=series.coefficients,
+        home=safety.home,
+        home_moved=safety.moved,
+        space=() if safety.check is None else safety.check.margins(motion),
         freedom=None if freedom is None else collision_data(freedom),
         strokes_left_out=left_out,
     )
@@ -231,20 +266,6 @@ def usable_limits(limits: Limits, velocity_fraction: float = 1.0) -> Limits:
     return replace(scaled, lower=scaled.lower + narrower, upper=scaled.upper - narrower)
 
 
-def _check(
-    harmonics: int, base_frequency: float, periods: int, velocity_fraction: float, time_limit: float, seed: int
-) -> None:
-    for name, value, least in (("harmonics", harmonics, 2), ("periods", periods, 1), ("seed", seed, 0)):
-        if value < least or value != int(value):
-            raise InputError(f"{name} is {value}", allowed=f"a whole number, at least {least}")
-    if not (np.isfinite(base_frequency) and base_frequency > 0):
-        raise InputError(f"the base frequency is {base_frequency} Hz", allowed="a positive number")
-    if not 0 < velocity_fraction <= 1:
-        raise InputError(f"the velocity fraction is {velocity_fraction}", allowed="above 0, up to 1")
-    if not time_limit > 0:
-        raise InputError(f"the time limit is {time_limit} s", allowed="a positive number")
-
-
 def _effort(choice: str | Effort) -> Effort:
     if isinstance(choice, Effort):
         return choice
@@ -261,6 +282,7 @@ def _outcome(found: Found) -> Outcome:
         iterations=found.iterations,
         evaluations=found.evaluations,
         status=found.status,
+        starts=found.starts,
     )
 
 
@@ -270,17 +292,28 @@ class _Task:
 
     problem: FourierProblem
     effort: Effort
-    solver: Ipopt
+    solver: Solver
     seed: int
     number: int
     deadline: float
     board: Board
+    outlive: bool
 
 
 @one_blas_thread()
 def _search(task: _Task) -> Found:
-    tell = task.board.teller(task.number)
-    island = Island(task.problem, task.effort, task.solver, task.seed, task.number, tell=tell, deadline=task.deadline)
+    if task.outlive:
+        outlive_interrupts()
+    island = Island(
+        task.problem,
+        task.effort,
+        task.solver,
+        task.seed,
+        task.number,
+        tell=task.board.teller(task.number),
+        deadline=task.deadline,
+        halted=lambda: task.board.stopped,
+    )
     # Threads inside small matrix products cost more than they bring, and would make the result depend on their number.
     with threadpool_limits(limits=1):
         return island.search()

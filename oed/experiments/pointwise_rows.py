@@ -1,17 +1,11 @@
 """The pointwise limits as rows of the solver: only where a motion comes near them."""
 
-# ruff: noqa: D102 -- CasADi prescribes the callbacks' methods
-
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import casadi
 import numpy as np
 from numpy.typing import NDArray
 
 from oed.experiments.problem import FourierProblem
-from oed.experiments.trap import Trap
 
 Array = NDArray[np.float64]
 
@@ -20,7 +14,7 @@ BETWEEN = 0.005
 
 
 class PointwiseRows:
-    """Chosen (sample, row) pairs of the pointwise limits, and their exact derivatives by z.
+    """Chosen (sample, row) pairs of the pointwise limits, all averaged ones, and their exact derivatives by z.
 
     Args:
         problem: the design problem; with no pointwise limits there are no rows.
@@ -31,11 +25,12 @@ class PointwiseRows:
         self._problem, self._near = problem, near
         count = sum(len(limit.labels) for limit in problem.pointwise)
         self._chosen = np.zeros((problem.limit_samples, count), dtype=bool)
+        self._averaged = sum(len(limit.labels) for limit in problem.averaged)
 
     @property
     def size(self) -> int:
         """Number of rows chosen."""
-        return int(self._chosen.sum())
+        return int(self._chosen.sum()) + self._averaged
 
     def add_peaks(self, z: Array, tolerance: float) -> bool:
         """Adds the sample of each near peak; tells whether one passed its bound by more than the tolerance."""
@@ -54,74 +49,38 @@ class PointwiseRows:
         lower = np.concatenate([limit.lower for limit in limits]) if limits else np.zeros(0)
         upper = np.concatenate([limit.upper for limit in limits]) if limits else np.zeros(0)
         columns = np.nonzero(self._chosen)[1]
-        return lower[columns] + BETWEEN, upper[columns] - BETWEEN
+        lower = np.append(lower[columns], np.full(self._averaged, -np.inf))
+        upper = np.append(upper[columns], np.ones(self._averaged))
+        return lower + BETWEEN, upper - BETWEEN
 
     def values(self, z: Array) -> Array:
         """Evaluates the chosen rows."""
         states = self._problem.limit_states(z)
+        whole = [limit.values(*states) for limit in self._problem.averaged]
         rows = np.flatnonzero(self._chosen.any(axis=1))
+        if not len(rows):
+            return np.concatenate([np.zeros(0), *whole])
         values = [limit.values(*(state[rows] for state in states)) for limit in self._problem.pointwise]
-        return np.concatenate(values, axis=1)[self._chosen[rows]]
+        return np.concatenate([np.concatenate(values, axis=1)[self._chosen[rows]], *whole])
 
     def jacobian(self, z: Array) -> Array:
         """Evaluates the derivatives (rows, n K) of the chosen rows by z."""
         problem = self._problem
         states = problem.limit_states(z)
+        bases = np.stack(problem.limit_bases[:3], axis=1)  # (M, 3, K)
+        whole = []
+        for limit in problem.averaged:
+            each = limit.jacobian(*states).reshape(len(limit.labels), len(bases), 3, problem.joints)
+            summed = np.einsum("rmdj,mdk->rjk", each, bases, optimize=True) * problem.scale
+            whole.append(summed.reshape(len(limit.labels), -1))
         samples = np.flatnonzero(self._chosen.any(axis=1))
+        if not len(samples):
+            return np.concatenate([np.zeros((0, problem.size)), *whole])
         by_state = np.concatenate(
             [limit.jacobian(*(state[samples] for state in states)) for limit in problem.pointwise], axis=1
         )
         chosen = self._chosen[samples]
         slopes = by_state[chosen].reshape(-1, 3, problem.joints)  # per row: by q, dq, ddq of each joint
         at = samples[np.nonzero(chosen)[0]]
-        bases = np.stack([basis[at] for basis in problem.limit_bases[:3]], axis=1)  # (rows, 3, K)
-        gradient = np.einsum("rdj,rdk->rjk", slopes, bases) * problem.scale
-        return gradient.reshape(len(at), -1)
-
-
-class PointwiseFunction(casadi.Callback):
-    """The chosen rows as a CasADi function with an exact Jacobian."""
-
-    def __init__(self, rows: PointwiseRows, size: int, trap: Trap) -> None:
-        casadi.Callback.__init__(self)
-        self.trap = trap
-        self.rows, self.variables, self.outputs = rows, size, rows.size
-        self._jacobian = _Jacobian(self)
-        self.construct("pointwise", {"enable_fd": False})
-
-    def get_sparsity_in(self, _: int) -> casadi.Sparsity:
-        return casadi.Sparsity.dense(self.variables, 1)
-
-    def get_sparsity_out(self, _: int) -> casadi.Sparsity:
-        return casadi.Sparsity.dense(self.outputs, 1)
-
-    def eval(self, arguments: Sequence[casadi.DM]) -> list[casadi.DM]:
-        z = np.array(arguments[0].nonzeros())
-        return [casadi.DM(self.trap.call(lambda: self.rows.values(z), np.zeros(self.outputs)))]
-
-    def has_jacobian(self) -> bool:
-        return True
-
-    def get_jacobian(self, *_: object) -> casadi.Function:
-        return self._jacobian
-
-
-class _Jacobian(casadi.Callback):
-    def __init__(self, function: PointwiseFunction) -> None:
-        casadi.Callback.__init__(self)
-        self._rows, self._trap = function.rows, function.trap
-        self._variables, self._outputs = function.variables, function.outputs
-        self.construct("pointwise_jacobian", {"enable_fd": False})
-
-    def get_n_in(self) -> int:
-        return 2
-
-    def get_sparsity_in(self, index: int) -> casadi.Sparsity:
-        return casadi.Sparsity.dense(self._variables if index == 0 else self._outputs, 1)
-
-    def get_sparsity_out(self, _: int) -> casadi.Sparsity:
-        return casadi.Sparsity.dense(self._outputs, self._variables)
-
-    def eval(self, arguments: Sequence[casadi.DM]) -> list[casadi.DM]:
-        z = np.array(arguments[0].nonzeros())
-        return [casadi.DM(self._trap.call(lambda: self._rows.jacobian(z), np.zeros((self._outputs, self._variables))))]
+        gradient = np.einsum("rdj,rdk->rjk", slopes, bases[at]) * problem.scale
+        return np.concatenate([gradient.reshape(len(at), -1), *whole])

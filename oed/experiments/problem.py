@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.constraints import KinematicRows, PointwiseLimit, kinematic_rows
+from oed.constraints import KinematicRows, PointwiseLimit, TorqueRms, kinematic_rows
 from oed.criteria import Criterion, Information, Weighting
 from oed.trajectories import FourierSeries, Kinematics, fourier_basis, rest_basis
 from robots.base_parameters import BaseParameters
@@ -16,6 +16,9 @@ from robots.common.errors import InfeasibleError
 from robots.limits import Limits
 
 Array = NDArray[np.float64]
+
+# How far within each pointwise bound, in its own scale, a motion counts as feasible: a solver starts strictly inside.
+ROOM = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +38,7 @@ class FourierProblem:
             rest there and a row of zeros informs of nothing.
         limit_samples: per period, at which the limits are imposed, tightened for what lies between.
         pointwise: limits that are not linear in the coefficients, such as torque; imposed at the same samples.
+        averaged: limits on the root mean square over the period.
         weighting: of rows and columns, and what is known already.
         home: pose (n,) to shrink motions to where the middle of the ranges breaks a pointwise limit.
     """
@@ -47,6 +51,7 @@ class FourierProblem:
     samples: int = 104
     limit_samples: int = 250
     pointwise: tuple[PointwiseLimit, ...] = ()
+    averaged: tuple[TorqueRms, ...] = ()
     home: Array | None = None
     weighting: Weighting = field(default_factory=Weighting)
 
@@ -90,25 +95,28 @@ class FourierProblem:
         """
         middle = (self.limits.lower + self.limits.upper) / 2
         middle = np.where(np.isfinite(middle), middle, 0.0)
-        if not self.pointwise:
+        if not self.curved:
             return middle
         poses = [middle] if self.home is None else [middle, np.asarray(self.home, dtype=float)]
         still = np.zeros((1, self.joints))
-        broken = []
+        broken: list[str] = []
         for pose in poses:
             excess = [limit.excess(pose[None], still, still)[0] for limit in self.pointwise]
-            if max(e.max() for e in excess) < 0:
+            excess += [limit.values(pose[None], still, still) - 1 for limit in self.averaged]
+            if max(e.max() for e in excess) < -ROOM:
                 return pose
-            broken = [
-                label
-                for limit, e in zip(self.pointwise, excess, strict=True)
-                for label, passed in zip(limit.labels, e >= 0, strict=True)
-                if passed
-            ]
+            labels = [label for limit in self.pointwise for label in limit.labels]
+            labels += [label for limit in self.averaged for label in limit.labels]
+            broken = [labels[row] for row in np.flatnonzero(np.concatenate(excess) >= -ROOM)]
         raise InfeasibleError(
             f"at rest in the home pose and in the middle of the ranges: {', '.join(broken[:3])} passes its limit",
             remedy="state another home pose or other limits",
         )
+
+    @property
+    def curved(self) -> bool:
+        """Whether there are limits that are not linear in the coefficients."""
+        return bool(self.pointwise or self.averaged)
 
     @cached_property
     def _free(self) -> Array:
@@ -172,30 +180,38 @@ class FourierProblem:
         q, dq, ddq = self.limit_states(z)
         return np.concatenate([limit.excess(q, dq, ddq) for limit in self.pointwise], axis=1)
 
+    def inside(self, z: Array) -> bool:
+        """Whether all limits that are not linear hold, with some room."""
+        states = self.limit_states(z)
+        if any(limit.excess(*states).max() > -ROOM for limit in self.pointwise):
+            return False
+        return all(limit.values(*states).max() <= 1 - ROOM for limit in self.averaged)
+
     def limit_states(self, z: Array) -> tuple[Array, Array, Array]:
         """Position, velocity and acceleration (M, n) at the limit samples."""
         free = self.free(z).T
         q, dq, ddq = (np.ascontiguousarray(basis @ free) for basis in self.limit_bases[:3])
         return q, dq, ddq
 
-    def shrunk(self, z: Array, fraction: float = 1.0) -> Array:
+    def shrunk(self, z: Array, fraction: float = 1.0, halvings: int = 12) -> Array:
         """Pulls each joint's motion towards the pose of z = 0 until it keeps the limits.
 
         Args:
             z: any point (n K,).
             fraction: of the way to the limits that it may go.
+            halvings: of the interval in which the way to the pointwise limits is sought.
         """
         still = self.free(np.zeros(self.size))
         room = self.rows.room(still, self.free(z) - still)
         kept = (z.reshape(self.joints, -1) * np.minimum(1.0, fraction * room)[:, None]).reshape(-1)
-        return self._inside(kept) if self.pointwise else kept
+        return self._inside(kept, halvings) if self.curved else kept
 
-    def _inside(self, z: Array) -> Array:
+    def _inside(self, z: Array, halvings: int) -> Array:
         """Shrinks all joints alike until the pointwise limits hold; z = 0 does."""
         low, high = 0.0, 1.0
-        if self.pointwise_excess(z).max() <= 0:
+        if self.inside(z):
             return z
-        for _ in range(20):
+        for _ in range(halvings):
             middle = (low + high) / 2
-            low, high = (middle, high) if self.pointwise_excess(middle * z).max() <= 0 else (low, middle)
+            low, high = (middle, high) if self.inside(middle * z) else (low, middle)
         return low * z

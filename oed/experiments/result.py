@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.criteria import Criterion, Weighting, triangle
-from oed.criteria import criterion as choose_criterion
+from oed.criteria import Criterion
+from oed.experiments.design_file import DESIGN, TRAJECTORY, design_data, load_design
+from oed.experiments.margins import measured_margins
+from oed.experiments.quality import Quality
+from oed.experiments.search import INTERRUPTED
+from oed.experiments.spatial_check import SpatialMargin
 from oed.experiments.views import motion_frame, plot_velocities
-from oed.exports import read_trajectory, write_trajectory
-from robots.base_parameters import BaseParameters, find_base_parameters
-from robots.common.errors import InputError
-from robots.common.files import existing_file, write_atomic
-from robots.common.parallel import one_blas_thread
-from robots.limits import Limits, Margin, symmetric_margins
-from robots.loading import load_robot
-from robots.regressor import TorqueModel, default_model
+from oed.exports import write_trajectory
+from robots.base_parameters import BaseParameters
+from robots.common.files import write_atomic
+from robots.limits import Margin
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.version import VERSION
@@ -32,39 +32,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-TRAJECTORY, DESIGN = "trajectory.csv", "design.json"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Quality:
-    """What a part of the experiment tells of the parameters.
-
-    Attributes:
-        part: which segments, such as ``fourier`` or ``whole``.
-        samples: how many.
-        singular_values: of the unscaled regressor Y (m,), ascending.
-    """
-
-    part: str
-    samples: int
-    singular_values: tuple[float, ...]
-
-    def value(self, criterion: str | Criterion) -> float:
-        """Evaluates a criterion."""
-        return choose_criterion(criterion).value(np.square(self.singular_values))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Lists cond(Y), log det(Y'Y) and the smallest singular value; null where Y has not full rank."""
-        full = self.singular_values[0] > 1e-10 * self.singular_values[-1]
-        return {
-            "part": self.part,
-            "samples": self.samples,
-            "cond_Y": self.value("cond") if full else None,
-            "log_det_YtY": self.value("d") if full else None,
-            "smallest_singular_value_Y": self.singular_values[0] if full else 0.0,
-            "singular_values_Y": list(self.singular_values),
-        }
-
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
@@ -74,9 +41,10 @@ class Outcome:
         island: its number, counted from 1.
         initial: the criterion at its first feasible point.
         final: the criterion of its best design.
-        iterations: of IPOPT.
+        iterations: of the local solver.
         evaluations: of criterion and gradient.
         status: ``finished``, or what stopped it early.
+        starts: of each random start, pulled within the limits, the criterion there and after the first solution.
     """
 
     island: int
@@ -85,15 +53,19 @@ class Outcome:
     iterations: int
     evaluations: int
     status: str
+    starts: tuple[tuple[float, float], ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Writes plain data; null where a point did not excite all parameters."""
-        return {name: None if value != value else value for name, value in asdict(self).items()}
+        data = {name: None if value != value else value for name, value in asdict(self).items()}
+        return data | {"starts": [[float(v) if np.isfinite(v) else None for v in pair] for pair in self.starts]}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Outcome:
         """Reads what `to_dict` wrote."""
         values: dict[str, Any] = {name: np.nan if value is None else value for name, value in data.items()}
+        pairs = ((np.nan if v is None else v for v in pair) for pair in data.get("starts", ()))
+        values["starts"] = tuple((before, after) for before, after in pairs)
         return cls(**values)
 
 
@@ -112,9 +84,12 @@ class Design:
         islands: every search's outcome; the best one was taken.
         settings: everything that, with the seed, makes the same design again.
         coefficients: of the Fourier series, rows q0, a1..aN, b1..bN per joint (n, 2 N + 1).
+        home: pose (n,) at both ends.
+        home_moved: whether that is the nearest pose that keeps the limits in space, for the usual one does not.
+        space: the closest approach to each further limit in space.
         freedom: of collisions: the smallest clearance [m], between what, when, and whether it is proved for all times;
             None where it was not asked for.
-        strokes_left_out: joints without a stroke, for on it the arm would collide.
+        strokes_left_out: joints without a stroke, for on it the arm would collide or break another limit in space.
     """
 
     robot: Robot
@@ -127,6 +102,9 @@ class Design:
     islands: tuple[Outcome, ...]
     settings: Mapping[str, Any]
     coefficients: Array
+    home: Array
+    home_moved: bool = False
+    space: tuple[SpatialMargin, ...] = ()
     freedom: Mapping[str, Any] | None = None
     strokes_left_out: tuple[int, ...] = ()
 
@@ -149,7 +127,13 @@ class Design:
     def success(self) -> bool:
         """Whether all limits hold and all parameters are excited."""
         free = self.freedom is None or bool(self.freedom["certified"])
+        free = free and not any(margin.violated for margin in self.space)
         return free and not self.violated and self.fourier.to_dict()["cond_Y"] is not None
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended the search early."""
+        return any(island.status == INTERRUPTED for island in self.islands)
 
     def part(self, kind: str) -> Motion:
         """Cuts the samples of the segments of one kind out of the motion."""
@@ -197,8 +181,15 @@ class Design:
                 f"  closest bodies: {self.freedom['pair']}, {1e3 * self.freedom['clearance']:.0f} mm at "
                 f"{self.freedom['time']:.2f} s, {'proved' if self.freedom['certified'] else 'NOT proved'} at all times"
             )
+        for near in self.space:
+            unit = f" {near.unit}" if near.unit else ""
+            lines.append(f"  {near.limit}: {near.value:.4g}{unit} left at {near.time:.2f} s")
+        if self.home_moved:
+            pose = ", ".join(f"{x:.3f}" for x in self.home)
+            lines.append(f"  begins and ends at {pose}: the usual home pose breaks a limit in space")
         if self.strokes_left_out:
-            lines.append(f"  no stroke for joints {self.strokes_left_out}: the arm would collide")
+            why = "the arm would collide or leave its space"
+            lines.append(f"  no stroke for joints {self.strokes_left_out}: {why}")
         for margin in self.violated:
             lines.append(
                 f"  PASSED: {margin.quantity} of joint {margin.joint}: {margin.value:.4g} of {margin.limit:.4g} "
@@ -216,40 +207,7 @@ class Design:
 
     def to_dict(self) -> dict[str, Any]:
         """Writes everything but the samples as plain data for `design.json`."""
-        model = self.base.model
-        return {
-            "format": "robot-oed design",
-            "format_version": 1,
-            "tool_version": VERSION,
-            "robot": {"name": self.robot.name, "origin": self.robot.origin, "sha256": self.robot.digest},
-            "assumed": [*self.robot.assumed, *(f"limits.{name}" for name in missing_limits(self.robot.limits))],
-            "model": {
-                "columns": list(self.base.names),
-                "units": [column.unit for column in self.base.columns],
-                "stands_for": list(self.base.formulas()),
-                "terms": [term.name for term in model.terms],
-                "scaling": self.settings.get("scaling", "none"),
-                "coulomb": f"tanh(dq / {self.settings['velocity_scale']:g})",
-            },
-            "criterion": self.criterion.name,
-            "criterion_label": self.criterion.label,
-            "quality": [quality.to_dict() for quality in self.qualities],
-            "fourier": {
-                "base_frequency_hz": self.settings["base_frequency"],
-                "harmonics": self.settings["harmonics"],
-                "periods": self.settings["periods"],
-                "coefficients": self.coefficients.tolist(),
-            },
-            "segments": [dict(segment) for segment in self.segments],
-            "duration": self.motion.duration,
-            "period": self.robot.period,
-            "collision": None if self.freedom is None else dict(self.freedom),
-            "strokes_left_out": list(self.strokes_left_out),
-            "smallest_margins": [margin_data(margin) for margin in self.margins],
-            "solver": {"name": "ipopt", "islands": [island.to_dict() for island in self.islands]},
-            "seed": self.settings["seed"],
-            "settings": dict(self.settings),
-        }
+        return design_data(self)
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Writes `trajectory.csv` and `design.json` into a folder that is there.
@@ -273,38 +231,7 @@ class Design:
         Raises:
             InputError: a missing or damaged file, or another robot than the design's.
         """
-        file = Path(folder) / DESIGN
-        try:
-            data = json.loads(existing_file(file).read_text(encoding="utf-8"))
-            known = robot or load_robot(data["robot"]["origin"])
-            settings = data["settings"]
-            base = find_base_parameters(design_model(known, settings))
-            if list(base.names) != data["model"]["columns"]:
-                raise InputError(f"the design is for {data['robot']['name']}, not for {known.name}", file=file)
-            qualities = tuple(
-                Quality(part=q["part"], samples=q["samples"], singular_values=tuple(q["singular_values_Y"]))
-                for q in data["quality"]
-            )
-            margins = tuple(
-                Margin(**{**margin, "limit": np.inf if margin["limit"] is None else margin["limit"]})
-                for margin in data["smallest_margins"]
-            )
-            return cls(
-                robot=known,
-                base=base,
-                criterion=choose_criterion(criterion or data["criterion"]),
-                motion=read_trajectory(Path(folder) / TRAJECTORY)[0],
-                segments=tuple(data["segments"]),
-                qualities=qualities,
-                margins=margins,
-                islands=tuple(Outcome.from_dict(island) for island in data["solver"]["islands"]),
-                settings=settings,
-                coefficients=np.array(data["fourier"]["coefficients"]),
-                freedom=data["collision"],
-                strokes_left_out=tuple(data["strokes_left_out"]),
-            )
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
-            raise InputError(f"is no design file: {type(error).__name__} {error}", file=file) from error
+        return load_design(folder, robot, criterion)
 
     def metadata(self) -> dict[str, Any]:
         """What the trajectory file says of itself."""
@@ -314,47 +241,3 @@ class Design:
             "criterion": self.criterion.name,
             "tool": f"robot-oed {VERSION}",
         }
-
-
-def design_model(robot: Robot, settings: Mapping[str, Any]) -> TorqueModel:
-    """Builds the model whose columns a design with these settings is for."""
-    keys = ("friction", "velocity_scale", "rotor", "offset")
-    return default_model(robot, **{key: settings[key] for key in keys})
-
-
-def missing_limits(limits: Limits) -> dict[str, tuple[int, ...]]:
-    """Finds the quantities, and their joints from 1, for which cautious limits had to be assumed."""
-    lacking = {name: np.flatnonzero(~np.isfinite(getattr(limits, name))) + 1 for name in ("acceleration", "jerk")}
-    return {name: tuple(map(int, joints)) for name, joints in lacking.items() if joints.size}
-
-
-@one_blas_thread()
-def measure(part: str, base: BaseParameters, motion: Motion, weighting: Weighting | None = None) -> Quality:
-    """Computes the singular values of a motion's regressor, or of what a weighting makes of it."""
-    judged = weighting or Weighting()
-    reduced = triangle(base.model, base.independent, motion.q, motion.dq, motion.ddq, judged.rows)
-    values = judged.singular_values(reduced, len(motion))
-    return Quality(part=part, samples=len(motion), singular_values=tuple(float(v) for v in values))
-
-
-def measured_margins(robot: Robot, motion: Motion, base: BaseParameters) -> tuple[Margin, ...]:
-    """Measures the margins to all limits, the torque by the robot's nominal model where it is described."""
-    limits: Limits = robot.limits
-    margins = list(limits.margins(motion))
-    nominal = base.model.nominal
-    if np.isfinite(nominal).all() and np.isfinite(limits.torque).any():
-        tau = base.model.torque(motion.q, motion.dq, motion.ddq, nominal)
-        margins += symmetric_margins("torque", motion.t, tau, limits.torque)
-    return tuple(margins)
-
-
-def margin_data(margin: Margin) -> dict[str, Any]:
-    """Writes a margin as plain data; a limit that is not there is null."""
-    return {
-        "quantity": margin.quantity,
-        "joint": margin.joint,
-        "value": margin.value,
-        "limit": margin.limit if np.isfinite(margin.limit) else None,
-        "time": margin.time,
-        "slack_fraction": margin.slack_fraction,
-    }

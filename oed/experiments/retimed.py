@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.criteria import CRITERIA
-from oed.experiments.result import DESIGN, TRAJECTORY, Quality, design_model, margin_data, measured_margins
+from oed.experiments.design_file import DESIGN, TRAJECTORY
+from oed.experiments.margins import margin_data, measured_margins
+from oed.experiments.quality import Quality, design_model
 from oed.experiments.views import motion_frame, plot_velocities
 from oed.exports import read_trajectory, write_trajectory
 from oed.retiming import Retimed

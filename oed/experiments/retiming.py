@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.designing import usable_limits
-from oed.experiments.result import design_model, measure, measured_margins
+from oed.experiments.margins import measured_margins
+from oed.experiments.quality import design_model, measure
 from oed.experiments.retimed import RetimedExperiment, torque_use
 from oed.retiming import retime as retime_by_toppra
 from oed.retiming import retime_with_stops

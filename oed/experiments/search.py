@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from oed.criteria import triangle
 from oed.experiments.problem import FourierProblem
-from oed.experiments.solver import Ipopt, Solved, Stage, minimise
+from oed.experiments.solvers import Solved, Solver, Stage
 from oed.trajectories import count_periods
 from robots.common.errors import InputError
 
@@ -22,6 +22,7 @@ THROWS = (0.15, 0.3, 0.6)
 
 # Per period, by which designs are compared.
 FINE_SAMPLES = 1000
+INTERRUPTED = "interrupted"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +40,7 @@ class Effort:
     islands: int = 2
     starts: int = 6
     screened: int = 100
-    hops: int = 30
+    hops: int = 60
     finish_samples: int = 400
 
     def __post_init__(self) -> None:
@@ -60,9 +61,9 @@ class Effort:
 
 
 EFFORTS = {
-    "quick": Effort(islands=1, starts=4, hops=6),
+    "quick": Effort(islands=1, starts=5, hops=16, finish_samples=200),
     "standard": Effort(),
-    "thorough": Effort(hops=200),
+    "thorough": Effort(hops=400),
 }
 
 
@@ -77,9 +78,10 @@ class Found:
             excited.
         value: the criterion as people read it.
         initial: the same of its first feasible point.
-        iterations: of IPOPT.
+        iterations: of the local solver.
         evaluations: of the criterion with its gradient.
         status: ``finished``, or what stopped it early.
+        starts: of each random start, the criterion there and of what the first solution made of it.
     """
 
     number: int
@@ -90,6 +92,7 @@ class Found:
     iterations: int
     evaluations: int
     status: str
+    starts: tuple[tuple[float, float], ...] = ()
 
 
 class Island:
@@ -98,29 +101,32 @@ class Island:
     Args:
         problem: the design problem.
         effort: how long to search.
-        settings: of IPOPT.
+        settings: the local solver and its settings.
         seed: of the whole design.
         number: of this island.
         tell: told after each local solution how many are done, and the best value so far.
         deadline: as `time.time` counts, for islands of one design may run one after the other or on several machines;
             after it the best design so far is kept.
+        halted: asked again and again whether to end early with the best design so far.
     """
 
     def __init__(
         self,
         problem: FourierProblem,
         effort: Effort,
-        settings: Ipopt,
+        settings: Solver,
         seed: int,
         number: int,
         *,
         tell: Callable[[int, float], None] = lambda done, best: None,
         deadline: float = np.inf,
+        halted: Callable[[], bool] = lambda: False,
     ) -> None:
         self._problem, self._effort, self._settings = problem, effort, settings
         self._fine = replace(problem, samples=FINE_SAMPLES)
         self._rng = np.random.default_rng([seed, number])
-        self._number, self._tell, self._deadline = number, tell, deadline
+        self._number, self._tell, self._deadline, self._halted = number, tell, deadline, halted
+        self._starts: list[tuple[float, float]] = []
         self._iterations = self._evaluations = self._done = 0
         self._best = np.inf
 
@@ -128,14 +134,17 @@ class Island:
         """Runs the search."""
         criterion, settings = self._problem.criterion, self._settings
         rough, *sharper = criterion.stages
-        first = Stage(sharpness=rough, max_iter=settings.max_iter * 4 // 3, barrier=1e-2)
-        again = [Stage(sharpness=p, max_iter=settings.max_iter, barrier=1e-3) for p in (rough, *sharper)]
+        fresh, known, _ = settings.barriers
+        first = Stage(sharpness=rough, max_iter=settings.max_iter * 4 // 3, barrier=fresh)
+        again = [Stage(sharpness=p, max_iter=settings.max_iter, barrier=known) for p in (rough, *sharper)]
         start = self._screen()
         initial = dense(self._problem, start)[1]
         pool = [(self._cost(start), start)]
         for number in range(self._effort.starts):
             if self._in_time():
-                pool.append(self._solve(start if not number else self._screen(), [first]))
+                point = start if not number else self._screen()
+                pool.append(self._solve(point, [first]))
+                self._starts.append((self._as_read(point), self._as_read(pool[-1][1])))
         pool.sort(key=_by_cost)
         # Several starts end in the same few valleys: only the best are worth sharpening.
         pool = [*pool[:1], *(self._solve(z, again) for _, z in pool[: max(1, self._effort.starts // 3)])]
@@ -154,16 +163,25 @@ class Island:
             initial=initial,
             iterations=self._iterations,
             evaluations=self._evaluations,
-            status="finished" if self._in_time() else "stopped at the time limit",
+            status=self._status(),
+            starts=tuple(self._starts),
         )
 
     def _in_time(self) -> bool:
-        return time.time() < self._deadline
+        return time.time() < self._deadline and not self._halted()
+
+    def _status(self) -> str:
+        if self._halted():
+            return INTERRUPTED
+        return "finished" if self._in_time() else "stopped at the time limit"
+
+    def _as_read(self, z: Array) -> float:
+        return (-1.0 if self._problem.criterion.larger_is_better else 1.0) * self._cost(z)
 
     def _screen(self) -> Array:
         problem = self._problem
-        points = [problem.shrunk(self._rng.normal(size=problem.size), 0.95) for _ in range(self._effort.screened)]
-        return min(points, key=problem.cost)
+        drawn = (self._rng.normal(size=problem.size) for _ in range(self._effort.screened))
+        return min((problem.shrunk(z, 0.95, halvings=6) for z in drawn), key=problem.cost)
 
     def _thrown(self, pool: list[tuple[float, Array]], hop: int) -> Array:
         """Throws one or two joints' coefficients of the best design, or now and then of one of the next best."""
@@ -177,7 +195,7 @@ class Island:
     def _solve(self, start: Array, stages: list[Stage]) -> tuple[float, Array]:
         if not self._in_time():
             return np.inf, start
-        solved = minimise(self._problem, start, stages, self._settings, tell=self._in_time)
+        solved = self._settings.minimise(self._problem, start, stages, tell=self._in_time)
         return self._count(solved, self._cost(solved.z)), solved.z
 
     def _cost(self, z: Array) -> float:
@@ -195,18 +213,18 @@ class Island:
     def _finish(self, z: Array) -> Array:
         """Sharpens the stand-in on a finer grid until it is the criterion, keeping each stage that brings something."""
         problem = replace(self._problem, samples=self._effort.finish_samples)
-        best, best_cost, barrier = z, dense(problem, z)[0], 1e-4
+        best, best_cost, barrier = z, dense(problem, z)[0], self._settings.barriers[2]
         for sharpness in problem.criterion.finish or problem.criterion.stages:
             if not self._in_time():
                 break
             stage = Stage(sharpness=sharpness, max_iter=self._settings.finish_iter, barrier=barrier)
-            solved = minimise(problem, best, [stage], self._settings, tell=self._in_time)
+            solved = self._settings.minimise(problem, best, [stage], tell=self._in_time)
             self._iterations += solved.iterations
             self._evaluations += solved.evaluations
             cost = dense(problem, solved.z)[0]
             if cost < best_cost:
                 best, best_cost = solved.z, cost
-            barrier = max(barrier / 3, 1e-5)
+            barrier = max(barrier / 3, self._settings.tolerance / 10)
         self._done += 1
         self._tell(self._done, best_cost)
         return best

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from oed.reports.campaign_report import campaign_page, save_campaign_report
 from oed.reports.design_report import design_page, save_design_report
+from oed.reports.diagnosis_limits import limits_page, save_limits_report
+from oed.reports.diagnosis_report import diagnosis_page, save_diagnosis_report
 from oed.reports.estimate_report import estimate_page, save_estimate_report
 from oed.reports.matplotlib_ import save_png, to_matplotlib
 from oed.reports.page import Fact, Footer, Page, Section, Table, render
 from oed.reports.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
+from oed.reports.pareto_report import pareto_page, save_pareto_report
 from oed.reports.pictures import Band, Line, Panel, Picture, Series, Span
 from oed.reports.plotly_ import to_plotly
 from oed.reports.retime_report import retime_page, save_retime_report
@@ -29,18 +32,24 @@ __all__ = [
     "Table",
     "campaign_page",
     "design_page",
+    "diagnosis_page",
     "error_bars_picture",
     "estimate_page",
     "friction_picture",
+    "limits_page",
     "margins_picture",
     "parameter_picture",
+    "pareto_page",
     "percent",
     "render",
     "residual_picture",
     "retime_page",
     "save_campaign_report",
     "save_design_report",
+    "save_diagnosis_report",
     "save_estimate_report",
+    "save_limits_report",
+    "save_pareto_report",
     "save_png",
     "save_retime_report",
     "significant",

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.experiments import Design
-from oed.experiments.result import Quality, missing_limits
+from oed.experiments.margins import missing_limits
+from oed.experiments.quality import Quality
 from oed.reports.page import Cell, Fact, Page, Section, Table
 from oed.reports.saving import footer, save_page
 from oed.reports.significant import significant
@@ -191,13 +192,16 @@ def _search_text(design: Design) -> str:
     searches = "One search" if count == 1 else f"{count} independent searches"
     return (
         f"{searches} from seed {settings['seed']}, {'' if count == 1 else 'each '}with "
-        f"{settings['effort']['starts']} screened starts and {settings['effort']['hops']} hops, solved by IPOPT with "
-        "exact gradients. The limits were imposed so that they hold between the samples, too."
+        f"{settings['effort']['starts']} screened starts and {settings['effort']['hops']} hops, solved by "
+        f"{'IPOPT' if settings['solver']['name'] == 'ipopt' else 'a feasible interior-point method'} with exact "
+        "gradients. The limits were imposed so that they hold between the samples, too."
     )
 
 
 def _islands(design: Design) -> Table:
-    rows = tuple(tuple(island.to_dict().values()) for island in design.islands)
+    rows = tuple(
+        tuple(value for key, value in island.to_dict().items() if key != "starts") for island in design.islands
+    )
     name = design.criterion.name
     headings = ("search", f"first {name}", f"final {name}", "iterations", "evaluations", "end")
     return Table(headings=headings, rows=rows, caption="The criterion of one period at the controller's samples.")

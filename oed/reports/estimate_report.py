@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.estimate import Estimate
+from estimation.method_table import MethodTable
 from oed.reports.page import Cell, Fact, Page, Section, Table
 from oed.reports.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
 from oed.reports.pictures import Picture
@@ -16,14 +17,24 @@ from robots.common.files import ResultFolder
 
 Array = NDArray[np.float64]
 
+# Pairs of parameters shown, and the correlation of their errors from which they are.
+PAIRS, CORRELATED = 12, 0.8
 
-def save_estimate_report(estimate: Estimate, folder: ResultFolder, *, png: bool = False) -> None:
+
+def save_estimate_report(
+    estimate: Estimate, folder: ResultFolder, *, png: bool = False, methods: MethodTable | None = None
+) -> None:
     """Writes the page of an identification, and its pictures as PNG on request."""
-    save_page(estimate_page(estimate), folder, png=png)
+    save_page(estimate_page(estimate, methods), folder, png=png)
 
 
-def estimate_page(estimate: Estimate) -> Page:
-    """Builds the page: how well the torques are explained, by which parameters, known how well."""
+def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Page:
+    """Builds the page: how well the torques are explained, by which parameters, known how well.
+
+    Args:
+        estimate: the identification.
+        methods: estimators that were compared on unseen data.
+    """
     model, joints = estimate.model, estimate.joints
     robot = model.robot
     known = int(model.determined.sum())
@@ -51,7 +62,11 @@ def estimate_page(estimate: Estimate) -> Page:
             ),
             tables=(_joints(estimate),),
         ),
-        Section(title="Parameters", pictures=_parameter_pictures(estimate), tables=(_parameters(estimate),)),
+        Section(
+            title="Parameters",
+            pictures=_parameter_pictures(estimate),
+            tables=(_parameters(estimate), *_correlations(estimate)),
+        ),
         Section(
             title="Residual",
             pictures=(residual_picture(residual, estimate.dq, period=period, joint_names=names, kinds=kinds),),
@@ -59,15 +74,20 @@ def estimate_page(estimate: Estimate) -> Page:
         Section(
             title="How it was made",
             paragraphs=(
-                f"Method {model.provenance['method']}; positions smoothed at {estimate.choice.cutoff:g} Hz without "
-                f"phase lag; ridge {estimate.choice.ridge:g} on the Gram matrix with unit columns; both chosen by "
-                "predicting contiguous blocks of the logs from the rest. Standard errors come from a sandwich with an "
-                "autoregressive model of the residual, joints correlated.",
+                f"Method {model.provenance['method']}; positions: {estimate.choice.smoother.text}, without phase "
+                f"lag; {_regularisation(estimate)}; both chosen by predicting contiguous blocks of the logs from the "
+                "rest. Standard errors come from a sandwich with an autoregressive model of the residual, joints "
+                "correlated. The 95 % band holds the errors of left-out blocks; its coverage is counted on each block "
+                "with the band of the others.",
             ),
             tables=(_logs(estimate),),
             folded=True,
         ),
     ]
+    if methods is not None:
+        sections.insert(1, Section(title="Estimators", tables=(_methods(methods),)))
+    if any(gate.findings for gate in estimate.gates):
+        sections.insert(len(sections) - 1, Section(title="The logs", tables=(_findings(estimate),)))
     return Page(
         title="Identified dynamics",
         subtitle=robot.title or robot.name,
@@ -95,6 +115,7 @@ def _errors(estimate: Estimate) -> Picture:
         return np.array([error / scale if scale else np.nan for error, scale in pairs])
 
     errors = {"fitted": shares("residual_rms"), "left out": shares("held_out_rms"), "constant": shares("torque_spread")}
+    errors["noise floor"] = shares("noise_floor")
     nominal = shares("nominal_rms")
     if np.isfinite(nominal).any():
         errors["robot's description"] = nominal
@@ -105,13 +126,21 @@ def _joints(estimate: Estimate) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for joint in estimate.joints:
         scale = joint.torque_rms or np.nan
-        errors = (joint.residual_rms, joint.held_out_rms, joint.torque_spread, joint.nominal_rms)
+        errors = (
+            joint.residual_rms,
+            joint.held_out_rms,
+            joint.torque_spread,
+            joint.nominal_rms,
+            joint.noise_floor,
+            joint.band,
+        )
         rows.append(
             (
                 joint.joint,
                 joint.name,
                 joint.torque_rms,
                 *(None if not np.isfinite(e) else 100 * e / scale for e in errors),
+                100 * joint.band_coverage if np.isfinite(joint.band_coverage) else None,
                 "yes" if joint.identified else "NO",
             )
         )
@@ -123,6 +152,9 @@ def _joints(estimate: Estimate) -> Table:
         "left out [%]",
         "constant [%]",
         "description [%]",
+        "noise floor [%]",
+        "95 % band ± [%]",
+        "band holds [%]",
         "identified",
     )
     return Table(
@@ -150,6 +182,50 @@ def _parameters(estimate: Estimate) -> Table:
         caption="Values rounded to two digits of their standard errors.",
         align=("left", "right", "right", "right", "left", "left"),
     )
+
+
+def _regularisation(estimate: Estimate) -> str:
+    choice = estimate.choice
+    if choice.pull is not None:
+        return f"a pull of {choice.ridge:g} towards the robot's description"
+    return f"ridge {choice.ridge:g} on the Gram matrix with unit columns"
+
+
+def _correlations(estimate: Estimate) -> tuple[Table, ...]:
+    """Pairs of determined parameters whose errors go together: the data tell their sum better than each."""
+    model = estimate.model
+    known = np.flatnonzero(model.determined)
+    errors = np.sqrt(np.maximum(np.diag(model.covariance), np.finfo(float).tiny))
+    correlation = (model.covariance / errors[:, None] / errors)[np.ix_(known, known)]
+    first, second = np.triu_indices(len(known), 1)
+    values = correlation[first, second]
+    order = [k for k in np.argsort(-np.abs(values))[:PAIRS] if abs(values[k]) >= CORRELATED]
+    if not order:
+        return ()
+    names = [model.names[i] for i in known]
+    rows = tuple((names[first[k]], names[second[k]], f"{values[k]:+.3f}") for k in order)
+    caption = f"Determined parameters with the most correlated errors, from {CORRELATED:g} on."
+    return (Table(headings=("parameter", "parameter", "correlation"), rows=rows, caption=caption),)
+
+
+def _methods(methods: MethodTable) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for row in methods.rows:
+        shares = [None if row.problem else 100 * float(value) for value in row.unseen]
+        mean = None if row.problem else 100 * float(row.unseen.mean())
+        rows.append((row.method, *shares, mean, 100 * row.determined, row.seconds, row.problem or "–"))
+    joints = (f"joint {joint} [%]" for joint in range(1, len(methods.joint_names) + 1))
+    return Table(
+        headings=("estimator", *joints, "mean [%]", "determined [%]", "time [s]", "problem"),
+        rows=tuple(rows),
+        caption="Error over torque, standard deviations, on data that none has seen. The best one made this page.",
+    )
+
+
+def _findings(estimate: Estimate) -> Table:
+    rows = tuple((gate.log, finding.severity, str(finding)) for gate in estimate.gates for finding in gate.findings)
+    caption = "What the gate found before the fit, and what was done about it."
+    return Table(headings=("log", "severity", "finding"), rows=rows, caption=caption)
 
 
 def _parameter_pictures(estimate: Estimate) -> tuple[Picture, ...]:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import qmc
 
 from oed.trajectories.base import Array, Kinematics, Trajectory, frozen
 from robots.common.errors import InputError
@@ -94,6 +93,8 @@ def spread_postures(
     if down.shape != (3,):
         raise InputError(f"found a gravity of {down.size} numbers", allowed="three")
     lower, upper = _window(limits)
+    from scipy.stats import qmc  # half a second to import, and needed here alone
+
     places = qmc.Sobol(d=chain.n, scramble=False).random(CANDIDATES)  # (C, n), 0 to 1
     poses = lower + (reserve + (1.0 - 2.0 * reserve) * places) * (upper - lower)
     features = np.hstack([_gravity_directions(chain, poses, down), POSITION_WEIGHT * places])

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import oed
-from oed.experiments import Design, Effort, Ipopt
+from oed.experiments import Design, Effort, InteriorPoint
 from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits
 from robots.loading import load_robot
@@ -19,7 +19,7 @@ from robots.robot import Robot
 Array = NDArray[np.float64]
 
 TINY = Effort(islands=1, starts=1, screened=10, hops=0, finish_samples=100)
-BRIEF = Ipopt(max_iter=15, finish_iter=10)
+BRIEF = InteriorPoint(max_iter=25, finish_iter=15)
 
 
 def _turned(alpha: float) -> Array:
@@ -83,7 +83,7 @@ def tiny() -> Effort:
 
 
 @pytest.fixture(scope="session")
-def brief() -> Ipopt:
+def brief() -> InteriorPoint:
     return BRIEF
 
 

@@ -10,13 +10,13 @@ import pytest
 
 import oed
 from oed.criteria import Prior
-from oed.experiments import Effort, Ipopt
+from oed.experiments import Effort, InteriorPoint
 from robots.collision import check_motion, collision_model
 from robots.common.errors import InfeasibleError, InputError
 from robots.loading import load_robot
 
 TINY = Effort(islands=1, starts=1, screened=10, hops=0, finish_samples=100)
-BRIEF = Ipopt(max_iter=15, finish_iter=10)
+BRIEF = InteriorPoint(max_iter=25, finish_iter=15)
 
 
 def design(robot, **options):
@@ -60,6 +60,29 @@ def test_the_torque_limit_decides(er3a):
     # 10 % are kept for what the description is wrong by; the samples of the solver are not those of the file
     assert 0.8 < tight.max() < 0.905
     assert not kept.violated
+
+
+def test_the_rms_torque_decides(er3a):
+    """Where the free design is too hard on a motor in the mean, the limited one is not, by pinocchio."""
+    free = design(er3a, periods=3)
+    hot = np.sqrt(np.square(pinocchio_torque(er3a, free.part("fourier"))).mean(axis=0))
+    bound = np.full(6, np.inf)
+    bound[0] = hot[0]
+    kept = design(replace(er3a, limits=replace(er3a.limits, torque_rms=bound)), periods=3)
+    warm = np.sqrt(np.square(pinocchio_torque(er3a, kept.motion)).mean(axis=0))[0]
+    # 10 % of the limit are kept; the moves to and from the optimised part are in the mean, too.
+    assert 0.8 * bound[0] < warm <= 0.9 * bound[0] * 1.0001
+    (margin,) = [m for m in kept.margins if m.quantity == "torque RMS" and m.joint == 1]
+    assert margin.value == pytest.approx(warm, rel=1e-6)
+    assert kept.success
+
+
+def test_an_rms_limit_below_gravity_is_told_first(er3a):
+    """A joint whose motor cannot hold the home pose for long is named, with the limit that would do."""
+    bound = np.full(6, np.inf)
+    bound[1] = 1.0
+    with pytest.raises(InfeasibleError, match=r"joint 2: holding the pose takes .* RMS torque .* or more"):
+        design(replace(er3a, limits=replace(er3a.limits, torque_rms=bound)))
 
 
 def test_a_limit_below_gravity_is_told_first(er3a):
@@ -137,3 +160,26 @@ def test_scaling_is_reported_beside_the_plain_numbers(er3a, scaling):
     assert made.qualities[1].part == f"fourier (columns by {scaling}, rows by noise)"
     assert made.qualities[1].value("cond") != pytest.approx(made.fourier.value("cond"))
     assert made.islands[0].final == pytest.approx(made.qualities[1].value("cond"), rel=1e-6)
+
+
+def test_essential_parameters_only(er3a, tmp_path):
+    """With a share stated, columns whose torque is below it are left out, and what is left is easier to tell apart."""
+    whole, part = design(er3a), design(er3a, essential=0.02)
+    assert set(part.base.names) < set(whole.base.names)
+    assert part.fourier.value("cond") < whole.fourier.value("cond")
+    # By the description itself: each column left out is below the share of every joint's torque on the design.
+    motion, nominal = whole.part("fourier"), whole.base.from_standard(whole.base.model.nominal)
+    own = whole.base.regressor(motion.q, motion.dq, motion.ddq) * nominal
+    share = np.sqrt(np.square(own).mean(axis=0)) / np.sqrt(np.square(own.sum(axis=2)).mean(axis=0))[:, None]
+    for name, most in zip(whole.base.names, share.max(axis=0), strict=True):
+        # The shares that decide are those on random motions: a factor of two between them and this one.
+        assert most < 0.04 or name in part.base.names
+    part.save(tmp_path)
+    assert oed.Design.load(tmp_path).to_dict() == part.to_dict()
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.0])
+def test_essential_share_out_of_range(er3a, share):
+    """A share that is none is refused."""
+    with pytest.raises(InputError, match="0 to below 1"):
+        design(er3a, essential=share)

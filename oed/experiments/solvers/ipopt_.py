@@ -4,125 +4,76 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi
 import numpy as np
 from numpy.typing import NDArray
 
 from oed.experiments.objective import Objective, Watch
-from oed.experiments.pointwise_rows import PointwiseFunction, PointwiseRows
+from oed.experiments.pointwise_function import PointwiseFunction
+from oed.experiments.pointwise_rows import PointwiseRows
 from oed.experiments.problem import FourierProblem
+from oed.experiments.solvers.base import PASSED, Solved, Solver, Stage
 from oed.experiments.trap import Trap
 from oed.experiments.working_set import WorkingSet
 
 Array = NDArray[np.float64]
 
-# By how much a row may be passed, as a share of its bound, before it is added; less than that is shrunk away.
-PASSED = 1e-3
 # IPOPT's last word when CasADi noticed Ctrl-C before Python did.
 INTERRUPTED = ("User_Requested_Stop", "NonIpopt_Exception_Thrown")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ipopt:
-    """Settings of the interior-point solver.
+class Ipopt(Solver):
+    """Settings of IPOPT; see `Solver` for what all solvers share.
 
     Attributes:
-        max_iter: iterations per stage of the criterion in the search.
-        finish_iter: iterations per stage of the finish.
-        tolerance: at which a stage ends.
         history: of the limited-memory Hessian.
-        rounds: how often rows that a solution passes are added and the stage is solved again.
     """
 
-    max_iter: int = 60
-    finish_iter: int = 150
-    tolerance: float = 1e-4
+    name: ClassVar[str] = "ipopt"
+    barriers: ClassVar[tuple[float, float, float]] = (1e-2, 1e-3, 1e-4)
+
     history: int = 10
-    rounds: int = 2
 
+    def minimise(
+        self,
+        problem: FourierProblem,
+        start: Array,
+        stages: Sequence[Stage],
+        *,
+        tell: Callable[[], bool] = lambda: True,
+    ) -> Solved:
+        """See `Solver.minimise`."""
+        trap = Trap()
+        objective, working, pointwise = Objective(problem, trap), WorkingSet(problem), PointwiseRows(problem)
+        pointwise.add_peaks(start, PASSED)
+        z, iterations, status, going = start, 0, "no iteration", True
 
-@dataclass(frozen=True, kw_only=True)
-class Stage:
-    """One smooth stand-in of the criterion to be minimised.
+        def watch() -> bool:
+            nonlocal going
+            going = going and tell()
+            return going
 
-    Attributes:
-        sharpness: of the stand-in.
-        max_iter: iterations.
-        barrier: initial barrier parameter.
-    """
-
-    sharpness: float
-    max_iter: int
-    barrier: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Solved:
-    """What one solution came to.
-
-    Attributes:
-        z: a feasible point (n K,).
-        iterations: of IPOPT, all stages together.
-        evaluations: of the criterion with its gradient.
-        status: IPOPT's last word.
-    """
-
-    z: Array
-    iterations: int
-    evaluations: int
-    status: str
-
-
-def minimise(
-    problem: FourierProblem,
-    start: Array,
-    stages: Sequence[Stage],
-    settings: Ipopt,
-    *,
-    tell: Callable[[], bool] = lambda: True,
-) -> Solved:
-    """Solves stages one after the other from a feasible start.
-
-    Args:
-        problem: the design problem.
-        start: z (n K,), within the limits.
-        stages: of the criterion, the smoothest first.
-        settings: of IPOPT.
-        tell: called after each iteration; returning False stops the solver, which keeps its last iterate.
-
-    Returns:
-        The last stage's solution, pulled within the limits where it passes a row that was left out.
-    """
-    trap = Trap()
-    objective, working, pointwise = Objective(problem, trap), WorkingSet(problem), PointwiseRows(problem)
-    pointwise.add_peaks(start, PASSED)
-    z, iterations, status, going = start, 0, "no iteration", True
-
-    def watch() -> bool:
-        nonlocal going
-        going = going and tell()
-        return going
-
-    for stage in stages:
-        objective.forget(stage.sharpness)
-        max_iter, barrier = stage.max_iter, stage.barrier
-        for _ in range(settings.rounds):
-            run = _Run(objective, working, pointwise, settings, max_iter, barrier, watch, trap)
-            z, count, status = run.solve(z)
-            trap.release()
-            if status in INTERRUPTED and going:
-                raise KeyboardInterrupt
-            iterations += count
-            passed = [rows.add_peaks(z, PASSED) for rows in (working, pointwise)]
-            if not going or not any(passed):
+        for stage in stages:
+            objective.forget(stage.sharpness)
+            max_iter, barrier = stage.max_iter, stage.barrier
+            for _ in range(self.rounds):
+                run = _Run(objective, working, pointwise, self, max_iter, barrier, watch, trap)
+                z, count, status = run.solve(z)
+                trap.release()
+                if status in INTERRUPTED and going:
+                    raise KeyboardInterrupt
+                iterations += count
+                passed = [rows.add_peaks(z, PASSED) for rows in (working, pointwise)]
+                if not going or not any(passed):
+                    break
+                max_iter, barrier = max(10, max_iter // 2), barrier / 10
+            z = problem.shrunk(z)
+            if not going:
                 break
-            max_iter, barrier = max(10, max_iter // 2), barrier / 10
-        z = problem.shrunk(z)
-        if not going:
-            break
-    return Solved(z=z, iterations=iterations, evaluations=objective.evaluations, status=status)
+        return Solved(z=z, iterations=iterations, evaluations=objective.evaluations, status=status)
 
 
 class _Run:

@@ -1,0 +1,182 @@
+"""``oed diagnose``: what the model gets wrong, why, and what mending it brings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from oed.cli.console import Console
+from oed.cli.options import (
+    ForceOption,
+    JointsOption,
+    JsonOption,
+    LockOption,
+    PngOption,
+    QuietOption,
+    RobotOption,
+    SeedOption,
+    TipOption,
+    robot_from,
+)
+from robots.common.progress import Progress
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+
+def diagnose(
+    context: typer.Context,
+    robot: RobotOption,
+    log: Annotated[
+        list[Path] | None,
+        typer.Option("--log", help="A log, or a folder of logs; may be given again.", show_default=False),
+    ] = None,
+    held_out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--held-out", help="A log to measure the gain on; by default whole runs are kept.", show_default=False
+        ),
+    ] = None,
+    friction: Annotated[str, typer.Option(help="Of the base model: polynomial or coulomb-viscous.")] = "polynomial",
+    limits: Annotated[
+        bool, typer.Option("--limits", help="Before any experiment: say what --trajectory could show.")
+    ] = False,
+    trajectory: Annotated[
+        list[Path] | None,
+        typer.Option("--trajectory", help="With --limits: a trajectory.csv; may be given again.", show_default=False),
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            "--model",
+            help="With --limits: a model.json; by default the robot's nominal dynamics.",
+            show_default=False,
+        ),
+    ] = None,
+    noise: Annotated[
+        float, typer.Option(min=0.0, help="With --limits: torque noise expected, as a share of the torque RMS.")
+    ] = 0.02,
+    seed: SeedOption = 0,
+    out: Annotated[Path, typer.Option("--out", help="Folder for the results.")] = Path("diagnosed"),
+    tip: TipOption = None,
+    joints: JointsOption = None,
+    lock: LockOption = None,
+    png: PngOption = False,
+    force: ForceOption = False,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Names what the simulation gets wrong, extends the model and measures the gain."""
+    console = Console(json=json, quiet=quiet)
+    with console.working() as progress:
+        described = robot_from(robot, tip, joints, lock)
+        if limits:
+            if log or held_out or not trajectory:
+                raise typer.BadParameter("--limits takes --trajectory, and no logs", ctx=context)
+            summary, data = _limits(described, trajectory, model, noise, out, force, progress)
+        else:
+            if not log or trajectory or model:
+                raise typer.BadParameter("give --log, or --limits with --trajectory", ctx=context)
+            summary, data = _diagnosis(described, log, held_out or [], friction, seed, out, png, force, progress)
+    console.result(f"{summary}\nwritten to {out.resolve()}", data)
+
+
+def _limits(
+    robot: Robot,
+    trajectories: list[Path],
+    model: Path | None,
+    noise: float,
+    out: Path,
+    force: bool,
+    progress: Progress,
+) -> tuple[str, dict[str, Any]]:
+    """Says what planned motions could show: limits.json and report.html."""
+    import json as codec
+
+    import numpy as np
+
+    from estimation import load_model
+    from estimation.diagnosis.limits import planned_limits
+    from oed.exports import read_trajectory
+    from oed.reports import save_limits_report
+    from robots.common.errors import InputError
+    from robots.common.files import ResultFolder, write_atomic
+    from robots.plants import Sensors
+    from robots.regressor import default_model
+    from robots.signals import Motion
+
+    with ResultFolder(out, force, names=["limits.json", "report.html"]) as folder:
+        torque_model = default_model(robot, velocity_scale=1e-3)
+        parameters = np.asarray(torque_model.nominal)
+        if model is not None:
+            known = load_model(model)
+            if known.robot.n != robot.n:
+                raise InputError(f"a model of {known.robot.n} joints", file=model, allowed=f"{robot.n}")
+            torque_model = known.torque_model
+            parameters = np.zeros(torque_model.size)
+            parameters[list(known.columns)] = known.values
+        motions: list[Motion] = []
+        for path in trajectories:
+            motion = read_trajectory(path)[0]
+            if motion.n != robot.n:
+                raise InputError(f"a motion of {motion.n} joints", file=path, allowed=f"{robot.n}")
+            start = float(motions[-1].t[-1]) + 1.0 if motions else 0.0
+            motions.append(Motion(motion.t - motion.t[0] + start, motion.q, motion.dq, motion.ddq))
+        progress.start("all effects, all joints", None)
+        found = planned_limits(torque_model, parameters, motions, noise=Sensors(torque_noise=max(noise, 1e-4)))
+        data = {"robot": robot.name, "limits": [limit.to_dict() for limit in found]}
+        write_atomic(folder.path("limits.json"), codec.dumps(data, indent=2, allow_nan=False) + "\n")
+        save_limits_report(found, robot.title or robot.name, folder)
+    hidden = sum(not np.isfinite(limit.detectable) for limit in found)
+    named = sum(limit.attributable <= 0.02 for limit in found)
+    summary = [
+        f"{len(found)} effects and places: {named} would be seen and named at 2 % of the joint's torque, "
+        f"{hidden} are hidden in this motion",
+        "  effect                       joint   found [%]   named [%]   toughest rival",
+    ]
+    summary += [
+        f"  {limit.effect:28} {limit.joint or 'all':>5} {_percent(limit.detectable):>11} "
+        f"{_percent(limit.attributable):>11}   {limit.toughest or ''}".rstrip()
+        for limit in found
+    ]
+    return "\n".join(summary), data
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g}" if share < float("inf") else "-"
+
+
+def _diagnosis(
+    robot: Robot,
+    logs: list[Path],
+    held_out: list[Path],
+    friction: str,
+    seed: int,
+    out: Path,
+    png: bool,
+    force: bool,
+    progress: Progress,
+) -> tuple[str, dict[str, Any]]:
+    """Diagnoses logs: diagnosis.json, model.json, report.html and, where new motions are proposed, those."""
+    from estimation import read_logs
+    from estimation.diagnosis.diagnosing import diagnose as run
+    from estimation.diagnosis.next_experiment_motions import MADE, at_rate
+    from oed.exports import write_trajectory
+    from oed.reports import save_diagnosis_report
+    from robots.common.files import ResultFolder
+
+    with ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]) as folder:
+        read = read_logs(logs, n=robot.n)
+        other = read_logs(held_out, n=robot.n) if held_out else None
+        result = run(robot, read, held_out=other, friction=friction, seed=seed, progress=progress)
+        result.save(folder.path("diagnosis.json").parent)
+        following = result.next_experiment
+        if following is not None and following.kind in MADE:
+            for number, stage in enumerate(following.stages, start=1):
+                path = folder.path(f"next_experiment_{number}.csv")
+                motion = at_rate(stage.motion, robot.period)
+                write_trajectory(path, motion, {"robot": robot.name, "experiment": following.kind})
+        save_diagnosis_report(result, folder, png=png)
+    return result.summary(), result.to_dict()

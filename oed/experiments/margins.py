@@ -1,0 +1,69 @@
+"""How far a motion stays from every limit, measured on its own samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.base_parameters import BaseParameters
+from robots.limits import Limits, Margin, symmetric_margins
+from robots.robot import Robot
+from robots.signals import Motion
+
+Array = NDArray[np.float64]
+
+
+def missing_limits(limits: Limits) -> dict[str, tuple[int, ...]]:
+    """Finds the quantities, and their joints from 1, for which cautious limits had to be assumed."""
+    lacking = {name: np.flatnonzero(~np.isfinite(getattr(limits, name))) + 1 for name in ("acceleration", "jerk")}
+    return {name: tuple(map(int, joints)) for name, joints in lacking.items() if joints.size}
+
+
+def measured_margins(robot: Robot, motion: Motion, base: BaseParameters) -> tuple[Margin, ...]:
+    """Measures the margins to all limits, the torque by the robot's nominal model where it is described."""
+    limits: Limits = robot.limits
+    margins = list(limits.margins(motion))
+    nominal = base.model.nominal
+    if np.isfinite(nominal).all() and np.isfinite(limits.torque).any():
+        tau = base.model.torque(motion.q, motion.dq, motion.ddq, nominal)
+        margins += symmetric_margins("torque", motion.t, tau, limits.torque)
+    if np.isfinite(nominal).all() and np.isfinite(limits.torque_rms).any():
+        margins += _rms_margins(motion, base.model.torque(motion.q, motion.dq, motion.ddq, nominal), limits)
+    if np.isfinite(robot.motor_speed).any():
+        margins += symmetric_margins("motor speed", motion.t, robot.gear_ratio * motion.dq, robot.motor_speed)
+    return tuple(margins)
+
+
+def _rms_margins(motion: Motion, tau: Array, limits: Limits) -> list[Margin]:
+    rms = np.sqrt(np.square(tau).mean(axis=0))
+    return [
+        Margin(
+            quantity="torque RMS",
+            joint=joint + 1,
+            value=float(value),
+            limit=float(limit),
+            time=float(motion.t[-1]),
+            slack_fraction=float(1 - value / limit) if limit > 0 else -np.inf,
+        )
+        for joint, (value, limit) in enumerate(zip(rms, limits.torque_rms, strict=True))
+    ]
+
+
+def margin_data(margin: Margin) -> dict[str, Any]:
+    """Writes a margin as plain data; a limit that is not there is null."""
+    return {
+        "quantity": margin.quantity,
+        "joint": margin.joint,
+        "value": margin.value,
+        "limit": margin.limit if np.isfinite(margin.limit) else None,
+        "time": margin.time,
+        "slack_fraction": margin.slack_fraction,
+    }
+
+
+def margin_from(data: Mapping[str, Any]) -> Margin:
+    """Reads what `margin_data` wrote."""
+    return Margin(**{**data, "limit": np.inf if data["limit"] is None else data["limit"]})

@@ -1,0 +1,179 @@
+"""The verb: designs for several criteria at once, and shows what each costs the others."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oed.criteria import Blend, Criterion
+from oed.criteria import criterion as choose_criterion
+from oed.experiments.designing import design
+from oed.experiments.result import Design
+from robots.common.errors import InputError
+from robots.common.files import write_atomic
+from robots.robot import Robot
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+PARETO = "pareto.json"
+MOST_CRITERIA = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParetoFront:
+    """Designs between the extremes of several criteria.
+
+    Attributes:
+        criteria: the k criteria.
+        weights: of each criterion's logarithm, (P, k), each row's sum 1.
+        designs: the P designs, one for each row of weights.
+        values: of each criterion for the optimised part of each design, (P, k), as people read them.
+    """
+
+    criteria: tuple[Criterion, ...]
+    weights: Array
+    designs: tuple[Design, ...]
+    values: Array
+
+    @property
+    def efficient(self) -> NDArray[np.bool_]:
+        """Which designs (P,) no other one beats in every criterion."""
+        signs = np.array([-1.0 if criterion.larger_is_better else 1.0 for criterion in self.criteria])
+        costs = self.values * signs
+        worse = (costs[None] <= costs[:, None]).all(axis=2) & (costs[None] < costs[:, None]).any(axis=2)
+        efficient: NDArray[np.bool_] = ~worse.any(axis=1)
+        return efficient
+
+    @property
+    def success(self) -> bool:
+        """Whether all designs keep their limits and excite all parameters."""
+        return all(design.success for design in self.designs)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per design: weights, values, and whether it is efficient."""
+        import pandas as pd
+
+        names = [criterion.name for criterion in self.criteria]
+        data: dict[str, Any] = {f"weight_{name}": self.weights[:, k] for k, name in enumerate(names)}
+        data |= {name: self.values[:, k] for k, name in enumerate(names)}
+        index = pd.RangeIndex(1, len(self.designs) + 1, name="point")
+        return pd.DataFrame({**data, "efficient": self.efficient}, index=index)
+
+    def summary(self) -> str:
+        """Lists the designs with their criteria."""
+        labels = ", ".join(f"{criterion.name} = {criterion.label}" for criterion in self.criteria)
+        head = "  point  " + "".join(f"{criterion.name:>14}" for criterion in self.criteria)
+        lines = [f"{self.designs[0].robot.name}: {len(self.designs)} designs; {labels}", head]
+        for point, (values, efficient) in enumerate(zip(self.values, self.efficient, strict=True), start=1):
+            numbers = "".join(f"{value:14.6g}" for value in values)
+            lines.append(f"  {point:5}  {numbers}{'' if efficient else '   beaten by another'}")
+        return "\n".join(lines)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the first two criteria against each other."""
+        from matplotlib.figure import Figure
+
+        axes = ax if ax is not None else Figure(figsize=(6, 5)).subplots()
+        for efficient, marker in ((True, "o"), (False, "x")):
+            chosen = self.efficient == efficient
+            axes.plot(self.values[chosen, 0], self.values[chosen, 1], marker, label="efficient" if efficient else "not")
+        axes.set_xlabel(self.criteria[0].label)
+        axes.set_ylabel(self.criteria[1].label)
+        axes.legend()
+        return axes
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes the front as plain data for `pareto.json`; the designs lie in folders beside it."""
+        return {
+            "format": "robot-oed pareto front",
+            "format_version": 1,
+            "criteria": [{"name": criterion.name, "label": criterion.label} for criterion in self.criteria],
+            "points": [
+                {
+                    "folder": folder_of(point),
+                    "weights": weights.tolist(),
+                    "values": values.tolist(),
+                    "efficient": bool(efficient),
+                }
+                for point, (weights, values, efficient) in enumerate(
+                    zip(self.weights, self.values, self.efficient, strict=True), start=1
+                )
+            ],
+        }
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Writes `pareto.json`, and each design in a folder of its own.
+
+        Raises:
+            InputError: a file is there, and force is not given.
+        """
+        for point, saved in enumerate(self.designs, start=1):
+            own = Path(folder) / folder_of(point)
+            own.mkdir(exist_ok=True)
+            saved.save(own, force=force)
+        write_atomic(Path(folder) / PARETO, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
+
+
+def pareto(
+    robot: Robot, *, criteria: Sequence[str | Criterion] = ("cond", "d"), points: int = 5, **options: Any
+) -> ParetoFront:
+    """Designs experiments between the extremes of several criteria.
+
+    Each design minimises a weighted sum of the criteria's logarithms, see `Blend`; the weights go evenly from one
+    criterion to the other. What lies between is a choice for people: what one criterion gains where the other loses
+    little is what the picture shows.
+
+    Args:
+        robot: the robot.
+        criteria: two or three criteria.
+        points: designs along each edge from one criterion to another, both ends included.
+        options: those of `oed.design`, but for the criterion.
+
+    Returns:
+        The front.
+
+    Raises:
+        InputError: fewer than two or more than three criteria, one twice, or fewer than two points; see also `design`.
+        InfeasibleError: see `design`.
+    """
+    chosen = tuple(choose_criterion(name) for name in criteria)
+    names = [part.name for part in chosen]
+    if not 2 <= len(chosen) <= MOST_CRITERIA or len(set(names)) < len(names):
+        raise InputError(f"criteria {', '.join(names) or 'none'}", allowed="two or three different ones")
+    if "i" in names:
+        raise InputError(
+            "criterion i in a front", remedy="it judges other directions than the others: design for it alone"
+        )
+    if points < 2 or points != int(points):
+        raise InputError(f"{points} points", allowed="a whole number, at least 2")
+    weights = lattice(len(chosen), points)
+    designs = [
+        design(robot, criterion=Blend(dict(zip(chosen, row.tolist(), strict=True))), **options) for row in weights
+    ]
+    weighted = [made.qualities[1] if "(" in made.qualities[1].part else made.fourier for made in designs]
+    values = np.array([[quality.value(part) for part in chosen] for quality in weighted])
+    return ParetoFront(criteria=chosen, weights=weights, designs=tuple(designs), values=values)
+
+
+def lattice(criteria: int, points: int) -> Array:
+    """Spreads weights (P, k) evenly over all mixtures, `points` along each edge; each row's sum is 1."""
+    rows = []
+    for picks in combinations_with_replacement(range(criteria), points - 1):
+        rows.append(np.bincount(picks, minlength=criteria) / (points - 1))
+    return np.array(rows)
+
+
+def folder_of(point: int) -> str:
+    """Names the folder of a design, counted from 1."""
+    return f"point_{point}"

@@ -1,0 +1,63 @@
+"""What a motion tells of the parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from oed.criteria import Criterion, Weighting, triangle
+from oed.criteria import criterion as choose_criterion
+from robots.base_parameters import BaseParameters
+from robots.common.parallel import one_blas_thread
+from robots.regressor import TorqueModel, default_model
+from robots.robot import Robot
+from robots.signals import Motion
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quality:
+    """What a part of the experiment tells of the parameters.
+
+    Attributes:
+        part: which segments, such as ``fourier`` or ``whole``.
+        samples: how many.
+        singular_values: of the unscaled regressor Y (m,), ascending.
+    """
+
+    part: str
+    samples: int
+    singular_values: tuple[float, ...]
+
+    def value(self, criterion: str | Criterion) -> float:
+        """Evaluates a criterion."""
+        return choose_criterion(criterion).value(np.square(self.singular_values))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Lists cond(Y), log det(Y'Y) and the smallest singular value; null where Y has not full rank."""
+        full = self.singular_values[0] > 1e-10 * self.singular_values[-1]
+        return {
+            "part": self.part,
+            "samples": self.samples,
+            "cond_Y": self.value("cond") if full else None,
+            "log_det_YtY": self.value("d") if full else None,
+            "smallest_singular_value_Y": self.singular_values[0] if full else 0.0,
+            "singular_values_Y": list(self.singular_values),
+        }
+
+
+@one_blas_thread()
+def measure(part: str, base: BaseParameters, motion: Motion, weighting: Weighting | None = None) -> Quality:
+    """Computes the singular values of a motion's regressor, or of what a weighting makes of it."""
+    judged = weighting or Weighting()
+    reduced = triangle(base.model, base.independent, motion.q, motion.dq, motion.ddq, judged.rows)
+    values = judged.singular_values(reduced, len(motion))
+    return Quality(part=part, samples=len(motion), singular_values=tuple(float(v) for v in values))
+
+
+def design_model(robot: Robot, settings: Mapping[str, Any]) -> TorqueModel:
+    """Builds the model whose columns a design with these settings is for."""
+    keys = ("friction", "velocity_scale", "rotor", "offset")
+    return default_model(robot, **{key: settings[key] for key in keys})

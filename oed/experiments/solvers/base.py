@@ -1,0 +1,92 @@
+"""What a local solver of design problems is."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oed.experiments.problem import FourierProblem
+
+Array = NDArray[np.float64]
+
+# By how much a row may be passed, as a share of its bound, before it is added; less than that is shrunk away.
+PASSED = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """One smooth stand-in of the criterion to be minimised.
+
+    Attributes:
+        sharpness: of the stand-in.
+        max_iter: iterations.
+        barrier: initial barrier parameter.
+    """
+
+    sharpness: float
+    max_iter: int
+    barrier: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solved:
+    """What one solution came to.
+
+    Attributes:
+        z: a feasible point (n K,).
+        iterations: of the solver, all stages together.
+        evaluations: of the criterion with its gradient.
+        status: the solver's last word.
+    """
+
+    z: Array
+    iterations: int
+    evaluations: int
+    status: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solver(ABC):
+    """Settings that every solver has; each member adds its own.
+
+    Attributes:
+        max_iter: iterations per stage of the criterion in the search.
+        finish_iter: iterations per stage of the finish.
+        tolerance: at which a stage ends.
+        rounds: how often rows that a solution passes are added and the stage is solved again.
+    """
+
+    name: ClassVar[str]
+    # Initial barrier parameters of a first solution, of one from a known design, and of the finish.
+    barriers: ClassVar[tuple[float, float, float]]
+
+    max_iter: int = 60
+    finish_iter: int = 150
+    tolerance: float = 1e-4
+    rounds: int = 2
+
+    @abstractmethod
+    def minimise(
+        self,
+        problem: FourierProblem,
+        start: Array,
+        stages: Sequence[Stage],
+        *,
+        tell: Callable[[], bool] = lambda: True,
+    ) -> Solved:
+        """Solves stages one after the other from a feasible start.
+
+        Args:
+            problem: the design problem.
+            start: z (n K,), within the limits.
+            stages: of the criterion, the smoothest first.
+            tell: called after each iteration; returning False stops the solver, which keeps its last iterate.
+
+        Returns:
+            The last stage's solution, within all limits.
+        """

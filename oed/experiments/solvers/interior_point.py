@@ -1,0 +1,193 @@
+"""A feasible interior-point method with a dense quasi-Newton Hessian, made for some hundred unknowns and many limits.
+
+IPOPT spends two thirds of a design's time on the sparse algebra of slacks and multipliers. Here the limits of each
+joint share one small block of rows, so that all of them are condensed into the Hessian of the unknowns, and every
+iterate is within all limits: whenever the solver is stopped, it has a design.
+
+Source: Nocedal and Wright, Numerical Optimization, 2nd ed., sections 18.3 (damped BFGS) and 19.3; Waechter and Biegler
+2006 for the barrier's schedule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dposv
+
+from oed.experiments.pointwise_rows import PointwiseRows
+from oed.experiments.problem import FourierProblem
+from oed.experiments.solvers.base import PASSED, Solved, Solver, Stage
+from oed.experiments.solvers.slacks import LinearSlacks, Slacks
+
+Array = NDArray[np.float64]
+
+ARMIJO = 1e-4
+HALVINGS = 12
+# Multipliers stay within this factor of mu / slack, as IPOPT's do.
+DRIFT = 1e10
+
+
+@dataclass(frozen=True, kw_only=True)
+class InteriorPoint(Solver):
+    """Settings of the feasible interior-point method; see `Solver`."""
+
+    name: ClassVar[str] = "interior-point"
+    barriers: ClassVar[tuple[float, float, float]] = (1e-4, 1e-4, 1e-5)
+
+    def minimise(
+        self,
+        problem: FourierProblem,
+        start: Array,
+        stages: Sequence[Stage],
+        *,
+        tell: Callable[[], bool] = lambda: True,
+    ) -> Solved:
+        """See `Solver.minimise`."""
+        linear, curved = LinearSlacks(problem), PointwiseRows(problem)
+        curved.add_peaks(start, PASSED)
+        descent = _Descent(problem, start, self.tolerance, tell)
+        for stage in stages:
+            max_iter, barrier = stage.max_iter, stage.barrier
+            for _ in range(self.rounds):
+                descent.run(Slacks(linear, curved, descent.z), stage.sharpness, max_iter, barrier)
+                passed = curved.add_peaks(descent.z, PASSED)
+                descent.z = problem.shrunk(descent.z)
+                if not passed or descent.stopped:
+                    break
+                max_iter = max(10, max_iter // 2)
+            if descent.stopped:
+                break
+        return Solved(
+            z=descent.z, iterations=descent.iterations, evaluations=descent.evaluations, status=descent.status
+        )
+
+
+class _Descent:
+    """An iterate, its quasi-Newton Hessian, and the iterations that improve both."""
+
+    def __init__(self, problem: FourierProblem, start: Array, tolerance: float, tell: Callable[[], bool]) -> None:
+        self._problem, self._tolerance, self._tell = problem, tolerance, tell
+        self.z = start
+        self._hessian: Array | None = None
+        self.iterations = self.evaluations = 0
+        self.stopped = False
+        self.status = "no iteration"
+
+    def run(self, slacks: Slacks, sharpness: float, max_iter: int, mu: float) -> None:
+        """Minimises the stand-in of one sharpness under the limits behind the slacks."""
+        z, (f, g) = self.z, self._evaluated(self.z, sharpness)
+        s = slacks.values(z)
+        slacks.linearise(z)
+        multipliers = mu / s
+        self.status = "iterations used up"
+        for _ in range(max_iter):
+            mu = self._lowered(mu, np.abs(g - slacks.pullback(multipliers)).max(), s, multipliers)
+            if mu == 0.0:
+                self.status = "solved"
+                break
+            gradient = g - slacks.pullback(mu / s)
+            p = self._direction(slacks, multipliers / s, gradient)
+            change = slacks.change(p)
+            step = min(1.0, _to_the_boundary(s, change, mu))
+            taken = self._searched(slacks, sharpness, z, f, s, p, step, float(gradient @ p), mu)
+            if taken is None:
+                self.status = "no further progress"
+                break
+            # First order in the slacks: the multipliers' Newton step towards s * multiplier = mu.
+            push = mu / s - multipliers - multipliers / s * change
+            multipliers = multipliers + min(1.0, _to_the_boundary(multipliers, push, mu)) * push
+            new, f, slope, s = taken
+            multipliers = np.clip(multipliers, mu / s / DRIFT, mu / s * DRIFT)
+            y = slope - g
+            if slacks.bent:
+                y = y + slacks.bend(multipliers)
+            slacks.linearise(new)
+            if slacks.bent:
+                y = y - slacks.bend(multipliers)
+            self._learn(new - z, y)
+            z, g = new, slope
+            self.z = z
+            self.iterations += 1
+            if not self._tell():
+                self.stopped, self.status = True, "stopped"
+                break
+
+    def _lowered(self, mu: float, residual: float, s: Array, multipliers: Array) -> float:
+        """The barrier parameter of the next step: smaller where the present one is solved well enough; 0 at the end."""
+        products, least = s * multipliers, self._tolerance / 10
+        while max(residual, np.abs(products - mu).max()) < 10 * mu:
+            if mu <= least:
+                return 0.0 if max(residual, products.max()) < self._tolerance else mu
+            mu = max(least, min(0.2 * mu, mu**1.5))
+        return mu
+
+    def _direction(self, slacks: Slacks, weights: Array, gradient: Array) -> Array:
+        size = len(gradient)
+        if self._hessian is None:
+            self._hessian = np.eye(size)
+        while True:
+            matrix = self._hessian.copy()
+            slacks.add_normal(matrix, weights)
+            _, p, failed = dposv(matrix, -gradient)
+            if not failed:
+                return np.asarray(p, dtype=np.float64)
+            # Rounding made the Hessian indefinite: what it knew of directions is given up, its size is kept.
+            self._hessian = np.eye(size) * max(float(np.abs(np.diag(self._hessian)).mean()), 1e-8) * 10
+
+    def _searched(
+        self,
+        slacks: Slacks,
+        sharpness: float,
+        z: Array,
+        f: float,
+        s: Array,
+        p: Array,
+        step: float,
+        slope: float,
+        mu: float,
+    ) -> tuple[Array, float, Array, Array] | None:
+        """Goes along p until the barrier function falls enough; point, value, gradient and slacks there, or None."""
+        before = f - mu * np.log(s).sum()
+        for _ in range(HALVINGS):
+            new = z + step * p
+            there = slacks.values(new)
+            if there.min() <= 0:  # a pointwise limit bends away
+                step /= 2
+                continue
+            value, gradient = self._evaluated(new, sharpness)
+            rise = value - mu * np.log(there).sum() - before
+            if rise <= ARMIJO * step * slope:
+                return new, value, gradient, there
+            curvature = (rise - step * slope) / step**2
+            step = float(np.clip(-slope / (2 * curvature) if curvature > 0 else 0.0, 0.1 * step, 0.5 * step))
+        return None
+
+    def _learn(self, moved: Array, y: Array) -> None:
+        """Updates the Hessian by Powell's damped BFGS, which keeps it positive definite."""
+        assert self._hessian is not None
+        sy = float(moved @ y)
+        if not self.iterations and sy > 0:
+            self._hessian = np.eye(len(moved)) * (y @ y / sy)
+        image = self._hessian @ moved
+        quadratic = float(moved @ image)
+        if quadratic <= 0 or not np.isfinite(sy):
+            return
+        if sy < 0.2 * quadratic:
+            share = 0.8 * quadratic / (quadratic - sy)
+            y = share * y + (1 - share) * image
+            sy = float(moved @ y)
+        self._hessian = self._hessian + np.outer(y, y) / sy - np.outer(image, image) / quadratic
+
+    def _evaluated(self, z: Array, sharpness: float) -> tuple[float, Array]:
+        self.evaluations += 1
+        return self._problem.surrogate(z, sharpness)
+
+
+def _to_the_boundary(values: Array, change: Array, mu: float) -> float:
+    """The step at which the first of some positive values has used up 99 % of itself, more as mu goes to zero."""
+    fastest = float((-change / values).max())
+    return max(0.99, 1 - mu) / fastest if fastest > 0 else np.inf

@@ -1,0 +1,207 @@
+"""The page of a diagnosis, for a reader who has never seen the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.diagnosis import Diagnosis
+from oed.reports.diagnosis_limits import limits_section
+from oed.reports.diagnosis_pictures import cause_picture, gain_picture
+from oed.reports.diagnosis_view import DiagnosisView, view_of
+from oed.reports.joint_units import joint_titles, joint_units
+from oed.reports.page import Cell, Fact, Page, Section, Status, Table
+from oed.reports.pictures import Picture
+from oed.reports.saving import footer, save_page
+from oed.reports.significant import significant
+from oed.reports.torque_pictures import torque_picture
+from robots.common.files import ResultFolder
+
+Array = NDArray[np.float64]
+
+
+def save_diagnosis_report(diagnosis: Diagnosis, folder: ResultFolder, *, png: bool = False) -> None:
+    """Writes the page of a diagnosis, and its pictures as PNG on request."""
+    save_page(diagnosis_page(view_of(diagnosis)), folder, png=png)
+
+
+def diagnosis_page(view: DiagnosisView) -> Page:
+    """Builds the page: what is wrong, how it shows, what mending it brings, what could not be seen, what to do next."""
+    sections = [_torque(view)]
+    sections += [_finding(view, index) for index in range(len(view.findings))]
+    if view.unexplained:
+        sections.append(Section(title="What is left", paragraphs=view.unexplained))
+    sections.append(_next(view))
+    sections.append(limits_section(view.limits, folded=bool(view.findings)))
+    status: dict[str, Status] = {"none": "good", "named": "good"}
+    return Page(
+        title="Diagnosis",
+        subtitle=view.robot,
+        verdict=_verdict(view),
+        status=status.get(view.verdict, "warning"),
+        facts=_facts(view),
+        warnings=view.warnings,
+        sections=tuple(sections),
+        footer=footer(),
+    )
+
+
+def _verdict(view: DiagnosisView) -> str:
+    if view.verdict == "none":
+        smallest = [limit.detectable for limit in view.limits if np.isfinite(limit.detectable)]
+        seen = (
+            f" Effects of {100 * float(np.median(smallest)):.1f} % of the torque would have been." if smallest else ""
+        )
+        return f"Nothing that the model leaves out was found.{seen}"
+    if not view.findings:
+        return "The model leaves something out that no effect of the catalogue explains."
+    first = view.findings[0].sentence
+    others = len(view.findings) - 1
+    more = f" And {others} more: see below." if others else ""
+    if view.verdict == "ambiguous":
+        return f"Something is found, but not which of several causes. The likeliest: {first}{more}"
+    if view.verdict == "unexplained":
+        return f"A part of the error is explained, another is not. {first}{more}"
+    return f"{first}{more}"
+
+
+def _facts(view: DiagnosisView) -> tuple[Fact, ...]:
+    facts = [Fact(label="Effects found", value=len(view.findings))]
+    if np.isfinite(view.nrmse_before).any():
+        worst = int(np.nanargmax(np.nan_to_num(view.nrmse_before - view.nrmse_after)))
+        facts.append(
+            Fact(
+                label=f"Error of joint {worst + 1}, unseen data",
+                value=f"{100 * view.nrmse_before[worst]:.2g} → {100 * view.nrmse_after[worst]:.2g} %",
+                note="of its torque RMS, without and with what was found",
+                status="good" if view.nrmse_after[worst] < view.nrmse_before[worst] else "neutral",
+            )
+        )
+        facts.append(
+            Fact(
+                label="Error of all joints, unseen data",
+                value=f"{100 * _pooled(view.nrmse_before):.2g} → {100 * _pooled(view.nrmse_after):.2g} %",
+                note="root mean square over the joints",
+            )
+        )
+    if view.findings:
+        chance = max(finding.p_value for finding in view.findings)
+        facts.append(Fact(label="Chance of a false alarm", value=f"{100 * chance:.2g} %", note="the weakest finding"))
+    return tuple(facts)
+
+
+def _pooled(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
+
+
+def _torque(view: DiagnosisView) -> Section:
+    known = np.isfinite(view.nrmse_before).any()
+    pictures: list[Picture] = []
+    if known:
+        pictures.append(gain_picture(view.nrmse_before, view.nrmse_after, joint_names=view.joint_names))
+    pictures.append(
+        torque_picture(view.t, view.measured, view.extended, joint_names=view.joint_names, kinds=view.kinds)
+    )
+    titles = joint_titles(view.joint_names, len(view.joint_names))
+    rows: list[tuple[Cell, ...]] = []
+    for j, title in enumerate(titles):
+        old, new = (None if not np.isfinite(e[j]) else 100 * float(e[j]) for e in (view.nrmse_before, view.nrmse_after))
+        gain = None if old is None or new is None or not old else 100 * (1 - new / old)
+        rows.append((title, old, new, gain))
+    table = Table(
+        headings=("joint", "base model [%]", "extended model [%]", "less error [%]"),
+        rows=tuple(rows),
+        caption="Error of the simulated torque over the torque's RMS, on data that the fit has not seen.",
+    )
+    return Section(
+        title="Measured and simulated torque",
+        paragraphs=(
+            f"The robot's torque as it was measured, and as the extended model simulates it, on {view.unseen}.",
+        ),
+        pictures=tuple(pictures),
+        tables=(table,) if known else (),
+    )
+
+
+def _finding(view: DiagnosisView, index: int) -> Section:
+    finding = view.findings[index]
+    place = "the whole robot" if finding.joint is None else f"joint {finding.joint}"
+    unit = joint_units(view.kinds, len(view.kinds))[finding.shown_on - 1].torque
+    values: list[tuple[Cell, ...]] = []
+    for name, value, unit_of, lower, upper in finding.parameters:
+        known = np.isfinite(lower) and np.isfinite(upper)
+        interval = (
+            f"{significant(lower, digits=3)} to {significant(upper, digits=3)}"
+            if known
+            else "not determined by these logs"
+        )
+        values.append((name.replace("_", " "), significant(value), unit_of, interval))
+    tables = [
+        Table(
+            headings=("parameter", "value", "unit", "95 % interval"),
+            rows=tuple(values),
+            align=("left", "right", "left", "left"),
+        )
+    ]
+    evidence: list[tuple[Cell, ...]] = [
+        ("chance that noise alone looks like this", f"{finding.p_value:.2g}"),
+        ("better than without it, in BIC", significant(finding.delta_bic, digits=3)),
+    ]
+    if np.isfinite(finding.before):
+        evidence.append(
+            ("error on unseen data", f"{100 * finding.before:.3g} → {100 * finding.after:.3g} % of the torque RMS")
+        )
+    if np.isfinite(finding.interval).all():
+        low, high = finding.interval
+        evidence.append(("gain, 95 % interval", f"{100 * low:.2g} to {100 * high:.2g} percentage points"))
+    tables.append(Table(headings=("evidence", "value"), rows=tuple(evidence)))
+    if finding.rivals:
+        tables.append(
+            Table(
+                headings=("instead of it", "worse by, in BIC"),
+                rows=tuple((title, round(margin, 1)) for title, margin in finding.rivals),
+                caption="Below 10 the rival remains possible.",
+            )
+        )
+    picture = cause_picture(
+        finding.label,
+        finding.coordinate,
+        finding.residual_before,
+        finding.residual_after,
+        title=f"What the model leaves of the torque of joint {finding.shown_on}",
+        unit=unit,
+        name=f"cause-{index + 1}",
+    )
+    return Section(
+        title=f"Finding {index + 1}: {finding.title}, {place}",
+        paragraphs=(finding.sentence,),
+        pictures=(picture,),
+        tables=tuple(tables),
+    )
+
+
+def _next(view: DiagnosisView) -> Section:
+    if not view.next_kind:
+        text = (
+            "No further experiment is needed to name the cause." if view.findings else "Nothing is left to tell apart."
+        )
+        return Section(title="Next step", paragraphs=(text,))
+    paragraphs = [f"Make {view.next_kind}: {view.next_why}." if view.next_why else f"Make {view.next_kind}."]
+    rows: Sequence[tuple[Cell, ...]] = tuple(
+        (kind, round(100 * chance), round(duration)) for kind, chance, duration in view.next_ranking
+    )
+    tables = (
+        (
+            Table(
+                headings=("experiment", "chance to name one cause [%]", "takes [s]"),
+                rows=tuple(rows),
+                align=("left", "right", "right"),
+            ),
+        )
+        if rows
+        else ()
+    )
+    return Section(title="Next step", paragraphs=tuple(paragraphs), tables=tables)

@@ -1,0 +1,168 @@
+"""A diagnosis as its page tells it: words, tables and curves, free of the objects that they come from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.diagnosis import Diagnosis, Finding, Trace
+from estimation.diagnosis.limits import Limit
+from robots.terms.effects import EFFECTS, EXPERIMENTS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FindingView:
+    """One finding as the page tells it.
+
+    Attributes:
+        title: what it is, in words.
+        sentence: what its values mean.
+        joint: counted from 1; None for the whole robot.
+        parameters: name, value, unit, lower and upper end of the 95 % interval (NaN where not determined).
+        p_value: chance that noise alone has an effect this strong.
+        delta_bic: how much better the model is with it.
+        before: error over torque RMS without it, on unseen data.
+        after: with it.
+        interval: 95 % interval of the difference.
+        rivals: title and how much worse in BIC, the closest first.
+        shown_on: the joint, from 1, whose residual the picture shows.
+        label: the coordinate's label.
+        coordinate: its values (N,).
+        residual_before: of that joint without the finding (N,).
+        residual_after: with all findings (N,).
+    """
+
+    title: str
+    sentence: str
+    joint: int | None
+    parameters: tuple[tuple[str, float, str, float, float], ...]
+    p_value: float
+    delta_bic: float
+    before: float
+    after: float
+    interval: tuple[float, float]
+    rivals: tuple[tuple[str, float], ...]
+    shown_on: int
+    label: str
+    coordinate: Array
+    residual_before: Array
+    residual_after: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DiagnosisView:
+    """A diagnosis as the page tells it.
+
+    Attributes:
+        robot: its name for people.
+        verdict: none, named, ambiguous or unexplained.
+        findings: strongest first.
+        joint_names: names (n,).
+        kinds: revolute or prismatic (n,).
+        t: time [s] of the unseen data (N,).
+        measured: torque (N, n).
+        base: the base model's (N, n).
+        extended: the extended model's (N, n).
+        nrmse_before: error over torque RMS per joint on unseen data (n,).
+        nrmse_after: with what was found (n,).
+        unseen: what the unseen data are.
+        limits: what could have been seen.
+        next_kind: the next experiment's kind in words; empty for none.
+        next_why: why.
+        next_resolves: its chance.
+        next_ranking: kind in words, chance and duration [s], the best first.
+        unexplained: what is left, in words.
+        warnings: what a reader must know.
+    """
+
+    robot: str
+    verdict: str
+    findings: tuple[FindingView, ...]
+    joint_names: tuple[str, ...]
+    kinds: tuple[str, ...]
+    t: Array
+    measured: Array
+    base: Array
+    extended: Array
+    nrmse_before: Array
+    nrmse_after: Array
+    unseen: str
+    limits: tuple[Limit, ...]
+    next_kind: str = ""
+    next_why: str = ""
+    next_resolves: float = float("nan")
+    next_ranking: tuple[tuple[str, float, float], ...] = ()
+    unexplained: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+def view_of(diagnosis: Diagnosis) -> DiagnosisView:
+    """Tells a diagnosis that has just been made: one that was loaded has no curves.
+
+    Raises:
+        ValueError: a diagnosis without curves.
+    """
+    if diagnosis.trace is None:
+        raise ValueError("a diagnosis that was loaded from a file has no curves")
+    robot, trace, following = diagnosis.model.robot, diagnosis.trace, diagnosis.next_experiment
+    left = [f for f in diagnosis.findings if f.pattern]
+    return DiagnosisView(
+        robot=robot.title or robot.name,
+        verdict=diagnosis.verdict,
+        findings=tuple(_finding(f, trace, x) for f, x in zip(diagnosis.findings, trace.coordinate, strict=True)),
+        joint_names=robot.joint_names,
+        kinds=robot.chain.kinds,
+        t=trace.t,
+        measured=trace.measured,
+        base=trace.measured - trace.before,
+        extended=trace.measured - trace.after,
+        nrmse_before=diagnosis.baseline,
+        nrmse_after=diagnosis.extended,
+        unseen=diagnosis.how_unseen,
+        limits=diagnosis.limits,
+        next_kind="" if following is None else EXPERIMENTS.get(following.kind, following.kind.replace("_", " ")),
+        next_why="" if following is None else following.why,
+        next_resolves=np.nan if following is None else following.resolves,
+        next_ranking=()
+        if following is None
+        else tuple((EXPERIMENTS.get(p.kind, p.kind), p.resolves, p.duration) for p in following.ranking),
+        unexplained=tuple(f"{f.sentence}" for f in left),
+        warnings=diagnosis.notes,
+    )
+
+
+def _finding(finding: Finding, trace: Trace, coordinate: Array) -> FindingView:
+    effect = EFFECTS.get(finding.effect)
+    title = effect.title if effect is not None else "a pattern without a known cause"
+    joint = finding.joint if finding.joint is not None else _most(trace)
+    known = bool(np.isfinite(coordinate).any())
+    return FindingView(
+        title=title,
+        sentence=finding.sentence,
+        joint=finding.joint,
+        parameters=tuple(
+            (p.name, p.value, p.unit, *(p.ci95 if p.determined else (np.nan, np.nan)))
+            for p in finding.parameters
+        ),
+        p_value=finding.p_value,
+        delta_bic=finding.delta_bic,
+        before=finding.gain.nrmse_before,
+        after=finding.gain.nrmse_after,
+        interval=finding.gain.ci95,
+        rivals=tuple((name.replace("_", " "), worse) for name, worse in finding.rivals),
+        shown_on=joint,
+        label=finding.coordinate if known and finding.coordinate else "time [s]",
+        coordinate=coordinate if known else trace.t,
+        residual_before=trace.before[:, joint - 1],
+        residual_after=trace.after[:, joint - 1],
+    )
+
+
+def _most(trace: Trace) -> int:
+    """The joint, from 1, whose error falls most."""
+    before, after = (np.sqrt(np.nanmean(part**2, axis=0)) for part in (trace.before, trace.after))
+    return 1 + int(np.argmax((before - after) / np.maximum(np.sqrt(np.nanmean(trace.measured**2, axis=0)), 1e-12)))

@@ -1,0 +1,117 @@
+"""The diagnosis from the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation.logs import write_log
+from estimation.model import load_model
+from oed.exports import read_trajectory
+from robots.loading import load_robot
+from robots.plants import load_plant, simulate
+from robots.signals import Motion
+
+PLANT = """
+effects:
+  - {effect: friction_step, joint: 2, parameters: {coulomb_step: 2.5, viscous_step: 1.0, change_time: 6.0}}
+"""
+
+
+@pytest.fixture(scope="module")
+def logs(robot: Path, experiment: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Play the experiment on a robot whose second joint is damaged after six seconds: two logs, the last unseen."""
+    folder = tmp_path_factory.mktemp("logs")
+    (folder / "plant.yaml").write_text(PLANT)
+    described = load_robot(robot)
+    plant = load_plant(folder / "plant.yaml", described)
+    motion = read_trajectory(experiment / "trajectory.csv")[0]
+    write_log(folder / "first.csv", simulate(plant, motion, seed=1))
+    later = Motion(motion.t + 60.0, motion.q[::-1], -motion.dq[::-1], motion.ddq[::-1])
+    write_log(folder / "second.csv", simulate(plant, later, seed=2))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def done(robot: Path, logs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Diagnose the logs once: a folder of results."""
+    from typer.testing import CliRunner
+
+    from oed.cli.app import app
+
+    out = tmp_path_factory.mktemp("diagnosed")
+    line = ["diagnose", "--robot", robot, "--log", logs / "first.csv", "--held-out", logs / "second.csv", "--out", out]
+    result = CliRunner().invoke(app, [str(part) for part in line])
+    assert result.exit_code == 0, result.output
+    assert "friction_step (joint 2)" in result.output
+    return out
+
+
+def test_a_hidden_damage_is_named(done: Path) -> None:
+    """The file names the damage that the plant had, its joint and its time, and the gain on the unseen log."""
+    data = json.loads((done / "diagnosis.json").read_text())
+    assert data["verdict"] == "named"
+    (finding,) = data["findings"]
+    assert (finding["effect"], finding["joint"]) == ("friction_step", 2)
+    values = {parameter["name"]: parameter["value"] for parameter in finding["parameters"]}
+    assert values["change_time"] == pytest.approx(6.0, abs=0.2)
+    assert values["coulomb_step"] == pytest.approx(2.5, rel=0.3)
+    assert finding["gain"]["nrmse_after"] < finding["gain"]["nrmse_before"]
+    assert {"effect", "joint", "detectable", "attributable"} <= set(data["limits"][0])
+
+
+def test_its_files_are_of_use(done: Path) -> None:
+    """The model can be loaded again with its extension, and the page names the finding."""
+    model = load_model(done / "model.json")
+    assert [extension.effect for extension in model.extensions] == ["friction_step"]
+    page = (done / "report.html").read_text()
+    assert "friction that changed at one moment" in page
+    assert "Smallest size that would be found" in page
+
+
+def test_limits_before_any_experiment(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
+    """With --limits, a trajectory alone tells what it could show, and what it could not."""
+    line = ("diagnose", "--limits", "--robot", robot, "--trajectory", experiment / "trajectory.csv", "--out", tmp_path)
+    result = run(*line, "--json")
+    assert result.code == 0, result.err
+    limits = {(limit["effect"], limit["joint"]): limit for limit in result.data["limits"]}
+    assert 0 < limits["stribeck", 2]["detectable"] < 0.2
+    assert limits["encoder_offset", 1]["detectable"] is None
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["limits.json", "report.html"]
+    again = run(*line)
+    assert again.code == 2
+    assert "--force" in again.err
+    louder = run(*line, "--noise", 0.1, "--force", "--json")
+    changed = {(limit["effect"], limit["joint"]): limit for limit in louder.data["limits"]}
+    assert changed["stribeck", 2]["detectable"] == pytest.approx(5 * limits["stribeck", 2]["detectable"], rel=1e-3)
+
+
+def test_limits_by_an_identified_model(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
+    """An identified model stands in for the description."""
+    line = ["diagnose", "--limits", "--robot", robot, "--trajectory", experiment / "trajectory.csv"]
+    result = run(*line, "--model", experiment / "model.json", "--out", tmp_path, "--json")
+    assert result.code == 0, result.err
+    assert any(np.isfinite(limit["detectable"] or np.inf) for limit in result.data["limits"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "give --log"),
+        (("--limits",), "--limits takes --trajectory"),
+        (("--limits", "--log", "a.csv", "--trajectory", "b.csv"), "--limits takes --trajectory"),
+        (("--log", "a.csv", "--trajectory", "b.csv"), "give --log"),
+        (("--log", "nowhere.csv"), "nowhere.csv"),
+        (("--limits", "--trajectory", "nowhere.csv"), "nowhere.csv"),
+    ],
+)
+def test_bad_use_is_told(arguments, message, run, robot: Path, tmp_path: Path) -> None:
+    """A call that means nothing, and files that are not there, end with code 2, the reason, and no file."""
+    result = run("diagnose", "--robot", robot, *arguments, "--out", tmp_path / "out")
+    assert result.code == 2
+    assert message in result.err.replace("\n", " ")
+    assert "Traceback" not in result.err
+    assert not (tmp_path / "out").exists()

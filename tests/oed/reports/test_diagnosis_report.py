@@ -1,0 +1,153 @@
+"""The page of a diagnosis, and of a planned experiment's limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.limits import Limit
+from oed.reports.diagnosis_limits import limits_page
+from oed.reports.diagnosis_pictures import binned, cause_picture, gain_picture
+from oed.reports.diagnosis_report import diagnosis_page
+from oed.reports.diagnosis_view import DiagnosisView, FindingView
+from oed.reports.page import render
+from robots.common.errors import InputError
+
+N = 400
+LIMITS = tuple(
+    Limit(effect=name, joint=joint, detectable=size, attributable=2 * size, toughest="spring", visible=0.3, note="")
+    for name, joint, size in (
+        ("stribeck", 1, 0.01),
+        ("stribeck", 2, np.inf),
+        ("encoder_offset", 2, 0.004),
+        ("base_tilt", None, 0.02),
+    )
+)
+
+
+@pytest.fixture
+def view():
+    random = np.random.default_rng(0)
+    t = 0.01 * np.arange(N)
+    speed = np.sin(t)
+    base = random.normal(size=(N, 2))
+    bend = np.column_stack([np.zeros(N), np.exp(-np.abs(speed) / 0.1) * np.sign(speed)])
+    finding = FindingView(
+        title="more friction at low speed (Stribeck)",
+        sentence="Joint 2 needs 1 N m more than its Coulomb friction to break away.",
+        joint=2,
+        parameters=(("stribeck_torque", 1.0, "N m", 0.9, 1.1), ("exponent", 1.3, "1", np.nan, np.nan)),
+        p_value=0.001,
+        delta_bic=86.0,
+        before=0.1,
+        after=0.05,
+        interval=(0.03, 0.07),
+        rivals=(("presliding", 40.0),),
+        shown_on=2,
+        label="velocity of joint 2 [rad/s]",
+        coordinate=speed,
+        residual_before=bend[:, 1] + 0.1 * random.normal(size=N),
+        residual_after=0.1 * random.normal(size=N),
+    )
+    return DiagnosisView(
+        robot="two <joints>",
+        verdict="named",
+        findings=(finding,),
+        joint_names=("lift", "swing"),
+        kinds=("prismatic", "revolute"),
+        t=t,
+        measured=base + bend,
+        base=base,
+        extended=base + bend,
+        nrmse_before=np.array([0.05, 0.1]),
+        nrmse_after=np.array([0.05, 0.05]),
+        unseen="a log that the fit has not seen",
+        limits=LIMITS,
+        next_kind="constant speeds",
+        next_why="it would tell them apart",
+        next_resolves=0.98,
+        next_ranking=(("constant speeds", 0.98, 60.0),),
+    )
+
+
+def test_the_page_tells_all(view):
+    """The page holds verdict, finding, parameters, rivals, gain, limits and next step, and escapes names."""
+    text = render(diagnosis_page(view))
+    for part in ("Joint 2 needs 1 N m more", "stribeck torque", "0.900 to 1.10", "presliding", "10 → 5 %", "hidden"):
+        assert part in text, part
+    assert "not determined by these logs" in text
+    assert "Make constant speeds" in text
+    assert "two <joints>" not in text
+
+
+@pytest.mark.parametrize(
+    ("verdict", "expected"),
+    [
+        ("none", "Nothing that the model leaves out was found. Effects of 1.0 % of the torque would have been."),
+        ("unexplained", "no effect of the catalogue explains"),
+    ],
+)
+def test_a_page_without_findings(verdict, expected, view):
+    """Where nothing is named, the verdict says so, and what would have been seen."""
+    page = diagnosis_page(replace(view, verdict=verdict, findings=(), next_kind=""))
+    assert expected in page.verdict
+    assert "Nothing is left to tell apart." in render(page)
+
+
+def test_an_ambiguous_verdict_is_no_good_news(view):
+    """An ambiguous diagnosis says so, and warns."""
+    page = diagnosis_page(replace(view, verdict="ambiguous"))
+    assert page.status == "warning"
+    assert "not which of several" in page.verdict
+
+
+def test_without_unseen_data_no_gain_is_claimed(view):
+    """Where no run was left to measure on, the page shows no error bars and no percentages."""
+    none = np.full(2, np.nan)
+    finding = replace(view.findings[0], before=np.nan, after=np.nan, interval=(np.nan, np.nan))
+    page = diagnosis_page(replace(view, nrmse_before=none, nrmse_after=none, findings=(finding,)))
+    assert [picture.name for picture in page.pictures] == ["torque", "cause-1"]
+    assert "percentage points" not in render(page)
+    assert all("unseen" not in fact.label for fact in page.facts)
+
+
+def test_the_mean_of_a_stretch_is_that_of_its_samples():
+    """Binned means are those of as many samples each, in the order of the coordinate."""
+    random = np.random.default_rng(1)
+    x = random.permutation(6000).astype(float)
+    middle, mean, error = binned(x, 2.0 * x + random.normal(size=6000))
+    assert (np.diff(middle) > 0).all()
+    np.testing.assert_allclose(mean, 2.0 * middle, atol=3.0)  # the median of a hundred numbers against their mean
+    assert len(middle) == 60
+    assert (error > 0).all()
+
+
+def test_neighbours_in_time_count_as_one():
+    """Samples in succession at one place do not make a mean more certain."""
+    values = np.random.default_rng(2).normal(size=3000)
+    slow, quick = np.repeat(np.arange(60.0), 50), np.tile(np.arange(60.0), 50)
+    assert binned(slow, values)[2].mean() > 5 * binned(quick, values)[2].mean()
+
+
+def test_pictures_of_nothing():
+    """A coordinate without a value, and one that never changes, are drawn without complaint."""
+    nothing = np.full(5, np.nan)
+    assert cause_picture("x [1]", nothing, nothing, nothing, title="none").panels
+    assert cause_picture("x [1]", np.zeros(5), np.ones(5), np.zeros(5), title="one").panels
+    with pytest.raises(InputError, match=r"shapes \(2,\)"):
+        cause_picture("x [1]", np.zeros(2), np.ones(5), np.zeros(5), title="bad")
+    with pytest.raises(InputError, match=r"allowed: \(n,\), both"):
+        gain_picture(np.zeros(2), np.zeros(3))
+
+
+def test_the_page_of_a_plan():
+    """A planned experiment's page counts what would be named, and lists what is hidden."""
+    page = limits_page((*LIMITS, replace(LIMITS[0], joint=3, note="joint hardly moves")), "two")
+    text = render(page)
+    assert "Of 5 effects and places, 3 would be seen and named at 2 %" in page.verdict
+    assert "1 / 2" in text
+    assert "on joint 3: joint hardly moves." in text
+    assert "hidden" in text
+    assert "more friction at low speed" in page.warnings[0]
