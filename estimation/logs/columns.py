@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,10 @@ from robots.common.errors import InputError
 from robots.common.table import Table
 
 _DEGREE = float(np.pi / 180.0)
+_TURN = float(2.0 * np.pi)
+_POSITION = {"rad": 1.0, "deg": _DEGREE, "mrad": 1e-3, "turn": _TURN, "m": 1.0, "mm": 1e-3}
+_VELOCITY = {"rad/s": 1.0, "deg/s": _DEGREE, "rpm": _TURN / 60.0, "m/s": 1.0, "mm/s": 1e-3}
+_ACCELERATION = {"rad/s2": 1.0, "deg/s2": _DEGREE, "m/s2": 1.0, "mm/s2": 1e-3}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,15 +43,15 @@ class Quantity:
 
 
 QUANTITIES = (
-    Quantity(prefix="t", field="t", unit="s", units={"s": 1.0, "ms": 1e-3}, per_joint=False),
-    Quantity(prefix="q", field="q", unit="rad", units={"rad": 1.0, "deg": _DEGREE, "m": 1.0}),
-    Quantity(prefix="dq", field="dq", unit="rad/s", units={"rad/s": 1.0, "deg/s": _DEGREE, "m/s": 1.0}),
-    Quantity(prefix="ddq", field="ddq", unit="rad/s^2", units={"rad/s2": 1.0, "deg/s2": _DEGREE, "m/s2": 1.0}),
-    Quantity(prefix="tau", field="tau", unit="N m", units={"Nm": 1.0, "N": 1.0}),
+    Quantity(prefix="t", field="t", unit="s", units={"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}, per_joint=False),
+    Quantity(prefix="q", field="q", unit="rad", units=_POSITION),
+    Quantity(prefix="dq", field="dq", unit="rad/s", units=_VELOCITY),
+    Quantity(prefix="ddq", field="ddq", unit="rad/s^2", units=_ACCELERATION),
+    Quantity(prefix="tau", field="tau", unit="N m", units={"Nm": 1.0, "N": 1.0, "Nmm": 1e-3, "mNm": 1e-3, "kNm": 1e3}),
     Quantity(prefix="i", field="current", unit="A", units={"A": 1.0, "mA": 1e-3}),
     Quantity(prefix="temp", field="temperature", unit="degC", units={"degC": 1.0, "deg_C": 1.0}, complete=False),
     Quantity(prefix="temp_env", field="ambient", unit="degC", units={"degC": 1.0, "deg_C": 1.0}, per_joint=False),
-    Quantity(prefix="qlink", field="qlink", unit="rad", units={"rad": 1.0, "deg": _DEGREE, "m": 1.0}),
+    Quantity(prefix="qlink", field="qlink", unit="rad", units=_POSITION),
     Quantity(prefix="segment", field="segment", unit="", units={"": 1.0}, per_joint=False),
     Quantity(prefix="cycle", field="cycle", unit="", units={"": 1.0}, per_joint=False),
 )
@@ -104,18 +109,30 @@ def unit_factors(table: Table, names: Mapping[str, Quantity]) -> dict[str, float
                 remedy="state the unit once",
             )
         unit = own if own is not None else shared
-        if unit is None:
-            factors[name] = 1.0
-        elif unit in quantity.units:
-            factors[name] = quantity.units[unit]
-        else:
-            raise InputError(
-                f"unit {table.units.get(name, unit)!r}",
-                file=table.path,
-                column=name,
-                allowed=", ".join(quantity.units) or "no unit",
-            )
+        factors[name] = (
+            1.0 if unit is None else unit_factor(quantity, table.units.get(name, unit), file=table.path, column=name)
+        )
     return factors
+
+
+def unit_factor(quantity: Quantity, unit: str, *, file: Path | None = None, column: str | None = None) -> float:
+    """Returns the factor that brings a unit to that of `Log`.
+
+    Args:
+        quantity: what is measured.
+        unit: as the file writes it; spaces and signs of product or power do not matter.
+        file: for the message.
+        column: for the message.
+
+    Raises:
+        InputError: a unit that is not known.
+    """
+    factor = quantity.units.get(_normal(unit))
+    if factor is None:
+        raise InputError(
+            f"unit {unit!r}", file=file, column=column, allowed=", ".join(quantity.units).strip(", ") or "no unit"
+        )
+    return factor
 
 
 def _stated_units(table: Table) -> dict[str, str]:

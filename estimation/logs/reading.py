@@ -1,41 +1,58 @@
-"""Logs from CSV and Parquet files."""
+"""Logs from files of any known format."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from os import PathLike
+from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
+from estimation.logs.campaigns import MAPPING, in_order, log_files
 from estimation.logs.columns import BY_FIELD, QUANTITIES, Quantity, column_name, parse_name, unit_factors
+from estimation.logs.formats import is_bag_folder, read_foreign
+from estimation.logs.mapping import LogMapping, count_joints, map_table, read_mapping
+from estimation.logs.repairs import drop_repeated_rows
 from robots.common.errors import InputError
 from robots.common.table import Table
-from robots.common.tables import read_table
 from robots.signals import FloatArray, Log
 
 
-def read_log(path: str | PathLike[str], n: int | None = None, *, torque: bool = True) -> Log:
+def read_log(
+    path: str | PathLike[str],
+    n: int | None = None,
+    *,
+    torque: bool = True,
+    mapping: LogMapping | str | PathLike[str] | None = None,
+    joints: Sequence[str] | None = None,
+) -> Log:
     """Reads a log: ``t, q1..qn``, torque or current, and whatever optional columns there are.
 
     Args:
-        path: a ``.csv`` file (comma separated, UTF-8, a leading ``#`` block may state units, robot and period) or a
-            ``.parquet`` file.
+        path: ``.csv`` (commas, semicolons or tabs; decimal points or commas; UTF-8; a leading ``#`` block may state
+            units, robot and period), ``.parquet``, ``.mat``, ``.npz``, or a ROS bag with joint states (``.bag``,
+            ``.mcap``, ``.db3``, or the folder of a rosbag 2).
         n: the number of joints of the robot, where it is known.
         torque: whether torque or current must be there; a prediction needs the motion only.
+        mapping: a mapping YAML, where the columns have other names, units, signs or another order.
+        joints: names of the robot's joints in its order: a bag names its joints, in any order.
 
     Returns:
-        The log in SI units. ``metadata`` holds what the file says of itself, ``file`` (its path) and
-        ``ignored_columns`` (the names of columns that are no part of a log).
+        The log in SI units. ``metadata`` holds what the file says of itself, ``file`` (its path),
+        ``ignored_columns`` (the names of columns that are no part of a log) and, where rows were mended, ``repairs``.
 
     Raises:
         InputError: anything that keeps the file from being a log, with column and row: the line of a CSV file, the
-            record of a Parquet file, both counted from 1.
+            record of another file, both counted from 1.
     """
-    table = read_table(path, wanted=lambda name: parse_name(name) is not None)
+    known = mapping if isinstance(mapping, LogMapping) or mapping is None else read_mapping(mapping)
+    table = _read_table(path, n, known, joints)
     quantities = _checked_names(table)
-    joints = _count_joints(table, quantities, n)
+    count = _count_joints(table, quantities, n)
     for name in table.names:
         if table.is_text(name):
             raise InputError(
@@ -45,35 +62,46 @@ def read_log(path: str | PathLike[str], n: int | None = None, *, torque: bool = 
                 row=table.first_row,
                 allowed="a number",
             )
+    whole = table
+    table, kept, repairs = drop_repeated_rows(table)
     if len(table) < 2:
         raise InputError("only one row", file=table.path, row=table.first_row, allowed="2 or more rows")
     factors = unit_factors(table, quantities)
     signals = {
-        quantity.field: _signal(table, quantity, joints, factors)
+        quantity.field: _signal(table, quantity, count, factors)
         for quantity in QUANTITIES
         if any(found is quantity for found in quantities.values())
     }
     if torque and "tau" not in signals and "current" not in signals:
         raise InputError(
-            f"neither tau1..tau{joints} nor i1..i{joints}",
+            f"neither tau1..tau{count} nor i1..i{count}",
             file=table.path,
             column="tau1",
             row=_header_row(table),
             allowed="columns of joint torque [N m] or motor current [A]",
         )
-    metadata = _metadata(table)
+    metadata = _metadata(table) | ({"repairs": repairs} if repairs else {})
     try:
         return Log(**signals, name=table.path.stem, metadata=metadata)
     except InputError as error:
-        _raise_for_file(error, table)
+        _raise_for_file(error, whole, kept)
 
 
-def read_logs(paths: Sequence[str | PathLike[str]], n: int | None = None) -> tuple[Log, ...]:
+def read_logs(
+    paths: str | PathLike[str] | Sequence[str | PathLike[str]],
+    n: int | None = None,
+    *,
+    mapping: LogMapping | str | PathLike[str] | None = None,
+    joints: Sequence[str] | None = None,
+) -> tuple[Log, ...]:
     """Reads the logs of one robot.
 
     Args:
-        paths: the files, each once.
+        paths: files, each once, or folders: all logs of a folder are one campaign, in the order of its clock. A
+            ``mapping.yaml`` in a folder is that of its logs.
         n: the number of joints of the robot; without it the first log decides.
+        mapping: see `read_log`.
+        joints: see `read_log`.
 
     Raises:
         InputError: no file, a file twice, another number of joints, or a file that is not a log.
@@ -84,20 +112,45 @@ def read_logs(paths: Sequence[str | PathLike[str]], n: int | None = None) -> tup
         raise InputError("no logs", allowed="one or more files")
     seen: set[str] = set()
     logs: list[Log] = []
-    for path in paths:
+
+    def read(path: str | PathLike[str], mapping: LogMapping | str | PathLike[str] | None) -> Log:
         real = os.path.realpath(path)
         if real in seen:
             raise InputError("the log is given twice", file=path, remedy="name each log once: it would count double")
         seen.add(real)
-        log = read_log(path, n)
+        log = read_log(path, n, mapping=mapping, joints=joints)
         if logs and log.n != logs[0].n:
             raise InputError(
                 f"{log.n} joints, but {logs[0].metadata['file']} has {logs[0].n}",
                 file=path,
                 remedy="give logs of one robot",
             )
-        logs.append(log)
+        return log
+
+    for path in paths:
+        place = Path(path)
+        if place.is_dir() and not is_bag_folder(place):
+            own = place / MAPPING
+            chosen = mapping if mapping is not None or not own.is_file() else own
+            logs += in_order([read(file, chosen) for file in log_files(place)])
+        else:
+            logs.append(read(path, mapping))
     return tuple(logs)
+
+
+def _read_table(
+    path: str | PathLike[str], n: int | None, mapping: LogMapping | None, joints: Sequence[str] | None
+) -> Table:
+    if mapping is None:
+        return read_foreign(path, lambda name: parse_name(name) is not None, joints=joints)
+    named = mapping.joints if mapping.joints is not None else joints
+    # Which columns the mapping names depends on the number of joints, and that on the columns: names come first.
+    table = read_foreign(path, lambda name: True, topic=mapping.topic, joints=named)
+    count = count_joints(mapping, table.names, n)
+    mapped = map_table(table, mapping, count)
+    kept = {name: values for name, values in mapped.columns.items() if parse_name(name) is not None}
+    left = tuple(name for name in mapped.columns if name not in kept)
+    return replace(mapped, columns=kept, skipped=(*mapped.skipped, *left))
 
 
 def _checked_names(table: Table) -> dict[str, Quantity]:
@@ -182,7 +235,9 @@ def _signal(table: Table, quantity: Quantity, joints: int, factors: Mapping[str,
     for joint in range(1, joints + 1):
         name = column_name(quantity, joint)
         if name in table.columns:
-            np.multiply(table.columns[name], factors[name], out=signal[:, joint - 1])
+            # Damaged files hold values that are no numbers in a way that a product complains of: `Log` names them.
+            with np.errstate(all="ignore"):
+                np.multiply(table.columns[name], factors[name], out=signal[:, joint - 1])
     return signal
 
 
@@ -206,7 +261,7 @@ def _header_row(table: Table) -> int | None:
     return table.first_row - 1 or None
 
 
-def _raise_for_file(error: InputError, table: Table) -> NoReturn:
+def _raise_for_file(error: InputError, table: Table, kept: NDArray[np.intp]) -> NoReturn:
     """Raises an error about an array as one about the file: its column by name, its row by line."""
     quantity = BY_FIELD[error.column or "t"]
     if error.problem.startswith("time"):
@@ -217,7 +272,7 @@ def _raise_for_file(error: InputError, table: Table) -> NoReturn:
         error.problem,
         file=table.path,
         column=column_name(quantity, error.joint if isinstance(error.joint, int) else None),
-        row=None if error.row is None else table.line(error.row - 1),
+        row=None if error.row is None else table.line(int(kept[error.row - 1])),
         joint=error.joint,
         allowed=error.allowed,
         remedy=remedy,

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from robots.common.csv_dialects import PLAIN, Dialect
 from robots.common.errors import InputError
 
 NULLS = ("", "nan", "NaN", "NAN", "-nan", "-NaN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None")
@@ -15,18 +16,22 @@ NULLS = ("", "nan", "NaN", "NAN", "-nan", "-NaN", "NA", "N/A", "n/a", "#N/A", "n
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*([eE][+-]?\d+)?|\.\d+([eE][+-]?\d+)?|inf|infinity|nan)\s*", re.IGNORECASE)
 
 
-def is_number(text: str) -> bool:
+def is_number(text: str, dialect: Dialect = PLAIN) -> bool:
     """Returns whether a cell can stand in a column of numbers; an empty one can."""
+    if dialect.decimal == ",":
+        if "." in text:
+            return False
+        text = text.replace(",", ".")
     return text in NULLS or _NUMBER.fullmatch(text) is not None
 
 
-def split_line(line: str) -> list[str]:
-    """Returns the cells of a comma separated line, quotes resolved.
+def split_line(line: str, dialect: Dialect = PLAIN) -> list[str]:
+    """Returns the cells of a line, quotes resolved.
 
     Raises:
         csv.Error: a cell of more than 131,072 characters.
     """
-    return next(csv.reader([line]), [])
+    return next(csv.reader([line], delimiter=dialect.delimiter), [])
 
 
 def check_names(names: Sequence[str], line: str, path: Path, row: int) -> None:
@@ -41,15 +46,14 @@ def check_names(names: Sequence[str], line: str, path: Path, row: int) -> None:
     Raises:
         InputError: no header, another separator, an unnamed column or one named twice.
     """
-    for mark, word in ((";", "semicolons"), ("\t", "tabs"), (" ", "spaces")):
-        if len(names) == 1 and mark in line.strip():
-            raise InputError(
-                f"columns are separated by {word}",
-                file=path,
-                row=row,
-                allowed="commas (and decimal points)",
-                remedy="export the file with commas",
-            )
+    if len(names) == 1 and " " in line.strip():
+        raise InputError(
+            "columns are separated by spaces",
+            file=path,
+            row=row,
+            allowed="commas, semicolons or tabs",
+            remedy="export the file with commas",
+        )
     if all(is_number(name) for name in names):
         raise InputError(
             f"no header: the first line holds numbers ({line[:40].strip()})",
@@ -85,7 +89,12 @@ def check_unique(names: Iterable[str], path: Path, row: int | None = None) -> No
 
 
 def find_fault(
-    lines: Iterable[bytes], names: Sequence[str], numeric: set[str], path: Path, first_row: int
+    lines: Iterable[bytes],
+    names: Sequence[str],
+    numeric: set[str],
+    path: Path,
+    first_row: int,
+    dialect: Dialect = PLAIN,
 ) -> InputError:
     """Returns the first fault of the data lines as an error to raise.
 
@@ -95,6 +104,7 @@ def find_fault(
         numeric: the columns that must hold numbers.
         path: the file, for messages.
         first_row: the line number of the first of them.
+        dialect: of the file.
     """
     checked = [(index, name) for index, name in enumerate(names) if name in numeric]
     for row, raw in enumerate(lines, start=first_row):
@@ -108,7 +118,7 @@ def find_fault(
                 "a comment line below the header", file=path, row=row, remedy="move it to the head of the file"
             )
         try:
-            cells = split_line(line)
+            cells = split_line(line, dialect)
         except csv.Error as error:
             return InputError(f"not a line of a CSV file ({error})", file=path, row=row)
         if len(cells) != len(names):
@@ -120,7 +130,7 @@ def find_fault(
                 remedy="complete or remove the row",
             )
         for index, name in checked:
-            if not is_number(cells[index]):
+            if not is_number(cells[index], dialect):
                 return InputError(
                     f"found {cells[index][:40]!r}",
                     file=path,
@@ -129,7 +139,7 @@ def find_fault(
                     allowed="a number",
                     remedy="correct or remove the row",
                 )
-    return InputError("not a CSV file that can be read", file=path, allowed="comma separated numbers below one header")
+    return InputError("not a CSV file that can be read", file=path, allowed="separated numbers below one header")
 
 
 def encoding_error(path: Path, row: int | None = None) -> InputError:

@@ -15,6 +15,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv as pa_csv
 
+from robots.common.csv_dialects import BYTES, Dialect, find_dialect
 from robots.common.csv_faults import NULLS, check_names, encoding_error, find_fault, is_number, split_line
 from robots.common.ecsv import Header, format_header, parse_header
 from robots.common.errors import InputError
@@ -27,7 +28,7 @@ _LONE_RETURN = re.compile(rb"\r(?!\n)")
 
 
 def read_csv(path: Path, wanted: Callable[[str], bool]) -> Table:
-    """Reads a comma separated file with one header line below an optional ``#`` block.
+    """Reads a file of comma, semicolon or tab separated cells with one header line below an optional ``#`` block.
 
     Args:
         path: the file, UTF-8 with or without byte order mark.
@@ -41,29 +42,29 @@ def read_csv(path: Path, wanted: Callable[[str], bool]) -> Table:
     with path.open("rb") as stream:
         data = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
     _check_bytes(data, path)
-    header, names, start, first_row = _read_head(data, path)
+    header, names, start, first_row, dialect = _read_head(data, path)
     end = _end_of_data(data)
     if start >= end:
         raise InputError("no rows below the header", file=path, row=first_row - 1, remedy="record the data again")
     chosen = [name for name in names if wanted(name)]
-    first_cells = _first_cells(data, start, names, path, first_row)
+    first_cells = _first_cells(data, start, names, path, first_row, dialect)
     declared = {name for name in chosen if header.datatypes.get(name) == "string"}
     text = declared | {
-        name for name in chosen if not is_number(first_cells.get(name, "")) and name not in header.datatypes
+        name for name in chosen if not is_number(first_cells.get(name, ""), dialect) and name not in header.datatypes
     }
     kinds = {name: pa.string() if name in text else pa.float64() for name in chosen}
 
     def fault(numeric: set[str], position: int = start) -> InputError:
         row = first_row + data[start:position].count(b"\n")
-        return find_fault(_lines(data, position, end), names, numeric, path, row)
+        return find_fault(_lines(data, position, end), names, numeric, path, row, dialect)
 
     gap = _GAP.search(data, start - 1, end)
     if gap is not None:
         raise fault(set(), max(gap.start() + 1, start))
     try:
-        arrays = _parse(data, start, end, names, kinds)
+        arrays = _parse(data, start, end, names, kinds, dialect)
     except (pa.ArrowException, OSError, ValueError) as error:
-        raise fault(set(chosen) - text, _first_refused(data, start, end, names, kinds)) from error
+        raise fault(set(chosen) - text, _first_refused(data, start, end, names, kinds, dialect)) from error
     for name in sorted(text - declared, key=names.index):
         if pc.any(pc.match_substring_regex(arrays[name], r"^\s*[+-]?\.?\d[\d.]*([eE][+-]?\d+)?\s*$")).as_py():
             raise fault({name})
@@ -119,8 +120,8 @@ def _check_bytes(data: mmap.mmap, path: Path) -> None:
         )
 
 
-def _read_head(data: mmap.mmap, path: Path) -> tuple[Header, list[str], int, int]:
-    """Returns the ``#`` block, the column names, the position of the data and the line number of their first row."""
+def _read_head(data: mmap.mmap, path: Path) -> tuple[Header, list[str], int, int, Dialect]:
+    """Returns the ``#`` block, the column names, the position and first line number of the data, and the dialect."""
     block: list[str] = []
     position, row = (len(_UTF8_MARK) if data[: len(_UTF8_MARK)] == _UTF8_MARK else 0), 0
     while position < len(data):
@@ -135,19 +136,23 @@ def _read_head(data: mmap.mmap, path: Path) -> tuple[Header, list[str], int, int
         if line.startswith("#"):
             block.append(line)
         elif line.strip():
+            beginning = data[position : position + BYTES].decode("utf-8", errors="replace")
+            dialect = find_dialect(line, beginning, path, row + 1)
             try:
-                names = [name.strip() for name in split_line(line)]
+                names = [name.strip() for name in split_line(line, dialect)]
             except csv.Error as error:
                 raise InputError(f"no header: {error}", file=path, row=row) from error
             check_names(names, line, path, row)
-            return parse_header(block, path), names, position, row + 1
+            return parse_header(block, path), names, position, row + 1, dialect
     raise InputError("no header and no data", file=path, allowed="a line of column names, then rows of numbers")
 
 
-def _first_cells(data: mmap.mmap, start: int, names: list[str], path: Path, row: int) -> dict[str, str]:
+def _first_cells(
+    data: mmap.mmap, start: int, names: list[str], path: Path, row: int, dialect: Dialect
+) -> dict[str, str]:
     stop = data.find(b"\n", start)
     try:
-        cells = split_line(data[start : stop if stop >= 0 else len(data)].decode("utf-8").rstrip("\r\n"))
+        cells = split_line(data[start : stop if stop >= 0 else len(data)].decode("utf-8").rstrip("\r\n"), dialect)
     except UnicodeDecodeError as error:
         raise encoding_error(path, row) from error
     except csv.Error as error:
@@ -174,13 +179,15 @@ def _lines(data: mmap.mmap, start: int, end: int) -> Iterator[bytes]:
         start = stop
 
 
-def _first_refused(data: mmap.mmap, start: int, end: int, names: list[str], kinds: dict[str, pa.DataType]) -> int:
+def _first_refused(
+    data: mmap.mmap, start: int, end: int, names: list[str], kinds: dict[str, pa.DataType], dialect: Dialect
+) -> int:
     """Returns where the first refused block starts: to look at each line of a long file would take minutes."""
     while start < end:
         stop = data.find(b"\n", min(start + _BLOCK, end), end)
         stop = end if stop < 0 else stop + 1
         try:
-            _parse(data, start, stop, names, kinds)
+            _parse(data, start, stop, names, kinds, dialect)
         except (pa.ArrowException, OSError, ValueError):
             break
         start = stop
@@ -188,15 +195,19 @@ def _first_refused(data: mmap.mmap, start: int, end: int, names: list[str], kind
 
 
 def _parse(
-    data: mmap.mmap, start: int, end: int, names: list[str], kinds: dict[str, pa.DataType]
+    data: mmap.mmap, start: int, end: int, names: list[str], kinds: dict[str, pa.DataType], dialect: Dialect
 ) -> dict[str, pa.ChunkedArray]:
     # The parser reads the mapped file: a slice of bytes would copy it.
     table = pa_csv.read_csv(
         pa.BufferReader(pa.py_buffer(data).slice(start, end - start)),
         read_options=pa_csv.ReadOptions(column_names=names, block_size=_BLOCK),
-        parse_options=pa_csv.ParseOptions(ignore_empty_lines=False),
+        parse_options=pa_csv.ParseOptions(delimiter=dialect.delimiter, ignore_empty_lines=False),
         convert_options=pa_csv.ConvertOptions(
-            column_types=kinds, include_columns=list(kinds), null_values=list(NULLS), strings_can_be_null=False
+            column_types=kinds,
+            include_columns=list(kinds),
+            null_values=list(NULLS),
+            strings_can_be_null=False,
+            decimal_point=dialect.decimal,
         ),
     )
     return {name: table.column(name) for name in kinds}

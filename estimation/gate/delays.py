@@ -1,0 +1,136 @@
+"""By how much the torque lags the position: a delay that a fit would take for damping and friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.gate.finding import Finding
+from estimation.gate.quick_fit import JointFit, Rows
+
+Array = NDArray[np.float64]
+
+# Delays looked for: up to so many samples, or so many seconds, either way, whichever is longer.
+SAMPLES, SECONDS = 8.0, 0.04
+# Where much of the torque is unexplained without, longer ones are tried as well.
+UNEXPLAINED, LONGER = 0.15, 12.0
+# They are tried in steps of this share of the smoothing's period.
+STEP = 0.06
+# A delay counts when it is so many standard errors long, ...
+SURE = 4.0
+# ... and matters when it is longer than this share of a sample, and takes this share of the unexplained torque away; of
+# a delay longer than usual, which friction with memory or an elastic joint may imitate: half.
+LONG, WORTH, WORTH_LONG = 0.5, 0.15, 0.5
+# Two joints' delays agree within this share of a sample, this share of the delay, or three standard errors.
+AGREE, AGREE_SHARE = 0.5, 0.2
+
+
+@dataclass(frozen=True)
+class Delay:
+    """The delay of one joint.
+
+    Attributes:
+        value: by which the torque is logged after the position that belongs to it [s].
+        error: standard error [s].
+        saved: share of the unexplained torque that vanishes with it.
+    """
+
+    value: float
+    error: float
+    saved: float
+
+
+def estimate_delay(rows: Rows, fit: JointFit, joint: int, period: float, cutoff: float, unexplained: float) -> Delay:
+    """Finds the delay at which the torque fits the motion best, to a part of a sample.
+
+    Args:
+        rows: the excerpts.
+        fit: of the joint.
+        joint: counted from 0.
+        period: [s].
+        cutoff: of the smoothing [Hz].
+        unexplained: torque error over the torque's standard deviation, without a delay.
+    """
+    reach = max(SAMPLES * period, SECONDS) * (LONGER if unexplained > UNEXPLAINED else 1.0)
+    half = int(np.clip(np.ceil(reach * cutoff / STEP), 6, 60))
+    shifts = np.linspace(-reach, reach, 2 * half + 1)
+
+    def remaining(shift: float) -> float:
+        tau = rows.torque(joint, shift)
+        tau = tau - tau.mean()
+        return _remainder(fit, tau) / max(float(tau @ tau), 1e-300)
+
+    errors = np.array([remaining(shift) for shift in shifts])
+    best = int(np.argmin(errors))
+    zero = errors[half]
+    if best in (0, 2 * half):
+        return Delay(float(shifts[best]), np.inf, float(1 - errors[best] / zero) if zero > 0 else 0.0)
+    left, middle, right = errors[best - 1 : best + 2]
+    bend = left - 2 * middle + right
+    value = float(shifts[best] + 0.5 * (left - right) / bend * (shifts[1] - shifts[0])) if bend > 0 else shifts[best]
+    # Gauss-Newton at the optimum gives the standard error, block by block.
+    rate = rows.torque_rate(joint, value)
+    tau = rows.torque(joint, value)
+    slope = rate - fit.Y @ (fit.inverse @ (fit.Y.T @ rate))
+    residual = tau - fit.Y @ (fit.inverse @ (fit.Y.T @ tau))
+    starts = np.flatnonzero(np.diff(rows.block, prepend=-1))
+    scores = np.add.reduceat(slope * residual, starts)
+    curvature = float(slope @ slope)
+    error = float(np.sqrt(scores @ scores)) / curvature if curvature > 0 else np.inf
+    return Delay(value, error, float(1 - np.sqrt(remaining(value) / zero)) if zero > 0 else 0.0)
+
+
+def delay_findings(delays: list[Delay | None], period: float) -> list[Finding]:
+    """Judges the delays (n,): one finding where the joints agree, else one a joint."""
+    told = {
+        joint: delay
+        for joint, delay in enumerate(delays, start=1)
+        if delay is not None
+        and np.isfinite(delay.error)
+        and abs(delay.value) > max(SURE * delay.error, LONG * period)
+        and (delay.saved > WORTH if abs(delay.value) <= max(SAMPLES * period, SECONDS) else _shared(delay, delays))
+    }
+    # A delay of the whole log shows in all joints alike, and may then be shorter than one joint by itself could tell.
+    known = [
+        delay
+        for delay in delays
+        if delay is not None and delay.error < max(0.5 * period, AGREE_SHARE * abs(delay.value))
+    ]
+    if len(known) > 1 and 2 * len(known) >= len(delays):
+        weights = np.array([1.0 / max(delay.error, 1e-3 * period) ** 2 for delay in known])
+        mean = float(weights @ [delay.value for delay in known] / weights.sum())
+        error = float(1 / np.sqrt(weights.sum()))
+        alike = all(
+            abs(delay.value - mean) < max(3 * delay.error, AGREE * period, AGREE_SHARE * abs(mean)) for delay in known
+        )
+        if alike and abs(mean) > max(LONG * period, SURE * error):
+            return [_finding(mean, error, None, period, len(known))]
+    return [_finding(delay.value, delay.error, joint, period, 1) for joint, delay in told.items()]
+
+
+def _shared(long: Delay, delays: list[Delay | None]) -> bool:
+    """Whether a long delay saves much, and no other joint is known to be without it: it comes from the whole logger."""
+    others = [delay for delay in delays if delay is not None and delay.error < 0.25 * abs(long.value)]
+    return long.saved > WORTH_LONG and all(abs(delay.value - long.value) < 0.25 * abs(long.value) for delay in others)
+
+
+def _finding(value: float, error: float, joint: int | None, period: float, joints: int) -> Finding:
+    who = f"the torques of {joints} joints" if joint is None else "the torque"
+    verb = ("lag" if value > 0 else "lead") + ("" if joint is None else "s")
+    return Finding(
+        name="delay",
+        severity="warning" if abs(value) > period else "info",
+        text=f"{who} {verb} the position by {1e3 * abs(value):.3g} ms ({abs(value) / period:.2g} samples, "
+        f"standard error {1e3 * error:.2g} ms)",
+        action="friction and damping take it up: log both on one clock, or shift the torque back",
+        value=value,
+        unit="s",
+        joint=joint,
+    )
+
+
+def _remainder(fit: JointFit, tau: Array) -> float:
+    cross = fit.Y.T @ tau
+    return float(tau @ tau - cross @ (fit.inverse @ cross))

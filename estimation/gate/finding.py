@@ -1,0 +1,45 @@
+"""One thing that the gate found in a log."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, get_args
+
+Severity = Literal["info", "warning", "refuse"]
+SEVERITIES: tuple[Severity, ...] = get_args(Severity)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """What was found, how much of it, and what follows.
+
+    Attributes:
+        name: the kind of finding, such as ``gap`` or ``unit_of_position``.
+        severity: ``info`` (the fit bears it), ``warning`` (the result suffers), ``refuse`` (the fit would be wrong).
+        text: what was found, in one clause.
+        action: what was done about it, or what to do.
+        value: the number behind it.
+        unit: of the value.
+        column: the column of the log, where one is meant.
+        joint: counted from 1, where one is meant.
+        row: the sample at which it begins, counted from 1, where it has a place.
+    """
+
+    name: str
+    severity: Severity
+    text: str
+    action: str
+    value: float
+    unit: str = ""
+    column: str | None = None
+    joint: int | None = None
+    row: int | None = None
+
+    def __str__(self) -> str:
+        named = (("joint", self.joint), ("column", self.column), ("row", self.row))
+        place = ", ".join(f"{word} {value}" for word, value in named if value is not None)
+        return f"{place}: {self.text}; {self.action}" if place else f"{self.text}; {self.action}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives the fields, for JSON."""
+        return asdict(self)

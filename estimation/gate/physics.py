@@ -1,0 +1,65 @@
+"""What a joint feels, by its quick fit: inertia and friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.gate.quick_fit import OWN, JointFit, Rows, regressor
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Poses at which the inertia that a joint feels is averaged.
+POSES = 64
+
+
+@dataclass(frozen=True, eq=False)
+class JointPhysics:
+    """What a joint feels, by its quick fit.
+
+    Attributes:
+        inertia: mean of the diagonal of the mass matrix over the log's poses, with rotor [kg m2 or kg].
+        inertia_error: its standard error.
+        loss: mean power that friction takes [W].
+        loss_error: its standard error.
+        power: mean absolute power [W].
+    """
+
+    inertia: float
+    inertia_error: float
+    loss: float
+    loss_error: float
+    power: float
+
+    @property
+    def ratios(self) -> tuple[float, float]:
+        """Inertia and friction over their standard errors."""
+        tiny = np.finfo(float).tiny
+        return self.inertia / max(self.inertia_error, tiny), self.loss / max(self.loss_error, tiny)
+
+    @property
+    def information(self) -> float:
+        """The larger of the two ratios: whether the log tells anything of the joint's own parameters."""
+        return float(np.abs(self.ratios).max())
+
+
+def joint_physics(robot: Robot, rows: Rows, fit: JointFit, joint: int) -> JointPhysics:
+    """Derives inertia and friction losses of a joint, counted from 0, from its fit."""
+    poses = rows.q[:: max(1, len(rows.q) // POSES)]
+    zero, unit = np.zeros_like(poses), np.zeros_like(poses)
+    unit[:, joint] = 1.0
+    felt = regressor(robot, poses, zero, unit)[:, joint] - regressor(robot, poses, zero, zero)[:, joint]
+    weights = np.zeros(len(fit.scale))
+    weights[: len(fit.used)] = felt.mean(axis=0)[fit.used]
+    weights[-OWN] = 1.0
+    inertia, inertia_error = fit.combination(weights)
+    own = fit.Y[:, -OWN:] * fit.scale[-OWN:]
+    dq = rows.dq[:, joint]
+    weights = np.zeros(len(fit.scale))
+    weights[-OWN + 1 : -1] = (own[:, 1:3] * dq[:, None]).mean(axis=0)
+    loss, loss_error = fit.combination(weights)
+    power = float(np.mean(np.abs(dq * (fit.residual + fit.Y @ fit.values))))
+    return JointPhysics(inertia, inertia_error, loss, loss_error, power)

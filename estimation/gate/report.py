@@ -1,0 +1,170 @@
+"""What the gate says of a log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.gate.finding import SEVERITIES, Finding, Severity
+from robots.common.errors import InputError
+from robots.signals import Log
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+# Fewer samples than this carry no derivatives.
+FEWEST = 20
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GateReport:
+    """The findings on one log.
+
+    Attributes:
+        robot: name of the robot.
+        log: name of the log, or its file.
+        samples: rows of the log.
+        duration: [s].
+        period: median sample period [s].
+        findings: the worst first.
+        parts: (first, stop) sample indices of the stretches without a gap; what lies between is not bridged.
+        spikes: indices of single rows that stick out of their neighbours, which a fit must leave out.
+        delay: by which the torque lags the position (n,) [s], NaN where the log does not tell.
+        delay_error: its standard error (n,) [s].
+        unexplained: torque error on stretches that the fit had not seen over the torque's standard deviation (n,), by
+            a quick fit of rigid body and friction; NaN without torque.
+        information: what the log tells of each joint's own parameters: inertia or friction losses over their standard
+            errors, the larger of the two (n,); NaN without torque.
+    """
+
+    robot: str
+    log: str
+    samples: int
+    duration: float
+    period: float
+    findings: tuple[Finding, ...]
+    parts: tuple[tuple[int, int], ...]
+    spikes: NDArray[np.intp]
+    delay: Array
+    delay_error: Array
+    unexplained: Array
+    information: Array
+
+    @property
+    def refused(self) -> bool:
+        """Whether the log must not be fitted."""
+        return any(finding.severity == "refuse" for finding in self.findings)
+
+    @property
+    def success(self) -> bool:
+        """Whether the log may be fitted."""
+        return not self.refused
+
+    def of(self, severity: Severity) -> tuple[Finding, ...]:
+        """Gives the findings of one severity."""
+        return tuple(finding for finding in self.findings if finding.severity == severity)
+
+    def raise_if_refused(self) -> None:
+        """Refuses the log with its first reason and the number of the others.
+
+        Raises:
+            InputError: the log cannot carry an identification.
+        """
+        reasons = self.of("refuse")
+        if not reasons:
+            return
+        first = reasons[0]
+        more = f" (and {len(reasons) - 1} more: {', '.join(_names(reasons[1:]))})" if len(reasons) > 1 else ""
+        raise InputError(
+            f"{first.text}{more}",
+            file=self.log or None,
+            column=first.column,
+            row=first.row,
+            joint=first.joint,
+            remedy=first.action,
+        )
+
+    def usable(self, log: Log) -> tuple[Log, ...]:
+        """Leaves out the rows with spikes and cuts the log at its gaps, so that nothing is interpolated across them.
+
+        Args:
+            log: the log that was checked.
+
+        Returns:
+            Its stretches of 20 samples or more; the log itself where nothing is wrong with it.
+
+        Raises:
+            InputError: another log, or nothing is left.
+        """
+        if len(log) != self.samples:
+            raise InputError(f"{len(log)} rows", allowed=f"{self.samples}, as the log that was checked")
+        if len(self.parts) == 1 and not len(self.spikes):
+            return (log,)
+        kept = np.ones(len(log), dtype=bool)
+        kept[self.spikes] = False
+        parts = [np.arange(first, stop)[kept[first:stop]] for first, stop in self.parts]
+        logs = tuple(pick_rows(log, part) for part in parts if len(part) >= FEWEST)
+        if not logs:
+            raise InputError("no stretch of the log is long enough", file=self.log or None, allowed=f"{FEWEST} rows")
+        return logs
+
+    def summary(self) -> str:
+        """Says the verdict and lists the findings, the worst first."""
+        verdict = "refused" if self.refused else "usable"
+        rate = 1.0 / self.period if self.period > 0 else float("nan")
+        head = f"{self.log or 'log'}: {verdict}; {self.samples} samples, {self.duration:.4g} s at {rate:.4g} Hz"
+        return "\n".join([head, *(f"  {finding.severity}: {finding}" for finding in self.findings)])
+
+    def to_frame(self) -> pd.DataFrame:
+        """Tabulates the findings, one a row."""
+        import pandas as pd
+
+        return pd.DataFrame([finding.to_dict() for finding in self.findings], columns=list(Finding.__annotations__))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives everything, for JSON: NaN becomes None."""
+        arrays = ("delay", "delay_error", "unexplained", "information")
+        return {
+            "robot": self.robot,
+            "log": self.log,
+            "refused": self.refused,
+            "samples": self.samples,
+            "duration": self.duration,
+            "period": self.period,
+            "spikes": [int(row) + 1 for row in self.spikes],
+            "parts": [list(part) for part in self.parts],
+            **{name: [_plain(value) for value in getattr(self, name)] for name in arrays},
+            "findings": [{**finding.to_dict(), "value": _plain(finding.value)} for finding in self.findings],
+        }
+
+    def _repr_html_(self) -> str:
+        import html
+
+        return f"<pre>{html.escape(self.summary())}</pre>"
+
+
+def pick_rows(log: Log, rows: NDArray[np.intp]) -> Log:
+    """Keeps some rows of a log, by their indices."""
+    kept: dict[str, Any] = {item.name: getattr(log, item.name) for item in fields(log)}
+    for name, value in kept.items():
+        if isinstance(value, np.ndarray):
+            kept[name] = value[rows]
+    return Log(**kept)
+
+
+def worst_first(findings: list[Finding]) -> tuple[Finding, ...]:
+    """Sorts findings by severity, the worst first, and keeps the order among equals."""
+    return tuple(sorted(findings, key=lambda finding: -SEVERITIES.index(finding.severity)))
+
+
+def _names(findings: tuple[Finding, ...]) -> list[str]:
+    return list(dict.fromkeys(finding.name for finding in findings))
+
+
+def _plain(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,103 @@
+"""Single rows that stick out of their neighbours: a garbled message, a dropout, a cell somebody mistyped."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.gate.columns import Columns
+from estimation.gate.finding import Finding
+from estimation.gate.resolution import lattice_step
+
+Array = NDArray[np.float64]
+
+# A row sticks out when it leaves and comes back by so many times the usual back and forth ...
+OUT = 25.0
+# ... and by this share of what the column does otherwise: a position cannot come back at once, a torque may.
+SHARE_OF_POSITION, SHARE_OF_SIGNAL = 0.01, 0.1
+# Steps of a coarse sensor between which its value flickers.
+FLICKER = 3.0
+# Share of rows above which they are no accident: of a torque they count as noise then, of a position they spoil it.
+MANY = 0.03
+
+
+def spike_rows(values: Array, share: float, *, noisy: bool) -> NDArray[np.intp]:
+    """Finds the rows of a column (N,) that stick out: a step away, and the same step back.
+
+    The back and forth of a row is the smaller of its two steps where they have opposite signs. Noise of any usual
+    distribution stays within a few times its median; a step, as at a reversal of friction, does not come back.
+
+    Args:
+        values: the column.
+        share: of the range between its outer twentieths that a spike must exceed.
+        noisy: whether back and forth is usual: a position goes on in its direction, save for the flicker of its sensor.
+    """
+    steps = np.diff(values)
+    before, after = steps[:-1], steps[1:]
+    back = np.where((before > 0) != (after > 0), np.minimum(np.abs(before), np.abs(after)), 0.0)
+    thinned = values[:: max(1, len(values) // 20_000)]
+    # Quartiles rather than the range, which the spikes themselves would set.
+    low, high = np.quantile(thinned, (0.05, 0.95))
+    usual = back[:: max(1, len(back) // 20_000)]
+    if noisy:
+        usual = usual[usual > 0]
+    noise = OUT * float(np.median(usual)) if len(usual) else 0.0
+    level = max(noise, share * float(high - low), FLICKER * lattice_step(values))
+    if not level > 0:
+        return np.empty(0, dtype=np.intp)
+    return np.flatnonzero(back > level) + 1
+
+
+def dropouts(values: Array, q: Array) -> NDArray[np.intp]:
+    """Finds rows in which a torque or current is exactly zero although the joint moves: lost messages.
+
+    Args:
+        values: the column (N,).
+        q: the joint's position (N,).
+    """
+    rows = np.flatnonzero((values[1:] == 0.0) & (q[1:] != q[:-1])) + 1
+    # Of a coarse torque zero is a value like any other, and a drive that is off is no accident.
+    if not 2 <= len(rows) <= MANY * len(values) or lattice_step(values) > 0:
+        return np.empty(0, dtype=np.intp)
+    return rows
+
+
+def check_spikes(columns: Columns) -> tuple[list[Finding], NDArray[np.intp]]:
+    """Finds spikes of position and of torque or current.
+
+    Args:
+        columns: of the log.
+
+    Returns:
+        The findings, and the rows in which any column sticks out.
+    """
+    findings: list[Finding] = []
+    rows: list[NDArray[np.intp]] = []
+    for prefix, values in (("q", columns.q), (columns.prefix, columns.signal)):
+        for joint, column in enumerate(() if values is None else values):
+            if prefix == "q":
+                found = spike_rows(column, SHARE_OF_POSITION, noisy=False)
+            else:
+                found = np.union1d(spike_rows(column, SHARE_OF_SIGNAL, noisy=True), dropouts(column, columns.q[joint]))
+            if not len(found):
+                continue
+            many = len(found) > MANY * len(column)
+            if not many:
+                rows.append(found)
+            findings.append(
+                Finding(
+                    name="spikes",
+                    severity="refuse" if many and prefix == "q" else "warning",
+                    text=f"{len(found)} row{'s stick' if len(found) > 1 else ' sticks'} out of "
+                    f"{'their' if len(found) > 1 else 'its'} neighbours, the first with "
+                    f"{float(column[found[0]]):.6g} between {float(column[found[0] - 1]):.6g} and "
+                    f"{float(column[found[0] + 1]):.6g}",
+                    action="repair the logger: too many to leave out" if many else "these rows are left out",
+                    value=float(len(found)),
+                    unit="rows",
+                    column=f"{prefix}{joint + 1}",
+                    joint=joint + 1,
+                    row=int(found[0]) + 1,
+                )
+            )
+    return findings, np.unique(np.concatenate(rows)) if rows else np.empty(0, dtype=np.intp)

@@ -1,0 +1,52 @@
+"""A folder of logs: one campaign on one clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from os import PathLike
+from pathlib import Path
+
+from estimation.logs.formats import SUFFIXES, is_bag_folder
+from robots.common.errors import InputError
+from robots.signals import Log
+
+MAPPING = "mapping.yaml"
+
+
+def log_files(folder: str | PathLike[str]) -> list[Path]:
+    """Lists the logs in a folder, by name.
+
+    Args:
+        folder: of files of any known format, or of folders of rosbag 2.
+
+    Raises:
+        InputError: no log in it.
+    """
+    place = Path(folder)
+    try:
+        entries = sorted(place.iterdir())
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror or error})", file=place) from error
+    found = [
+        entry
+        for entry in entries
+        if not entry.name.startswith(".")
+        and (is_bag_folder(entry) or (entry.is_file() and entry.suffix.lower() in SUFFIXES))
+    ]
+    if not found:
+        raise InputError("no logs in the folder", file=place, allowed=", ".join(SUFFIXES))
+    return found
+
+
+def in_order(logs: Sequence[Log]) -> tuple[Log, ...]:
+    """Sorts the logs of a campaign by time, where they are on one clock; else they keep their order.
+
+    Logs that overlap in time, such as logs that all start at zero, are on clocks of their own.
+
+    Args:
+        logs: of one folder.
+    """
+    ordered = sorted(logs, key=lambda log: float(log.t[0]))
+    apart = all(before.t[-1] < after.t[0] for before, after in pairwise(ordered))
+    return tuple(ordered) if apart else tuple(logs)

@@ -1,0 +1,348 @@
+"""What the gate says of logs with one known fault, and of logs without."""
+
+import json
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from estimation.gate import check_log
+from robots.common.errors import InputError
+from robots.geometry.chain import Chain, Joint
+from robots.limits import Limits
+from robots.loading import load_robot
+from robots.plants import Sensors, nominal_plant, simulate
+from robots.robot import Robot
+from robots.signals import Log
+
+
+def found(report, name):
+    return [finding for finding in report.findings if finding.name == name]
+
+
+def joints(report, name):
+    return [finding.joint for finding in found(report, name)]
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("options", [{}, {"period": 0.02}, {"torque_noise": 0.15}, {"encoder_counts": 1024.0}])
+def test_good_log_has_no_findings(er3a, good, seed, options):
+    """A log without a fault passes without a word, at 250 or 50 Hz, with noise, with coarse encoders."""
+    report = check_log(er3a, good(seed + 10, **options))
+    assert report.findings == ()
+    assert report.success
+    assert (report.unexplained < 0.3).all()
+
+
+@pytest.mark.parametrize("name", ["ur10", "panda"])
+def test_good_logs_of_other_robots_have_no_findings(name, fourier_motion):
+    """Robots without friction or gear ratios in their description pass as well."""
+    robot = load_robot(name)
+    log = simulate(nominal_plant(robot, sensors=Sensors()), fourier_motion(robot, 2), seed=2)
+    assert check_log(robot, log).findings == ()
+
+
+def test_degrees_as_radians_are_refused(good, spoilt):
+    """Positions in degrees leave the ranges, and the unit is named."""
+    report = spoilt(q=np.rad2deg(good().q))
+    assert report.refused
+    assert "degrees" in found(report, "unit_of_position")[0].text
+
+
+def test_motor_side_positions_are_refused(er3a, good, spoilt):
+    """Positions of the motors leave the ranges, and divided by the gear ratios do not."""
+    report = spoilt(q=good().q * er3a.gear_ratio)
+    assert report.findings[0].name == "motor_side_position"
+    with pytest.raises(InputError, match="the motor's, not the link's") as caught:
+        report.raise_if_refused()
+    assert "mapping" in caught.value.remedy
+
+
+def test_small_motion_in_degrees_is_told_by_its_velocities(good, spoilt):
+    """Positions in degrees that stay inside the ranges disagree with velocities in radians."""
+    log = good()
+    dq = np.gradient(log.q, log.t, axis=0) / 50
+    report = spoilt(q=np.rad2deg(log.q) / 50, dq=dq)
+    assert report.findings[0].name == "unit_of_position"
+    assert report.findings[0].value == pytest.approx(np.pi / 180, rel=0.02)
+
+
+def test_milliseconds_are_refused(good, spoilt):
+    """A step of 4 s on a robot with a controller of 4 ms is one of milliseconds."""
+    report = spoilt(t=1e3 * good().t)
+    assert "milliseconds" in found(report, "unit_of_time")[0].text
+    assert report.refused
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_turned_torque_is_refused(good, spoilt, joint):
+    """The torque of one joint with the wrong sign is refused, and the joint is named."""
+    tau = good().tau.copy()
+    tau[:, joint] *= -1
+    report = spoilt(tau=tau)
+    assert report.refused
+    assert joint + 1 in [finding.joint for finding in report.of("refuse")]
+
+
+def test_all_torques_turned_are_refused(good, spoilt):
+    """Torques with the wrong sign throughout are refused: inertia and friction are negative."""
+    assert len(joints(spoilt(tau=-good().tau), "torque_sign")) >= 4
+
+
+def test_time_that_runs_backward_is_refused(good, spoilt):
+    """A motion played backward has friction that drives."""
+    log = good()
+    report = spoilt(q=log.q[::-1], tau=log.tau[::-1])
+    assert report.refused
+    assert found(report, "negative_friction")
+
+
+def test_percent_of_rated_torque_is_told(er3a, good, spoilt):
+    """Torques in percent do not agree on the links that the joints share."""
+    report = spoilt(tau=100 * good().tau / er3a.limits.torque)
+    assert "in percent" in found(report, "unit_of_torque")[0].text
+
+
+def test_motor_torque_is_told_by_the_description(good, spoilt):
+    """Torques a hundredth of what the description expects are told."""
+    assert joints(spoilt(tau=good().tau / 100), "unit_of_torque")[:3] == [1, 2, 3]
+
+
+@pytest.mark.parametrize("samples", [0.7, 1.7, 5.0, 30.0])
+def test_common_delay_is_measured_to_a_part_of_a_sample(good, spoilt, samples):
+    """A torque logged late is told by a tenth of a sample, or four standard errors, whichever is more."""
+    log = good(duration=20.0)
+    late = CubicSpline(log.t, log.tau)(np.clip(log.t - 0.004 * samples, 0, None))
+    report = spoilt(tau=late)
+    (finding,) = found(report, "delay")
+    assert finding.joint is None
+    errors = 4 * float(np.nanmin(report.delay_error))
+    assert finding.value == pytest.approx(0.004 * samples, abs=max(errors, 0.0012))
+
+
+def test_delay_of_one_joint_is_told_of_that_joint(good, spoilt):
+    """A delay of one joint is not laid on the others."""
+    log = good()
+    tau = log.tau.copy()
+    tau[:, 1] = CubicSpline(log.t, log.tau[:, 1])(np.clip(log.t - 0.012, 0, None))
+    report = spoilt(tau=tau)
+    assert joints(report, "delay") == [2]
+    assert report.delay[1] == pytest.approx(0.012, abs=0.002)
+
+
+def test_clipped_torques_are_told(good, spoilt):
+    """Torques that pile up at a limit name the share of the rows."""
+    limit = np.quantile(np.abs(good().tau), 0.95, axis=0)
+    report = spoilt(tau=np.clip(good().tau, -limit, limit))
+    assert joints(report, "clipped") == [1, 2, 3, 4, 5, 6]
+    assert found(report, "clipped")[0].value == pytest.approx(5.0, abs=0.5)
+
+
+def test_gap_cuts_the_log(er3a, good):
+    """Across a gap nothing is interpolated: the usable parts end and begin at it."""
+    log = good()
+    keep = np.r_[0:2000, 2600 : len(log)]
+    cut = Log(log.t[keep], log.q[keep], tau=log.tau[keep])
+    report = check_log(er3a, cut)
+    assert found(report, "gap")[0].value == pytest.approx(2.404)
+    assert report.parts == ((0, 2000), (2000, len(cut)))
+    first, second = report.usable(cut)
+    assert (len(first), second.t[0]) == (2000, log.t[2600])
+
+
+def test_spikes_are_left_out(good, spoilt):
+    """Single rows that stick out are named and left out of what is usable."""
+    log = good()
+    q, tau = log.q.copy(), log.tau.copy()
+    q[500, 1] += 0.3
+    tau[[700, 900], 3] = 1e6
+    report = spoilt(q=q, tau=tau)
+    assert report.spikes.tolist() == [500, 700, 900]
+    assert not report.refused
+    (usable,) = report.usable(replace(log, q=q, tau=tau))
+    assert len(usable) == len(log) - 3
+    assert np.abs(usable.tau).max() < 1e3
+
+
+def test_lost_torques_are_left_out(good, spoilt):
+    """Exact zeros in a torque that is never zero are lost messages."""
+    tau = good().tau.copy()
+    rows = np.arange(100, 4000, 97)
+    tau[rows, 2] = 0.0
+    assert set(rows) == set(spoilt(tau=tau).spikes)
+
+
+def test_repeated_rows_are_counted(good, spoilt):
+    """Rows that repeat the row before while the arm moves are counted."""
+    log = good()
+    q, tau = log.q.copy(), log.tau.copy()
+    rows = np.arange(10, len(log) - 10, 8)
+    q[rows], tau[rows] = q[rows - 1], tau[rows - 1]
+    (finding,) = found(spoilt(q=q, tau=tau), "repeated_rows")
+    assert finding.value == pytest.approx(12.5, abs=0.2)
+    assert finding.severity == "warning"
+
+
+def test_hung_column_is_told(good, spoilt):
+    """A torque that holds one value while the arm moves, and jumps then, hung."""
+    tau = good().tau.copy()
+    tau[1000:1400, 0] = tau[1000, 0]
+    (finding,) = found(spoilt(tau=tau), "stuck")
+    assert (finding.column, finding.row) == ("tau1", 1001)
+
+
+def test_position_that_jumps_is_refused(good, spoilt):
+    """An encoder that is set anew in the middle of a log makes it useless."""
+    q = good().q.copy()
+    q[2500:, 4] += 0.5
+    (finding,) = found(spoilt(q=q), "jump")
+    assert (finding.severity, finding.joint, finding.row) == ("refuse", 5, 2501)
+
+
+def test_quantised_position_and_torque_are_told(good, spoilt):
+    """Steps that are coarse against what they measure are stated."""
+    log = good()
+    report = spoilt(q=np.round(log.q, 1), tau=np.round(log.tau / 5) * 5)
+    assert found(report, "quantised_position")[0].value == pytest.approx(0.1)
+    assert found(report, "quantised_torque")[0].value == pytest.approx(5.0)
+
+
+def test_joint_that_stands_is_told(er3a, good):
+    """A joint that hardly moves is named; where none moves, the log is refused."""
+    log = good()
+    q = log.q.copy()
+    q[:, 2] = q[0, 2] + 1e-4 * q[:, 2]
+    assert joints(check_log(er3a, replace(log, q=q)), "hardly_moves") == [3]
+    still = check_log(er3a, replace(log, q=np.tile(log.q[0], (len(log), 1))))
+    assert found(still, "no_motion")
+    assert still.refused
+
+
+def test_velocity_columns_are_compared(good, spoilt):
+    """Velocities in degrees, with the wrong sign or of another joint are told."""
+    log = good()
+    dq = np.gradient(log.q, log.t, axis=0)
+    assert spoilt(dq=dq).findings == ()
+    assert "degrees per second" in found(spoilt(dq=np.rad2deg(dq)), "velocity_column")[0].text
+    turned = dq * np.array([1, 1, -1, 1, 1, 1])
+    assert joints(spoilt(dq=turned), "velocity_column") == [3]
+    assert joints(spoilt(dq=dq[:, [1, 0, 2, 3, 4, 5]]), "velocity_column") == [1, 2]
+    assert found(spoilt(dq=dq * 1000), "unit_of_time")
+
+
+def test_torque_without_connection_to_the_motion_is_refused(good, spoilt):
+    """Shuffled torques follow from nothing."""
+    rng = np.random.default_rng(0)
+    report = spoilt(tau=rng.permutation(good().tau))
+    assert joints(report, "badly_excited") == [1, 2, 3, 4, 5, 6]
+    assert report.refused
+
+
+def test_joint_of_noise_is_badly_excited(good, spoilt):
+    """A joint whose torque is noise is named, and the others stay usable."""
+    tau = good().tau.copy()
+    tau[:, 5] = np.random.default_rng(0).normal(size=len(tau))
+    report = spoilt(tau=tau)
+    assert joints(report, "badly_excited") == [6]
+    assert not report.refused
+    assert report.unexplained[5] > 0.9
+
+
+def test_arm_that_is_moved_by_hand_is_refused(fourier_motion):
+    """A torque that holds a pendulum against gravity but never accelerates it says nothing of its inertia."""
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    one = np.ones(1)
+    limits = Limits(
+        lower=-3 * one, upper=3 * one, velocity=6 * one, acceleration=40 * one, jerk=900 * one, torque=9 * one
+    )
+    joint = Joint("pivot", "revolute", turn, np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    robot = Robot(name="pendulum", chain=Chain((joint,)), limits=limits)
+    motion = fourier_motion(robot, 0)
+    hold = 3.3 * np.sin(motion.q) + 0.01 * np.random.default_rng(0).normal(size=motion.q.shape)
+    assert found(check_log(robot, Log(motion.t, motion.q, tau=hold)), "moved_by_others")
+    moved = hold + 0.17 * motion.ddq  # of a mass of 0.68 kg at 0.5 m, as the weight is
+    assert check_log(robot, Log(motion.t, motion.q, tau=moved)).findings == ()
+
+
+def test_joint_that_turns_the_other_way_is_told(arm, arm_log):
+    """A position and a torque with turned signs fit the description badly, and turned back well."""
+    log = arm_log(motion_seed=3)
+    sign = np.array([1.0, -1.0])
+    report = check_log(arm, replace(log, q=log.q * sign, tau=log.tau * sign))
+    assert joints(report, "position_sign") == [2]
+
+
+def test_absurd_values_are_refused_without_a_fit(good, spoilt):
+    """Values near the largest number are named, not squared."""
+    tau = good().tau.copy()
+    tau[:, 1] = 1e300
+    report = spoilt(tau=tau)
+    assert joints(report, "absurd_value") == [2]
+    assert np.isnan(report.unexplained).all()
+
+
+def test_current_is_checked_as_torque_is(arm, arm_log):
+    """A log of currents is checked as well, in the units that the torque constants give."""
+    log = arm_log()
+    current = log.tau / arm.torque_constant
+    report = check_log(arm, Log(log.t, log.q, current=current))
+    assert report.findings == ()
+    assert (report.unexplained < 0.2).all()
+    turned = check_log(arm, Log(log.t, log.q, current=-current))
+    assert {finding.column for finding in found(turned, "torque_sign")} == {"i1", "i2"}
+
+
+def test_motion_without_torque_is_checked_too(er3a, good):
+    """A log of a motion only passes, or is told its faults."""
+    log = good()
+    report = check_log(er3a, Log(log.t, log.q))
+    assert report.findings == ()
+    assert np.isnan(report.delay).all()
+    assert check_log(er3a, Log(1e3 * log.t, log.q)).refused
+
+
+def test_few_rows_are_refused(er3a, good):
+    """Less than the smoothing needs is refused."""
+    for rows in (2, 10, 40):
+        assert found(check_log(er3a, good().rows(slice(0, rows))), "short"), rows
+
+
+def test_log_of_another_robot_is_an_input_error(arm, good):
+    """Another number of joints is no matter for a report."""
+    with pytest.raises(InputError, match="6 joints"):
+        check_log(arm, good())
+
+
+def test_report_says_everything(good, spoilt):
+    """Summary, table and JSON name verdict, findings, numbers and what to do."""
+    report = spoilt(t=1e3 * good().t, tau=-good().tau)
+    assert "refused" in report.summary()
+    assert "milliseconds" in report.summary()
+    frame = report.to_frame()
+    assert list(frame["severity"]) == sorted(frame["severity"], key=["refuse", "warning", "info"].index)
+    stated = json.loads(json.dumps(report.to_dict(), allow_nan=False))
+    assert stated["refused"] is True
+    assert stated["findings"][0]["action"]
+    with pytest.raises(InputError, match="more: "):
+        report.raise_if_refused()
+
+
+def test_two_hours_are_checked_in_about_a_second(er3a, good):
+    """1.8 million samples of six joints take some 1 s of CPU time (3 s allow for a busy machine)."""
+    log = good(duration=20.0)
+    times = 360
+    t = 0.004 * np.arange(times * len(log))
+    # The rows at which two copies meet jump, and are few.
+    long = Log(t, np.tile(log.q, (times, 1)), tau=np.tile(log.tau, (times, 1)))
+    start = time.process_time()
+    report = check_log(er3a, long)
+    assert time.process_time() - start < 3.0
+    assert report.samples == 1_800_000
+
+
+def test_short_log_is_told(er3a, good):
+    """Two seconds for six joints leave standard errors that nobody should trust."""
+    report = check_log(er3a, good().rows(slice(0, 500)))
+    assert found(report, "short")[0].severity == "warning"

@@ -1,0 +1,21 @@
+"""Two hundred mangled logs; the benchmark of the same name runs ten thousand."""
+
+from pathlib import Path
+
+import pytest
+
+BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
+
+
+def test_mangled_logs_end_in_a_message_or_a_right_result(monkeypatch):
+    """No traceback, and no wrong result in silence, whatever is done to a log."""
+    pytest.importorskip("rosbags", reason="rosbags is not installed")
+    pytest.importorskip("h5py", reason="h5py is not installed")
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    import mangled_logs
+
+    cases = list(mangled_logs.run(200, seed=7))
+    assert [case for case in cases if case.result in ("silent", "traceback")] == []
+    # The ways to spoil a log still let some through and stop some: neither side of the test is empty.
+    assert sum(case.result == "right" for case in cases) > 30
+    assert sum(case.result == "message" for case in cases) > 60
