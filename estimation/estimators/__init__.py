@@ -2,12 +2,38 @@
 
 from __future__ import annotations
 
-from estimation.estimators.base import Estimator
+from estimation.estimators.base import Estimator, Solution
+from estimation.estimators.closed_loop import Controller
+from estimation.estimators.consistent import PhysicallyConsistent
+from estimation.estimators.constrained import ConstrainedLeastSquares
+from estimation.estimators.data import RegressionData
+from estimation.estimators.didim import DirectAndInverse
+from estimation.estimators.irls import Huber, Tukey
+from estimation.estimators.iv import InstrumentalVariables
+from estimation.estimators.ml import MaximumLikelihood
 from estimation.estimators.ols import OrdinaryLeastSquares
+from estimation.estimators.recursive import RecursiveLeastSquares, Stream
+from estimation.estimators.simulated import Loop
+from estimation.estimators.tls import TotalLeastSquares
 from estimation.estimators.wls import WeightedLeastSquares
 from robots.common.errors import InputError
 
-ESTIMATORS: dict[str, type[Estimator]] = {kind.name: kind for kind in (WeightedLeastSquares, OrdinaryLeastSquares)}
+ESTIMATORS: dict[str, type[Estimator]] = {
+    kind.name: kind
+    for kind in (
+        WeightedLeastSquares,
+        OrdinaryLeastSquares,
+        Huber,
+        Tukey,
+        TotalLeastSquares,
+        ConstrainedLeastSquares,
+        PhysicallyConsistent,
+        InstrumentalVariables,
+        MaximumLikelihood,
+        DirectAndInverse,
+        RecursiveLeastSquares,
+    )
+}
 
 
 def estimator(choice: str | Estimator) -> Estimator:
@@ -23,4 +49,24 @@ def estimator(choice: str | Estimator) -> Estimator:
     return ESTIMATORS[choice]()
 
 
-__all__ = ["ESTIMATORS", "Estimator", "OrdinaryLeastSquares", "WeightedLeastSquares", "estimator"]
+__all__ = [
+    "ESTIMATORS",
+    "ConstrainedLeastSquares",
+    "Controller",
+    "DirectAndInverse",
+    "Estimator",
+    "Huber",
+    "InstrumentalVariables",
+    "Loop",
+    "MaximumLikelihood",
+    "OrdinaryLeastSquares",
+    "PhysicallyConsistent",
+    "RecursiveLeastSquares",
+    "RegressionData",
+    "Solution",
+    "Stream",
+    "TotalLeastSquares",
+    "Tukey",
+    "WeightedLeastSquares",
+    "estimator",
+]

@@ -1,19 +1,43 @@
-"""What an estimator is: a choice of how much each joint's rows count."""
+"""What an estimator is: how much each joint's rows count, and what more it makes of the data."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.estimators.data import RegressionData
 from estimation.moments import Moments
 
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Solution:
+    """What an estimator found.
+
+    Attributes:
+        values: base parameters (b,).
+        weights: of the joints' rows (n,) [1/(N m)^2 or alike].
+        row_weights: where rows of one joint count unlike: residual (N, n) -> factors (N, n) from 0 to 1.
+        covariance: of the values (b, b), where the estimator has its own; None leaves it to the fit's residual.
+        extras: what else it found: ``standard``, standard parameters (p,) in the torque model's column order, and
+            whatever the estimator's own docstring names.
+    """
+
+    values: Array
+    weights: Array
+    row_weights: Callable[[Array], Array] | None = None
+    covariance: Array | None = None
+    extras: Mapping[str, Any] = field(default_factory=dict)
+
+
 class Estimator(ABC):
-    """A least-squares estimator on per-joint normal equations.
+    """An estimator of base parameters: least squares on per-joint normal equations, then its own refinement.
 
     Attributes:
         name: as the command line spells it.
@@ -26,7 +50,7 @@ class Estimator(ABC):
         """Gives the weights of the joints' rows (n,) [1/(N m)^2 or alike]."""
 
     def solve(self, moments: Moments, ridge: float) -> tuple[Array, Array]:
-        """Estimates.
+        """Estimates from normal equations alone.
 
         Args:
             moments: of all data.
@@ -37,3 +61,16 @@ class Estimator(ABC):
         """
         weights = self.weights(moments, ridge)
         return moments.solve(weights, ridge), weights
+
+    def refine(self, data: RegressionData, values: Array, weights: Array) -> Solution:
+        """Estimates from all that is known of the data, starting from what `solve` found.
+
+        Args:
+            data: motion, torque and regressor.
+            values: base parameters (b,).
+            weights: of the joints' rows (n,).
+
+        Returns:
+            The solution; by default that of `solve`.
+        """
+        return Solution(values=values, weights=weights)

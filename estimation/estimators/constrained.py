@@ -1,0 +1,145 @@
+"""Weighted least squares under bounds, signs of friction and a known total mass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+
+import numpy as np
+
+from estimation.estimators.base import Array, Solution
+from estimation.estimators.data import RegressionData
+from estimation.estimators.regularisation import regularisation
+from estimation.estimators.standard import body_columns, largest_speed, nonnegative_rows, scaling
+from estimation.estimators.wls import WeightedLeastSquares
+from robots.common.errors import InfeasibleError, InputError, SolverError
+from robots.regressor import TorqueModel
+
+# Pulls what the data leave open towards the description, or a plausible arm; far below what they say of the rest.
+FAINT = 1e-8
+
+
+class ConstrainedLeastSquares(WeightedLeastSquares):
+    """min sum_j w_j ||tau_j - Y_j G pi||^2 over standard parameters pi within bounds: a quadratic program.
+
+    By default masses, rotor inertias, Coulomb and viscous friction are not negative, and friction brakes at every speed
+    seen. The solution's extras: ``standard`` (p,), and ``active``, the names of parameters at a bound of their own.
+
+    Args:
+        bounds: standard parameters by name, such as ``f1_3`` or ``m_2``, to their lowest and highest value; infinite
+            where there is none.
+        total_mass: sum of the moving links' masses [kg], or the lowest and highest.
+        signs: whether the default signs are demanded.
+        temper: see `WeightedLeastSquares`.
+
+    Raises:
+        InputError: a bound or mass that no number is between.
+    """
+
+    name = "constrained"
+
+    def __init__(
+        self,
+        *,
+        bounds: Mapping[str, tuple[float, float]] | None = None,
+        total_mass: float | tuple[float, float] | None = None,
+        signs: bool = True,
+        temper: float = 0.5,
+    ) -> None:
+        super().__init__(temper)
+        self.bounds = dict(bounds or {})
+        self.total_mass = (total_mass, total_mass) if isinstance(total_mass, int | float) else total_mass
+        self.signs = signs
+        ranges = {**self.bounds, **({} if self.total_mass is None else {"total_mass": self.total_mass})}
+        for name, (lower, upper) in ranges.items():
+            if not lower <= upper:
+                raise InputError(f"bounds {lower} to {upper}", column=name, allowed="the lower one first")
+
+    def refine(self, data: RegressionData, values: Array, weights: Array) -> Solution:
+        """Solves the quadratic program.
+
+        Raises:
+            InputError: a bound on a parameter that the model has not, or a mass of a model without links.
+            InfeasibleError: bounds that contradict each other.
+            SolverError: the solver gave up.
+        """
+        model = data.base.model
+        units = scaling(data)
+        scale = units.scale
+        limits = self._limits(model)
+        rows, lower, upper = self._rows(model, largest_speed(data))
+        gram = np.tensordot(weights, data.moments.gram, axes=1)
+        extra, right = regularisation(data.moments, weights, gram, data.ridge)
+        level = float(weights @ (np.maximum(data.moments.count, 1) * data.moments.level(values) ** 2))
+        root = _root(gram + extra) / np.sqrt(level)  # root' root = (gram + extra) / level
+        grouping = data.base.grouping * scale
+        target = np.linalg.lstsq(root.T, (weights @ data.moments.cross + right) / level, rcond=None)[0]
+        reference = np.zeros(model.size)
+        reference[units.bodies] = units.unit_reference
+        pull = np.full(model.size, np.sqrt(FAINT))
+        standard = scale * _solve(
+            np.vstack([root @ grouping, np.diag(pull)]),
+            np.concatenate([target, pull * reference]),
+            np.vstack([np.eye(model.size), rows * scale]),
+            np.concatenate([limits[:, 0] / scale, lower]),
+            np.concatenate([limits[:, 1] / scale, upper]),
+        )
+        standard = np.clip(standard, limits[:, 0], limits[:, 1])
+        active = np.isclose(standard, limits[:, 0], rtol=1e-6, atol=1e-9) | np.isclose(
+            standard, limits[:, 1], rtol=1e-6, atol=1e-9
+        )
+        names = tuple(name for name, bound in zip(model.names, active, strict=True) if bound)
+        return Solution(
+            values=data.base.from_standard(standard), weights=weights, extras={"standard": standard, "active": names}
+        )
+
+    def _limits(self, model: TorqueModel) -> Array:
+        limits = np.tile([-np.inf, np.inf], (model.size, 1))
+        if self.signs:
+            limits[[k for k, column in enumerate(model.columns) if column.symbol == "m"], 0] = 0.0
+        for name, (lower, upper) in self.bounds.items():
+            if name not in model.names:
+                near = get_close_matches(name, model.names, n=3)
+                raise InputError(f"unknown parameter {name}", allowed=f"such as {', '.join(near or model.names[:3])}")
+            limits[model.names.index(name)] = lower, upper
+        return limits
+
+    def _rows(self, model: TorqueModel, speed: Array) -> tuple[Array, Array, Array]:
+        rows = nonnegative_rows(model, speed) if self.signs else np.zeros((0, model.size))
+        lower, upper = np.zeros(len(rows)), np.full(len(rows), np.inf)
+        if self.total_mass is not None:
+            bodies = body_columns(model)
+            if not len(bodies):
+                raise InputError("a total mass, but the model has no links", remedy="leave it out")
+            row = np.zeros((1, model.size))
+            row[0, bodies[:, 0]] = 1.0
+            rows = np.vstack([rows, row])
+            lower, upper = np.append(lower, self.total_mass[0]), np.append(upper, self.total_mass[1])
+        return rows, lower, upper
+
+
+def _solve(matrix: Array, target: Array, rows: Array, lower: Array, upper: Array) -> Array:
+    """Min ||matrix x - target||^2 with lower <= rows x <= upper."""
+    import cvxpy
+
+    x = cvxpy.Variable(matrix.shape[1])
+    below, above, fixed = np.isfinite(lower) & (lower < upper), np.isfinite(upper) & (lower < upper), lower == upper
+    constraints = [rows[below] @ x >= lower[below], rows[above] @ x <= upper[above], rows[fixed] @ x == lower[fixed]]
+    problem = cvxpy.Problem(
+        cvxpy.Minimize(cvxpy.sum_squares(matrix @ x - target)), [c for c in constraints if c.shape[0]]
+    )
+    try:
+        problem.solve(solver=cvxpy.CLARABEL, max_threads=1)
+    except cvxpy.error.SolverError as error:
+        raise SolverError(f"constrained fit: {error}", remedy="check the bounds' sizes") from error
+    if problem.status in (cvxpy.INFEASIBLE, cvxpy.INFEASIBLE_INACCURATE):
+        raise InfeasibleError("constrained fit: no parameters obey all bounds", remedy="loosen the bounds")
+    if problem.status not in (cvxpy.OPTIMAL, cvxpy.OPTIMAL_INACCURATE):
+        raise SolverError(f"constrained fit: Clarabel ended with {problem.status}", remedy="check the bounds' sizes")
+    return np.asarray(x.value, dtype=float)
+
+
+def _root(gram: Array) -> Array:
+    """A square root of a Gram matrix: root' root = gram."""
+    values, vectors = np.linalg.eigh(gram)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))).T)

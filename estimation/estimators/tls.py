@@ -1,0 +1,156 @@
+"""Total least squares: noise in the motion spoils the regressor too, and biases all that take it for exact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+
+from estimation.estimators.base import Array, Solution
+from estimation.estimators.data import CHUNK, RegressionData
+from estimation.estimators.position_noise import smoothed_noise
+from estimation.estimators.regularisation import regularisation
+from estimation.estimators.wls import WeightedLeastSquares
+from estimation.moments import Moments
+from robots.common.errors import InputError, SolverError
+
+# Rows on which the regressor's noise is worked out: more don't know its mean square better.
+MOST_ROWS = 6000
+ROUNDS = 5
+# A direction of the parameters of which more than this share is noise is corrected as if it were this share: what is
+# left of its signal is too little to divide by.
+MOST_NOISE = 0.8
+# Share of a joint's misfit that is left to the torque's own noise at least.
+LEAST_TORQUE_NOISE = 0.05
+
+
+class TotalLeastSquares(WeightedLeastSquares):
+    """(G - mu C) pi = c: least squares less what noise in q, dq, ddq adds to the regressor's Gram matrix G.
+
+    C = E[dY' W dY] follows from the noise of the smoothed motion through the regressor's derivatives, row by row;
+    columns that the noise does not reach, such as torque offsets, are exact (mixed total least squares, Golub and Van
+    Loan 1980; Van Huffel and Vandewalle 1991). mu is the smallest generalised eigenvalue of [Y tau]'W[Y tau] against
+    the noise's covariance, which is total least squares, and at most 1: then C is all that is known.
+
+    The solution's extras: ``noise_share`` (b,), the share of each column's mean square that is noise, and ``mu``.
+
+    Args:
+        noise: covariance (n, 3, 3) of the noise in each joint's smoothed q, dq, ddq; None works it out from the
+            recorded positions, taking their noise for white.
+        temper: see `WeightedLeastSquares`.
+
+    Raises:
+        InputError: no covariances.
+    """
+
+    name = "tls"
+
+    def __init__(self, noise: ArrayLike | None = None, temper: float = 0.5) -> None:
+        super().__init__(temper)
+        self.noise = None if noise is None else np.asarray(noise, dtype=float)
+        if self.noise is not None:
+            shaped = self.noise.ndim == 3 and self.noise.shape[1:] == (3, 3) and bool(np.isfinite(self.noise).all())
+            if not shaped or np.linalg.eigvalsh(self.noise).min() < -1e-9 * np.abs(self.noise).max():
+                raise InputError(f"noise of shape {self.noise.shape}", allowed="covariances (n, 3, 3)")
+
+    def refine(self, data: RegressionData, values: Array, weights: Array) -> Solution:
+        """Corrects least squares for the noise of its regressor.
+
+        Raises:
+            InputError: noise of another number of joints.
+            SolverError: more noise than there is signal.
+        """
+        noise = smoothed_noise(data) if self.noise is None else self.noise
+        if len(noise) != data.robot.n:
+            raise InputError(f"noise of {len(noise)} joints", allowed=f"{data.robot.n}")
+        errors = _regressor_noise(data, noise)  # (n, b, b), summed over rows as the Gram matrices are
+        share = np.divide(
+            weights @ np.einsum("jbb->jb", errors),
+            weights @ np.einsum("jbb->jb", data.moments.gram),
+            out=np.zeros(data.base.size),
+            where=np.einsum("jbb->b", data.moments.gram) > 0,
+        )
+        mu = 0.0
+        if errors.any():
+            problem = _Problem(data.moments, weights, errors, data.ridge)
+            for _ in range(ROUNDS):
+                values, mu = problem.solve(values)
+        return Solution(values=values, weights=weights, extras={"noise_share": share, "mu": mu})
+
+
+@dataclass(frozen=True)
+class _Problem:
+    moments: Moments
+    weights: Array
+    errors: Array
+    ridge: float
+
+    def solve(self, values: Array) -> tuple[Array, float]:
+        """One round: torque noise from the last values, then mu and new values."""
+        moments, weights = self.moments, self.weights
+        misfit = np.maximum(moments.count, 1) * moments.level(values) ** 2
+        by_motion = np.einsum("p,jpq,q->j", values, self.errors, values, optimize=True)
+        torque = weights @ np.maximum(misfit - by_motion, LEAST_TORQUE_NOISE * misfit)
+        gram = np.tensordot(weights, moments.gram, axes=1)
+        errors = np.tensordot(weights, self.errors, axes=1)
+        cross, square = weights @ moments.cross, weights @ moments.square
+        extra, right = regularisation(moments, weights, gram, self.ridge)
+        scale = np.sqrt(np.diag(gram))
+        scale = np.where(scale > 0, scale, 1.0)
+        errors, cross, right = errors / scale[:, None] / scale, cross / scale, right / scale
+        matrix = (gram + extra) / scale[:, None] / scale
+        matrix[np.diag_indices_from(matrix)] += 1e-13
+        # Exact columns make the noise's covariance singular: its root keeps the eigenvalue finite.
+        length, vectors = np.linalg.eigh(errors)
+        root = vectors * np.sqrt(np.maximum(length, 0.0))
+        augmented = np.block([[matrix, cross[:, None]], [cross[None], np.array([[square]])]])
+        augmented[-1, -1] += 1e-12 * square  # an exact fit leaves nothing to divide by
+        noise = np.zeros((len(cross) + 1, len(cross) + 1))
+        noise[:-1, :-1], noise[-1, -1] = root, np.sqrt(torque)
+        try:
+            inner = noise.T @ cho_solve(cho_factor(augmented), noise)
+            mu = min(1.0, 1 / float(np.linalg.eigvalsh(inner)[-1]))
+            lower = np.linalg.cholesky(matrix)
+            share, directions = np.linalg.eigh(
+                solve_triangular(lower, solve_triangular(lower, errors, lower=True).T, lower=True)
+            )
+            gain = 1 / (1 - np.minimum(mu * share, MOST_NOISE))
+            inner = directions @ (gain * (directions.T @ solve_triangular(lower, cross + right, lower=True)))
+            return solve_triangular(lower.T, inner) / scale, mu
+        except np.linalg.LinAlgError as error:
+            raise SolverError(
+                "total least squares: the motion's noise outweighs the motion",
+                remedy="smooth more, or state smaller noise",
+            ) from error
+
+
+def _regressor_noise(data: RegressionData, noise: Array) -> Array:
+    """E[dY_j' dY_j] (n, b, b), summed over the rows that count.
+
+    Each joint's noise is taken along the three axes of its own covariance, one standard deviation to either side, so
+    that a sign's jump counts as the noise really sees it.
+    """
+    n, size = data.robot.n, data.base.size
+    total = np.zeros((n, size, size))
+    roots = []
+    for covariance in noise:
+        length, vectors = np.linalg.eigh(covariance)
+        roots.append(vectors * np.sqrt(np.maximum(length, 0.0)))
+    if not np.any(roots):
+        return total
+    rows = sum(len(part.motion) for part in data.parts)
+    stride = max(1, rows // MOST_ROWS)
+    for part in data.parts:
+        chosen = np.arange(stride // 2, len(part.motion), stride)
+        for start in range(0, len(chosen), CHUNK):
+            at = chosen[start : start + CHUNK]
+            state = np.stack([part.motion.q[at], part.motion.dq[at], part.motion.ddq[at]])
+            for joint, root in enumerate(roots):
+                for direction in root.T:
+                    step = np.zeros((3, 1, n))
+                    step[:, 0, joint] = direction
+                    change = (data.base.regressor(*(state + step)) - data.base.regressor(*(state - step))) / 2
+                    total += Moments.of(change, np.zeros_like(part.tau[at]), part.mask[at]).gram
+    return total * (rows / max(sum(len(range(stride // 2, len(p.motion), stride)) for p in data.parts), 1))
