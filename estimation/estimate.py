@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.choices import Choice
+from estimation.gate import GateReport
 from estimation.model import Model
 
 if TYPE_CHECKING:
@@ -35,6 +36,10 @@ class JointFit:
         residual_rms: error on the fitted rows in which the joint is not almost at rest.
         held_out_rms: error on such rows of blocks that were left out of the fit.
         nominal_rms: error of the robot description's own parameters; NaN where it has none.
+        noise_floor: what no model of the motion can predict: what differs from period to period where the motion is
+            periodic, else the level of white noise that explains the residual's fastest part.
+        band: half-width of a band that holds 95 % of the left-out errors.
+        band_coverage: share of each left-out block that the band of the other blocks holds; NaN of a single block.
         identified: whether the left-out error is clearly below that of a constant.
     """
 
@@ -45,6 +50,9 @@ class JointFit:
     residual_rms: float
     held_out_rms: float
     nominal_rms: float
+    noise_floor: float
+    band: float
+    band_coverage: float
     identified: bool
 
     @property
@@ -67,6 +75,7 @@ class Estimate:
         measured: torque (N, n) of the fitted rows [N m or N].
         predicted: by the model (N, n).
         dropped_rows: rows of the logs that repeated an old position.
+        gates: what the gate found in each log; empty where it was not asked.
     """
 
     model: Model
@@ -78,6 +87,7 @@ class Estimate:
     measured: Array
     predicted: Array
     dropped_rows: int
+    gates: tuple[GateReport, ...] = ()
 
     @property
     def success(self) -> bool:
@@ -105,7 +115,12 @@ class Estimate:
             found.append(
                 f"{len(unknown)} of {len(self.model.names)} parameters are not determined: {', '.join(unknown)}."
             )
-        if self.choice.ridge > 1e-6:
+        if self.choice.pull is not None:
+            found.append(
+                f"The data leave directions of the parameters open; a pull of {self.choice.ridge:g} towards the "
+                "robot's description fills them, and helps on data left out. Standard errors are those without it."
+            )
+        elif self.choice.ridge > 1e-6:
             found.append(
                 f"The data leave directions of the parameters open; a ridge of {self.choice.ridge:g} keeps predictions "
                 "sane and pulls those directions towards zero. Standard errors are those without it."
@@ -124,14 +139,20 @@ class Estimate:
         """Says how well each joint is explained, and what to beware of."""
         model = self.model
         lines = [
-            f"{model.robot.name}: {len(model.names)} base parameters from {len(self.t)} samples, smoothed at "
-            f"{self.choice.cutoff:g} Hz",
-            "  joint                 torque RMS   fitted   left out   constant    nominal",
+            f"{model.robot.name}: {len(model.names)} base parameters from {len(self.t)} samples; "
+            f"{self.choice.smoother.text}",
+            "  joint                 torque RMS   fitted   left out   constant    nominal  noise floor",
         ]
         for joint in self.joints:
             shares = [
                 100 * value / joint.torque_rms if joint.torque_rms else np.nan
-                for value in (joint.residual_rms, joint.held_out_rms, joint.torque_spread, joint.nominal_rms)
+                for value in (
+                    joint.residual_rms,
+                    joint.held_out_rms,
+                    joint.torque_spread,
+                    joint.nominal_rms,
+                    joint.noise_floor,
+                )
             ]
             texts = [f"{share:8.2f} %" if np.isfinite(share) else "       – " for share in shares]
             mark = "" if joint.identified else "  NOT IDENTIFIED"
@@ -156,9 +177,12 @@ class Estimate:
                     "torque_rms": joint.torque_rms,
                     "residual_rms": joint.residual_rms,
                     "held_out_rms": joint.held_out_rms,
-                    "held_out_nrmse": joint.nrmse if np.isfinite(joint.nrmse) else None,
+                    "held_out_nrmse": _finite(joint.nrmse),
                     "constant_rms": joint.torque_spread,
-                    "nominal_rms": joint.nominal_rms if np.isfinite(joint.nominal_rms) else None,
+                    "nominal_rms": _finite(joint.nominal_rms),
+                    "noise_floor": joint.noise_floor,
+                    "band95": joint.band,
+                    "band95_coverage": _finite(joint.band_coverage),
                 }
                 for joint in self.joints
             ],
@@ -186,6 +210,10 @@ class Estimate:
             InputError: the file is there, and force is not given.
         """
         self.model.save(Path(folder) / MODEL, force=force)
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def colour_of(errors: Array, white: Array, determined: NDArray[np.bool_]) -> float:

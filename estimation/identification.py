@@ -12,11 +12,14 @@ from estimation.choices import VELOCITY_SCALES, Candidates, Choice, choose
 from estimation.estimate import Estimate, JointFit, colour_of
 from estimation.estimators import Estimator
 from estimation.estimators import estimator as choose_estimator
+from estimation.fitting import Fit, fit, predict_rows
+from estimation.gate import GateReport, check_log
 from estimation.model import Model
-from estimation.moments import Moments
-from estimation.preparation import Prepared, Rows, prepare
-from estimation.uncertainty import Part, covariance, white_noise_covariance
-from robots.base_parameters import BaseParameters, find_base_parameters
+from estimation.preparation import Prepared, prepare
+from estimation.preprocessing import Harmonics
+from estimation.regression import JointRegressor
+from estimation.uncertainty import fast_noise, period_noise
+from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.files import sha256
 from robots.common.parallel import one_blas_thread
@@ -28,9 +31,9 @@ from robots.version import VERSION
 
 Array = NDArray[np.float64]
 
-CHUNK = 4096
-# Standard errors are those of the fit without regularisation; this much keeps the inverse finite.
-FAINT = 1e-13
+# Where this share of the parameters is determined by the data alone, nothing is regularised: a ridge or a pull would
+# move values by what is not data.
+ENOUGH = 0.9
 # A parameter is determined when its standard error is below this share of it ...
 RELATIVE = 0.5
 # ... or when the torque that its standard error makes is below this share of every joint's torque: it is then known
@@ -52,6 +55,7 @@ def identify(
     rotor: bool = True,
     offset: bool = True,
     candidates: Candidates | None = None,
+    check: bool = True,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Estimate:
@@ -69,6 +73,7 @@ def identify(
         rotor: with rotor inertias.
         offset: with a torque offset per joint.
         candidates: settings that the data choose from.
+        check: whether each log passes the gate first, which refuses what would be fitted wrongly and cuts at gaps.
         seed: of the noise drawn to correct the standard errors.
         progress: is told how far it is.
 
@@ -76,7 +81,7 @@ def identify(
         The estimate.
 
     Raises:
-        InputError: logs of another robot, without torque, or too short; unknown options.
+        InputError: logs of another robot, without torque, too short, or refused by the gate; unknown options.
         NotIdentifiableError: logs in which no joint's torque can be predicted.
     """
     chosen = choose_estimator(method)
@@ -85,69 +90,63 @@ def identify(
         raise InputError("no logs", allowed="one or more")
     bar = progress or SILENT
     bar.start("identifying", 4.0)
-    prepared = [prepare(robot, log) for log in data]
+    _require_motion(data)
+    gates: list[GateReport] = []
+    for log in data if check else ():
+        bar.update(0.0, "checking the logs")
+        gates.append(check_log(robot, log))
+        gates[-1].raise_if_refused()
+    usable = [part for log, gate in zip(data, gates, strict=True) for part in gate.usable(log)] if gates else data
+    prepared = [prepare(robot, log) for log in usable]
     sharp = default_model(robot, friction=friction, velocity_scale=VELOCITY_SCALES[0], rotor=rotor, offset=offset)
     base = find_base_parameters(sharp)
     bar.update(1.0, "choosing smoothing and regularisation")
     choice = choose(base, prepared, chosen, candidates or Candidates())
     predictable = _predictable(prepared, choice)
-    model = default_model(robot, friction=friction, velocity_scale=choice.velocity_scales, rotor=rotor, offset=offset)
-    base = replace(base, model=model)
-    rows = [log.rows(choice.cutoff) for log in prepared]
     bar.update(2.0, "fitting")
-    moments = _moments(base, rows)
-    values, weights = chosen.solve(moments, choice.ridge)
-    bar.update(3.0, "standard errors")
-    predicted = [base.torque(part.motion.q, part.motion.dq, part.motion.ddq, values) for part in rows]
-    parts = [_part(base, part, part.tau - torque) for part, torque in zip(rows, predicted, strict=True)]
-    inverse = moments.inverse(weights, FAINT)
-    full = covariance(parts, weights, inverse, seed)
-    white = white_noise_covariance(parts, weights, inverse)
-    joints = _joint_fits(base, rows, predicted, choice, predictable)
+
+    def fitted(setting: Choice) -> tuple[Fit, tuple[JointFit, ...], NDArray[np.bool_]]:
+        scales = setting.velocity_scales
+        model = default_model(robot, friction=friction, velocity_scale=scales, rotor=rotor, offset=offset)
+        found = fit(replace(base, model=model), prepared, chosen, setting, seed)
+        joints = _joint_fits(found, predictable)
+        return found, joints, _determined(found, joints)
+
+    found, joints, determined = fitted(choice.plain or choice)
+    if choice.plain is not None and determined.mean() < ENOUGH:
+        bar.update(3.0, "fitting with regularisation")
+        found, joints, determined = fitted(choice)
     bar.finish()
-    determined = _determined(base, moments, values, full, joints)
-    naive = np.sqrt(np.maximum(np.diag(white), 0.0))
-    colour = colour_of(np.sqrt(np.maximum(np.diag(full), 0.0)), naive, determined)
+    colour = colour_of(np.sqrt(np.maximum(np.diag(found.covariance), 0.0)), found.white, determined)
+    base, rows = found.base, found.rows
+    provenance = {**_provenance(data, chosen, found.choice, joints, seed), "colour": colour}
+    if "standard" in found.solution.extras:
+        provenance["standard_parameters"] = np.asarray(found.solution.extras["standard"], dtype=float).tolist()
     return Estimate(
         model=Model(
-            torque_model=model,
+            torque_model=base.model,
             columns=base.independent,
-            values=values,
-            covariance=full,
+            values=found.solution.values,
+            covariance=found.covariance,
             determined=determined,
             formulas=base.formulas(),
-            provenance={**_provenance(data, chosen, choice, joints, seed), "colour": colour},
+            provenance=provenance,
         ),
-        choice=choice,
+        choice=found.choice,
         joints=joints,
-        white_noise_errors=naive,
+        white_noise_errors=found.white,
         t=np.concatenate([part.motion.t for part in rows]),
         dq=np.concatenate([part.motion.dq for part in rows]),
         measured=np.concatenate([part.tau for part in rows]),
-        predicted=np.concatenate(predicted),
+        predicted=np.concatenate(found.predicted),
         dropped_rows=sum(log.positions.dropped for log in prepared),
+        gates=tuple(gates),
     )
 
 
-def _moments(base: BaseParameters, rows: Sequence[Rows]) -> Moments:
-    total: Moments | None = None
-    for part in rows:
-        for start in range(0, len(part.motion), CHUNK):
-            chunk = slice(start, start + CHUNK)
-            Y = base.regressor(part.motion.q[chunk], part.motion.dq[chunk], part.motion.ddq[chunk])
-            moments = Moments.of(Y, part.tau[chunk], part.mask[chunk])
-            total = moments if total is None else total + moments
-    assert total is not None
-    return total
-
-
-def _part(base: BaseParameters, rows: Rows, residual: Array) -> Part:
-    motion = rows.motion
-
-    def regressor(start: int, stop: int) -> Array:
-        return base.regressor(motion.q[start:stop], motion.dq[start:stop], motion.ddq[start:stop])
-
-    return Part(len(motion), regressor, rows.mask, residual * rows.mask)
+def _require_motion(logs: Sequence[Log]) -> None:
+    if not any(np.ptp(log.q, axis=0).any() for log in logs):
+        raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
 
 
 def _predictable(prepared: Sequence[Prepared], choice: Choice) -> NDArray[np.bool_]:
@@ -157,13 +156,12 @@ def _predictable(prepared: Sequence[Prepared], choice: Choice) -> NDArray[np.boo
         NotIdentifiableError: none.
     """
     moves = np.any([np.ptp(log.log.q, axis=0) > 0 for log in prepared], axis=0)
-    tau = np.concatenate([log.tau for log in prepared])
-    varies = np.ptp(tau, axis=0) > ROUNDING * np.maximum(1.0, np.abs(tau).max(axis=0))
+    highest = np.max([log.tau.max(axis=0) for log in prepared], axis=0)
+    lowest = np.min([log.tau.min(axis=0) for log in prepared], axis=0)
+    varies = highest - lowest > ROUNDING * np.maximum(1.0, np.maximum(highest, -lowest))
     follows = choice.held_out < HOPELESS * choice.spread
     if (moves & varies & follows).any():
         return np.asarray(moves & varies & follows)
-    if not moves.any():
-        raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
     if not varies.any():
         raise NotIdentifiableError(
             "no joint's torque varies", remedy="record the torque of the moving arm, and check what tau1.. hold"
@@ -175,51 +173,68 @@ def _predictable(prepared: Sequence[Prepared], choice: Choice) -> NDArray[np.boo
     )
 
 
-def _joint_fits(
-    base: BaseParameters,
-    rows: Sequence[Rows],
-    predicted: Sequence[Array],
-    choice: Choice,
-    predictable: NDArray[np.bool_],
-) -> tuple[JointFit, ...]:
+def _joint_fits(found: Fit, predictable: NDArray[np.bool_]) -> tuple[JointFit, ...]:
     """Measures each joint's errors, beside what a constant and the robot's description would give."""
-    measured = np.concatenate([part.tau for part in rows])
+    base, choice = found.base, found.choice
+    total = sum(len(part.motion) for part in found.rows)
+    rms = np.sqrt(sum(np.einsum("tj,tj->j", part.tau, part.tau) for part in found.rows) / total)
     # On the rows that count, as the left-out errors are: of a standing joint's friction no model knows the sign.
-    mask = np.concatenate([part.mask for part in rows])
-    fitted = np.sum(mask * (measured - np.concatenate(predicted)) ** 2, axis=0) / np.maximum(mask.sum(axis=0), 1)
-    rms = np.sqrt(np.mean(measured**2, axis=0))
+    pairs = list(zip(found.rows, found.predicted, strict=True))
+    squares = sum(np.einsum("tj,tj->j", part.mask * (part.tau - torque), part.tau - torque) for part, torque in pairs)
+    fitted = np.sqrt(squares / np.maximum(sum(part.mask.sum(axis=0) for part in found.rows), 1))
     nominal = np.full(len(rms), np.nan)
     description = base.model.nominal
     if np.isfinite(description).all():
-        torque = np.concatenate(
-            [base.model.torque(part.motion.q, part.motion.dq, part.motion.ddq, description) for part in rows]
-        )
-        nominal = np.sqrt(np.mean((measured - torque) ** 2, axis=0))
+        nominal = np.sqrt(_squares(found, base.from_standard(description)) / total)
+    floor = _noise_floor(found)
     return tuple(
         JointFit(
             joint=j + 1,
             name=base.model.robot.joint_names[j],
             torque_rms=float(rms[j]),
             torque_spread=float(choice.spread[j]),
-            residual_rms=float(np.sqrt(fitted[j])),
+            residual_rms=float(fitted[j]),
             held_out_rms=float(choice.held_out[j]),
             nominal_rms=float(nominal[j]),
+            noise_floor=float(floor[j]),
+            band=float(choice.band[j]),
+            band_coverage=float(choice.band_coverage[j]),
             identified=bool(predictable[j]),
         )
         for j in range(len(rms))
     )
 
 
-def _determined(
-    base: BaseParameters, moments: Moments, values: Array, full: Array, joints: Sequence[JointFit]
-) -> NDArray[np.bool_]:
-    errors = np.sqrt(np.maximum(np.diag(full), 0.0))
+def _noise_floor(found: Fit) -> Array:
+    residuals = [part.tau - torque for part, torque in zip(found.rows, found.predicted, strict=True)]
+    smoother = found.choice.smoother
+    if isinstance(smoother, Harmonics):
+        levels = [
+            period_noise(part.motion.t, residual, smoother.period)
+            for part, residual in zip(found.rows, residuals, strict=True)
+        ]
+        known = [level**2 for level in levels if level is not None]
+        if known:
+            return np.asarray(np.sqrt(np.mean(known, axis=0)))
+    return fast_noise(residuals)
+
+
+def _squares(found: Fit, values: Array) -> Array:
+    """Sums each joint's squared errors (n,) over all rows by other parameters."""
+    regressor = JointRegressor(found.base)
+    errors = ((part.tau - predict_rows(regressor, part, values)) for part in found.rows)
+    return np.asarray(sum(np.einsum("tj,tj->j", error, error) for error in errors))
+
+
+def _determined(found: Fit, joints: Sequence[JointFit]) -> NDArray[np.bool_]:
+    values, moments, columns = found.solution.values, found.moments, found.base.columns
+    errors = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
     excited = np.einsum("jpp->jp", moments.gram) / np.maximum(moments.count, 1)[:, None]  # mean square of each column
     torque = np.array([joint.torque_rms for joint in joints])
     share = (errors * np.sqrt(excited) / np.maximum(torque, np.finfo(float).tiny)[:, None]).max(axis=0)
     known = (errors <= RELATIVE * np.abs(values)) | (share <= NEGLIGIBLE)
-    own = np.array([column.term != "rigid_body" for column in base.columns])
-    lost = np.array([not joints[column.joint - 1].identified for column in base.columns])
+    own = np.array([column.term != "rigid_body" for column in columns])
+    lost = np.array([not joints[column.joint - 1].identified for column in columns])
     return known & (excited.sum(axis=0) > 0) & ~(own & lost)
 
 
@@ -242,9 +257,14 @@ def _provenance(
         "method": method.name,
         "tool_version": VERSION,
         "cutoff_hz": choice.cutoff,
+        "smoothing": choice.smoother.to_dict(),
         "ridge": choice.ridge,
+        "regularised": choice.plain is not None,
+        "pulled_to_description": choice.pull is not None,
         "velocity_scales": list(choice.velocity_scales),
         "seed": seed,
+        "band95": [joint.band for joint in joints],
+        "noise_floor": [joint.noise_floor for joint in joints],
         "residual_rms": [joint.residual_rms for joint in joints],
         "held_out_rms": [joint.held_out_rms for joint in joints],
         "torque_rms": [joint.torque_rms for joint in joints],

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimation.diagnosis.extension import Extension, extension_torque, read_extension
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.geometry.chain import Chain, Joint
@@ -42,6 +43,7 @@ class Model:
             makes the others right together, and means nothing by itself.
         formulas: (b,) the sum of standard parameters that each value stands for.
         provenance: logs with hashes, method, residual level per joint, tool version.
+        extensions: effects beyond the terms, as a diagnosis found them.
     """
 
     torque_model: TorqueModel
@@ -51,6 +53,7 @@ class Model:
     determined: NDArray[np.bool_]
     formulas: tuple[str, ...]
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    extensions: tuple[Extension, ...] = ()
 
     @property
     def robot(self) -> Robot:
@@ -72,9 +75,22 @@ class Model:
         """Standard errors (b,), infinite where the data do not determine the parameter."""
         return np.where(self.determined, np.sqrt(np.diag(self.covariance)), np.inf)
 
-    def torque(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
-        """Predicts the torque (N, n) [N m or N] of a motion given by arrays (N, n)."""
-        return self.torque_model.torque(q, dq, ddq, self.values, columns=self.columns)
+    def torque(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike, t: ArrayLike | None = None) -> Array:
+        """Predicts the torque (N, n) [N m or N] of a motion given by arrays (N, n).
+
+        Args:
+            q: positions.
+            dq: velocities.
+            ddq: accelerations.
+            t: times (N,) [s]. With them the extensions count, some of which depend on time or on what came before;
+                without, the terms alone.
+        """
+        own = self.torque_model.torque(q, dq, ddq, self.values, columns=self.columns)
+        if t is None or not self.extensions:
+            return own
+        arrays = [np.atleast_2d(np.asarray(array, dtype=float)) for array in (q, dq, ddq)]
+        times = np.asarray(t, dtype=float)
+        return own + extension_torque(self.extensions, self.torque_model, self.values, self.columns, times, *arrays)
 
     def to_frame(self) -> pd.DataFrame:
         """Gives a row per parameter: joint, value, standard error, percent, unit, determined, formula."""
@@ -121,6 +137,7 @@ class Model:
             "parameters": parameters,
             "covariance": self.covariance.tolist(),
             "provenance": dict(self.provenance),
+            **({"extensions": [extension.to_dict(robot) for extension in self.extensions]} if self.extensions else {}),
         }
 
     def save(self, path: Path, *, force: bool = False) -> None:
@@ -188,6 +205,7 @@ def _from_dict(data: Mapping[str, Any]) -> Model:
         determined=np.array([item["determined"] for item in parameters], dtype=bool),
         formulas=tuple(item["stands_for"] for item in parameters),
         provenance=data["provenance"],
+        extensions=tuple(read_extension(item, torque_model.robot) for item in data.get("extensions", [])),
     )
 
 

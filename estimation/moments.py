@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from estimation.pulls import Pull
+
 Array = NDArray[np.float64]
+
+# Keeps a matrix invertible that no ridge helps.
+FAINT = 1e-12
 
 
 @dataclass(frozen=True)
@@ -20,12 +25,14 @@ class Moments:
         cross: (n, p), Y_j' tau_j.
         square: (n,), tau_j' tau_j.
         count: (n,), rows.
+        pull: what the ridge of `solve` pulls to; without, to zero.
     """
 
     gram: Array
     cross: Array
     square: Array
     count: Array
+    pull: Pull | None = None
 
     @staticmethod
     def of(Y: Array, tau: Array, mask: Array) -> Moments:
@@ -41,29 +48,50 @@ class Moments:
         return Moments(gram, cross, (mask * tau**2).sum(axis=0), mask.sum(axis=0))
 
     def __add__(self, other: Moments) -> Moments:
-        return Moments(
-            self.gram + other.gram, self.cross + other.cross, self.square + other.square, self.count + other.count
+        return replace(
+            self,
+            gram=self.gram + other.gram,
+            cross=self.cross + other.cross,
+            square=self.square + other.square,
+            count=self.count + other.count,
         )
 
     def __sub__(self, other: Moments) -> Moments:
-        return Moments(
-            self.gram - other.gram, self.cross - other.cross, self.square - other.square, self.count - other.count
+        return replace(
+            self,
+            gram=self.gram - other.gram,
+            cross=self.cross - other.cross,
+            square=self.square - other.square,
+            count=self.count - other.count,
         )
+
+    def pulled(self, pull: Pull | None) -> Moments:
+        """Gives the same sums with another pull."""
+        return replace(self, pull=pull)
 
     def columns(self, chosen: NDArray[np.intp]) -> Moments:
         """Keeps some of the p columns."""
-        return Moments(self.gram[:, chosen][:, :, chosen], self.cross[:, chosen], self.square, self.count)
+        pull = None if self.pull is None else self.pull.columns(chosen)
+        return Moments(self.gram[:, chosen][:, :, chosen], self.cross[:, chosen], self.square, self.count, pull)
 
     def solve(self, weights: Array, ridge: float) -> Array:
         """Solves for parameters (p,).
 
         Args:
             weights: of each joint's rows (n,).
-            ridge: added to the diagonal of the weighted Gram matrix once its columns have unit length.
+            ridge: how much the pull counts. Without a pull it is added to the diagonal of the weighted Gram matrix
+                once its columns have unit length; with one, a ridge of 1 weighs an error of a parameter's own size
+                as much as all of the torque.
         """
         scale, matrix = self._scaled(weights)
         right = (weights @ self.cross) / scale
-        return cho_solve(cho_factor(matrix + ridge * np.eye(len(scale))), right) / scale
+        if self.pull is None:
+            matrix = matrix + ridge * np.eye(len(scale))
+        else:
+            precision = ridge * (weights @ self.square) * self.pull.precision
+            matrix = matrix + precision / scale[:, None] / scale + FAINT * np.eye(len(scale))
+            right = right + (precision @ self.pull.target) / scale + FAINT * scale * self.pull.target
+        return cho_solve(cho_factor(matrix), right) / scale
 
     def inverse(self, weights: Array, ridge: float) -> Array:
         """Inverts the weighted Gram matrix (p, p) with the ridge of `solve`."""

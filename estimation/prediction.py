@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from estimation.model import Model
 from estimation.preparation import torque_of
 from estimation.preprocessing import resample, smooth
+from estimation.preprocessing.smoothing import low_pass
+from estimation.regression import chunks
 from robots.common.errors import InputError
 from robots.common.tables import write_table
 from robots.signals import Log, Motion
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
+
+NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,12 +35,17 @@ class Prediction:
         predicted: torque (N, n) [N m or N].
         measured: torque (N, n) as logged, or None.
         joint_names: names (n,).
+        band: half-widths (N, n) of a band that held 95 % of the errors on data left out of the fit, widened by what
+            the parameters' errors make of this motion; None of a model that states none.
+        cutoff: of the model's smoothing [Hz]: above it, no motion is known.
     """
 
     motion: Motion
     predicted: Array
     measured: Array | None
     joint_names: tuple[str, ...]
+    band: Array | None = None
+    cutoff: float = np.inf
 
     @property
     def error_rms(self) -> Array:
@@ -57,6 +66,26 @@ class Prediction:
             return self.error_rms
         return self._over((self.measured - self.predicted).std(axis=0), self.measured.std(axis=0))
 
+    @property
+    def band_limited_spread(self) -> Array:
+        """`relative_spread` after one low-pass over measured and predicted torque alike (n,).
+
+        What the sensors add above the motion's frequencies is left out of both; the whole error is in
+        `relative_spread`.
+        """
+        if self.measured is None:
+            return self.error_rms
+        period = self.motion.duration / max(len(self.motion) - 1, 1)
+        error, torque = (low_pass(x, period, self.cutoff) for x in (self.measured - self.predicted, self.measured))
+        return self._over(error.std(axis=0), torque.std(axis=0))
+
+    @property
+    def band_coverage(self) -> Array:
+        """Share of the measured torque within the band (n,); NaN without measurement or band."""
+        if self.measured is None or self.band is None:
+            return np.full(self.predicted.shape[1], np.nan)
+        return np.asarray((np.abs(self.measured - self.predicted) <= self.band).mean(axis=0))
+
     def _over(self, error: Array, scale: Array | None) -> Array:
         if scale is None:
             return error
@@ -67,12 +96,15 @@ class Prediction:
         samples = len(self.motion)
         if self.measured is None:
             return f"torques of {samples} samples; the log has none to compare with"
-        lines = [f"torques of {samples} samples", "  joint                  error RMS   over RMS   std over std"]
-        rows = zip(self.joint_names, self.error_rms, self.nrmse, self.relative_spread, strict=True)
-        lines += [
-            f"  {j} {name[:18]:18} {rms:12.4g} {100 * share:8.2f} % {100 * spread:12.2f} %"
-            for j, (name, rms, share, spread) in enumerate(rows, start=1)
+        limited = f"below {self.cutoff:.3g} Hz"
+        lines = [
+            f"torques of {samples} samples",
+            f"  joint                  error RMS   over RMS   std over std  {limited:>14}  within the 95 % band",
         ]
+        columns = (self.error_rms, self.nrmse, self.relative_spread, self.band_limited_spread, self.band_coverage)
+        for j, (name, rms, *shares) in enumerate(zip(self.joint_names, *columns, strict=True), start=1):
+            share, spread, slow, covered = (f"{100 * v:.2f} %" if np.isfinite(v) else "–" for v in shares)
+            lines.append(f"  {j} {name[:18]:18} {rms:12.4g} {share:>10} {spread:>14} {slow:>15} {covered:>21}")
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -81,6 +113,8 @@ class Prediction:
             "error_rms": self.error_rms,
             "nrmse": self.nrmse,
             "error_std_over_torque_std": self.relative_spread,
+            "error_std_over_torque_std_below_cutoff": self.band_limited_spread,
+            "band95_coverage": self.band_coverage,
         }
         return {
             "samples": len(self.motion),
@@ -91,19 +125,22 @@ class Prediction:
         """Gives t, tau1.. as a table."""
         import pandas as pd
 
-        return pd.DataFrame(self._columns())
+        return pd.DataFrame(self._columns(band=False))
 
-    def save(self, path: str | Path, *, force: bool = False) -> None:
-        """Writes t, tau1..taun as CSV or Parquet.
+    def save(self, path: str | Path, *, band: bool = False, force: bool = False) -> None:
+        """Writes t, tau1..taun, and on request the band's half-widths band1..bandn, as CSV or Parquet.
 
         Raises:
             InputError: the file is there, and force is not given.
         """
-        write_table(path, self._columns(), {"content": "predicted joint torques"}, force=force)
+        write_table(path, self._columns(band), {"content": "predicted joint torques"}, force=force)
 
-    def _columns(self) -> dict[str, Array]:
+    def _columns(self, band: bool) -> dict[str, Array]:
         joints = range(self.predicted.shape[1])
-        return {"t": self.motion.t, **{f"tau{j + 1}": self.predicted[:, j] for j in joints}}
+        columns = {"t": self.motion.t, **{f"tau{j + 1}": self.predicted[:, j] for j in joints}}
+        if band and self.band is not None:
+            columns |= {f"band{j + 1}": self.band[:, j] for j in joints}
+        return columns
 
 
 def predict(model: Model, log: Log) -> Prediction:
@@ -129,7 +166,24 @@ def predict(model: Model, log: Log) -> Prediction:
     has_torque = log.tau is not None or log.current is not None
     return Prediction(
         motion=motion,
-        predicted=model.torque(motion.q, motion.dq, motion.ddq),
+        predicted=model.torque(motion.q, motion.dq, motion.ddq, motion.t),
         measured=torque_of(robot, log) if has_torque else None,
         joint_names=robot.joint_names,
+        band=_band(model, motion),
+        cutoff=cutoff,
     )
+
+
+def _band(model: Model, motion: Motion) -> Array | None:
+    level = model.provenance.get("band95")
+    if level is None:
+        return None
+    width = np.broadcast_to(np.asarray(level, dtype=float), motion.q.shape).copy()
+    if model.provenance.get("regularised", True):
+        # The covariance is that of the fit without regularisation: it knows nothing of what fills open directions.
+        return width
+    for rows in chunks(len(motion)):
+        Y = model.torque_model.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows], columns=model.columns)
+        variance = np.einsum("tjp,tjp->tj", Y @ model.covariance, Y)
+        width[rows] = np.hypot(width[rows], NORMAL_95 * np.sqrt(np.maximum(variance, 0.0)))
+    return width

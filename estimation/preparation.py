@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.preprocessing import Resampled, resample, smooth
-from estimation.preprocessing.smoothing import transient
+from estimation.preprocessing import LowPass, Resampled, Smoother, period_of, resample, smooth
+from estimation.regression import threaded
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log, Motion
@@ -19,11 +21,15 @@ Array = NDArray[np.float64]
 SLOW = 0.008
 # A joint with less RMS speed than this [rad/s or m/s] stands: what is left is rounding, not to be taken for motion.
 STANDING = 1e-9
+# A longer log is smoothed piece by piece, so that its intermediate signals never stand in memory together. Pieces
+# overlap by so many periods of the cut-off: the filter has forgotten their ends by then, to a part in 10^7.
+PIECE = 200_000
+OVERLAP = 4.0
 
 
 @dataclass(frozen=True)
 class Rows:
-    """What a fit sees of a log.
+    """What a fit sees of a log, or of a piece of a long one.
 
     Attributes:
         motion: smoothed, at the log's own times.
@@ -50,23 +56,79 @@ class Prepared:
     tau: Array
     positions: Resampled
 
-    def rows(self, cutoff: float, stride: int = 1) -> Rows:
+    @cached_property
+    def period(self) -> float | None:
+        """The period with which the motion repeats itself [s], found in the log; None where it does not."""
+        return period_of(self.positions)
+
+    @property
+    def even(self) -> bool:
+        """Whether the samples themselves are a uniform grid."""
+        return self.positions.q is self.positions.fresh_q
+
+    def rows(self, by: float | Smoother) -> Rows:
         """Smooths the log and leaves out its ends, where the smoothing has nothing to lean on.
 
         Args:
-            cutoff: of the smoothing [Hz].
-            stride: take every so many rows.
+            by: the smoothing; a number is the cut-off of a low-pass [Hz].
         """
-        motion = smooth(self.positions, cutoff)
-        t = motion.t
-        edge = transient(motion.duration, cutoff)
-        inside = np.flatnonzero((t >= t[0] + edge) & (t <= t[-1] - edge))[::stride]
-        dq = motion.dq[inside]
-        speed = np.sqrt(np.mean(dq**2, axis=0))
+        (rows,) = self._masked([self._smoothed(self, _smoother(by))])
+        return rows
+
+    def pieces(self, by: float | Smoother) -> list[Rows]:
+        """Smooths the log as `rows` does, a long one in pieces that follow each other."""
+        smoother = _smoother(by)
+        count = len(self.log)
+        if count <= PIECE or not isinstance(smoother, LowPass):
+            return [self.rows(smoother)]
+        bounds = np.linspace(0, count, -(-count // PIECE) + 1).astype(int)
+        margin = round(OVERLAP / (smoother.cutoff * self.positions.period))
+        edge = smoother.edge(self.log.duration)
+        t = self.log.t
+
+        def piece(ends: tuple[int, int]) -> tuple[Motion, Array]:
+            first, stop = max(ends[0] - margin, 0), min(ends[1] + margin, count)
+            inside = self.cut(slice(first, stop))
+            motion = smooth(inside.positions, smoother)
+            begin = max(ends[0], int(np.searchsorted(t, t[0] + edge)))
+            end = min(ends[1], int(np.searchsorted(t, t[-1] - edge, side="right")))
+            return motion.slice(begin - first, end - first), self.tau[begin:end]
+
+        return self._masked(list(threaded(piece, zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True))))
+
+    def cut(self, part: slice) -> Prepared:
+        """Takes some rows."""
+        return Prepared(_window(self.log, part), self.tau[part], resample(self.log.t[part], self.log.q[part]))
+
+    def stretches(self, count: int, rows: int) -> Iterator[Prepared]:
+        """Gives `count` evenly spread stretches of so many rows each, or the log where that is all of it."""
+        if count * rows >= len(self.log):
+            yield self
+            return
+        for start in np.linspace(0, len(self.log) - rows, count).astype(int).tolist():
+            yield self.cut(slice(start, start + rows))
+
+    @staticmethod
+    def _smoothed(log: Prepared, smoother: Smoother) -> tuple[Motion, Array]:
+        motion = smooth(log.positions, smoother)
+        t, edge = motion.t, smoother.edge(motion.duration)
+        begin = int(np.searchsorted(t, t[0] + edge))
+        end = int(np.searchsorted(t, t[-1] - edge, side="right"))
+        return (motion.slice(begin, end) if (begin, end) != (0, len(t)) else motion), log.tau[begin:end]
+
+    @staticmethod
+    def _masked(parts: list[tuple[Motion, Array]]) -> list[Rows]:
+        """Leaves out the rows (N, n) in which a joint is almost at rest, by its speed in all parts together."""
+        total = sum(len(motion) for motion, _ in parts)
+        speed = np.sqrt(sum(np.einsum("tj,tj->j", motion.dq, motion.dq) for motion, _ in parts) / total)
         moves = speed >= STANDING
-        fast = (np.abs(dq) >= SLOW * speed) | ~moves
-        cut = Motion(t=t[inside], q=motion.q[inside], dq=dq * moves, ddq=motion.ddq[inside] * moves)
-        return Rows(cut, self.tau[inside], fast.astype(float))
+        rows = []
+        for motion, tau in parts:
+            if not moves.all():
+                motion = Motion(motion.t, motion.q, motion.dq * moves, motion.ddq * moves)
+            fast = np.abs(motion.dq) >= SLOW * speed
+            rows.append(Rows(motion, tau, (fast | ~moves).astype(float)))
+        return rows
 
 
 def prepare(robot: Robot, log: Log) -> Prepared:
@@ -104,3 +166,12 @@ def torque_of(robot: Robot, log: Log) -> Array:
             remedy="state torque_constant under drives in the robot YAML",
         )
     return log.current * constant
+
+
+def _smoother(by: float | Smoother) -> Smoother:
+    return by if isinstance(by, Smoother) else LowPass(by)
+
+
+def _window(log: Log, part: slice) -> Log:
+    # Only what the fit needs: other signals of a long log need not be copied.
+    return Log(t=log.t[part], q=log.q[part], name=log.name)

@@ -1,6 +1,19 @@
 """From logged positions to noise-free motion, without phase lag."""
 
+from estimation.preprocessing.base import Smoother
+from estimation.preprocessing.harmonics import Harmonics, period_of
 from estimation.preprocessing.resampling import Resampled, resample, stale_rows
-from estimation.preprocessing.smoothing import smooth
+from estimation.preprocessing.smoothing import LowPass, smooth
+from estimation.preprocessing.spline import SmoothingSpline
 
-__all__ = ["Resampled", "resample", "smooth", "stale_rows"]
+__all__ = [
+    "Harmonics",
+    "LowPass",
+    "Resampled",
+    "Smoother",
+    "SmoothingSpline",
+    "period_of",
+    "resample",
+    "smooth",
+    "stale_rows",
+]

@@ -30,6 +30,8 @@ class Resampled:
         period: of the grid [s].
         dropped: rows of the log that repeated an older position.
         original: the log's own times (N,) [s].
+        fresh_t: times (K,) of the rows that are not stale [s].
+        fresh_q: positions (K, n) of those rows, as they were logged.
     """
 
     t: Array
@@ -37,6 +39,8 @@ class Resampled:
     period: float
     dropped: int
     original: Array
+    fresh_t: Array
+    fresh_q: Array
 
 
 def resample(t: Array, q: Array) -> Resampled:
@@ -53,7 +57,7 @@ def resample(t: Array, q: Array) -> Resampled:
         InputError: fewer than 20 distinct rows.
     """
     stale = stale_rows(t, q)
-    kept_t, kept_q = t[~stale], q[~stale]
+    kept_t, kept_q = (t[~stale], q[~stale]) if stale.any() else (t, q)
     if len(kept_t) < 20:
         raise InputError(f"{len(kept_t)} rows", allowed="20 or more", remedy="record a longer log")
     steps = np.diff(t)
@@ -63,9 +67,11 @@ def resample(t: Array, q: Array) -> Resampled:
     grid = t[0] + period * np.arange(int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1)
     if stale.any() or not even:
         values = PchipInterpolator(kept_t, kept_q)(np.minimum(grid, kept_t[-1]))
+    elif len(grid) == len(t) and np.abs(grid - t).max() <= 1e-6 * period:
+        values = q
     else:
         values = np.column_stack([np.interp(grid, kept_t, column) for column in kept_q.T])
-    return Resampled(grid, values, period, int(stale.sum()), t)
+    return Resampled(grid, values, period, int(stale.sum()), t, kept_t, kept_q)
 
 
 def stale_rows(t: Array, q: Array) -> NDArray[np.bool_]:

@@ -1,6 +1,7 @@
 """Honest uncertainty: covariances that survive coloured residuals."""
 
 from estimation.uncertainty.autoregressive import Noise
-from estimation.uncertainty.sandwich import Part, covariance, white_noise_covariance
+from estimation.uncertainty.floors import fast_noise, period_noise
+from estimation.uncertainty.sandwich import Part, batch_factors, covariance, white_noise_covariance
 
-__all__ = ["Noise", "Part", "covariance", "white_noise_covariance"]
+__all__ = ["Noise", "Part", "batch_factors", "covariance", "fast_noise", "period_noise", "white_noise_covariance"]

@@ -16,8 +16,10 @@ Array = NDArray[np.float64]
 # Rows whose regressor is held at a time.
 CHUNK = 4096
 # Above so many rows the fit eats too little of the noise to matter.
-MOST_CORRECTED = 100_000
+MOST_CORRECTED = 30_000
 DRAWS, ROUNDS = 8, 2
+# Fewer batches than this say too little of a standard error.
+LEAST_BATCHES = 100
 
 
 @dataclass(frozen=True)
@@ -29,12 +31,14 @@ class Part:
         regressor: (start, stop) -> Y (stop - start, n, p).
         mask: (N, n).
         residual: (N, n), as the fit left it.
+        used: per joint the indices of the columns that act on it; None for all.
     """
 
     rows: int
     regressor: Callable[[int, int], Array]
     mask: Array
     residual: Array
+    used: Sequence[NDArray[np.intp]] | None = None
 
     def chunks(self) -> Iterator[slice]:
         """Cuts the rows into pieces."""
@@ -42,7 +46,7 @@ class Part:
             yield slice(start, min(start + CHUNK, self.rows))
 
 
-def covariance(parts: Sequence[Part], weights: Array, inverse: Array, seed: int = 0) -> Array:
+def covariance(parts: Sequence[Part], weights: Array, inverse: Array, seed: int = 0, share: float = 1.0) -> Array:
     """Estimates the covariance of weighted least squares.
 
     The meat of the sandwich is Y'W Gamma W Y, Gamma the autocovariance of an autoregressive model of the residual, with
@@ -56,13 +60,15 @@ def covariance(parts: Sequence[Part], weights: Array, inverse: Array, seed: int 
         weights: of the joints' rows (n,).
         inverse: of the weighted Gram matrix (p, p).
         seed: of the drawn noise.
+        share: of the fitted rows that the parts hold, where they stand for a longer log.
 
     Returns:
         The covariance (p, p).
     """
     plain = _noise(parts, np.zeros((len(weights), HIGHEST_ORDER + 1)))
-    noise = _corrected(parts, weights, inverse, plain, np.random.default_rng(seed))
-    model, robust = _meats(parts, weights, noise)
+    # Of a long log the fit eats too little of the noise to matter.
+    noise = _corrected(parts, weights, inverse, plain, np.random.default_rng(seed)) if share == 1 else plain
+    model, robust = (meat / share for meat in _meats(parts, weights, noise))
     scale = float(np.mean(np.diag(noise.covariance) / np.diag(plain.covariance)))
     first, second = inverse @ model @ inverse, scale * (inverse @ robust @ inverse)
     errors = np.sqrt(np.maximum(np.diag(first), 0))
@@ -82,6 +88,31 @@ def white_noise_covariance(parts: Sequence[Part], weights: Array, inverse: Array
             flat = Y.reshape(-1, Y.shape[2])
             meat += flat.T @ flat
     return inverse @ meat @ inverse
+
+
+def batch_factors(scores: Array, inverse: Array, model: Array) -> Array:
+    """How much larger errors are (p,) by the scatter of batches than by a model of the residual's colour.
+
+    Sums of Y'We over stretches much longer than the noise's memory are independent, whatever the colour and however
+    it changes with the motion; a residual that drifts over seconds, which no short model sees, shows in them.
+
+    Args:
+        scores: Y'We of each batch (B, p).
+        inverse: of the weighted Gram matrix (p, p).
+        model: the covariance by the model (p, p).
+
+    Returns:
+        Factors, 1 where there are too few batches or their scatter is what chance makes of the model's.
+    """
+    batches = len(scores)
+    ones = np.ones(scores.shape[1])
+    if batches < LEAST_BATCHES:
+        return ones
+    by_batches = np.sqrt(np.einsum("pq,qr,pr->p", inverse, scores.T @ scores, inverse, optimize=True))
+    by_model = np.sqrt(np.maximum(np.diag(model), np.finfo(float).tiny))
+    ratio = by_batches / by_model
+    # The standard deviation of B batches is known to 1 / sqrt(2 B).
+    return np.where(ratio > 1 + 2 / np.sqrt(2 * batches), ratio, ones)
 
 
 def _noise(parts: Sequence[Part], correction: Array) -> Noise:
@@ -127,30 +158,38 @@ def _lost(parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, r
 
 def _meats(parts: Sequence[Part], weights: Array, noise: Noise) -> tuple[Array, Array]:
     """The sandwich's meat from the model, and from the products of innovations (p, p)."""
-    root = np.linalg.cholesky(noise.covariance)
     model = robust = np.zeros((0, 0))
     for part in parts:
         innovations = noise.whitened(part.residual)
-        states = [np.zeros((len(a), 0)) for a in noise.coefficients]
+        states: list[Array] = []
         # Gamma = A^-1 C A^-T: the transposed inverse filter runs from the last row to the first.
         for rows in reversed(list(part.chunks())):
             Y = part.regressor(rows.start, rows.stop)
+            size = Y.shape[2]
+            used = part.used or [np.arange(size)] * Y.shape[1]
             if not model.size:
-                model, robust = np.zeros((2, Y.shape[2], Y.shape[2]))
-            filtered = np.empty((Y.shape[1], Y.shape[0], Y.shape[2]))
-            scores = np.zeros((Y.shape[0], Y.shape[2]))
-            for j, a in enumerate(noise.coefficients):
-                if states[j].shape[1] == 0:
-                    states[j] = np.zeros((len(a), Y.shape[2]))
-                backward = (weights[j] * part.mask[rows, j, None] * Y[:, j])[::-1]
+                model, robust = np.zeros((2, size, size))
+            if not states:
+                states = [np.zeros((len(a), len(k))) for a, k in zip(noise.coefficients, used, strict=True)]
+            filtered = []
+            scores = np.zeros((len(Y), size))
+            for j, (a, columns) in enumerate(zip(noise.coefficients, used, strict=True)):
+                backward = (Y[:, j, columns] * (weights[j] * part.mask[rows, j, None]))[::-1]
                 if len(a):
-                    result, states[j] = lfilter([1.0], np.concatenate([[1.0], -a]), backward, axis=0, zi=states[j])
-                else:
-                    result = backward
-                filtered[j] = result[::-1]
-                scores += filtered[j] * innovations[rows, j, None]
-            for k in range(len(root)):
-                mixed = np.tensordot(root[k:, k], filtered[k:], axes=1)
-                model = model + mixed.T @ mixed
-            robust = robust + scores.T @ scores
+                    backward, states[j] = lfilter([1.0], np.concatenate([[1.0], -a]), backward, axis=0, zi=states[j])
+                filtered.append(backward[::-1])
+                scores[:, columns] += filtered[j] * innovations[rows, j, None]
+            _add_products(model, filtered, used, noise.covariance)
+            robust += scores.T @ scores
     return model, robust
+
+
+def _add_products(meat: Array, filtered: list[Array], used: Sequence[NDArray[np.intp]], covariance: Array) -> None:
+    """Adds sum_jk C_jk F_j'F_k to the meat (p, p), of filtered columns F_j (N, p_j)."""
+    products = np.hstack(filtered)
+    products = products.T @ products
+    ends = np.cumsum([0, *(len(columns) for columns in used)])
+    for j, left in enumerate(used):
+        for k, right in enumerate(used):
+            block = products[ends[j] : ends[j + 1], ends[k] : ends[k + 1]]
+            meat[np.ix_(left, right)] += covariance[j, k] * block

@@ -61,9 +61,9 @@ def test_good_data_need_no_ridge(chosen, arm_log):
 
 def test_candidates_are_what_is_chosen_from(chosen, arm_log):
     """A single candidate is taken as it is; cut-offs beyond the sampling are not tried."""
-    choice = chosen(arm_log(), cutoffs=(7.0, 1000.0), ridges=(1e-5,))
+    choice = chosen(arm_log(), cutoffs=(7.0, 1000.0), ridges=(1e-5,), smoothers=())
     assert (choice.cutoff, choice.ridge) == (7.0, 1e-5)
-    assert chosen(arm_log(), cutoffs=(1000.0,)).cutoff == pytest.approx(100.0)  # 0.4 of 250 Hz
+    assert chosen(arm_log(), cutoffs=(1000.0,), smoothers=()).cutoff == pytest.approx(100.0)  # 0.4 of 250 Hz
 
 
 def test_several_logs_are_chosen_for_together(chosen, arm_log):

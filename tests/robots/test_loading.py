@@ -293,3 +293,31 @@ def test_a_urdf_states_its_own_links(urdf, write):
         load_robot(write("name: x\nurdf: two.urdf\nbase: {xyz: [0, 0, 1]}\n"))
     with pytest.raises(InputError, match=r"three\.urdf: no such file"):
         load_robot(write("name: x\nurdf: three.urdf\n"))
+
+
+def test_motor_speed_and_rms_torque(tmp_path):
+    """A motor's speed, in its own unit and before the gear, lowers the joint's velocity limit; RMS torque is read."""
+    text = """
+name: geared
+geometry:
+  convention: modified
+  joints: [{alpha: 0.0, a: 0.0, d: 0.1}, {alpha: 1.5, a: 0.2, d: 0.0}]
+limits:
+  velocity: {values: [3.0, 3.0], unit: rad/s}
+  torque_rms: {values: [20.0, .inf], unit: N m}
+dynamics:
+  drives:
+    gear_ratio: {values: [-100.0, 50.0]}
+    motor_speed: {values: [1200.0, 3000.0], unit: rpm}
+"""
+    (tmp_path / "geared.yaml").write_text(text)
+    robot = load_robot(str(tmp_path / "geared.yaml"))
+    # 1200 turns a minute are 125.66 rad/s; the second motor would reach 6.3 rad/s at the joint, more than it may.
+    np.testing.assert_allclose(robot.limits.velocity, [1.2566370614, 3.0], rtol=1e-9)
+    np.testing.assert_allclose(robot.motor_speed, np.array([1200, 3000]) * 2 * np.pi / 60, rtol=1e-12)
+    np.testing.assert_array_equal(robot.limits.torque_rms, [20.0, np.inf])
+    assert robot.limits.scaled(torque=0.5).torque_rms[0] == 10.0
+    without = text.replace("    gear_ratio: {values: [-100.0, 50.0]}\n", "")
+    (tmp_path / "geared.yaml").write_text(without)
+    with pytest.raises(InputError, match="motor_speed is that of the motor; without gear_ratio"):
+        load_robot(str(tmp_path / "geared.yaml"))

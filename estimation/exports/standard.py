@@ -1,0 +1,87 @@
+"""Standard parameters for an identified model: bodies that can exist, nearest to the robot's description."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.estimators.conic import ConicProgram
+from estimation.model import Model
+from estimation.pulls import link_spreads
+from robots.base_parameters import find_base_parameters
+from robots.common.errors import InfeasibleError, InputError
+from robots.consistency import BASIS, normalised_eigenvalues
+from robots.geometry.inertia import SIZE
+
+Array = NDArray[np.float64]
+
+# Smallest eigenvalue of a pseudo-inertia, in units of the link's own mass and reach.
+MARGIN = 1e-6
+REMEDY = "identify with the method consistent, which fits bodies that can exist"
+
+
+def standard_parameters(model: Model, inertia: Array | None = None) -> Array:
+    """Gives inertial parameters of all links that make the model's rigid-body torque.
+
+    Base parameters leave directions open. Where the fit itself chose standard parameters, those are given; otherwise
+    the ones nearest to the description, in units of each link's mass and reach, among bodies with a positive definite
+    pseudo-inertia (Wensing, Kim, Slotine 2018) that have exactly these base parameters.
+
+    Args:
+        model: an identified model.
+        inertia: the description to stay near to (n, 10); by default the robot's own.
+
+    Returns:
+        (n, 10) ``m, mPx, mPy, mPz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz`` about the link frames.
+
+    Raises:
+        InputError: no description to stay near to.
+        InfeasibleError: no body that can exist has these base parameters.
+    """
+    torque_model = model.torque_model
+    n = model.robot.n
+    rigid = [i for i, column in enumerate(torque_model.columns) if column.term == "rigid_body"]
+    chosen = model.provenance.get("standard_parameters")
+    if chosen is not None:
+        return np.asarray(chosen, dtype=float)[rigid].reshape(n, SIZE)
+    described = np.asarray(model.robot.inertia if inertia is None else inertia, dtype=float)
+    if not np.isfinite(described).all():
+        raise InputError(
+            f"{model.robot.name}: the description states no inertial parameters to complete the identified ones with",
+            remedy=REMEDY,
+        )
+    base = find_base_parameters(torque_model)
+    if base.independent != model.columns:
+        raise InputError("the model's parameters are not the robot's base parameters", remedy="identify it again")
+    own = [i for i, column in enumerate(base.columns) if column.term == "rigid_body"]
+    grouping = base.grouping[np.ix_(own, rigid)]
+    # What is grouped with a rotor's inertia stays with the link: a URDF knows no rotors.
+    return _nearest(grouping, model.values[own], described)
+
+
+def _nearest(grouping: Array, values: Array, described: Array) -> Array:
+    """Minimises |(pi - described) / spread|^2 with grouping pi = values and every pseudo-inertia positive definite."""
+    n = len(described)
+    spread = link_spreads(described)
+    scaled = grouping * spread.reshape(-1)
+    start = described / spread
+    unit = np.maximum(np.abs(scaled).max(axis=1), np.finfo(float).tiny)
+    program = ConicProgram(SIZE * n)
+    program.equal(scaled / unit[:, None], -values / unit)
+    for link in range(n):
+        basis = np.zeros((SIZE * n, 4, 4))
+        place = slice(SIZE * link, SIZE * (link + 1))
+        # A congruence by mass and reach makes the units of the matrix one, and keeps its signs.
+        scale = np.array([1.0, 1.0, 1.0, spread[link, 1] / spread[link, 0]]) / np.sqrt(spread[link, 4])
+        basis[place] = BASIS * spread[link][:, None, None] * scale[:, None] * scale
+        program.semidefinite(basis, -MARGIN * np.eye(4))
+    try:
+        found = program.solve(np.eye(SIZE * n), -start.reshape(-1), "standard parameters")
+    except InfeasibleError as error:
+        raise InfeasibleError("no bodies that can exist have the identified base parameters", remedy=REMEDY) from error
+    # Onto the base parameters to the last digit: the solver stops at some 1e-8.
+    found = found + scaled.T @ np.linalg.solve(scaled @ scaled.T, values - scaled @ found)
+    standard = np.asarray(found.reshape(n, SIZE) * spread)
+    if not (normalised_eigenvalues(standard) > 0).all():
+        raise InfeasibleError("no bodies that can exist have the identified base parameters", remedy=REMEDY)
+    return standard

@@ -1,0 +1,151 @@
+"""An identified model as a URDF: the robot's own file with new inertials, or a new file from its chain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.exports.standard import REMEDY, standard_parameters
+from estimation.model import Model
+from robots.common.errors import InfeasibleError, InputError
+from robots.common.files import write_atomic
+from robots.geometry.chain import Joint
+from robots.geometry.inertia import symmetric
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+Element = ElementTree.Element
+
+
+def export_urdf(model: Model, path: str | Path, *, robot: Robot | None = None, force: bool = False) -> None:
+    """Writes a URDF with the identified inertial parameters.
+
+    Args:
+        model: an identified model.
+        path: the file to write.
+        robot: the robot as it was loaded, for its description and limits; the model's own by default, which knows its
+            geometry only.
+        force: whether an existing file may be replaced.
+
+    Raises:
+        InputError: an existing file without `force`, or no description to complete the base parameters with.
+        InfeasibleError: no body that can exist has the identified base parameters.
+    """
+    write_atomic(Path(path), urdf_text(model, robot), force=force)
+
+
+def urdf_text(model: Model, robot: Robot | None = None) -> str:
+    """Writes the URDF of `export_urdf` as text.
+
+    Where the robot came from a URDF, its file is kept, meshes and all, and only inertials change: the link that a joint
+    moves gets all the inertia that moves with it, and links that are fixed to it, or locked, lose theirs. Any other
+    robot gets a plain chain.
+    """
+    known = robot or model.robot
+    inertia = standard_parameters(model, None if robot is None else np.asarray(robot.inertia))
+    if not (inertia[:, 0] > 0).all():
+        raise InfeasibleError("a link's identified mass is not positive", remedy=REMEDY)
+    source = Path(known.origin)
+    root = _updated(source, known, inertia) if source.suffix.lower() == ".urdf" and source.is_file() else None
+    root = _chain(known, inertia) if root is None else root
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _updated(source: Path, robot: Robot, inertia: Array) -> Element:
+    try:
+        root = ElementTree.fromstring(source.read_bytes())
+    except (OSError, ElementTree.ParseError) as error:
+        raise InputError(f"cannot be read again: {error}", file=source) from error
+    links = {link.get("name"): link for link in root.findall("link")}
+    moving = set(robot.joint_names)
+    bodies: dict[str | None, str | None] = {}
+    ends = [(_end(joint, "parent"), _end(joint, "child"), joint.get("name")) for joint in root.findall("joint")]
+    for _, child, name in ends:
+        if name in moving:
+            bodies[child] = name
+    # What hangs on a moved link without a moving joint between moves with it.
+    pending = list(bodies)
+    while pending:
+        parent = pending.pop()
+        for above, child, name in ends:
+            if above == parent and name not in moving:
+                _remove_inertial(links[child])
+                pending.append(child)
+    for child, name in bodies.items():
+        link = links[child]
+        _remove_inertial(link)
+        link.insert(0, _inertial(inertia[robot.joint_names.index(str(name))]))
+    return root
+
+
+def _end(joint: Element, tag: str) -> str | None:
+    element = joint.find(tag)
+    return None if element is None else element.get("link")
+
+
+def _remove_inertial(link: Element) -> None:
+    for inertial in link.findall("inertial"):
+        link.remove(inertial)
+
+
+def _chain(robot: Robot, inertia: Array) -> Element:
+    root = Element("robot", name=robot.name)
+    ElementTree.SubElement(root, "link", name="base")
+    limits = robot.limits
+    for i, joint in enumerate(robot.chain.joints):
+        link = ElementTree.SubElement(root, "link", name=f"link_{i + 1}")
+        link.append(_inertial(inertia[i]))
+        parent = f"link_{i}" if i else "base"
+        bounds = (limits.lower[i], limits.upper[i], limits.velocity[i], limits.torque[i])
+        root.append(_joint(joint, parent, f"link_{i + 1}", bounds))
+    return root
+
+
+def _joint(joint: Joint, parent: str, child: str, bounds: Sequence[float]) -> Element:
+    lower, upper, velocity, effort = (float(value) for value in bounds)
+    limited = bool(np.isfinite([lower, upper]).all())
+    kind = joint.kind if joint.kind == "prismatic" or limited else "continuous"
+    element = Element("joint", name=joint.name, type=kind)
+    pose = {"xyz": _numbers(joint.translation), "rpy": _numbers(_rpy(np.asarray(joint.rotation)))}
+    ElementTree.SubElement(element, "origin", pose)
+    ElementTree.SubElement(element, "parent", link=parent)
+    ElementTree.SubElement(element, "child", link=child)
+    ElementTree.SubElement(element, "axis", xyz=_numbers(joint.axis))
+    limit = {"lower": lower, "upper": upper} if limited else {}
+    limit |= {name: value for name, value in (("velocity", velocity), ("effort", effort)) if np.isfinite(value)}
+    if limit:
+        ElementTree.SubElement(element, "limit", {name: repr(value) for name, value in limit.items()})
+    return element
+
+
+def _inertial(parameters: Array) -> Element:
+    """The ``<inertial>`` of ten parameters about the link frame: mass, centre of mass, inertia about it."""
+    mass = float(parameters[0])
+    centre = parameters[1:4] / mass
+    about = symmetric(parameters[4:]) - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    element = Element("inertial")
+    ElementTree.SubElement(element, "origin", xyz=_numbers(centre), rpy="0 0 0")
+    ElementTree.SubElement(element, "mass", value=repr(mass))
+    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    values = about[np.triu_indices(3)]
+    ElementTree.SubElement(element, "inertia", {k: repr(float(v)) for k, v in zip(names, values, strict=True)})
+    return element
+
+
+def _rpy(rotation: Array) -> Array:
+    """Roll, pitch and yaw of R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    horizontal = float(np.hypot(rotation[0, 0], rotation[1, 0]))
+    pitch = np.arctan2(-rotation[2, 0], horizontal)
+    if horizontal < 1e-12:  # straight up or down: roll and yaw turn about one axis
+        return np.array([np.arctan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0])
+    roll, yaw = np.arctan2(rotation[2, 1], rotation[2, 2]), np.arctan2(rotation[1, 0], rotation[0, 0])
+    return np.array([roll, pitch, yaw])
+
+
+def _numbers(values: Sequence[float] | Array) -> str:
+    return " ".join(repr(float(value)) for value in values)

@@ -1,0 +1,161 @@
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from estimation import identify, load_model
+from estimation.exports import export_urdf, standard_parameters
+from robots import load_robot, nominal_plant, simulate
+from robots.base_parameters import find_base_parameters
+from robots.common.errors import InfeasibleError, InputError
+from robots.consistency import normalised_eigenvalues
+from robots.regressor import TorqueModel
+from robots.terms import RigidBody
+
+# Rigid torques of two recursions over six bodies, of order 100 N m: rounding, relative to the largest.
+PARITY = 1e-9
+
+
+@pytest.fixture(scope="module")
+def ur10(fourier_motion):
+    """A UR10 whose links are 10 % off its description: identified by a consistent fit, and as it truly is."""
+    robot = load_robot("ur10")
+    plant = nominal_plant(robot, spread=0.1, seed=1)
+    log = simulate(plant, fourier_motion(robot, duration=30.0), seed=0)
+    base = find_base_parameters(plant.model)
+    return robot, identify(robot, log, method="consistent").model, _model(base, base.from_standard(plant.parameters))
+
+
+def states(n, count=40):
+    return np.random.default_rng(0).uniform(-2, 2, (3, count, n))
+
+
+def rigid_torque(model, q, dq, ddq):
+    values = np.where([column.term == "rigid_body" for column in model.parameters], model.values, 0.0)
+    return model.torque_model.torque(q, dq, ddq, values, columns=model.columns)
+
+
+def pinocchio_torque(path, q, dq, ddq):
+    model = pin.buildModelFromUrdf(str(path))
+    data = model.createData()
+    return np.array([pin.rnea(model, data, *row) for row in zip(q, dq, ddq, strict=True)])
+
+
+def test_an_urdf_reloads_and_gives_the_same_torques(ur10, tmp_path):
+    """pinocchio, and our own reader, get the identified model's rigid-body torques from the written file."""
+    robot, *models = ur10
+    q, dq, ddq = states(6)
+    for model in models:
+        path = tmp_path / "identified.urdf"
+        export_urdf(model, path, robot=robot, force=True)
+        # A consistent fit states bodies and rotors apart; base parameters leave a rotor with the link it turns.
+        expected = rigid_torque(model, q, dq, ddq)
+        if "standard_parameters" in model.provenance:
+            rigid = TorqueModel(robot, (RigidBody(),))
+            expected = rigid.torque(q, dq, ddq, standard_parameters(model).reshape(-1))
+        scale = np.abs(expected).max()
+        assert np.abs(pinocchio_torque(path, q, dq, ddq) - expected).max() < PARITY * scale
+        again = load_robot(path)
+        torque = TorqueModel(again, (RigidBody(),)).torque(q, dq, ddq, again.inertia.reshape(-1))
+        assert np.abs(torque - expected).max() < PARITY * scale
+        np.testing.assert_allclose(again.limits.velocity, robot.limits.velocity)
+
+
+def test_bodies_and_the_other_terms_make_the_models_torque(ur10):
+    """The bodies of a consistent fit, with its rotors, friction and offsets, give the identified model's torque."""
+    model = ur10[1]
+    q, dq, ddq = states(6)
+    chosen = np.array(model.provenance["standard_parameters"])
+    expected = model.torque(q, dq, ddq)
+    np.testing.assert_allclose(
+        model.torque_model.torque(q, dq, ddq, chosen), expected, atol=1e-9 * np.abs(expected).max()
+    )
+
+
+def test_the_bodies_can_exist_and_stay_near_the_description(ur10):
+    """Every pseudo-inertia is positive definite, and masses stay within a link's own size of the described ones."""
+    robot, *models = ur10
+    for model in models:
+        standard = standard_parameters(model, robot.inertia)
+        assert (normalised_eigenvalues(standard) > 0).all()
+        assert (np.abs(standard[:, 0] - robot.inertia[:, 0]) < robot.inertia[:, 0]).all()
+
+
+def test_a_described_robot_comes_back_as_it_is(ur10):
+    """Base parameters of the description itself give the description."""
+    robot = ur10[0]
+    model = TorqueModel(robot, (RigidBody(),))
+    base = find_base_parameters(model)
+    found = standard_parameters(_model(base, base.from_standard(model.nominal)), robot.inertia)
+    # The interior-point solver stops at some 1e-8 of the parameters' scale.
+    np.testing.assert_allclose(found, robot.inertia, rtol=1e-4, atol=1e-4)
+
+
+def test_bodies_that_cannot_exist_are_refused(arm, tmp_path):
+    """Base parameters that belong to no body are refused with what to do, and nothing is written."""
+    model = TorqueModel(arm, (RigidBody(),))
+    base = find_base_parameters(model)
+    path = tmp_path / "robot.urdf"
+    with pytest.raises(InfeasibleError, match="consistent"):
+        export_urdf(_model(base, -base.from_standard(model.nominal)), path, robot=arm)
+    assert not path.exists()
+
+
+def test_a_robot_without_description_is_refused(arm):
+    """Base parameters alone leave bodies open: without a description, or a consistent fit, there is no URDF."""
+    bare = replace(arm, inertia=None)
+    base = find_base_parameters(TorqueModel(bare, (RigidBody(),)))
+    with pytest.raises(InputError, match="consistent"):
+        standard_parameters(_model(base, np.ones(base.size)))
+
+
+def test_a_consistent_fit_is_written_as_it_is(arm, arm_log, tmp_path):
+    """The standard parameters that a consistent fit chose are those of the file, also from a saved model."""
+    estimate = identify(arm, arm_log(), method="consistent")
+    estimate.save(tmp_path)
+    model = load_model(tmp_path)
+    path = tmp_path / "arm.urdf"
+    export_urdf(model, path, robot=arm)
+    q, dq, ddq = states(2)
+    rigid = standard_parameters(model)
+    expected = TorqueModel(arm, (RigidBody(),)).torque(q, dq, ddq, rigid.reshape(-1))
+    np.testing.assert_allclose(pinocchio_torque(path, q, dq, ddq), expected, atol=PARITY * np.abs(expected).max())
+
+
+def test_the_robots_own_urdf_keeps_its_other_elements(tmp_path):
+    """Of a robot from a URDF the file itself is updated: visuals stay, fixed links hand their inertia over."""
+    source = tmp_path / "one.urdf"
+    source.write_text(
+        """<robot name="one"><link name="base"/><link name="a"><inertial><mass value="1"/><origin xyz="0 0 0.1"/>
+        <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial><visual><geometry>
+        <sphere radius="0.1"/></geometry></visual></link><link name="tool"><inertial><mass value="0.5"/>
+        <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+        <joint name="j" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/>
+        <limit lower="-1" upper="1" velocity="1" effort="5"/></joint>
+        <joint name="f" type="fixed"><parent link="a"/><child link="tool"/><origin xyz="0 0 0.3"/></joint></robot>"""
+    )
+    robot = load_robot(source)
+    base = find_base_parameters(TorqueModel(robot, (RigidBody(),)))
+    values = 1.2 * base.from_standard(base.model.nominal)
+    path = tmp_path / "new.urdf"
+    export_urdf(_model(base, values), path, robot=robot)
+    text = path.read_text()
+    assert "sphere" in text
+    assert text.count("<inertial>") == 1
+    q, dq, ddq = states(1)
+    expected = base.torque(q, dq, ddq, values)
+    np.testing.assert_allclose(pinocchio_torque(path, q, dq, ddq), expected, atol=PARITY * np.abs(expected).max())
+
+
+def _model(base, values):
+    from estimation import Model
+
+    return Model(
+        torque_model=base.model,
+        columns=base.independent,
+        values=values,
+        covariance=np.eye(base.size),
+        determined=np.ones(base.size, dtype=bool),
+        formulas=base.formulas(),
+    )

@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+
+from estimation import regression
+from estimation.moments import Moments
+from estimation.regression import JointRegressor, chunks, threaded
+from robots.base_parameters import find_base_parameters
+from robots.regressor import default_model
+
+
+@pytest.fixture(scope="module")
+def base(arm):
+    return find_base_parameters(default_model(arm, velocity_scale=0.01))
+
+
+@pytest.fixture
+def states():
+    return np.random.default_rng(0).normal(size=(3, 300, 2))
+
+
+def test_each_joints_rows_are_those_of_the_regressor(base, states):
+    """The parts hold the regressor's columns that act on a joint, and the others are zero."""
+    Y = base.regressor(*states)
+    regressor = JointRegressor(base)
+    for joint, (rows, used) in enumerate(zip(regressor(*states), regressor.used, strict=True)):
+        # The same expressions, compiled twice.
+        np.testing.assert_allclose(rows, Y[:, joint, used], rtol=1e-12, atol=1e-12)
+        assert not np.delete(Y[:, joint], used, axis=1).any()
+
+
+def test_moments_and_torque_are_those_of_dense_rows(base, states):
+    """Normal equations and torque equal those of the whole regressor, rows that do not count left out."""
+    rng = np.random.default_rng(1)
+    tau, values = rng.normal(size=(300, 2)), rng.normal(size=base.size)
+    mask = (rng.random((300, 2)) < 0.9).astype(float)
+    regressor = JointRegressor(base)
+    found, expected = regressor.moments(*states, tau, mask), Moments.of(base.regressor(*states), tau, mask)
+    for name in ("gram", "cross", "square", "count"):
+        a, b = getattr(found, name), getattr(expected, name)
+        np.testing.assert_allclose(a, b, rtol=1e-10, atol=1e-10 * np.abs(b).max())
+    np.testing.assert_allclose(regressor.torque(*states, values), base.torque(*states, values), rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.parametrize("cores", [1, 3])
+def test_threads_keep_the_order(monkeypatch, cores):
+    """Results come in the order of the items, on any number of cores."""
+    monkeypatch.setattr(regression, "available_cores", lambda: cores)
+    assert list(threaded(lambda x: x * x, range(50))) == [x * x for x in range(50)]
+
+
+def test_chunks_cover_all_rows_once():
+    """Slices follow each other, the last one short."""
+    assert [(c.start, c.stop) for c in chunks(5, 2)] == [(0, 2), (2, 4), (4, 5)]
