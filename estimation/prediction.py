@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,8 @@ from robots.signals import Log, Motion
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from estimation.thermal import ThermalTorqueModel
 
 Array = NDArray[np.float64]
 
@@ -143,12 +146,23 @@ class Prediction:
         return columns
 
 
-def predict(model: Model, log: Log) -> Prediction:
+def predict(
+    model: Model,
+    log: Log,
+    *,
+    thermal: ThermalTorqueModel | None = None,
+    start: Sequence[Array | None] | None = None,
+    ambient: Array | float | None = None,
+) -> Prediction:
     """Predicts the torques of a log's motion.
 
     Args:
         model: an identified model.
         log: positions over time; its torque, if any, is compared with the prediction and not used otherwise.
+        thermal: this model with its thermal models: friction falls as the motion heats the joints.
+        start: temperatures of each joint's zones at first [degC]; those of the surroundings by default.
+        ambient: temperature of the surroundings, a number or one at each time of the motion [degC]; each thermal
+            model's by default.
 
     Returns:
         The torques at the log's own times.
@@ -164,9 +178,13 @@ def predict(model: Model, log: Log) -> Prediction:
     cutoff = float(model.provenance.get("cutoff_hz", 10.0))
     motion = smooth(resample(log.t, log.q), cutoff)
     has_torque = log.tau is not None or log.current is not None
+    if thermal is None:
+        predicted = model.torque(motion.q, motion.dq, motion.ddq, motion.t)
+    else:
+        predicted, _ = thermal.simulate(motion, ambient=ambient, start=start)
     return Prediction(
         motion=motion,
-        predicted=model.torque(motion.q, motion.dq, motion.ddq, motion.t),
+        predicted=predicted,
         measured=torque_of(robot, log) if has_torque else None,
         joint_names=robot.joint_names,
         band=_band(model, motion),

@@ -8,6 +8,7 @@ from estimation.thermal.derived import Quantity
 from estimation.thermal.estimate import RunFit, ThermalEstimate, load_thermal_model
 from estimation.thermal.extraction import friction_signal, thermal_runs
 from estimation.thermal.fitting import fit_thermal
+from estimation.thermal.history import start_temperatures
 from estimation.thermal.runs import ThermalRun
 from estimation.thermal.single_axis import SingleAxis, Sweep, fit_single_axis, sweep_friction
 from estimation.thermal.torque import ThermalTorqueModel, thermal_from_dict
@@ -29,6 +30,7 @@ __all__ = [
     "friction_signal",
     "load_thermal_model",
     "predict_run",
+    "start_temperatures",
     "sweep_friction",
     "thermal_from_dict",
     "thermal_runs",

@@ -15,6 +15,7 @@ from oed.cli.pareto import pareto
 from oed.cli.predict import predict
 from oed.cli.retime import retime
 from oed.cli.simulate import simulate
+from oed.cli.thermal import thermal
 
 app = typer.Typer(
     name="oed",
@@ -24,7 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (design, pareto, retime, export, campaign, simulate, identify, diagnose, predict):
+for command in (design, pareto, retime, export, campaign, simulate, identify, thermal, diagnose, predict):
     app.command()(command)
 
 

@@ -2,19 +2,36 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from oed.cli.console import Console
 from oed.cli.options import ForceOption, JsonOption, MappingOption, QuietOption
 
+if TYPE_CHECKING:
+    from estimation.model import Model
+    from robots.signals import Log
+
 
 def predict(
     model: Annotated[Path, typer.Option("--model", help="A model.json, or its folder.", show_default=False)],
     log: Annotated[Path, typer.Option("--log", help="A log of the motion.", show_default=False)],
     mapping: MappingOption = None,
+    before: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--before",
+            help="Of a model with heat: a log of what warmed the robot before, or a folder; may be given again.",
+            show_default=False,
+        ),
+    ] = None,
+    ambient: Annotated[
+        float | None,
+        typer.Option(help="Of a model with heat: temperature of the surroundings [degC].", show_default=False),
+    ] = None,
     out: Annotated[Path, typer.Option("--out", help="The table to write: t, tau1..taun.")] = Path("predicted.csv"),
     band: Annotated[bool, typer.Option("--band", help="Also write band1..bandn, half-widths of 95 %.")] = False,
     force: ForceOption = False,
@@ -31,6 +48,44 @@ def predict(
         robot = identified.robot
         recorded = read_log(log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names)
         progress.start("predicting", None)
-        result = run(identified, recorded)
+        heat = _heat(model, identified, recorded, before or [], ambient, mapping)
+        result = run(identified, recorded, **heat.options)
         result.save(out, band=band, force=force)
-    console.result(f"{result.summary()}\nwritten to {out}", {"file": str(out), **result.to_dict()})
+    summary = "\n".join([result.summary(), *([heat.assumed] if heat.assumed else []), f"written to {out}"])
+    console.result(summary, {"file": str(out), **result.to_dict(), "heat": heat.assumed or None})
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Heat:
+    """What a model with heat is told, and what that assumes."""
+
+    options: dict[str, Any] = field(default_factory=dict)
+    assumed: str = ""
+
+
+def _heat(
+    path: Path, model: Model, log: Log, before: list[Path], ambient: float | None, mapping: Path | None
+) -> _Heat:
+    import json as codec
+
+    from estimation import read_logs
+    from estimation.thermal import start_temperatures, thermal_from_dict
+    from estimation.thermal.history import surroundings
+    from robots.common.errors import InputError
+
+    file = path / "model.json" if path.is_dir() else path
+    thermal = thermal_from_dict(model, codec.loads(file.read_text(encoding="utf-8")))
+    if thermal is None:
+        if before or ambient is not None:
+            raise InputError("the model has no heat", file=file, remedy="fit one with oed thermal, or leave these out")
+        return _Heat()
+    if ambient is not None and not -30.0 <= ambient <= 60.0:
+        raise InputError(f"--ambient {ambient}", allowed="-30 to 60 degC")
+    robot, start = model.robot, None
+    if before:
+        earlier = read_logs(before, n=robot.n, mapping=mapping, joints=robot.joint_names)
+        start = start_temperatures(thermal, earlier, float(log.t[0]), ambient=ambient)
+        assumed = f"friction with heat: warmed by {len(earlier)} logs before, the first of which began cold"
+    else:
+        assumed = "friction with heat: the motion is taken to begin cold; --before says what warmed the robot"
+    return _Heat(options={"thermal": thermal, "start": start, "ambient": around(log, ambient)}, assumed=assumed)

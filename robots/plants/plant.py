@@ -1,4 +1,4 @@
-"""The virtual robot: a torque model with its true parameters, and the sensors that look at it."""
+"""The virtual robot: a torque model with its true parameters, effects beyond it, and the sensors that look at it."""
 
 from __future__ import annotations
 
@@ -10,27 +10,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
+from robots.plants.effects import PlantEffect
+from robots.plants.heat import PlantHeat, Warmth, heat_piece, reference_friction
 from robots.plants.sensors import Sensors
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Log, Motion
+from robots.terms.effects import situation
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plant:
-    """A robot that obeys a torque model exactly.
+    """A robot that obeys a torque model exactly, but for the effects that it is given.
 
     Attributes:
         model: the torque model with p parameters.
         parameters: the truth (p,).
         sensors: what the log sees of it.
+        effects: what it has beyond the model.
+        heat: of its friction; None where friction does not change.
     """
 
     model: TorqueModel
     parameters: Array
     sensors: Sensors = field(default_factory=Sensors)
+    effects: tuple[PlantEffect, ...] = ()
+    heat: PlantHeat | None = None
 
     def __post_init__(self) -> None:
         """Checks the parameters.
@@ -56,6 +63,28 @@ class Plant:
         """The robot."""
         return self.model.robot
 
+    def warmth(self, motion: Motion) -> Warmth | None:
+        """Follows the temperatures of a motion that begins cold; None where friction does not change."""
+        if self.heat is None:
+            return None
+        friction = reference_friction(self.model, self.parameters, motion)
+        return self.heat.follow([heat_piece(motion, friction)])
+
+    def torque(self, motion: Motion, warmth: Warmth | None = None) -> Array:
+        """Evaluates the true torque (N, n) [N m or N] of a motion, which begins unstrained, and cold by default."""
+        now = self.warmth(motion) if warmth is None else warmth
+        torque = self._torque_at_reference(motion)
+        if now is None:
+            return torque
+        friction = reference_friction(self.model, self.parameters, motion)
+        return np.asarray(torque + (now.factor(motion.t) - 1.0) * friction)
+
+    def _torque_at_reference(self, motion: Motion) -> Array:
+        if not self.effects:
+            return self.model.torque(motion.q, motion.dq, motion.ddq, self.parameters)
+        now = situation(self.model, self.parameters, motion.t, motion.q, motion.dq, motion.ddq)
+        return np.sum([now.torque, *(effect.torque(now) for effect in self.effects)], axis=0)
+
 
 def nominal_plant(
     robot: Robot,
@@ -66,6 +95,7 @@ def nominal_plant(
     spread: float = 0.0,
     seed: int = 0,
     overrides: Mapping[str, float] | None = None,
+    effects: tuple[PlantEffect, ...] = (),
 ) -> Plant:
     """Builds the plant of a robot's own description.
 
@@ -78,6 +108,7 @@ def nominal_plant(
             scaled, centres of mass and inertias follow, so that every link stays a possible body.
         seed: of the differences.
         overrides: the truth of single standard parameters by name, such as ``f1_3``.
+        effects: what it has beyond the model.
 
     Returns:
         The plant.
@@ -106,7 +137,7 @@ def nominal_plant(
                 allowed=f"such as {', '.join(near or model.names[:3])}",
             )
         parameters[model.names.index(name)] = value
-    return Plant(model=model, parameters=parameters, sensors=sensors or Sensors())
+    return Plant(model=model, parameters=parameters, sensors=sensors or Sensors(), effects=effects)
 
 
 def _varied_inertia(inertia: Array, spread: float, rng: np.random.Generator) -> Array:
@@ -117,28 +148,39 @@ def _varied_inertia(inertia: Array, spread: float, rng: np.random.Generator) -> 
     return inertia * factors
 
 
-def simulate(plant: Plant, motion: Motion, *, seed: int = 0) -> Log:
+def simulate(plant: Plant, motion: Motion, *, seed: int = 0, warmth: Warmth | None = None) -> Log:
     """Plays a motion on the plant and logs it as a controller would.
 
     Args:
         plant: the virtual robot.
         motion: the motion that the robot makes.
         seed: of the noise.
+        warmth: temperatures of the joints of a plant with heat; by default the motion begins cold.
 
     Returns:
-        A log of t, q (rounded by the encoders) and tau (with noise).
+        A log of t, q (rounded by the encoders) and tau (with noise), and of temperatures where the plant has
+        thermometers.
 
     Raises:
         InputError: a motion of another number of joints.
     """
     if motion.n != plant.robot.n:
         raise InputError(f"a motion of {motion.n} joints", allowed=f"{plant.robot.n}, as {plant.robot.name} has")
-    tau = plant.model.torque(motion.q, motion.dq, motion.ddq, plant.parameters)
+    now = plant.warmth(motion) if warmth is None else warmth
+    tau = plant.torque(motion, now)
     rng = np.random.default_rng(seed)
     period = float(np.median(np.diff(motion.t))) if len(motion) > 1 else 0.0
     return Log(
         t=motion.t,
         q=plant.sensors.position(motion.q, np.asarray(plant.robot.gear_ratio)),
         tau=plant.sensors.torque(tau, period, rng),
+        **_readings(plant, motion, now),
         name=f"virtual {plant.robot.name}",
     )
+
+
+def _readings(plant: Plant, motion: Motion, warmth: Warmth | None) -> dict[str, Array]:
+    if plant.heat is None or warmth is None or plant.heat.thermometers == "none":
+        return {}
+    around = {"ambient": np.full(len(motion), plant.heat.ambient)}
+    return around if plant.heat.thermometers == "ambient" else {**around, "temperature": warmth.at(motion.t)}

@@ -79,3 +79,50 @@ def test_a_missing_file_is_refused(tmp_path, er3a):
     """A missing file is refused by name."""
     with pytest.raises(InputError, match=r"nowhere\.yaml"):
         load_plant(tmp_path / "nowhere.yaml", er3a)
+
+
+EFFECTS = """
+effects:
+  - {effect: stribeck, joint: 2, parameters: {stribeck_torque: 5, stribeck_velocity: 0.05, exponent: 2}}
+  - {effect: base_tilt, parameters: {tilt_2: 0.01}}
+"""
+
+
+def test_effects_are_listed(write, er3a):
+    """A plant file lists effects by name, joint and parameters; a coefficient that is not stated is zero."""
+    stribeck, tilt = load_plant(write(EFFECTS), er3a).effects
+    assert (stribeck.effect, stribeck.joint, stribeck.coefficients, stribeck.shape) == (
+        "stribeck",
+        2,
+        (5.0,),
+        (0.05, 2),
+    )
+    assert (tilt.effect, tilt.joint, tilt.coefficients, tilt.shape) == ("base_tilt", None, (0.0, 0.01), ())
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("{effect: stribek, joint: 2, parameters: {}}", "unknown effect 'stribek'; allowed: such as stribeck"),
+        ("{effect: stribeck, joint: 9, parameters: {}}", "stribeck on joint 9; allowed: 1, 2, 3"),
+        ("{effect: stribeck, parameters: {}}", "stribeck on joint None"),
+        ("{effect: base_tilt, joint: 1, parameters: {}}", "base_tilt on joint 1; allowed: no joint"),
+        (
+            "{effect: base_tilt, parameters: {tilt_3: 1}}",
+            "base_tilt has no parameter 'tilt_3'; allowed: tilt_1, tilt_2",
+        ),
+        ("{effect: base_tilt, parameters: {tilt_2: 9}}", "tilt_2 is 9.0 rad; allowed: -0.5 to 0.5"),
+        ("{effect: base_tilt, parameters: {tilt_2: .nan}}", "tilt_2 is nan"),
+        ("{effect: base_tilt, parameters: {}}", "base_tilt has no size; allowed: one of tilt_1, tilt_2"),
+        ("{effect: friction_step, joint: 1, parameters: {coulomb_step: 1}}", "friction_step lacks change_time"),
+        ("{effect: base_tilt}", "parameters"),
+        ("base_tilt", "effects"),
+    ],
+)
+def test_a_wrong_effect_is_refused(entry, message, write, er3a):
+    """An unknown effect, joint or parameter, and a missing or impossible value, are refused by name."""
+    path = write(f"effects:\n  - {entry}\n")
+    with pytest.raises(InputError) as caught:
+        load_plant(path, er3a)
+    assert message in str(caught.value)
+    assert str(path) in str(caught.value)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from robots.common.errors import InputError
-from robots.plants import Plant, Sensors, nominal_plant, simulate
+from robots.plants import Plant, Sensors, nominal_plant, plant_effect, simulate
 from robots.regressor import default_model
 from robots.signals import Motion
 
@@ -121,3 +121,23 @@ def test_a_plant_keeps_its_own_parameters(er3a):
     with pytest.raises(ValueError, match="read-only"):
         plant.parameters[0] = 1.0
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(plant)).parameters, plant.parameters)
+
+
+def test_effects_add_their_torque(er3a, motion):
+    """What a plant has beyond its model adds to the torque: here a spring's, written out."""
+    spring = plant_effect(er3a, "spring", 2, {"stiffness": 40.0, "stiffness_3": -8.0})
+    plain, sprung = nominal_plant(er3a, sensors=IDEAL), nominal_plant(er3a, sensors=IDEAL, effects=(spring,))
+    middle = (er3a.limits.lower[1] + er3a.limits.upper[1]) / 2
+    x = motion.q[:, 1] - middle
+    difference = simulate(sprung, motion).tau - simulate(plain, motion).tau
+    # The difference of two torques of some 1000 N m.
+    np.testing.assert_allclose(difference[:, 1], 40.0 * x - 8.0 * x**3, atol=1e-9)
+    np.testing.assert_allclose(np.delete(difference, 1, axis=1), 0.0, atol=1e-9)
+
+
+def test_a_plant_with_effects_can_be_pickled(er3a, motion):
+    """A plant with effects plays the same in another process."""
+    effect = plant_effect(er3a, "friction_step", 1, {"coulomb_step": 3.0, "change_time": 0.4})
+    plant = nominal_plant(er3a, effects=(effect,))
+    again = pickle.loads(pickle.dumps(plant))
+    np.testing.assert_array_equal(simulate(again, motion, seed=3).tau, simulate(plant, motion, seed=3).tau)

@@ -1,0 +1,135 @@
+"""The figures of a benchmark as text, each beside what is wanted."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+
+from benchmarks.diagnosis_parts.statistics import (
+    CHANGE_TIME,
+    DETERMINED,
+    NONLINEAR,
+    SHAPES,
+    TIMES,
+    Row,
+    both,
+    detected,
+    first_is_right,
+    gain_ratios,
+    in_the_set,
+    named_right,
+    parameter_errors,
+    share,
+    spurious,
+)
+
+
+def figures(rows: Sequence[Row]) -> str:
+    """Writes all figures that the rows hold."""
+    of: dict[str, list[Row]] = defaultdict(list)
+    for row in rows:
+        if row["status"] == "done":
+            of[row["stratum"]].append(row)
+    one, half = of["one"], of["half"]
+    found = [row for row in half + one if detected(row)]
+    lines = [
+        share("false alarms, no effect", of["none"], detected, "1 % or less"),
+        share("  periodic", [r for r in of["none"] if r["motion"] == "periodic"], detected, ""),
+        share("  aperiodic", [r for r in of["none"] if r["motion"] != "periodic"], detected, ""),
+        share("detected at 0.5 % visible", half, detected, "98 %"),
+        share("effect and joint right among detected, .5 and 1 %", found, first_is_right, "97 %"),
+        share("  truth first or among the rivals", found, in_the_set, ""),
+        share("detected at 1 % visible", one, detected, ""),
+        share("first name right at 1 % visible", one, named_right, "95 %"),
+        share("  nothing false named beside it", one, lambda row: not spurious(row), ""),
+        share("two effects at 3 %: both named", of["two"], both, "95 %"),
+        share("  a spurious one", of["two"], spurious, "2 % or less"),
+        share(
+            "outside the catalogue at 1 %: unexplained",
+            of["stranger"],
+            lambda row: row["verdict"] == "unexplained",
+            "85 %",
+        ),
+        share("  wrongly named", of["stranger"], spurious, "5 % or less"),
+        *_gains(half + one + of["two"]),
+        *_parameters(half + one + of["two"]),
+        *_followed(half + one),
+        *_cost([row for rows_of in of.values() for row in rows_of]),
+    ]
+    bad = [row for row in rows if row["status"] in ("failed", "refused")]
+    lines.append(share("ended in an error", [r for r in rows if r["status"] != "hidden"], lambda r: r in bad, "0 %"))
+    hidden = sum(row["status"] == "hidden" for row in rows)
+    lines.append(f"  {hidden} cases left out: no robot shows their effect at the size with a plausible value")
+    return "\n".join([*lines, "", *_by_effect(half, one)])
+
+
+def _gains(rows: Sequence[Row]) -> list[str]:
+    ratios = gain_ratios(rows)
+    if not len(ratios):
+        return ["  gain on unseen motion over the true effect's own: no case"]
+    median, low = np.median(ratios), np.quantile(ratios, 0.1)
+    name = f"gain on unseen motion over the true effect's own, {len(ratios)} cases"
+    return [f"  {name:58} median {median:.2f}, lowest tenth {low:.2f}   wanted .97 and .85"]
+
+
+def _parameters(rows: Sequence[Row]) -> list[str]:
+    times, shapes = parameter_errors(rows, TIMES), parameter_errors(rows, SHAPES)
+    well = [e for e in shapes if e["energy"] >= DETERMINED]
+    return [
+        share("change times within .2 s", times, lambda e: e["absolute"] <= CHANGE_TIME, "all"),
+        share("nonlinear parameters within 20 %, well determined", well, lambda e: e["relative"] <= NONLINEAR, "all"),
+        share(
+            "  within 20 % or marked as not determined", shapes, lambda e: e["relative"] <= NONLINEAR or e["marked"], ""
+        ),
+        share("  their stated interval holds the truth", shapes + times, lambda e: e["inside"], "95 %"),
+    ]
+
+
+def _followed(rows: Sequence[Row]) -> list[str]:
+    unclear = [row for row in rows if row["verdict"] == "ambiguous"]
+    tried = [row for row in unclear if row.get("after") and row["after"].get("kind")]
+
+    def resolved(row: Row) -> bool:
+        after = row["after"]
+        truth = [(e["effect"], e["joint"]) for e in row["truth"]]
+        first = [(f["effect"], f["joint"]) for f in after["findings"][:1]]
+        return after["verdict"] == "named" and bool(first) and first[0] in truth
+
+    return [
+        share("ambiguous at .5 and 1 %", rows, lambda row: row["verdict"] == "ambiguous", ""),
+        share("  resolved, and rightly, after the one experiment", tried, resolved, "90 %"),
+    ]
+
+
+def _cost(rows: Sequence[Row]) -> list[str]:
+    if not rows:
+        return []
+    cpu, wall = np.array([r["cpu"] for r in rows]), np.array([r["wall"] for r in rows])
+    memory = max(r["memory"] for r in rows)
+    text = f"median {np.median(cpu):.1f} s of CPU, {np.median(wall):.1f} s of wall, at most {cpu.max():.1f} s of CPU"
+    return [
+        f"  {'one diagnosis, false-alarm control and limits included':58} {text}",
+        f"  {'memory of its process':58} {memory:.0f} MB",
+    ]
+
+
+def _by_effect(half: Sequence[Row], one: Sequence[Row]) -> list[str]:
+    kinds = sorted({row["truth"][0]["kind"] for row in [*half, *one]})
+    lines = ["  effect                 detected .5 %  right .5 %  detected 1 %  right 1 %   mistaken for"]
+    for kind in kinds:
+        cells, wrong = [], []
+        for rows in (half, one):
+            mine = [row for row in rows if row["truth"][0]["kind"] == kind]
+            cells += [f"{sum(map(detected, mine))}/{len(mine)}", f"{sum(map(first_is_right, mine))}/{len(mine)}"]
+            wrong += [_said(row) for row in mine if detected(row) and not first_is_right(row)]
+        lines.append(f"  {kind:22} {cells[0]:>13} {cells[1]:>11} {cells[2]:>13} {cells[3]:>10}   {', '.join(wrong)}")
+    return lines
+
+
+def _said(row: Row) -> str:
+    if not row["findings"]:
+        return str(row["verdict"])
+    first = row["findings"][0]
+    return f"{first['effect']} {first['joint'] or ''}".strip() + f" (seed {row['seed']})"

@@ -1,0 +1,26 @@
+"""The experiment that a diagnosis recommends, done on the true robot, and the diagnosis of all logs together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from robots.robot import Robot
+from robots.signals import Log
+from tests.truth.cases import Case
+from tests.truth.experiments import Stage, follow_up
+
+
+def follow(case: Case, robot: Robot, diagnosis: Any) -> dict[str, Any]:
+    """Does the recommended experiment and diagnoses again, with the new logs beside the old."""
+    from estimation import diagnose
+
+    plan = diagnosis.next_experiment
+    if plan is None:
+        return {"kind": None}
+    stages = [
+        Stage(t=s.motion.t, q=s.motion.q, pause=s.pause, payload=s.payload, gravity=s.gravity) for s in plan.stages
+    ]
+    records = [*case.logs, *follow_up(case, stages)]
+    said = diagnose(robot, [Log(t=record.t, q=record.q, tau=record.tau) for record in records]).to_dict()
+    found = [{"effect": f["effect"], "joint": f["joint"]} for f in said["findings"]]
+    return {"kind": plan.kind, "promised": plan.resolves, "verdict": said["verdict"], "findings": found}

@@ -1,0 +1,117 @@
+"""One case through the diagnosis, and what is kept of it: a row of plain data."""
+
+from __future__ import annotations
+
+import contextlib
+import resource
+import tempfile
+import time
+import traceback
+import warnings
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.diagnosis_parts.followups import follow
+from benchmarks.diagnosis_parts.strata import Task, draw
+from robots import load_robot
+from robots.common.errors import AssumedValueWarning, OedError
+from robots.robot import Robot
+from robots.signals import Log
+from tests.truth.cases import Case
+from tests.truth.description import write_description
+from tests.truth.plant import Record
+
+
+def run(task: Task) -> dict[str, Any]:
+    """Draws a case, diagnoses it, follows its advice where it is ambiguous; a failure is kept as a row, too."""
+    warnings.simplefilter("ignore", AssumedValueWarning)
+    row: dict[str, Any] = {"key": task.key, "stratum": task.stratum, "seed": task.seed}
+    case = draw(task)
+    if case is None:
+        return {**row, "status": "hidden"}
+    row |= truth_of(case)
+    with described(case) as robot:
+        try:
+            diagnosis, told = diagnose_case(case, robot)
+            row |= told
+            if row["verdict"] == "ambiguous" and row["stratum"] in ("half", "one"):
+                row["after"] = follow(case, robot, diagnosis)
+        except OedError as error:
+            return {**row, "status": "refused", "error": str(error)}
+        except Exception:
+            return {**row, "status": "failed", "error": traceback.format_exc()}
+    return {**row, "status": "done"}
+
+
+@contextlib.contextmanager
+def described(case: Case) -> Iterator[Robot]:
+    """The robot as its maker describes it, read from files as a user has them."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield load_robot(write_description(case.machine, Path(folder)))
+
+
+def logs_of(records: Sequence[Record]) -> list[Log]:
+    """Logs of t, q and tau alone."""
+    return [Log(t=record.t, q=record.q, tau=record.tau) for record in records]
+
+
+def truth_of(case: Case) -> dict[str, Any]:
+    """What is true of a case."""
+    shown = case.visible() if case.effects else []
+    effects = [
+        {
+            "effect": effect.name,
+            "kind": type(effect).__name__,
+            "joint": effect.joint,
+            "amount": float(effect.amount),
+            "visible": share,
+            "lasting": effect.lasting,
+            "parameters": {name: float(value) for name, value in effect.truths().items()},
+        }
+        for effect, share in zip(case.effects, shown, strict=True)
+    ]
+    return {
+        "robot": case.machine.name,
+        "motion": case.references[0].kind,
+        "duration": case.references[0].duration,
+        "tails": case.noise.tails is not None,
+        "truth": effects,
+    }
+
+
+def diagnose_case(case: Case, robot: Robot) -> tuple[Any, dict[str, Any]]:
+    """Diagnoses a case's logs and measures the gain on its unseen ones."""
+    from estimation import diagnose
+
+    logs, unseen = logs_of(case.logs), logs_of(case.unseen)
+    cpu, wall = time.process_time(), time.perf_counter()
+    diagnosis = diagnose(robot, logs, held_out=unseen or None)
+    row: dict[str, Any] = {
+        "cpu": time.process_time() - cpu,
+        "wall": time.perf_counter() - wall,
+        "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
+    }
+    said = diagnosis.to_dict()
+    row |= {"verdict": said["verdict"], "findings": [_finding(f) for f in said["findings"]]}
+    row["next"] = said.get("next_experiment")
+    row["limits"] = [
+        limit
+        for effect in case.effects
+        for limit in said.get("limits", [])
+        if limit["effect"] == effect.name and limit["joint"] == effect.joint
+    ]
+    if unseen and case.effects:
+        before, after = case.oracle_gain()
+        size = np.mean(np.concatenate([log.tau for log in unseen]) ** 2, axis=0)
+        row["oracle_before"], row["oracle_after"] = float((before / size).sum()), float((after / size).sum())
+        told = (np.square(said["baseline"]["nrmse"]), np.square(said["extended"]["nrmse"]))
+        row["before"], row["after_extension"] = float(told[0].sum()), float(told[1].sum())
+    return diagnosis, row
+
+
+def _finding(finding: dict[str, Any]) -> dict[str, Any]:
+    kept = ("effect", "joint", "parameters", "p_value", "delta_bic", "rivals")
+    return {name: finding.get(name) for name in kept}

@@ -1,0 +1,140 @@
+"""Shares with their intervals, and the figures that the rows of a benchmark give."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from scipy.stats import beta
+
+Row = dict[str, Any]
+
+LEVEL = 0.95
+# A gain smaller than this share of the error before is lost in the noise of the unseen log.
+LEAST_GAIN = 0.01
+ALIKE = 0.1
+CHANGE_TIME, NONLINEAR = 0.2, 0.2
+DETERMINED = 100.0
+# Names of the truth's parameters, and those a diagnosis gives them.
+TIMES = {"change_time": ("change_time",), "start": ("start", "change_time")}
+SHAPES = {
+    "stribeck_velocity": ("stribeck_velocity",),
+    "presliding_distance": ("presliding_travel",),
+    "time_constant": ("time_constant",),
+    "order": ("order",),
+    "delay": ("delay",),
+    "limit": ("level",),
+}
+
+
+def interval(hits: int, tries: int) -> tuple[float, float]:
+    """The Clopper-Pearson interval of a share at 95 %."""
+    tail = (1 - LEVEL) / 2
+    lower = 0.0 if hits == 0 else float(beta.ppf(tail, hits, tries - hits + 1))
+    upper = 1.0 if hits == tries else float(beta.ppf(1 - tail, hits + 1, tries - hits))
+    return lower, upper
+
+
+def share(name: str, rows: Iterable[Row], hit: Callable[[Row], bool], target: str) -> str:
+    """One line: hits of tries, the share, its interval and what is asked for."""
+    values = [bool(hit(row)) for row in rows]
+    if not values:
+        return f"  {name:58} no case                                 wanted {target}"
+    hits, tries = sum(values), len(values)
+    low, high = interval(hits, tries)
+    counted = f"{hits} of {tries}"
+    return (
+        f"  {name:58} {counted:>12} {100 * hits / tries:6.1f} % [{100 * low:5.1f}, {100 * high:5.1f}]  wanted {target}"
+    )
+
+
+def detected(row: Row) -> bool:
+    """Whether anything was said."""
+    return bool(row["verdict"] != "none")
+
+
+def first_is_right(row: Row) -> bool:
+    """Whether the first finding is a hidden effect on its joint."""
+    return bool(row["findings"]) and _pair(row["findings"][0]) in [_pair(e) for e in row["truth"]]
+
+
+def named_right(row: Row) -> bool:
+    """Whether the verdict is ``named`` or ``ambiguous`` and the first finding is right."""
+    return row["verdict"] in ("named", "ambiguous") and first_is_right(row)
+
+
+def in_the_set(row: Row) -> bool:
+    """Whether the truth is the first finding or among its rivals."""
+    if not row["findings"]:
+        return False
+    first = row["findings"][0]
+    names = {first["effect"], *(rival[0] for rival in first.get("rivals") or ())}
+    return first_is_right(row) or any(effect["effect"] in names for effect in row["truth"])
+
+
+def both(row: Row) -> bool:
+    """Whether every hidden effect is found on its joint."""
+    found = [_pair(finding) for finding in row["findings"]]
+    return all(_pair(effect) in found for effect in row["truth"])
+
+
+def spurious(row: Row) -> bool:
+    """Whether something is named that is not there."""
+    true = [_pair(effect) for effect in row["truth"]]
+    return any(_pair(finding) not in true and finding["effect"] != "unexplained" for finding in row["findings"])
+
+
+def gain_ratios(rows: Iterable[Row]) -> np.ndarray:
+    """Gain over the gain of the true effects' own model, where that is more than noise and the effect lasts.
+
+    The diagnosis' gain counts from its own base model, the true effects' from least squares with the motion as it was.
+    Where these two differ by more than a tenth on the unseen log, both count from the better one: a base model that
+    extrapolates badly must not make a gain.
+    """
+    ratios = []
+    for row in rows:
+        if not detected(row) or row.get("oracle_after") is None or not all(e["lasting"] for e in row["truth"]):
+            continue
+        told, true = row["before"], row["oracle_before"]
+        if abs(told / true - 1) > ALIKE:
+            told = true = min(told, true)
+        possible = true - row["oracle_after"]
+        if possible > LEAST_GAIN * true:
+            ratios.append((told - row["after_extension"]) / possible)
+    return np.array(ratios)
+
+
+def parameter_errors(rows: Iterable[Row], wanted: dict[str, tuple[str, ...]]) -> list[dict[str, Any]]:
+    """Errors of parameters of effects rightly found: absolute, relative, and whether the interval holds the truth."""
+    errors = []
+    for row in rows:
+        for effect in row["truth"]:
+            for finding in row["findings"]:
+                if _pair(finding) != _pair(effect):
+                    continue
+                told = {p["name"]: p for p in finding["parameters"] or ()}
+                for name, value in effect["parameters"].items():
+                    match = next((told[n] for n in wanted.get(name, ()) if n in told), None)
+                    if match is None:
+                        continue
+                    low, high = match.get("ci95") or (None, None)
+                    absolute = abs(float(match["value"]) - value)
+                    errors.append(
+                        {
+                            "key": row["key"],
+                            "effect": effect["effect"],
+                            "name": name,
+                            "absolute": absolute,
+                            "relative": absolute / max(abs(value), 1e-12),
+                            "energy": float(finding.get("delta_bic") or 0.0),
+                            "inside": low is not None and high is not None and low <= value <= high,
+                            # An open or wide interval is how a diagnosis marks what it cannot tell.
+                            "marked": low is None or high is None or (high - low) > abs(value),
+                        }
+                    )
+    return errors
+
+
+def _pair(entry: Row) -> tuple[str, int | None]:
+    return entry["effect"], entry["joint"]

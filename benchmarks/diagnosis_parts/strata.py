@@ -1,0 +1,91 @@
+"""What the benchmark hides: its strata, how many cases of each, and their seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from tests.truth.cases import Case, Hidden, draw_case
+from tests.truth.effects import KNOWN, STRANGERS
+from tests.truth.effects.base import Effect
+from tests.truth.machines import KINDS
+
+TUNING = 1000
+"""Seeds below this one are the benchmark's: no threshold may be tuned on them."""
+
+
+@dataclass(frozen=True)
+class Stratum:
+    """A kind of case: how many the full benchmark has, how many effects each hides, and their visible size."""
+
+    name: str
+    count: int
+    hidden: int
+    size: float
+    strange: bool = False
+    durations: tuple[float, ...] = (60.0,)
+
+
+STRATA: dict[str, Stratum] = {
+    stratum.name: stratum
+    for stratum in (
+        Stratum("none", 300, 0, 0.0, durations=(60.0, 60.0, 60.0, 120.0)),
+        Stratum("half", 220, 1, 0.005),
+        Stratum("one", 220, 1, 0.01, durations=(60.0, 60.0, 60.0, 120.0)),
+        Stratum("two", 100, 2, 0.03),
+        Stratum("stranger", 100, 1, 0.01, strange=True),
+    )
+}
+
+
+@dataclass(frozen=True)
+class Task:
+    """One case of one stratum."""
+
+    stratum: str
+    seed: int
+
+    @property
+    def key(self) -> str:
+        """Its name in the file of results."""
+        return f"{self.stratum}-{self.seed}"
+
+
+def tasks(strata: list[str], share: float, first: int) -> Iterator[Task]:
+    """Lists cases, the strata in turn so that a stopped run holds some of each.
+
+    Args:
+        strata: names of strata.
+        share: of the full counts.
+        first: the first seed: 0 for the benchmark, `TUNING` or more to tune.
+    """
+    counts = {name: max(1, round(STRATA[name].count * share)) for name in strata}
+    for k in range(max(counts.values())):
+        for name in strata:
+            if k < counts[name]:
+                yield Task(name, first + k)
+
+
+def draw(task: Task) -> Case | None:
+    """Draws a task's case; None when no robot shows its effect at the size.
+
+    Single effects take turns, so that each is hidden equally often; the robot is the first that shows it.
+    """
+    stratum = STRATA[task.stratum]
+    stream = 1 + list(STRATA).index(task.stratum)
+    options = {"size": stratum.size, "periodic": task.seed % 2 == 0, "stream": stream}
+    duration = stratum.durations[task.seed // 2 % len(stratum.durations)]
+    kinds = [KINDS[(task.seed // 2 + k) % len(KINDS)] for k in range(len(KINDS))]
+    pool: tuple[type[Effect], ...] = STRANGERS if stratum.strange else KNOWN
+    hide: list[type[Effect]] | int = stratum.hidden
+    if stratum.hidden == 1:
+        # Each effect is met by robots of all kinds, in periodic and in other motion.
+        turn = task.seed % len(pool)
+        hide = [pool[turn]]
+        options["periodic"] = (task.seed + task.seed // len(pool)) % 2 == 0
+    for kind in kinds:
+        try:
+            return draw_case(task.seed, hide=hide, kind=kind, duration=duration, unseen=30.0, **options)  # type: ignore[arg-type]
+        except Hidden:
+            continue
+    return None

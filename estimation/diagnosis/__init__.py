@@ -1,0 +1,13 @@
+"""What a model gets wrong, why, and what mending it brings."""
+
+from __future__ import annotations
+
+from robots.common.lazy import lazy_exports
+
+_EXPORTS = {
+    "Diagnosis": "estimation.diagnosis.diagnosis",
+    "Finding": "estimation.diagnosis.diagnosis",
+    "diagnose": "estimation.diagnosis.diagnosing",
+}
+__all__ = list(_EXPORTS)
+__getattr__ = lazy_exports(__name__, _EXPORTS)

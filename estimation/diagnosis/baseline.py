@@ -1,0 +1,143 @@
+"""The base model on a recording: its columns, the sharpness of its sign, and its fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.states import Recording
+from estimation.diagnosis.whitening import orthonormal
+from robots.base_parameters import BaseParameters, find_base_parameters
+from robots.regressor import default_model
+from robots.robot import Robot
+from robots.terms.effects import Situation
+from robots.terms.effects.situation import situation
+
+Array = NDArray[np.float64]
+
+# tanh(dq / v0) of the Coulomb friction: from sharp to the widest that is still a sign.
+SCALES = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.03, 0.06)
+ROUNDS = 3
+# Directions of the column-scaled regressor below this share of the largest are not determined by the log.
+FAINT = 1e-7
+CHUNK = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """The base model, ready to be fitted by any weighting.
+
+    Attributes:
+        base: base parameters of the model.
+        regressor: columns (N, n, b).
+        nuisance: columns (N, n, m) that are fitted beside and belong to no finding: how sharp each joint's sign is.
+    """
+
+    base: BaseParameters
+    regressor: Array
+    nuisance: Array
+
+    def situation(self, recording: Recording, values: Array) -> Situation:
+        """Gives what effects may depend on, with base parameters (b,)."""
+        return situation(
+            self.base.model,
+            values,
+            recording.t,
+            recording.q,
+            recording.dq,
+            recording.ddq,
+            starts=recording.starts,
+            columns=self.base.independent,
+        )
+
+
+def base_parameters(robot: Robot, friction: str, scales: tuple[float, ...]) -> BaseParameters:
+    """Finds the base parameters of rigid body, friction, rotors and offsets, the sign as sharp as `scales` say."""
+    return find_base_parameters(default_model(robot, friction=friction, velocity_scale=scales))
+
+
+def build_baseline(base: BaseParameters, recording: Recording, residual_scale: Array | None = None) -> Baseline:
+    """Chooses the sharpness of each joint's sign by the fit, and evaluates the columns.
+
+    Args:
+        base: base parameters with any sharpness.
+        recording: the data.
+        residual_scale: standard deviation of the noise (n,); by default a share of the torque.
+    """
+    scale = recording.tau.std(axis=0) if residual_scale is None else residual_scale
+    weights = 1.0 / np.maximum(scale, 1e-9 * max(1.0, float(np.abs(recording.tau).max())))
+    Y = base.regressor(recording.q, recording.dq, recording.ddq)
+    signs = [i for i, column in enumerate(base.columns) if column.symbol == "f1"]
+    chosen = _sharpness(Y, signs, base, recording, weights) if signs else None
+    if chosen is not None:
+        model = default_model(
+            base.model.robot,
+            friction="polynomial" if any(c.symbol == "f4" for c in base.model.columns) else "coulomb-viscous",
+            velocity_scale=chosen,
+        )
+        base = replace(base, model=model)
+        for i in signs:
+            joint = base.columns[i].joint - 1
+            Y[:, joint, i] = np.tanh(recording.dq[:, joint] / chosen[joint])
+    return Baseline(base, Y, _nuisance(recording, chosen))
+
+
+def _nuisance(recording: Recording, chosen: tuple[float, ...] | None) -> Array:
+    """How each joint's sign would change if it were less sharp (N, n, n): its derivative by the logarithm of v0."""
+    if chosen is None:
+        return np.zeros((len(recording), recording.n, 0))
+    result = np.zeros((len(recording), recording.n, recording.n))
+    for j, v0 in enumerate(chosen):
+        x = recording.dq[:, j] / v0
+        result[:, j, j] = x / np.cosh(np.clip(x, -300, 300)) ** 2
+    return result
+
+
+def _sharpness(
+    Y: Array, signs: list[int], base: BaseParameters, recording: Recording, weights: Array
+) -> tuple[float, ...]:
+    """Picks the scales of all joints' signs together, one joint at a time with the others as they are."""
+    stride = max(1, len(recording) // 20_000)
+    n = recording.n
+    counts = ~recording.unsure[::stride] * weights
+    rest = np.delete(Y[::stride], signs, axis=2) * counts[:, :, None]
+    Q = orthonormal(rest.reshape(-1, rest.shape[2]), FAINT)
+    tau = (recording.tau[::stride] * counts).reshape(-1)
+    tau = tau - Q @ (Q.T @ tau)
+    joints = [base.columns[i].joint - 1 for i in signs]
+    columns = np.zeros((len(joints), len(SCALES), len(tau)))
+    for a, joint in enumerate(joints):
+        for k, v0 in enumerate(SCALES):
+            column = np.zeros((len(tau) // n, n))
+            column[:, joint] = np.tanh(recording.dq[::stride, joint] / v0) * counts[:, joint]
+            series = column.reshape(-1)
+            columns[a, k] = series - Q @ (Q.T @ series)
+    wide = columns.reshape(len(joints) * len(SCALES), -1)
+    gram, cross = wide @ wide.T, wide @ tau
+    picked = [1] * len(joints)
+    for _ in range(ROUNDS):
+        for a in range(len(joints)):
+            gains = []
+            for k in range(len(SCALES)):
+                trial = [len(SCALES) * b + (k if b == a else picked[b]) for b in range(len(joints))]
+                gains.append(float(cross[trial] @ np.linalg.pinv(gram[np.ix_(trial, trial)], 1e-9) @ cross[trial]))
+            picked[a] = int(np.argmax(gains))
+    scales = [SCALES[0]] * n
+    for a, joint in enumerate(joints):
+        scales[joint] = SCALES[picked[a]]
+    return tuple(scales)
+
+
+def inertia_of(baseline: Baseline, recording: Recording, values: Array) -> Array:
+    """Gives each joint's own inertia (n,), rotor and all, as base parameters (b,) say it: mean over some states."""
+    rows = np.linspace(0, len(recording) - 1, 50).astype(int)
+    q, zero = recording.q[rows], np.zeros((len(rows), recording.n))
+    still = baseline.base.torque(q, zero, zero, values)
+    result = np.empty(recording.n)
+    for j in range(recording.n):
+        unit = zero.copy()
+        unit[:, j] = 1.0
+        result[j] = np.mean((baseline.base.torque(q, zero, unit, values) - still)[:, j])
+    return np.maximum(np.abs(result), 1e-9)

@@ -1,0 +1,219 @@
+"""The verb: finds what a robot's model gets wrong, names the cause, extends the model, measures the gain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.baseline import Baseline, base_parameters, build_baseline, inertia_of
+from estimation.diagnosis.diagnosis import Diagnosis
+from estimation.diagnosis.excess import residual_shares
+from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
+from estimation.diagnosis.limits import find_limits
+from estimation.diagnosis.patterns import all_patterns
+from estimation.diagnosis.problem import Problem, fit_values, pose
+from estimation.diagnosis.reporting import Told, assemble
+from estimation.diagnosis.scan import Entry, measure
+from estimation.diagnosis.selection import Selection, select
+from estimation.diagnosis.states import Recording, record
+from estimation.diagnosis.verdict import Judgement, judge
+from estimation.diagnosis.whitening import estimate_whitening
+from robots.common.errors import InputError, NotIdentifiableError
+from robots.common.parallel import one_blas_thread
+from robots.common.progress import SILENT, Progress
+from robots.robot import Robot
+from robots.signals import Log
+from robots.terms.effects import EFFECTS, Effect
+
+Array = NDArray[np.float64]
+
+DRAWS = 200
+# After an effect is found the noise is estimated anew; where it changes by less than this the search stands.
+CALMER = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """One search through the catalogue with one noise model."""
+
+    problem: Problem
+    entries: list[Entry]
+    selection: Selection
+
+
+@one_blas_thread()
+def diagnose(
+    robot: Robot,
+    logs: Log | Sequence[Log],
+    *,
+    held_out: Log | Sequence[Log] | None = None,
+    candidates: Sequence[str | Effect] | None = None,
+    friction: str = "polynomial",
+    false_alarm: float = 0.01,
+    seed: int = 0,
+    progress: Progress | None = None,
+    executor: Executor | None = None,
+) -> Diagnosis:
+    """Finds what rigid body, friction, rotors and offsets do not explain in a robot's logs.
+
+    Positions become noise-free motion (harmonics where it repeats, a low-pass chosen by its spectrum elsewhere); the
+    torque noise is estimated with its colour; every effect of the catalogue at every joint is scored beside the base
+    model, against what noise alone would have made of the strongest; shapes are refined, and rivals tried, before the
+    next effect is sought. What no effect explains is told as such.
+
+    Args:
+        robot: the robot.
+        logs: one or several, of t, q and tau or current; t is one clock.
+        held_out: logs of other motions to measure the gain on; without, runs or stretches are kept apart.
+        candidates: effects to look for, by name; all by default.
+        friction: of the base model: ``polynomial`` or ``coulomb-viscous``.
+        false_alarm: chance of finding an effect in logs that have none.
+        seed: of the noise that is drawn.
+        progress: is told how far it is.
+        executor: not needed so far: the work is in threads.
+
+    Returns:
+        The diagnosis.
+
+    Raises:
+        InputError: logs of another robot, without torque, too short or overlapping; an unknown effect or option.
+        NotIdentifiableError: no joint moves.
+    """
+    data = [logs] if isinstance(logs, Log) else list(logs)
+    other = [] if held_out is None else [held_out] if isinstance(held_out, Log) else list(held_out)
+    if not data:
+        raise InputError("no logs", allowed="one or more")
+    if not 0 < false_alarm < 0.5:
+        raise InputError(f"a false-alarm probability of {false_alarm}", allowed="between 0 and 0.5")
+    effects = _effects(candidates)
+    bar = progress or SILENT
+    bar.start("diagnosing", 1.0)
+    try:
+        recording = record(robot, data)
+        if not (np.ptp(recording.q, axis=0) > 0).any():
+            raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
+        search = _search(robot, recording, effects, friction, false_alarm, seed, bar)
+        bar.update(0.75, "what is left")
+        patterns = measure(search.problem, all_hypotheses(robot, list(all_patterns(robot))))
+        judgement = judge(search.problem, search.selection, patterns, false_alarm, np.random.default_rng(seed + 2))
+        bar.update(0.85, "limits of what the logs can show")
+        limits = find_limits(search.problem, search.entries, false_alarm=false_alarm)
+        bar.update(0.93, "gain on unseen data")
+        told = Told(
+            problem=search.problem,
+            selection=search.selection,
+            judgement=judgement,
+            limits=limits,
+            excess=residual_shares(search.problem),
+            logs=tuple(data),
+            held_out=tuple(other),
+            false_alarm=false_alarm,
+            seed=seed,
+        )
+        return assemble(robot, told)
+    finally:
+        bar.finish()
+
+
+def _effects(candidates: Sequence[str | Effect] | None) -> list[Effect]:
+    if candidates is None:
+        return list(EFFECTS.values())
+    chosen = []
+    for candidate in candidates:
+        if isinstance(candidate, str):
+            if candidate not in EFFECTS:
+                raise InputError(f"unknown effect {candidate!r}", allowed=", ".join(EFFECTS))
+            candidate = EFFECTS[candidate]
+        chosen.append(candidate)
+    if not chosen:
+        raise InputError("no effects to look for", allowed="one or more names")
+    return chosen
+
+
+def _search(
+    robot: Robot,
+    recording: Recording,
+    effects: Sequence[Effect],
+    friction: str,
+    false_alarm: float,
+    seed: int,
+    bar: Progress,
+) -> Search:
+    """Searches the catalogue; once more where what was found had been taken for noise."""
+    hypotheses = all_hypotheses(robot, effects)
+    base = base_parameters(robot, friction, (0.001,) * robot.n)
+    baseline = build_baseline(base, recording)
+    tau = recording.tau
+    values = fit_values(baseline, tau.std(axis=0) + 1e-12, recording.unsure, tau)
+    residual = tau - baseline.regressor @ values
+    search: Search | None = None
+    known = 0
+    for attempt in range(2):
+        share = 0.1 + 0.3 * attempt
+        inertia = inertia_of(baseline, recording, values)
+        whitening = estimate_whitening(recording, residual, baseline.base.size + known, inertia)
+        if search is not None and not _calmer(search.problem, whitening.scale):
+            break
+        rng = np.random.default_rng(seed)
+        problem = pose(recording, baseline, whitening, draws=DRAWS, rng=rng)
+        entries = measure(problem, hypotheses, _teller(bar, share, 0.2))
+        selection = select(
+            problem,
+            entries,
+            false_alarm=false_alarm,
+            rng=rng,
+            advance=_noter(bar, share + 0.25),
+        )
+        search = Search(problem, entries, selection)
+        if not selection.found:
+            break
+        residual, values = _cleaned(problem, baseline, selection)
+        known = sum(found.member.degrees for found in selection.found)
+    assert search is not None
+    return search
+
+
+def _teller(bar: Progress, start: float, share: float) -> Callable[[float], None]:
+    return lambda done: bar.update(start + share * done, "scan")
+
+
+def _noter(bar: Progress, at: float) -> Callable[[str], None]:
+    return lambda note: bar.update(at, note)
+
+
+def _calmer(problem: Problem, scale: Array) -> bool:
+    """Whether the noise without what was found is smaller than it was taken to be."""
+    return bool(np.max(np.log(problem.whitening.scale / scale)) > CALMER)
+
+
+def _cleaned(problem: Problem, baseline: Baseline, selection: Selection) -> tuple[Array, Array]:
+    """Residual (N, n) of base model and effects found, fitted together, and the base parameters."""
+    blocks = [baseline.regressor]
+    for found in selection.found:
+        blocks.append(_dense(problem, found.member.hypothesis, found.member.shape))
+    full = np.concatenate(blocks, axis=2)
+    weights = ~problem.recording.unsure / problem.whitening.scale
+    flat = (full * weights[:, :, None]).reshape(-1, full.shape[2])
+    norms = np.linalg.norm(flat, axis=0)
+    norms[norms == 0] = 1.0
+    target = (problem.recording.tau * weights).reshape(-1)
+    gram_values, vectors = np.linalg.eigh((flat.T @ flat) / norms[:, None] / norms)
+    kept = gram_values > 1e-12 * gram_values[-1]
+    right = vectors[:, kept].T @ (flat.T @ target / norms)
+    values = vectors[:, kept] @ (right / gram_values[kept]) / norms
+    return problem.recording.tau - full @ values, values[: baseline.base.size]
+
+
+def _dense(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Array:
+    joints, columns = problem.columns_of(hypothesis, shape)
+    X = np.zeros((len(problem.recording), problem.n, columns[0].shape[1]))
+    for j, part in zip(joints, columns, strict=True):
+        X[:, j] = part
+    return X
+
+
+__all__ = ["Judgement", "Search", "diagnose"]

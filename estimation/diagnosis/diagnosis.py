@@ -1,0 +1,388 @@
+"""What a diagnosis found: the verdict, the causes, what mending them brings, and what could not have been seen."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.limits import Limit
+from estimation.diagnosis.next_experiment import NextExperiment
+from estimation.model import Model, load_model
+from robots.common.errors import InputError
+from robots.common.files import write_atomic
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+DIAGNOSIS, MODEL = "diagnosis.json", "model.json"
+VERDICTS = ("none", "named", "ambiguous", "unexplained")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """A parameter of an effect.
+
+    Attributes:
+        name: as the effect names it.
+        value: the estimate.
+        unit: its unit.
+        standard_error: NaN where the data do not determine it.
+        ci95: 95 % interval; infinite where the data do not determine it.
+        determined: whether they do.
+    """
+
+    name: str
+    value: float
+    unit: str
+    standard_error: float
+    ci95: tuple[float, float]
+    determined: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes it as plain data; what is not determined is None."""
+        return {
+            "name": self.name,
+            "value": self.value,
+            "unit": self.unit,
+            "ci95": [_finite(bound) for bound in self.ci95],
+            "standard_error": _finite(self.standard_error),
+            "determined": self.determined,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gain:
+    """What an effect brings on unseen data, on its joint, or averaged over the joints of the whole robot.
+
+    Attributes:
+        nrmse_before: residual RMS over torque RMS without it.
+        nrmse_after: with it.
+        ci95: interval of the fall.
+    """
+
+    nrmse_before: float
+    nrmse_after: float
+    ci95: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One cause.
+
+    Attributes:
+        effect: its name in the vocabulary; ``unexplained`` for a pattern without a known cause.
+        joint: counted from 1; None for the whole robot.
+        parameters: coefficients, then shape.
+        p_value: family-wise: the chance that noise alone has an effect this strong found.
+        delta_bic: how much better the model with it is (Schwarz).
+        gain: on unseen data.
+        rivals: other causes in its place, ``(name, how much worse their BIC is)``, the closest first.
+        sentence: what it means, in words.
+        visible: share of its energy that the base model does not absorb.
+        coordinate: label of the axis on which it shows.
+        pattern: the description of an unexplained pattern; empty for a named effect.
+    """
+
+    effect: str
+    joint: int | None
+    parameters: tuple[Parameter, ...]
+    p_value: float
+    delta_bic: float
+    gain: Gain
+    rivals: tuple[tuple[str, float], ...]
+    sentence: str
+    visible: float
+    coordinate: str = ""
+    pattern: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes it as plain data."""
+        return {
+            "effect": self.effect,
+            "joint": self.joint,
+            "parameters": [parameter.to_dict() for parameter in self.parameters],
+            "p_value": self.p_value,
+            "delta_bic": self.delta_bic,
+            "gain": {
+                "nrmse_before": self.gain.nrmse_before,
+                "nrmse_after": self.gain.nrmse_after,
+                "ci95": list(self.gain.ci95),
+            },
+            "rivals": [[name, worse] for name, worse in self.rivals],
+            "sentence": self.sentence,
+            "visible": self.visible,
+            **({"pattern": self.pattern} if self.pattern else {}),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Curves behind a finding, for pictures; all (M,) or (M, n).
+
+    Attributes:
+        coordinate: per finding the axis on which it shows.
+        measured: torque.
+        before: residual of the base model.
+        after: residual of the extended model.
+        t: time [s].
+    """
+
+    t: Array
+    measured: Array
+    before: Array
+    after: Array
+    coordinate: tuple[Array, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnosis:
+    """The result of `diagnose`.
+
+    Attributes:
+        verdict: ``none``, ``named``, ``ambiguous`` or ``unexplained``.
+        findings: the strongest first.
+        baseline: NRMSE of the base model per joint (n,), on data that the fit has not seen.
+        extended: NRMSE of the extended model there.
+        explained: share of the excess over noise that the named effects explain; 1 where nothing is left.
+        excess: per joint the shares (n, 3) of the base model's squared residual that are noise, that repeat with the
+            motion, and that change with time; NaN where the motion does not repeat.
+        limits: what the logs could have shown.
+        next_experiment: what to measure next; None where nothing is open.
+        model: the extended model.
+        how_unseen: how the unseen data were kept apart.
+        notes: what a reader must know.
+        trace: curves for pictures; None once loaded from a file.
+    """
+
+    verdict: str
+    findings: tuple[Finding, ...]
+    baseline: Array
+    extended: Array
+    explained: float
+    excess: Array
+    limits: tuple[Limit, ...]
+    next_experiment: NextExperiment | None
+    model: Model
+    how_unseen: str
+    notes: tuple[str, ...] = ()
+    trace: Trace | None = field(default=None, repr=False)
+
+    @property
+    def success(self) -> bool:
+        """Whether the question is answered: nothing found, or named without a rival left."""
+        return self.verdict in ("none", "named")
+
+    def summary(self) -> str:
+        """Says what was found, what it brings, and what stays open."""
+        robot = self.model.robot
+        lines = [f"{robot.name}: {_VERDICTS[self.verdict]}"]
+        for finding in self.findings:
+            where = f"joint {finding.joint}" if finding.joint else "whole robot"
+            gain = finding.gain
+            lines.append(f"  {finding.effect} ({where}), p {_p(finding.p_value)}: {finding.sentence}")
+            lines.append(
+                f"    unseen error {100 * gain.nrmse_before:.2f} % -> {100 * gain.nrmse_after:.2f} % of the torque "
+                f"(fall {100 * gain.ci95[0]:.2f} to {100 * gain.ci95[1]:.2f} %)"
+            )
+            open_ = [parameter.name for parameter in finding.parameters if not parameter.determined]
+            if open_:
+                lines.append(f"    not determined by these logs: {', '.join(open_)}")
+            close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]
+            if close:
+                lines.append(f"    not told apart from: {', '.join(close)}")
+        before = " ".join(f"{100 * value:.2f}" for value in self.baseline)
+        after = " ".join(f"{100 * value:.2f}" for value in self.extended)
+        lines.append(f"  unseen error per joint [% of torque RMS]: {before}")
+        if self.findings:
+            lines.append(f"                          with the extension: {after}")
+        lines.append(f"  measured on {self.how_unseen}")
+        if self.next_experiment is not None:
+            lines.append(f"  next: {self.next_experiment.why}")
+        lines += [f"  {note}" for note in self.notes]
+        return "\n".join(lines)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per finding and parameter."""
+        import pandas as pd
+
+        rows = [
+            {
+                "effect": finding.effect,
+                "joint": finding.joint,
+                "parameter": parameter.name,
+                "value": parameter.value,
+                "unit": parameter.unit,
+                "low": parameter.ci95[0],
+                "high": parameter.ci95[1],
+                "determined": parameter.determined,
+                "p_value": finding.p_value,
+                "delta_bic": finding.delta_bic,
+            }
+            for finding in self.findings
+            for parameter in finding.parameters
+        ]
+        names = ["effect", "joint", "parameter", "value", "unit", "low", "high", "determined", "p_value", "delta_bic"]
+        return pd.DataFrame(rows, columns=names)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes `diagnosis.json`."""
+        return {
+            "verdict": self.verdict,
+            "findings": [finding.to_dict() for finding in self.findings],
+            "baseline": {"nrmse": self.baseline.tolist()},
+            "extended": {"nrmse": self.extended.tolist()},
+            "explained": self.explained,
+            "excess": [
+                dict(zip(("noise", "state", "time"), map(_finite, row), strict=True)) for row in self.excess.tolist()
+            ],
+            "limits": [limit.to_dict() for limit in self.limits],
+            "next_experiment": None if self.next_experiment is None else self.next_experiment.to_dict(),
+            "unseen": self.how_unseen,
+            "notes": list(self.notes),
+        }
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the unseen error of each joint, before and after."""
+        from matplotlib.figure import Figure
+
+        axes = ax if ax is not None else Figure(figsize=(6, 4)).subplots()
+        joints = np.arange(1, len(self.baseline) + 1)
+        axes.bar(joints - 0.2, 100 * self.baseline, 0.4, label="base model")
+        axes.bar(joints + 0.2, 100 * self.extended, 0.4, label="extended model")
+        axes.set_xlabel("joint")
+        axes.set_ylabel("unseen error / torque RMS [%]")
+        axes.legend()
+        return axes
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Writes `diagnosis.json` and `model.json` into a folder that is there.
+
+        Raises:
+            InputError: a file is there, and force is not given.
+        """
+        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
+        write_atomic(Path(folder) / DIAGNOSIS, text, force=force)
+        self.model.save(Path(folder) / MODEL, force=force)
+
+    @staticmethod
+    def load(folder: str | Path) -> Diagnosis:
+        """Reads what `save` wrote; the curves and the motions of the next experiment are not in the files.
+
+        Raises:
+            InputError: a missing file, or one that is no diagnosis.
+        """
+        file = Path(folder) / DIAGNOSIS
+        try:
+            data = json.loads(file.read_text(encoding="utf-8"))
+            model = load_model(Path(folder) / MODEL)
+            return _from_dict(data, model)
+        except FileNotFoundError:
+            raise InputError("no such file", file=file, remedy="give the folder that `oed diagnose` wrote") from None
+        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+            raise InputError(f"cannot be read as JSON: {error}", file=file) from error
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(f"is damaged: {type(error).__name__} {error}", file=file) from error
+
+
+def _from_dict(data: dict[str, Any], model: Model) -> Diagnosis:
+    if data["verdict"] not in VERDICTS:
+        raise ValueError(f"verdict {data['verdict']!r}")
+    following = data["next_experiment"]
+    return Diagnosis(
+        verdict=data["verdict"],
+        findings=tuple(_finding(item) for item in data["findings"]),
+        baseline=np.array(data["baseline"]["nrmse"], dtype=float),
+        extended=np.array(data["extended"]["nrmse"], dtype=float),
+        explained=float(data["explained"]),
+        excess=np.array([[_number(row[key]) for key in ("noise", "state", "time")] for row in data["excess"]]),
+        limits=tuple(_limit(item) for item in data["limits"]),
+        next_experiment=None if following is None else _next(following),
+        model=model,
+        how_unseen=data["unseen"],
+        notes=tuple(data["notes"]),
+    )
+
+
+def _finding(item: dict[str, Any]) -> Finding:
+    parameters = tuple(
+        Parameter(
+            name=p["name"],
+            value=float(p["value"]),
+            unit=p["unit"],
+            standard_error=_number(p["standard_error"]),
+            ci95=(
+                -np.inf if p["ci95"][0] is None else float(p["ci95"][0]),
+                np.inf if p["ci95"][1] is None else float(p["ci95"][1]),
+            ),
+            determined=bool(p["determined"]),
+        )
+        for p in item["parameters"]
+    )
+    gain = item["gain"]
+    return Finding(
+        effect=item["effect"],
+        joint=item["joint"],
+        parameters=parameters,
+        p_value=float(item["p_value"]),
+        delta_bic=float(item["delta_bic"]),
+        gain=Gain(
+            nrmse_before=float(gain["nrmse_before"]),
+            nrmse_after=float(gain["nrmse_after"]),
+            ci95=(float(gain["ci95"][0]), float(gain["ci95"][1])),
+        ),
+        rivals=tuple((str(name), float(worse)) for name, worse in item["rivals"]),
+        sentence=item["sentence"],
+        visible=float(item["visible"]),
+        pattern=item.get("pattern", ""),
+    )
+
+
+def _limit(item: dict[str, Any]) -> Limit:
+    return Limit(
+        effect=item["effect"],
+        joint=item["joint"],
+        detectable=_number(item["detectable"], np.inf),
+        attributable=_number(item["attributable"], np.inf),
+        toughest=item["toughest_rival"],
+        visible=float(item["visible"]),
+        note=item["note"],
+    )
+
+
+def _next(item: dict[str, Any]) -> NextExperiment:
+    return NextExperiment(
+        kind=item["kind"],
+        joint=item["joint"],
+        why=item["why"],
+        resolves=float(item["resolves"]),
+        stages=(),
+        ranking=(),
+    )
+
+
+_VERDICTS = {
+    "none": "nothing found beyond the base model and its noise",
+    "named": "the model lacks a cause that has a name",
+    "ambiguous": "the model lacks a cause, and more than one fits",
+    "unexplained": "the model lacks something that no effect of the catalogue explains",
+}
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _number(value: float | None, missing: float = np.nan) -> float:
+    return missing if value is None else float(value)
+
+
+def _p(value: float) -> str:
+    return f"{value:.3f}" if value >= 0.001 else "< 0.001"

@@ -1,0 +1,196 @@
+"""The extended model: base parameters and all effects found, fitted together, with what is uncertain about both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.extension import Extension
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.problem import Problem, accept, score
+from estimation.diagnosis.refinement import Member
+from estimation.identification import NEGLIGIBLE, RELATIVE
+from estimation.model import Model
+
+Array = NDArray[np.float64]
+
+# Steps of a shape parameter along which its likelihood is followed: up to where it drops by this much.
+DROP = 2.0
+# A drop that stays below this all the way to the bound leaves the parameter open.
+OPEN = 3.84
+FAINT = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Base parameters and effects, fitted together.
+
+    Attributes:
+        model: with the extensions.
+        effects: for each extension, which of its parameters the data determine (k + s,).
+        values: base parameters and nuisance (b + m,).
+    """
+
+    model: Model
+    effects: tuple[NDArray[np.bool_], ...]
+    values: Array
+
+
+def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[str, object]) -> Fitted:
+    """Fits base parameters and the members' coefficients by generalised least squares, shapes as they were refined.
+
+    The covariance counts the shape parameters as free, by the derivative of the members' torque.
+    """
+    baseline, white = problem.baseline, problem.whitening
+    base = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
+    blocks, slices, deviations = [base], [], []
+    at = base.shape[2]
+    for i, member in enumerate(members):
+        X = dense(problem, member.hypothesis, member.shape)
+        others = accept(problem, tuple(m.group for k, m in enumerate(members) if k != i))
+        steps = _steps(problem, member, others)
+        slopes = [_slope(problem, member, k, abs(step)) for k, step in enumerate(steps)]
+        blocks += [X, *slopes]
+        slices.append((at, X.shape[2], len(member.shape)))
+        deviations.append(steps)
+        at += X.shape[2] + len(member.shape)
+    columns = np.concatenate(blocks, axis=2)
+    root = np.linalg.cholesky(white.precision)
+    mixed = np.einsum("jk,njb->nkb", root, white.all(columns), optimize=True)
+    tau = (white.all(problem.recording.tau) @ root).reshape(-1)
+    flat = mixed.reshape(-1, mixed.shape[2])
+    linear = np.ones(columns.shape[2], dtype=bool)
+    for start, size, shapes in slices:
+        linear[start + size : start + size + shapes] = False
+    values = np.zeros(columns.shape[2])
+    values[linear] = _solve(flat[:, linear], tau)[0]
+    covariance = _solve(flat, tau)[1]
+    lower_upper = [m.hypothesis.coefficient_bounds(problem.situation.robot) for m in members]
+    extensions, known = [], []
+    for member, (start, size, shapes), steps, (lower, upper) in zip(
+        members, slices, deviations, lower_upper, strict=True
+    ):
+        rows = slice(start, start + size + shapes)
+        own = covariance[rows, rows].copy()
+        scale = np.concatenate([np.ones(size), np.abs(steps)])
+        own = own * scale[:, None] * scale
+        coefficients = np.clip(values[start : start + size], lower, upper)
+        errors = np.sqrt(np.maximum(np.diag(own), 0.0))
+        determined = np.concatenate(
+            [
+                np.isfinite(errors[:size]) & (errors[:size] < 0.5 * np.max(np.abs(coefficients), initial=1e-300)),
+                np.array([bool(np.isfinite(step)) for step in steps], dtype=bool),
+            ]
+        )
+        own[~np.isfinite(own)] = np.inf
+        extensions.append(
+            Extension(
+                effect=member.hypothesis.name,
+                joint=member.hypothesis.joint,
+                shape=member.shape,
+                coefficients=coefficients,
+                covariance=own,
+            )
+        )
+        known.append(determined)
+    b = baseline.base.size
+    errors = np.sqrt(np.maximum(np.diag(covariance)[:b], 0.0))
+    model = Model(
+        torque_model=baseline.base.model,
+        columns=baseline.base.independent,
+        values=values[:b],
+        covariance=covariance[:b, :b],
+        determined=_determined(problem, values[:b], errors),
+        formulas=baseline.base.formulas(),
+        provenance=provenance,
+        extensions=tuple(extensions),
+    )
+    return Fitted(model, tuple(known), values[: base.shape[2]])
+
+
+def dense(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Array:
+    """Evaluates a hypothesis' columns on all joints (N, n, k)."""
+    joints, columns = problem.columns_of(hypothesis, shape)
+    X = np.zeros((len(problem.recording), problem.n, columns[0].shape[1]))
+    for j, part in zip(joints, columns, strict=True):
+        X[:, j] = part
+    return X
+
+
+def _steps(problem: Problem, member: Member, others: object) -> list[float]:
+    """Finds each shape parameter's standard error by its profile; infinite where the likelihood hardly drops."""
+    situation = problem.situation
+    bounds = member.hypothesis.effect.bounds(situation, member.hypothesis.joint)
+    steps = []
+    for k, (value, (low, high), shape) in enumerate(
+        zip(member.shape, bounds, member.hypothesis.effect.shapes, strict=True)
+    ):
+        best = _gain(problem, member, member.shape, others)
+        room = (high - low) if np.isfinite(high - low) else max(abs(value), 1.0)
+        step = 0.05 * abs(value) if shape.scale == "log" else 1e-3 * room
+        found = np.inf
+        for _ in range(14):
+            drops = [
+                best - _gain(problem, member, _moved(member.shape, k, x), others)
+                for x in (value - step, value + step)
+                if low <= x <= high
+            ]
+            if not drops:
+                break
+            drop = float(np.mean(drops))
+            if drop >= DROP:
+                found = step / np.sqrt(drop)
+                if drop <= 8 * DROP:
+                    break
+                step *= float(np.sqrt(2 * DROP / drop))
+            elif np.isfinite(found):
+                break
+            else:
+                step *= 2.0
+        steps.append(found if found <= (abs(value) if shape.scale == "log" else 0.3 * room) else np.inf)
+    return steps
+
+
+def _gain(problem: Problem, member: Member, shape: tuple[float, ...], others: object) -> float:
+    joints, columns = problem.columns_of(member.hypothesis, shape)
+    return score(problem, problem.group(joints, columns), others).gain  # type: ignore[arg-type]
+
+
+def _moved(shape: tuple[float, ...], k: int, value: float) -> tuple[float, ...]:
+    return (*shape[:k], value, *shape[k + 1 :])
+
+
+def _slope(problem: Problem, member: Member, k: int, step: float) -> Array:
+    """How the member's torque changes by one standard error of a shape parameter (N, n, 1)."""
+    value = member.shape[k]
+    h = step if np.isfinite(step) else 0.3 * abs(value)
+    low, high = member.hypothesis.effect.bounds(problem.situation, member.hypothesis.joint)[k]
+    up, down = min(value + h, high), max(value - h, low)
+    if up <= down:
+        return np.zeros((len(problem.recording), problem.n, 1))
+    above, below = (dense(problem, member.hypothesis, _moved(member.shape, k, x)) for x in (up, down))
+    return ((above - below) @ member.coefficients * (h / (up - down)))[:, :, None]
+
+
+def _solve(matrix: Array, right: Array) -> tuple[Array, Array]:
+    """Least squares of least norm over unit columns, and its covariance; infinite where nothing is known."""
+    norms = np.linalg.norm(matrix, axis=0)
+    norms[norms == 0] = 1.0
+    values, vectors = np.linalg.eigh((matrix.T @ matrix) / norms[:, None] / norms)
+    kept = values > FAINT**1.5 * values[-1]
+    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+    solution = inverse @ ((matrix.T @ right) / norms) / norms
+    return solution, inverse / norms[:, None] / norms
+
+
+def _determined(problem: Problem, values: Array, errors: Array) -> NDArray[np.bool_]:
+    """Which base parameters mean something by themselves: known to a half, or known to be too small to matter."""
+    Y = problem.baseline.regressor
+    torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
+    excited = np.sqrt(np.mean(Y**2, axis=0))
+    share = (errors * excited / np.maximum(torque, 1e-12)[:, None]).max(axis=0)
+    known: NDArray[np.bool_] = (errors <= RELATIVE * np.abs(values)) | (share <= NEGLIGIBLE)
+    return known & (excited.max(axis=0) > 0) & (errors > 0)

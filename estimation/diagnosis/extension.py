@@ -1,0 +1,139 @@
+"""What was added to a model: effects with their shapes, coefficients and uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.patterns import build_pattern
+from robots.common.errors import InputError
+from robots.regressor import TorqueModel
+from robots.robot import Robot
+from robots.terms.effects import EFFECTS, Effect
+from robots.terms.effects.situation import Situation, situation
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Extension:
+    """One effect beside a base model.
+
+    Attributes:
+        effect: its name in the catalogue, or the description of a pattern.
+        joint: counted from 1; None for the whole robot.
+        shape: values of the shape parameters.
+        coefficients: values of the linear ones (k,).
+        covariance: of coefficients and shape together (k + s, k + s).
+    """
+
+    effect: str
+    joint: int | None
+    shape: tuple[float, ...]
+    coefficients: Array
+    covariance: Array
+
+    @property
+    def source(self) -> Effect:
+        """The effect.
+
+        Raises:
+            InputError: a name that this version does not know.
+        """
+        return find_effect(self.effect)
+
+    def torque(self, state: Situation) -> Array:
+        """Evaluates its torque (N, n) [N m or N]."""
+        X = np.nan_to_num(self.source.columns(state, self.joint, self.shape), nan=0.0, posinf=0.0, neginf=0.0)
+        return np.asarray(X @ self.coefficients)
+
+    def parameters(self, robot: Robot) -> list[dict[str, Any]]:
+        """Lists its parameters with standard errors: the linear ones, then the shape."""
+        effect = self.source
+        described = [(c.name, c.unit) for c in effect.parameters(robot, self.joint)]
+        described += [(s.name, s.unit) for s in effect.shapes]
+        values = [*self.coefficients.tolist(), *self.shape]
+        errors = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return [
+            {"name": name, "unit": unit, "value": float(value), "standard_error": _finite(error)}
+            for (name, unit), value, error in zip(described, values, errors, strict=True)
+        ]
+
+    def to_dict(self, robot: Robot) -> dict[str, Any]:
+        """Writes it as plain data for `model.json`."""
+        return {
+            "effect": self.effect,
+            "joint": self.joint,
+            "shape": list(self.shape),
+            "coefficients": self.coefficients.tolist(),
+            "covariance": [[_finite(value) for value in row] for row in self.covariance.tolist()],
+            "parameters": self.parameters(robot),
+        }
+
+
+def read_extension(data: Mapping[str, Any], robot: Robot) -> Extension:
+    """Reads what `Extension.to_dict` wrote.
+
+    Raises:
+        InputError: an unknown effect, or values that do not fit it.
+    """
+    effect = find_effect(str(data["effect"]))
+    joint = data["joint"]
+    if joint not in effect.joints(robot):
+        raise InputError(f"extension {effect.name} on joint {joint}", allowed="a joint on which the effect can act")
+    shape = tuple(float(value) for value in data["shape"])
+    coefficients = np.array(data["coefficients"], dtype=float)
+    rows = [[np.inf if value is None else float(value) for value in row] for row in data["covariance"]]
+    covariance = np.array(rows, dtype=float).reshape(len(rows), len(rows))
+    count = len(effect.parameters(robot, joint))
+    if len(shape) != len(effect.shapes) or coefficients.shape != (count,) or len(rows) != count + len(shape):
+        raise InputError(
+            f"extension {effect.name} has {len(coefficients)} coefficients and {len(shape)} shape values",
+            allowed=f"{count} and {len(effect.shapes)}",
+        )
+    if not (np.isfinite(coefficients).all() and np.isfinite(shape).all()):
+        raise InputError(f"extension {effect.name} has values that are not finite")
+    return Extension(
+        effect=str(data["effect"]), joint=joint, shape=shape, coefficients=coefficients, covariance=covariance
+    )
+
+
+def find_effect(name: str) -> Effect:
+    """Finds an effect of the catalogue, or the pattern that a text describes.
+
+    Raises:
+        InputError: neither.
+    """
+    if name in EFFECTS:
+        return EFFECTS[name]
+    pattern = build_pattern(name)
+    if pattern is None:
+        raise InputError(f"unknown effect {name!r}", allowed=", ".join(EFFECTS), remedy="use a newer version")
+    return pattern
+
+
+def extension_torque(
+    extensions: Sequence[Extension],
+    model: TorqueModel,
+    values: Array,
+    columns: tuple[int, ...],
+    t: Array,
+    q: Array,
+    dq: Array,
+    ddq: Array,
+) -> Array:
+    """Evaluates the extensions of a model with base parameters `values` on a motion (N, n) [N m or N]."""
+    total = np.zeros_like(q)
+    if extensions:
+        state = situation(model, values, t, q, dq, ddq, columns=columns)
+        for extension in extensions:
+            total += extension.torque(state)
+    return total
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,165 @@
+"""What an extension brings on data that its fit has not seen, with an interval that survives coloured errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.states import Recording
+
+Array = NDArray[np.float64]
+
+PARTS = 5
+RESAMPLES = 500
+BLOCK = 1.0  # [s], and five times the errors' correlation time
+FAINT = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Unseen:
+    """Errors on data that the fits behind them had not seen.
+
+    Attributes:
+        how: one sentence: what was kept apart.
+        t: time [s], (M,).
+        step: sample period [s].
+        measured: torque (M, n).
+        errors: per model the errors (M, n): the base model first, the whole extended model last, and between them the
+            extended model less one effect each.
+        counts: rows that count (M, n): not those whose direction of motion is unknown.
+    """
+
+    how: str
+    t: Array
+    step: float
+    measured: Array
+    errors: tuple[Array, ...]
+    counts: NDArray[np.bool_]
+
+    def nrmse(self, model: int) -> Array:
+        """Residual RMS over torque RMS (n,) of one of the models."""
+        return self._rms(self.errors[model]) / np.maximum(self._rms(self.measured), 1e-300)
+
+    def _rms(self, values: Array) -> Array:
+        return np.sqrt((values**2 * self.counts).sum(axis=0) / np.maximum(self.counts.sum(axis=0), 1))
+
+    def interval(self, before: int, after: int, joints: Sequence[int], rng: np.random.Generator) -> tuple[float, float]:
+        """95 % interval of the fall in NRMSE from one model to another, averaged over joints, by moving blocks."""
+        rows = len(self.t)
+        block = int(min(max(round(self._block() / self.step), 1), max(rows // 4, 1)))
+        level = np.maximum(self._rms(self.measured), 1e-300)
+        sums = []
+        for model in (before, after):
+            squares = np.vstack([np.zeros((1, len(level))), np.cumsum(self.errors[model] ** 2 * self.counts, axis=0)])
+            sums.append((squares[block:] - squares[:-block])[:, list(joints)])
+        counted = np.vstack([np.zeros((1, len(level))), np.cumsum(self.counts, axis=0)])
+        counted = (counted[block:] - counted[:-block])[:, list(joints)]
+        starts = rng.integers(0, rows - block + 1, (RESAMPLES, max(1, rows // block)))
+        count = np.maximum(counted[starts].sum(axis=1), 1)
+        old, new = (np.sqrt(part[starts].sum(axis=1) / count) for part in sums)
+        falls = ((old - new) / level[list(joints)]).mean(axis=1)
+        low, high = np.quantile(falls, [0.025, 0.975])
+        return float(low), float(high)
+
+    def _block(self) -> float:
+        """Length of a block [s]."""
+        times = []
+        for column in self.errors[-1].T:
+            series = column - column.mean()
+            power = np.abs(np.fft.rfft(series, 2 * len(series))) ** 2
+            correlation = np.fft.irfft(power)[: len(series)]
+            below = np.flatnonzero(correlation < correlation[0] / np.e) if correlation[0] > 0 else np.zeros(1)
+            times.append(float(below[0]) * self.step if len(below) else 0.0)
+        return max(BLOCK, 5 * max(times))
+
+
+def cross_validated(problem: Problem, effects: Sequence[Array]) -> Unseen:
+    """Fits on all runs but one, or all parts but one of a single run, and measures on the one left out.
+
+    Args:
+        problem: the data.
+        effects: columns (N, n, k) of each effect found.
+    """
+    recording = problem.recording
+    runs = recording.runs
+    if len(runs) > 1:
+        folds = list(runs)
+        how = f"each of {len(runs)} logs, predicted from the others"
+    else:
+        edges = np.linspace(0, len(recording), PARTS + 1).astype(int)
+        folds = [slice(int(a), int(b)) for a, b in pairwise(edges)]
+        how = (
+            f"each of {PARTS} stretches of the only log, predicted from the other stretches: the same kind of motion, "
+            "so that the gain on another motion may differ"
+        )
+    base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
+    weights = ~recording.unsure / problem.whitening.scale
+    full = np.concatenate([base, *effects], axis=2)
+    weighted = full * weights[:, :, None]
+    target = recording.tau * weights
+    grams = [_moments(weighted[fold], target[fold]) for fold in folds]
+    total = (sum(g for g, _ in grams), sum(c for _, c in grams))
+    errors = [np.empty_like(recording.tau) for _ in models(base.shape[2], effects)]
+    for fold, (gram, cross) in zip(folds, grams, strict=True):
+        rest = (total[0] - gram, total[1] - cross)
+        for error, chosen in zip(errors, models(base.shape[2], effects), strict=True):
+            values = _solve(rest[0][np.ix_(chosen, chosen)], rest[1][chosen])
+            error[fold] = recording.tau[fold] - full[fold][:, :, chosen] @ values
+    return Unseen(how, recording.t, recording.step, recording.tau, tuple(errors), ~recording.unsure)
+
+
+def on_held_out(
+    problem: Problem,
+    effects: Sequence[Array],
+    unseen: Recording,
+    unseen_base: Array,
+    unseen_effects: Sequence[Array],
+) -> Unseen:
+    """Fits on all logs and measures on others.
+
+    Args:
+        problem: the data of the fit.
+        effects: columns (N, n, k) of each effect found, there.
+        unseen: other logs.
+        unseen_base: columns of base model and nuisance on them (M, n, b + m).
+        unseen_effects: columns of each effect on them (M, n, k).
+    """
+    recording = problem.recording
+    base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
+    weights = ~recording.unsure / problem.whitening.scale
+    full = np.concatenate([base, *effects], axis=2)
+    gram, cross = _moments(full * weights[:, :, None], recording.tau * weights)
+    other = np.concatenate([unseen_base, *unseen_effects], axis=2)
+    errors = []
+    for chosen in models(base.shape[2], effects):
+        values = _solve(gram[np.ix_(chosen, chosen)], cross[chosen])
+        errors.append(unseen.tau - other[:, :, chosen] @ values)
+    how = f"{len(unseen.runs)} log{'s' if len(unseen.runs) > 1 else ''} that the fit has not seen"
+    return Unseen(how, unseen.t, unseen.step, unseen.tau, tuple(errors), ~unseen.unsure)
+
+
+def models(base: int, effects: Sequence[Array]) -> list[NDArray[np.intp]]:
+    """Columns of the base model, of the extended model less each effect, and of the extended model."""
+    edges = np.cumsum([base, *(X.shape[2] for X in effects)])
+    own = [np.arange(a, b) for a, b in pairwise(edges)]
+    everything = np.arange(edges[-1])
+    return [np.arange(base), *(np.setdiff1d(everything, part) for part in own), everything]
+
+
+def _moments(Y: Array, target: Array) -> tuple[Array, Array]:
+    flat = Y.reshape(-1, Y.shape[2])
+    return flat.T @ flat, flat.T @ target.reshape(-1)
+
+
+def _solve(gram: Array, cross: Array) -> Array:
+    scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    scale[scale == 0] = 1.0
+    values, vectors = np.linalg.eigh(gram / scale[:, None] / scale)
+    kept = values > FAINT * values[-1]
+    result: Array = vectors[:, kept] @ ((vectors[:, kept].T @ (cross / scale)) / values[kept]) / scale
+    return result

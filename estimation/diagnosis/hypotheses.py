@@ -1,0 +1,59 @@
+"""A hypothesis: one effect at one place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.robot import Robot
+from robots.terms.effects import Effect, JointEffect, Situation
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An effect at a joint, or on the whole robot.
+
+    Attributes:
+        effect: the effect.
+        joint: counted from 1; None for the whole robot.
+    """
+
+    effect: Effect
+    joint: int | None
+
+    @property
+    def name(self) -> str:
+        """The effect's name."""
+        return self.effect.name
+
+    @property
+    def label(self) -> str:
+        """Effect and joint, for logs and messages."""
+        return self.name if self.joint is None else f"{self.name} of joint {self.joint}"
+
+    def columns(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[int, ...], tuple[Array, ...]]:
+        """Evaluates the columns (N, k) on each joint, from 0, on which they are not zero throughout."""
+        if isinstance(self.effect, JointEffect) and self.joint is not None:
+            return (self.joint - 1,), (_finite(self.effect.local(situation, self.joint, shape)),)
+        X = _finite(self.effect.columns(situation, self.joint, shape))
+        joints = tuple(int(j) for j in np.flatnonzero(X.any(axis=(0, 2)))) or (0,)
+        return joints, tuple(np.ascontiguousarray(X[:, j]) for j in joints)
+
+    def coefficient_bounds(self, robot: Robot) -> tuple[Array, Array]:
+        """Least and largest physically possible coefficients (k,)."""
+        described = self.effect.parameters(robot, self.joint)
+        return np.array([c.lower for c in described]), np.array([c.upper for c in described])
+
+
+def all_hypotheses(robot: Robot, effects: Sequence[Effect]) -> tuple[Hypothesis, ...]:
+    """Lists every effect at every place where it can act."""
+    return tuple(Hypothesis(effect, joint) for effect in effects for joint in effect.joints(robot))
+
+
+def _finite(X: Array) -> Array:
+    return np.where(np.isfinite(X), X, 0.0)

@@ -1,0 +1,277 @@
+"""What a log could have shown: for each effect and joint the smallest size that it would, and could have named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_toeplitz
+
+from estimation.diagnosis.baseline import build_baseline
+from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
+from estimation.diagnosis.power import beside, detectable_energy, resolving_energy, size_per_energy
+from estimation.diagnosis.problem import Problem, pose, visible_root
+from estimation.diagnosis.scan import Entry, measure
+from estimation.diagnosis.states import Recording
+from estimation.diagnosis.whitening import Band, Gaps, Whitening
+from robots.base_parameters import find_base_parameters
+from robots.common.errors import InputError
+from robots.plants.sensors import Sensors
+from robots.regressor import TorqueModel
+from robots.signals import Motion
+from robots.terms.effects import EFFECTS
+
+Array = NDArray[np.float64]
+
+HIDDEN = "the base model absorbs it: no size shows in this motion"
+SHAPES = 3
+"""Shapes of an effect that its limit is the median of."""
+RIVAL_SHAPES = 4
+"""Shapes with which a rival may imitate it."""
+ORDER = 12
+"""Of the prediction filter of noise that is a sum of white and first-order noise, which has no finite one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limit:
+    """What one log can tell of one effect at one joint.
+
+    Attributes:
+        effect: its name.
+        joint: counted from 1; None for the whole robot.
+        detectable: smallest size that is found with 95 % chance, as a share of the joint's torque RMS (of a robot's
+            effect: of the joint where it shows most); infinite where no size shows.
+        attributable: smallest that is also told from every rival; infinite where none is.
+        toughest: the rival that is hardest to tell from it; None without.
+        visible: share of its energy that the base model does not absorb.
+        note: why no size shows, or empty.
+    """
+
+    effect: str
+    joint: int | None
+    detectable: float
+    attributable: float
+    toughest: str | None
+    visible: float
+    note: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes it as plain data; what is infinite is None."""
+        return {
+            "effect": self.effect,
+            "joint": self.joint,
+            "detectable": _finite(self.detectable),
+            "attributable": _finite(self.attributable),
+            "toughest_rival": self.toughest,
+            "visible": self.visible,
+            "note": self.note,
+        }
+
+
+def find_limits(problem: Problem, entries: Sequence[Entry], *, false_alarm: float = 0.01) -> tuple[Limit, ...]:
+    """Finds the limits of a log, by the noise it has and the base model it is fitted with.
+
+    Args:
+        problem: the data, white; nothing of its residual is used.
+        entries: all hypotheses, measured.
+        false_alarm: chance that noise alone has an effect named.
+
+    Returns:
+        One per hypothesis, in the catalogue's order.
+    """
+    tries = sum(entry.tries for entry in entries)
+    known = {(entry.hypothesis.name, entry.hypothesis.joint): entry for entry in entries}
+    rms = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
+    limits = []
+    for hypothesis in all_hypotheses(problem.situation.robot, list(EFFECTS.values())):
+        entry = known.get((hypothesis.name, hypothesis.joint))
+        if entry is None:
+            note = "joint hardly moves" if hypothesis.joint else "nothing of it shows in this motion"
+            limits.append(_none(hypothesis, note))
+        else:
+            limits.append(_limit(problem, entry, known, rms, tries, false_alarm))
+    return tuple(limits)
+
+
+def planned_limits(
+    model: TorqueModel, parameters: Array, motions: Sequence[Motion], *, noise: Sensors | None = None
+) -> tuple[Limit, ...]:
+    """Finds the limits of an experiment that has not been made.
+
+    Args:
+        model: the torque model.
+        parameters: its standard parameters (p,).
+        motions: the planned motions, one after the other on one clock.
+        noise: the torque noise expected.
+
+    Raises:
+        InputError: parameters that are not known.
+    """
+    problem = planned_problem(model, parameters, motions, noise=noise or Sensors())
+    return find_limits(problem, measure(problem, all_hypotheses(model.robot, list(EFFECTS.values()))))
+
+
+def planned_problem(model: TorqueModel, parameters: Array, motions: Sequence[Motion], *, noise: Sensors) -> Problem:
+    """Poses the diagnosis of an experiment that has not been made: its torque is the model's."""
+    if not np.isfinite(parameters).all():
+        missing = model.columns[int(np.argmin(np.isfinite(parameters)))]
+        raise InputError(
+            f"{model.robot.name}: {missing.name} is not known",
+            joint=missing.joint,
+            remedy="identify the robot first, and give its model.json",
+        )
+    joined = Motion.concatenate(motions)
+    starts = tuple(int(s) for s in np.cumsum([0, *(len(motion) for motion in motions[:-1])]))
+    step = float(np.median(np.diff(joined.t)))
+    recording = Recording(
+        t=joined.t,
+        starts=starts,
+        q=joined.q,
+        dq=joined.dq,
+        ddq=joined.ddq,
+        tau=model.torque(joined.q, joined.dq, joined.ddq, parameters),
+        step=step,
+        cycles=(None,) * len(motions),
+        cutoff=0.5 / step,
+        unsure=np.zeros(joined.q.shape, dtype=bool),
+        floor=np.zeros(joined.q.shape[1]),
+        names=tuple(f"motion {i}" for i in range(1, len(motions) + 1)),
+    )
+    whitening = expected_whitening(recording, noise)
+    baseline = build_baseline(find_base_parameters(model), recording, whitening.scale)
+    return pose(recording, baseline, whitening, draws=0, rng=np.random.default_rng(0))
+
+
+def expected_whitening(recording: Recording, noise: Sensors) -> Whitening:
+    """Whitens the noise that sensors are expected to have: white and first-order coloured, a share of the torque."""
+    size = noise.torque_noise * np.sqrt(np.mean(recording.tau**2, axis=0))
+    size = np.maximum(size, 1e-3 * max(float(size.max()), 1e-9))
+    rho = float(np.exp(-recording.step / noise.correlation_time)) if noise.correlation_time else 0.0
+    lags = noise.coloured_share * rho ** np.arange(ORDER + 1)
+    lags[0] = 1.0
+    taps = solve_toeplitz(lags[:-1], lags[1:])
+    innovation = float(np.sqrt(lags[0] - taps @ lags[1:]))
+    n = recording.n
+    return Whitening(
+        coefficients=(taps,) * n,
+        scale=size * innovation,
+        precision=np.eye(n),
+        starts=recording.starts,
+        gaps=no_gaps(n),
+        band=Band(np.zeros(0), 1, 0.5 / recording.step),
+        innovations=np.random.default_rng(0).standard_normal((1024, n)),
+    )
+
+
+def no_gaps(joints: int) -> Gaps:
+    """Builds the gaps of a motion whose direction is known throughout."""
+    none = np.zeros(0, dtype=np.intp)
+    return Gaps(((none, none, none, np.zeros(0)),) * joints, ())
+
+
+def _limit(
+    problem: Problem,
+    entry: Entry,
+    known: dict[tuple[str, int | None], Entry],
+    rms: Array,
+    tries: int,
+    false_alarm: float,
+) -> Limit:
+    hypothesis = entry.hypothesis
+    found: list[float] = []
+    named: list[tuple[float, str | None]] = []
+    shares: list[float] = []
+    resolving = resolving_energy()
+    for at in _spread(len(entry.groups), SHAPES):
+        group, shape = entry.groups[at], entry.shapes[at]
+        root = visible_root(group.gram, group.raw)
+        size = _torque_gram(problem, hypothesis, shape, rms)
+        shares.append(float(np.max(np.diag(group.gram) / np.maximum(group.raw, 1e-300))))
+        if not len(root):
+            found.append(np.inf)
+            named.append((np.inf, None))
+            continue
+        penalty = (len(root) + len(shape)) * float(np.log(problem.rows * len(group.joints)))
+        needed = detectable_energy(len(root), tries, false_alarm=false_alarm, penalty=penalty)
+        smallest = size_per_energy(size, group.gram) * np.sqrt(needed)
+        found.append(smallest)
+        worst: tuple[float, str | None] = (smallest, None)
+        for name, rival in _rivals(problem, hypothesis, known):
+            per_energy = max(
+                size_per_energy(size, beside(group.gram, problem.product(group, other), other.gram, other.raw))
+                for other in (rival.groups[k] for k in _spread(len(rival.groups), RIVAL_SHAPES))
+            )
+            if per_energy * np.sqrt(resolving) > worst[0] or worst[1] is None:
+                worst = (max(per_energy * np.sqrt(resolving), smallest), name)
+        named.append(worst)
+    middle = sorted(range(len(found)), key=lambda i: named[i][0])[len(found) // 2]
+    detectable = float(np.median(found))
+    visible = float(np.median(shares))
+    return Limit(
+        effect=hypothesis.name,
+        joint=hypothesis.joint,
+        detectable=detectable,
+        attributable=max(named[middle][0], detectable),
+        toughest=named[middle][1],
+        visible=visible,
+        note=_note(problem, hypothesis) if np.isfinite(detectable) else HIDDEN,
+    )
+
+
+def _note(problem: Problem, hypothesis: Hypothesis) -> str:
+    """Says what a log that is shorter than an effect's slowest time constant leaves open."""
+    duration = float(problem.recording.t[-1] - problem.recording.t[0])
+    slow = [shape for shape in hypothesis.effect.shapes if shape.name == "time_constant" and shape.upper > duration]
+    if not slow:
+        return ""
+    return (
+        f"in {duration:.0f} s of data, time constants beyond {duration:.0f} s look alike: how fast it goes stays open"
+    )
+
+
+def _rivals(
+    problem: Problem, hypothesis: Hypothesis, known: dict[tuple[str, int | None], Entry]
+) -> list[tuple[str, Entry]]:
+    """Finds the declared rivals on the joints where the effect acts; rare ones only of a rare one."""
+    joints: list[int | None] = [None, *(range(1, problem.n + 1) if hypothesis.joint is None else [hypothesis.joint])]
+    names = [name for name in hypothesis.effect.rivals if hypothesis.effect.rare or not EFFECTS[name].rare]
+    return [(name, known[name, joint]) for name in names for joint in joints if (name, joint) in known]
+
+
+def _torque_gram(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...], rms: Array) -> Array:
+    """Mean products of the columns as shares of the torque of the joint where they are largest."""
+    joints, columns = problem.columns_of(hypothesis, shape)
+    best: Array | None = None
+    for j, part in zip(joints, columns, strict=True):
+        scaled = part / max(float(rms[j]), 1e-12)
+        gram = scaled.T @ scaled / len(part)
+        if best is None or np.trace(gram) > np.trace(best):
+            best = gram
+    assert best is not None
+    return best
+
+
+def _spread(count: int, most: int) -> list[int]:
+    """Picks up to `most` of `count` places, evenly, the middle first of all."""
+    if count <= most:
+        return list(range(count))
+    return sorted({round((k + 0.5) * count / most - 0.5) for k in range(most)})
+
+
+def _none(hypothesis: Hypothesis, note: str) -> Limit:
+    return Limit(
+        effect=hypothesis.name,
+        joint=hypothesis.joint,
+        detectable=np.inf,
+        attributable=np.inf,
+        toughest=None,
+        visible=0.0,
+        note=note,
+    )
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None

@@ -1,0 +1,119 @@
+"""Continuous refinement of an effect's shape, its linear coefficients and the base model always refitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.problem import Accepted, Group, Problem, score
+
+Array = NDArray[np.float64]
+
+# Evaluations a shape parameter.
+EFFORT = 20
+# First step of the search: a factor of a logarithmic parameter, a share of the range of another.
+FACTOR, SHARE = 1.5, 0.04
+# Twice the log of the odds against an effect that robots seldom have.
+RARE = 6.0
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """A hypothesis with its best shape, measured beside the base model and others.
+
+    Attributes:
+        hypothesis: effect and joint.
+        shape: one value per shape parameter.
+        group: its columns there.
+        gain: squared residual explained beside the others, coefficients within their bounds.
+        coefficients: (k,) beside the others.
+        degrees: coefficients that show, and shape parameters.
+        visible: largest share of a column's energy that the model before leaves.
+    """
+
+    hypothesis: Hypothesis
+    shape: tuple[float, ...]
+    group: Group
+    gain: float
+    coefficients: Array
+    degrees: int
+    visible: float
+
+    def bic(self, rows: int) -> float:
+        """Gain less what its parameters are worth: Schwarz's criterion, larger is better."""
+        prior = RARE if self.hypothesis.effect.rare else 0.0
+        return self.gain - self.degrees * float(np.log(rows * len(self.group.joints))) - prior
+
+
+def refine(
+    problem: Problem, hypothesis: Hypothesis, start: tuple[float, ...], accepted: Accepted, *, effort: int = EFFORT
+) -> Member:
+    """Searches the shape that explains most, from a point of the grid.
+
+    The linear coefficients and the base model are projected out at every step (variable projection, Golub and Pereyra
+    1973), so that the search has as many dimensions as the effect has shape parameters.
+    """
+    situation = problem.situation
+    lower, upper = hypothesis.coefficient_bounds(situation.robot)
+    bounds = hypothesis.effect.bounds(situation, hypothesis.joint)
+    scales = [shape.scale for shape in hypothesis.effect.shapes]
+    best: list[Member] = []
+
+    def evaluate(shape: tuple[float, ...]) -> float:
+        joints, columns = problem.columns_of(hypothesis, shape)
+        group = problem.group(joints, columns)
+        result = score(problem, group, accepted)
+        gain, coefficients = result.bounded(lower, upper)
+        if not best or gain > best[0].gain:
+            member = Member(hypothesis, shape, group, gain, coefficients, result.degrees + len(shape), result.visible)
+            best[:] = [member]
+        return gain
+
+    evaluate(start)
+    if start and effort:
+        _search(evaluate, start, bounds, scales, effort)
+    return best[0]
+
+
+def _search(
+    evaluate: Callable[[tuple[float, ...]], float],
+    start: tuple[float, ...],
+    bounds: tuple[tuple[float, float], ...],
+    scales: Sequence[str],
+    effort: int,
+) -> None:
+    """Nelder and Mead's simplex on logarithms where the scale is one: change times make the objective rough."""
+    logs = [scale == "log" and low > 0 for scale, (low, _) in zip(scales, bounds, strict=True)]
+
+    def forward(values: tuple[float, ...]) -> Array:
+        return np.array([np.log(v) if is_log else v for v, is_log in zip(values, logs, strict=True)])
+
+    low, high = forward(tuple(b[0] for b in bounds)), forward(tuple(b[1] for b in bounds))
+    x0 = np.clip(forward(start), low, high)
+    span = np.where(np.isfinite(high - low), high - low, 1.0)
+    step = np.where(logs, np.minimum(np.log(FACTOR), 0.2 * span), SHARE * span)
+    simplex = np.vstack(
+        [x0, *(x0 + np.where(x0[i] + step[i] > high[i], -1, 1) * step * unit for i, unit in enumerate(np.eye(len(x0))))]
+    )
+
+    def objective(x: Array) -> float:
+        inside = np.clip(x, low, high)
+        shape = tuple(float(np.exp(v)) if is_log else float(v) for v, is_log in zip(inside, logs, strict=True))
+        return -evaluate(shape)
+
+    minimize(
+        objective,
+        x0,
+        method="Nelder-Mead",
+        options={
+            "initial_simplex": simplex,
+            "maxfev": effort * len(x0),
+            "xatol": 1e-3 * float(step.min()),
+            "fatol": 1e-2,
+        },
+    )

@@ -1,0 +1,198 @@
+"""The scan: all hypotheses at all shapes as score tests, and what noise alone would have made of the largest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaincc, gammaln
+from scipy.stats import gumbel_r
+
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.problem import Accepted, Group, Problem, score
+from robots.common.parallel import available_cores
+
+Array = NDArray[np.float64]
+
+# A grid longer than this is not scanned whole: its effect proposes points, and is charged for the whole grid.
+LONG = 60
+PROPOSED = 6
+# Mean of the Gumbel distribution: the largest of m independent -log p is log m + this, on average.
+EULER = 0.5772156649015329
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """A hypothesis with all its shapes measured.
+
+    Attributes:
+        hypothesis: effect and joint.
+        shapes: the points scanned.
+        groups: one a point.
+        tries: points that the choice was made from.
+    """
+
+    hypothesis: Hypothesis
+    shapes: tuple[tuple[float, ...], ...]
+    groups: tuple[Group, ...]
+    tries: int
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """A hypothesis in one scan.
+
+    Attributes:
+        hypothesis: effect and joint.
+        shape: the best point.
+        gain: squared residual explained there, coefficients within their bounds.
+        visible: largest share of a column's energy that the model before leaves.
+        evidence: -log of the p-value of the best point, corrected for the points tried.
+        degrees: directions that show; 0 where the log cannot tell.
+    """
+
+    hypothesis: Hypothesis
+    shape: tuple[float, ...]
+    gain: float
+    visible: float
+    evidence: float
+    degrees: int
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """All hypotheses, the strongest first, and the null.
+
+    Attributes:
+        outcomes: sorted by evidence.
+        largest: evidence of the strongest hypothesis in each null log (draws,).
+    """
+
+    outcomes: tuple[Outcome, ...]
+    largest: Array
+
+    def p_value(self, evidence: float) -> float:
+        """Family-wise p-value: the chance that noise alone has a hypothesis this strong.
+
+        Counted where the draws reach; beyond, by the Gumbel distribution fitted to them.
+        """
+        draws = len(self.largest)
+        if not draws:
+            return float("nan")
+        above = int(np.sum(self.largest >= evidence))
+        if above >= 10:
+            return (1 + above) / (1 + draws)
+        location, scale = gumbel_r.fit(self.largest)
+        return float(max(gumbel_r.sf(evidence, location, scale), np.finfo(float).tiny))
+
+
+def measure(
+    problem: Problem, hypotheses: Sequence[Hypothesis], advance: Callable[[float], None] = lambda share: None
+) -> list[Entry]:
+    """Evaluates, whitens and projects the columns of every hypothesis at every shape."""
+    done = 0
+
+    def one(hypothesis: Hypothesis) -> Entry | None:
+        nonlocal done
+        entry = _entry(problem, hypothesis)
+        done += 1
+        advance(done / len(hypotheses))
+        return entry
+
+    # Threads: the work is in BLAS and in filters, which run beside Python.
+    with ThreadPoolExecutor(min(4, available_cores())) as pool:
+        entries = list(pool.map(one, hypotheses))
+    return [entry for entry in entries if entry is not None]
+
+
+def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
+    situation = problem.situation
+    shapes = hypothesis.effect.grid(situation, hypothesis.joint)
+    tries = len(shapes)
+    if tries > LONG:
+        shapes = hypothesis.effect.propose(situation, hypothesis.joint, problem.remainder, PROPOSED)
+    groups = []
+    kept = []
+    for shape in shapes:
+        joints, columns = problem.columns_of(hypothesis, shape)
+        if any(part.any() for part in columns):
+            groups.append(problem.group(joints, columns))
+            kept.append(shape)
+    return Entry(hypothesis, tuple(kept), tuple(groups), max(tries, 1)) if groups else None
+
+
+def scan(
+    problem: Problem,
+    entries: Sequence[Entry],
+    accepted: Accepted,
+    rng: np.random.Generator,
+    *,
+    nulls: bool = True,
+) -> Scan:
+    """Scores all entries beside what is accepted, on the data and on the null logs.
+
+    Each hypothesis' best -log p is corrected by the number of independent points that its grid is worth, found from the
+    null logs, so that a fine grid is no advantage; the largest of all in each null log gives the family-wise error.
+    Without `nulls` there are no p-values.
+    """
+    draws = problem.nulls[1].shape[1] if nulls else 0
+
+    def one(entry: Entry) -> tuple[Outcome, Array]:
+        return _outcome(problem, entry, accepted, draws)
+
+    with ThreadPoolExecutor(min(4, available_cores())) as pool:
+        results = list(pool.map(one, entries))
+    largest = np.zeros(draws)
+    for entry, (outcome, null) in zip(entries, results, strict=True):
+        if outcome.degrees:
+            if entry.tries > LONG and draws:
+                null = rng.exponential(size=draws)  # corrected for its grid, a p-value is uniform
+            np.maximum(largest, null, out=largest)
+    outcomes = sorted((outcome for outcome, _ in results), key=lambda o: -o.evidence)
+    return Scan(tuple(outcomes), largest)
+
+
+def _outcome(problem: Problem, entry: Entry, accepted: Accepted, draws: int) -> tuple[Outcome, Array]:
+    lower, upper = entry.hypothesis.coefficient_bounds(problem.situation.robot)
+    best: tuple[float, float, tuple[float, ...], float, int] = (-1.0, 0.0, (), 0.0, 0)
+    highest: dict[int, Array] = {}
+    for shape, group in zip(entry.shapes, entry.groups, strict=True):
+        result = score(problem, group, accepted)
+        if not result.degrees:
+            continue
+        # Within physical bounds: a gear of negative stiffness is no alarm.
+        gain = result.bounded(lower, upper)[0]
+        evidence = float(surprise(np.array(gain), result.degrees))
+        if draws and entry.tries <= LONG:
+            cross = problem.null_cross(group) - result.onto.T @ accepted.nulls
+            stats = ((result.root @ cross) ** 2).sum(axis=0)
+            highest[result.degrees] = np.maximum(highest.get(result.degrees, np.zeros(draws)), stats)
+        if evidence > best[0]:
+            best = (evidence, gain, shape, result.visible, result.degrees)
+    worst = np.zeros(draws)
+    for degrees, stats in highest.items():
+        np.maximum(worst, surprise(stats, degrees), out=worst)
+    if best[4] == 0:
+        return Outcome(entry.hypothesis, entry.shapes[0], 0.0, 0.0, 0.0, 0), worst
+    correction = np.log(entry.tries) if entry.tries > LONG else _tries(worst)
+    null = np.maximum(worst - correction, 0.0)
+    evidence = max(best[0] - correction, 0.0)
+    return Outcome(entry.hypothesis, best[2], best[1], best[3], evidence, best[4]), null
+
+
+def surprise(statistic: Array, degrees: int) -> Array:
+    """Gives -log of the chance that a chi-square variable of these degrees of freedom is as large."""
+    half = np.asarray(statistic, dtype=float) / 2
+    p = gammaincc(degrees / 2, half)
+    with np.errstate(divide="ignore"):
+        # Beyond the smallest double the tail's leading term is exact to a per cent of a unit.
+        far = half - (degrees / 2 - 1) * np.log(np.maximum(half, 1e-300)) + gammaln(degrees / 2)
+        return np.asarray(np.where(p > 1e-290, -np.log(np.maximum(p, 1e-300)), far))
+
+
+def _tries(worst: Array) -> float:
+    """Logarithm of the number of independent tests that a null maximum of -log p speaks of."""
+    return max(float(worst.mean()) - EULER, 0.0) if len(worst) else 0.0

@@ -1,0 +1,164 @@
+"""Which effects the data ask for: forward steps, each refined before the next, swaps with rivals, backward steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.diagnosis.problem import Accepted, Problem, accept, score
+from estimation.diagnosis.refinement import Member, refine
+from estimation.diagnosis.scan import Entry, Outcome, Scan, scan
+from robots.common.parallel import available_cores
+
+# Hypotheses refined at each step, the best by their point on the grid.
+CONTENDERS = 7
+# A hypothesis whose grid point explains less than this share of the best one's gain is no contender.
+NEAR = 0.3
+# A further effect on the joints of one that is found must explain this share of what that one explains: formulas are
+# true to some per cent of an effect, and what they leave must not be taken for another.
+BEYOND = 0.03
+MOST = 4  # effects at once
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """One effect that was selected, and what else could have been.
+
+    Attributes:
+        member: the effect, its shape, measured beside the other effects found.
+        p_value: family-wise, of the step that found it.
+        rivals: other hypotheses in its place, the closest first, with how much worse their BIC is.
+    """
+
+    member: Member
+    p_value: float
+    rivals: tuple[tuple[Member, float], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """What was found in one problem.
+
+    Attributes:
+        found: the effects, strongest first.
+        first: the scan before any was found.
+        last: the scan beside all that were found.
+        accepted: all found, joined.
+    """
+
+    found: tuple[Found, ...]
+    first: Scan
+    last: Scan
+    accepted: Accepted
+
+
+def select(
+    problem: Problem,
+    entries: Sequence[Entry],
+    *,
+    false_alarm: float,
+    rng: np.random.Generator,
+    advance: Callable[[str], None] = lambda note: None,
+) -> Selection:
+    """Adds effects while the strongest is significant, refining and swapping before each next step."""
+    members: list[Member] = []
+    p_values: list[float] = []
+    first: Scan | None = None
+    while True:
+        accepted = accept(problem, tuple(member.group for member in members))
+        result = scan(problem, entries, accepted, rng)
+        first = first or result
+        if len(members) == MOST or not result.outcomes:
+            break
+        p = result.p_value(result.outcomes[0].evidence)
+        if not p <= false_alarm:
+            break
+        advance(f"{result.outcomes[0].hypothesis.label}")
+        best = _best(problem, contenders(problem, result, members), accepted)
+        if not best or best[0].bic(problem.rows) <= 0 or not _beyond(best[0], members):
+            break
+        members.append(best[0])
+        p_values.append(p)
+        if len(members) > 1:
+            members, p_values = _polished(problem, entries, members, p_values, rng)
+            if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
+                break
+    found = _found(problem, entries, members, p_values, rng)
+    order = sorted(found, key=lambda f: -f.member.gain)
+    last = result if members else first
+    return Selection(tuple(order), first, last, accept(problem, tuple(f.member.group for f in order)))
+
+
+def contenders(problem: Problem, result: Scan, members: Sequence[Member] = ()) -> list[Outcome]:
+    """Picks the hypotheses worth refining: near the best at the grid, each effect and joint once."""
+    taken = {(m.hypothesis.name, m.hypothesis.joint) for m in members}
+    able = [o for o in result.outcomes if o.degrees and (o.hypothesis.name, o.hypothesis.joint) not in taken]
+    if not able:
+        return []
+    ranked = sorted(able, key=lambda o: -(o.gain - o.degrees * np.log(problem.rows)))
+    best = max(o.gain for o in able)
+    return [o for o in ranked if o.gain >= NEAR * best][:CONTENDERS]
+
+
+def _best(problem: Problem, outcomes: Sequence[Outcome], accepted: Accepted) -> list[Member]:
+    """Refines contenders, the best BIC first."""
+    with ThreadPoolExecutor(min(4, available_cores())) as pool:
+        refined = list(pool.map(lambda o: refine(problem, o.hypothesis, o.shape, accepted), outcomes))
+    return sorted(refined, key=lambda member: -member.bic(problem.rows))
+
+
+def _beyond(candidate: Member, members: Sequence[Member]) -> bool:
+    shared = [m.gain for m in members if set(m.group.joints) & set(candidate.group.joints)]
+    return not shared or candidate.gain >= BEYOND * max(shared)
+
+
+def _polished(
+    problem: Problem,
+    entries: Sequence[Entry],
+    members: list[Member],
+    p_values: list[float],
+    rng: np.random.Generator,
+) -> tuple[list[Member], list[float]]:
+    """Refines each member beside the others, lets its rivals take its place, and drops what is no longer needed."""
+    for _ in range(2):
+        changed = False
+        for i in range(len(members)):
+            others = [m for k, m in enumerate(members) if k != i]
+            beside = accept(problem, tuple(m.group for m in others))
+            own = refine(problem, members[i].hypothesis, members[i].shape, beside)
+            result = scan(problem, entries, beside, rng, nulls=False)
+            rest = [o for o in contenders(problem, result, others) if o.hypothesis != own.hypothesis][:4]
+            best = max([own, *_best(problem, rest, beside)], key=lambda m: m.bic(problem.rows))
+            changed |= best.hypothesis != members[i].hypothesis
+            members[i] = best
+        if not changed:
+            break
+    keep = [i for i, m in enumerate(members) if m.bic(problem.rows) > 0]
+    return [members[i] for i in keep], [p_values[i] for i in keep]
+
+
+def _found(
+    problem: Problem,
+    entries: Sequence[Entry],
+    members: Sequence[Member],
+    p_values: Sequence[float],
+    rng: np.random.Generator,
+) -> list[Found]:
+    """Measures each member beside the others, and its rivals in its place."""
+    found = []
+    for i, member in enumerate(members):
+        others = [m for k, m in enumerate(members) if k != i]
+        beside = accept(problem, tuple(m.group for m in others))
+        result = scan(problem, entries, beside, rng, nulls=False)
+        rest = [o for o in contenders(problem, result, others) if o.hypothesis != member.hypothesis]
+        lower, upper = member.hypothesis.coefficient_bounds(problem.situation.robot)
+        own = score(problem, member.group, beside)
+        gain, coefficients = own.bounded(lower, upper)
+        measured = replace(member, gain=gain, coefficients=coefficients, visible=own.visible)
+        reference = measured.bic(problem.rows)
+        rivals = [(rival, reference - rival.bic(problem.rows)) for rival in _best(problem, rest, beside)]
+        found.append(Found(measured, p_values[i], tuple(rivals)))
+    return found

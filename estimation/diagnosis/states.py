@@ -1,0 +1,321 @@
+"""Logs made ready for diagnosis: one grid, motion free of noise, torque as measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import maximum_filter1d
+from scipy.signal import butter, sosfiltfilt, welch
+
+from estimation.diagnosis.periods import Cycle, find_cycle, project
+from estimation.preparation import SLOW, Prepared, prepare
+from robots.common.errors import InputError
+from robots.robot import Robot
+from robots.signals import Log
+
+Array = NDArray[np.float64]
+
+# More rows than this only cost time: the logs are then thinned by a whole number, torque low-passed before.
+MOST_ROWS = 40_000
+FASTEST = 260.0  # [Hz] sampling beyond which no effect of the catalogue gains
+# A frequency of a position is kept where its power is this much above the encoder's noise.
+STANDS_OUT = 3.0
+# Least and most of the cut-off [Hz, share of the sampling rate].
+LOWEST, HIGHEST = 2.0, 0.4
+ORDER = 8
+SHORTEST = 5.0  # [s] of log below which nothing can be told
+# Spectra are taken of this difference of the positions: the slow motion would leak over all of the band otherwise.
+DIFFERENCE = 3
+# Below so many standard errors of its velocity a joint's direction is not known.
+SURE = 4.0
+BESIDE, KICK = 3, 0.3
+# The largest jump, over the root mean square of all.
+LARGER = 3.0
+# A mean over repetitions is taken where it knows frequencies higher by this factor than a single pass.
+SHARPER = 1.2
+# A joint slower than this share of its RMS speed for so long [s] creeps: its friction may have any value.
+CREEP, CREEPING = 0.03, 0.15
+# At the ends of a log, rows in which all joints are slower than this share are left out, up to so long [s].
+SETTLED, ENDS = 0.15, 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """All logs, one after the other.
+
+    Attributes:
+        t: time [s], (N,), one clock.
+        starts: row at which each log begins.
+        q: positions (N, n), free of noise [rad or m].
+        dq: velocities (N, n).
+        ddq: accelerations (N, n).
+        tau: torque as measured (N, n) [N m or N].
+        step: sample period [s].
+        cycles: per log the repeated part, in rows of the log; None where nothing repeats.
+        cutoff: lowest frequency [Hz] above which positions are taken for noise.
+        floor: power density of each joint's position noise (n,) [rad^2/Hz].
+        unsure: rows (N, n) in which the direction of motion is not known: friction may have either sign there.
+        names: of the logs.
+    """
+
+    t: Array
+    starts: tuple[int, ...]
+    q: Array
+    dq: Array
+    ddq: Array
+    tau: Array
+    step: float
+    cycles: tuple[Cycle | None, ...]
+    cutoff: float
+    floor: Array
+    unsure: NDArray[np.bool_]
+    names: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return int(self.q.shape[1])
+
+    @property
+    def runs(self) -> tuple[slice, ...]:
+        """Each log's rows."""
+        return tuple(slice(a, b) for a, b in pairwise((*self.starts, len(self.t))))
+
+    @property
+    def duration(self) -> float:
+        """Time recorded, without the pauses between logs [s]."""
+        return len(self.t) * self.step
+
+    @property
+    def periodic(self) -> bool:
+        """Whether every log repeats its motion."""
+        return all(cycle is not None for cycle in self.cycles)
+
+
+def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None) -> Recording:
+    """Reads logs into noise-free motion on a common grid.
+
+    Positions of a repeated motion are projected on its harmonics. Others are low-passed, joint by joint, where their
+    spectrum meets the encoder's noise: what is left has a known ratio of signal to noise at every frequency, and so in
+    every derivative.
+
+    Args:
+        robot: the robot.
+        logs: of t, q and tau or current.
+        step: sample period to take [s]; by default that of the slowest log, longer where there are too many rows.
+
+    Raises:
+        InputError: logs of another robot, without torque, or too short.
+    """
+    prepared = sorted((prepare(robot, log) for log in logs), key=lambda log: float(log.log.t[0]))
+    for before, after in pairwise(prepared):
+        if after.log.t[0] <= before.log.t[-1]:
+            raise InputError(
+                "overlaps another log in time",
+                file=after.log.metadata.get("file", after.log.name or None),
+                column="t",
+                allowed="one clock for all logs of a robot, one after the other",
+                remedy="shift t by the time at which the log was recorded",
+            )
+    if step is None:
+        step = _step(prepared)
+    parts = [_part(log, step) for log in prepared]
+    lengths = [len(part[0]) for part in parts]
+    total = sum(lengths) * step
+    if total < SHORTEST:
+        raise InputError(f"{total:.1f} s of logs", allowed=f"{SHORTEST:g} s or more", remedy="record a longer log")
+    joined = [np.concatenate([part[k] for part in parts]) for k in range(5)]
+    return Recording(
+        t=joined[0],
+        starts=tuple(int(s) for s in np.cumsum([0, *lengths[:-1]])),
+        q=joined[1],
+        dq=joined[2],
+        ddq=joined[3],
+        tau=joined[4],
+        step=step,
+        cycles=tuple(part[5] for part in parts),
+        cutoff=min(part[6] for part in parts),
+        floor=np.max([part[8] for part in parts], axis=0),
+        unsure=np.concatenate([part[7] for part in parts]),
+        names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
+    )
+
+
+def _step(prepared: Sequence[Prepared]) -> float:
+    slowest = max(log.positions.period for log in prepared)
+    rows = sum(log.log.duration for log in prepared) / slowest
+    stride = max(1, int(np.ceil(1 / (slowest * FASTEST))), int(np.ceil(rows / MOST_ROWS)))
+    return slowest * stride
+
+
+def _part(
+    log: Prepared, step: float
+) -> tuple[Array, Array, Array, Array, Array, Cycle | None, float, NDArray[np.bool_], Array]:
+    """One log: t, q, dq, ddq, tau on the working grid, its cycle there, the lowest cut-off, unsure rows, noise."""
+    period, grid = log.positions.period, log.positions.t
+    positions = log.positions.q
+    spectra = [_spectrum(column, period) for column in positions.T]
+    cutoffs = np.array([_cutoff(*spectrum, period) for spectrum in spectra])
+    q, dq, ddq = _smoothed(positions, period, cutoffs)
+    cycle = find_cycle(positions, period)
+    if cycle is not None:
+        rows = slice(cycle.start, cycle.stop)
+        exact, known = project(positions, period, cycle)
+        # One pass alone may be sharper, where the motion does not repeat as exactly as its encoder counts.
+        better = known > SHARPER * cutoffs
+        rest = positions[rows] - exact[0]
+        slow = _smoothed(rest, period, np.array([_cutoff(*_spectrum(x, period), period, none=0.0) for x in rest.T]))
+        for whole, harmonic, other in zip((q, dq, ddq), exact, slow, strict=True):
+            # What does not repeat is motion too, where it stands out of the noise.
+            whole[rows] = np.where(better, harmonic + other, whole[rows])
+        cutoffs = np.where(better, known, cutoffs)
+    edge = min(4.0 / float(cutoffs.min()), 0.02 * (grid[-1] - grid[0]))
+    # On a sample: between two of them nobody knows when a torque jumped.
+    begin = grid[0] + np.ceil(edge / period - 1e-9) * period
+    count = int(np.floor((grid[-1] - edge - begin) / step + 1e-6)) + 1
+    t = begin + step * np.arange(count)
+    tau = _torque(log, step)(np.minimum(t, log.log.t[-1]))
+    first = round((begin - grid[0]) / period)
+    if abs(step - period) < 1e-9:
+        states = [array[first : first + count] for array in (q, dq, ddq)]
+    else:
+        states = [CubicSpline(grid, array)(t) for array in (q, dq, ddq)]
+    moved = None
+    if cycle is not None:
+        start = max(0, int(np.ceil((cycle.start - first) * period / step)))
+        stop = min(count, int(np.floor((cycle.stop - first) * period / step)))
+        moved = Cycle(start, stop, cycle.period, int((stop - start) * step / cycle.period + 0.1))
+    floor = np.array([spectrum[2] for spectrum in spectra])
+    if cycle is not None:
+        floor = np.where(better, floor / cycle.count, floor)
+    ends = [float(np.interp(cutoff, f, density)) for cutoff, (f, density, _) in zip(cutoffs, spectra, strict=True)]
+    unsure = _unsure(states[1], states[2], cutoffs, floor, np.maximum(ends, floor), step)
+    cut = slice(None) if moved is not None else _moving(states[1], step)
+    q, dq, ddq = (array[cut] for array in states)
+    return t[cut], q, dq, ddq, tau[cut], moved, float(cutoffs.min()), unsure[cut], floor
+
+
+def _torque(log: Prepared, step: float) -> _Interpolation:
+    """Gives the torque as a function of time, low-passed where the grid is coarser than the log."""
+    t, tau = log.log.t, log.tau
+    period = log.positions.period
+    if step > 1.5 * period:
+        even = t[0] + period * np.arange(int((t[-1] - t[0]) / period + 1e-6) + 1)
+        tau = np.column_stack([np.interp(even, t, column) for column in tau.T])
+        sections = butter(ORDER, 0.8 * period / step, output="sos")
+        t, tau = even, sosfiltfilt(sections, tau, axis=0)
+    return _Interpolation(t, tau)
+
+
+class _Interpolation:
+    """Straight lines between samples: they neither overshoot at a step nor ring."""
+
+    def __init__(self, t: Array, values: Array) -> None:
+        self.t, self.values = t, values
+
+    def __call__(self, at: Array) -> Array:
+        return np.column_stack([np.interp(at, self.t, column) for column in self.values.T])
+
+
+def _spectrum(x: Array, period: float) -> tuple[Array, Array, float]:
+    """Gives a position's frequencies [Hz], power density, and the density of its white noise."""
+    rate = 1 / period
+    length = min(len(x) - DIFFERENCE, max(64, round(8 / period)))
+    f, power = welch(np.diff(x, DIFFERENCE), rate, "blackmanharris", length, detrend=False)
+    shape = (2 * np.sin(np.pi * f * period)) ** (2 * DIFFERENCE)
+    density = np.divide(power, shape, out=np.zeros_like(power), where=shape > 0)
+    density[0] = density[1]
+    # The encoder's noise is what the end of the band holds.
+    floor = float(np.median(density[f > 0.4 * rate]))
+    return f, np.convolve(np.pad(density, 2, mode="edge"), np.ones(5) / 5, mode="valid"), floor
+
+
+def _cutoff(f: Array, density: Array, floor: float, period: float, none: float = LOWEST) -> float:
+    """The frequency at which a position's spectrum meets its noise [Hz]; `none` where nothing stands out."""
+    rate = 1 / period
+    if floor <= 0:
+        return none if not density.any() else HIGHEST * rate
+    lost = np.flatnonzero((density < STANDS_OUT * floor) & (f > 4 * f[1]))
+    cutoff = float(f[lost[0]]) if len(lost) else HIGHEST * rate
+    if none == 0.0 and cutoff <= 5 * f[1]:
+        return 0.0
+    return float(np.clip(cutoff, min(LOWEST, HIGHEST * rate), HIGHEST * rate))
+
+
+def _moving(dq: Array, step: float) -> slice:
+    """Leaves out the ends of a log where the robot comes from and to rest: stiction may hold any torque there."""
+    speed = np.sqrt(np.mean(dq**2, axis=0))
+    active = np.flatnonzero((np.abs(dq) > SETTLED * np.maximum(speed, 1e-9)).any(axis=1))
+    if not len(active):
+        return slice(None)
+    most = int(min(ENDS / step, 0.05 * len(dq)))
+    return slice(min(int(active[0]), most), max(int(active[-1]) + 1, len(dq) - most))
+
+
+def _unsure(dq: Array, ddq: Array, cutoffs: Array, floor: Array, ends: Array, step: float) -> NDArray[np.bool_]:
+    """Flags the rows (N, n) in which a joint's direction is not known.
+
+    Friction that turns round kicks the joint: its acceleration jumps, and a velocity known up to a frequency f only is
+    wrong beside a jump J by some J / (2 pi f) times `KICK`. Jumps at a rate r give the position a power density of
+    2 r J^2 / (2 pi f)^6, so that the density at f (`ends`) bounds them. Encoder noise adds to that. The rows beside a
+    reversal are flagged in any case, for a sharp sign turns round between samples.
+    """
+    rows = len(dq)
+    flags = np.zeros(dq.shape, dtype=bool)
+    for j, cutoff in enumerate(np.maximum(cutoffs, 1e-3)):
+        reach = max(1, round(0.5 / cutoff / step))
+        jump = np.zeros(rows)
+        if rows > 2 * reach:
+            jump[reach:-reach] = np.abs(ddq[2 * reach :, j] - ddq[: -2 * reach, j])
+        rate = max(float(np.sum(dq[1:, j] * dq[:-1, j] < 0)), 1.0) / (rows * step)
+        jump = np.minimum(jump, LARGER * np.sqrt(ends[j] / (2 * rate)) * (2 * np.pi * cutoff) ** 3)
+        error = KICK * maximum_filter1d(jump, 2 * reach + 1) / (2 * np.pi * cutoff)
+        error = np.hypot(error, 2 * np.pi * np.sqrt(floor[j] * cutoff**3 / 3))
+        turned = np.concatenate([dq[1:, j] * dq[:-1, j] < 0, [False]])
+        near = maximum_filter1d(turned.astype(np.int8), 2 * BESIDE, origin=0) > 0
+        speed = float(np.sqrt(np.mean(dq[:, j] ** 2)))
+        flags[:, j] = (np.abs(dq[:, j]) < np.maximum(SURE * error, SLOW * speed)) | near
+        creeping = np.abs(dq[:, j]) < CREEP * speed
+        for start, stop in spans(creeping):
+            if (stop - start) * step > CREEPING:
+                flags[start:stop, j] = True
+    return flags
+
+
+def spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Lists the stretches [start, stop) of rows (N,) that are flagged."""
+    edges = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _smoothed(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array, Array]:
+    """Low-passes each joint without lag and differentiates it (N, n)."""
+    q = np.zeros_like(x)
+    for j, cutoff in enumerate(cutoffs):
+        if cutoff <= 0:
+            continue
+        sections = butter(ORDER, min(cutoff * 2 * period, 0.99), output="sos")
+        padding = min(len(x) - 1, round(6 / (cutoff * period)))
+        q[:, j] = sosfiltfilt(sections, x[:, j], padtype="odd", padlen=padding)
+    dq, ddq = _differentiated(q, period)
+    return q, dq, ddq
+
+
+def _differentiated(x: Array, period: float) -> tuple[Array, Array]:
+    """First and second derivative by sixth-order central differences, lower orders at the ends."""
+    first = np.gradient(x, period, axis=0, edge_order=2)
+    second = np.gradient(first, period, axis=0, edge_order=2)
+    if len(x) > 7:
+        a, b, c = x[4:-2] - x[2:-4], x[5:-1] - x[1:-5], x[6:] - x[:-6]
+        first[3:-3] = (45 * a - 9 * b + c) / (60 * period)
+        a, b, c = x[4:-2] + x[2:-4], x[5:-1] + x[1:-5], x[6:] + x[:-6]
+        second[3:-3] = (270 * a - 27 * b + 2 * c - 490 * x[3:-3]) / (180 * period**2)
+    return first, second

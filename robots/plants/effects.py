@@ -1,0 +1,93 @@
+"""What a virtual robot has besides its model: an effect of the catalogue with its true size and shape."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.common.errors import InputError
+from robots.robot import Robot
+from robots.terms.effects import EFFECTS, Effect, Situation
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlantEffect:
+    """One effect that a plant has.
+
+    Attributes:
+        effect: its name in `EFFECTS`.
+        joint: where it acts, counted from 1; None for the whole robot.
+        coefficients: of its columns (k,).
+        shape: its shape parameters.
+    """
+
+    effect: str
+    joint: int | None
+    coefficients: tuple[float, ...]
+    shape: tuple[float, ...]
+
+    @property
+    def term(self) -> Effect:
+        """The effect's physics."""
+        return EFFECTS[self.effect]
+
+    def torque(self, situation: Situation) -> Array:
+        """Evaluates what the effect adds to the torque (N, n) [N m or N]."""
+        return self.term.columns(situation, self.joint, self.shape) @ np.asarray(self.coefficients)
+
+
+def plant_effect(robot: Robot, effect: str, joint: int | None, values: Mapping[str, float]) -> PlantEffect:
+    """Checks an effect and its values by name.
+
+    Args:
+        robot: the robot.
+        effect: a name of `EFFECTS`.
+        joint: counted from 1; None for an effect of the whole robot.
+        values: coefficients and shape parameters by name. All shape parameters must be there; a coefficient that is
+            not is zero.
+
+    Raises:
+        InputError: an unknown effect or parameter, a joint where the effect cannot act, a value out of range, a
+            missing shape parameter, or no coefficient.
+    """
+    if effect not in EFFECTS:
+        near = get_close_matches(effect, EFFECTS, n=3) or list(EFFECTS)
+        raise InputError(f"unknown effect {effect!r}", column="effects", allowed=f"such as {', '.join(near)}")
+    term = EFFECTS[effect]
+    places = term.joints(robot)
+    if joint not in places:
+        allowed = "no joint: it is the whole robot's" if term.whole_robot else ", ".join(str(place) for place in places)
+        raise InputError(f"{effect} on joint {joint}", column="effects", allowed=allowed or "none of this robot's")
+    coefficients = term.parameters(robot, joint)
+    names = [c.name for c in coefficients] + [s.name for s in term.shapes]
+    for name, value in values.items():
+        if name not in names:
+            raise InputError(f"{effect} has no parameter {name!r}", column="effects", allowed=", ".join(names))
+        if not np.isfinite(value):
+            raise InputError(f"{effect}: {name} is {value}", column="effects", allowed="a finite number")
+    if not any(c.name in values for c in coefficients):
+        raise InputError(
+            f"{effect} has no size", column="effects", allowed=f"one of {', '.join(c.name for c in coefficients)}"
+        )
+    ranges = [(c.name, c.unit, c.lower, c.upper) for c in coefficients]
+    ranges += [(s.name, s.unit, s.lower, s.upper) for s in term.shapes]
+    for name, unit, lower, upper in ranges:
+        if name in values and not lower <= values[name] <= upper:
+            raise InputError(
+                f"{effect}: {name} is {values[name]} {unit}", column="effects", allowed=f"{lower:g} to {upper:g}"
+            )
+    missing = [shape.name for shape in term.shapes if shape.name not in values]
+    if missing:
+        raise InputError(f"{effect} lacks {missing[0]}", column="effects", remedy=f"state {', '.join(missing)}")
+    return PlantEffect(
+        effect=effect,
+        joint=joint,
+        coefficients=tuple(float(values.get(c.name, 0.0)) for c in coefficients),
+        shape=tuple(float(values[s.name]) for s in term.shapes),
+    )

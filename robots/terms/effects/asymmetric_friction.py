@@ -1,0 +1,74 @@
+"""Friction that is not the same both ways."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import force_unit, length_unit
+from robots.terms.effects.base import Coefficient, Place, Situation, StaticJointEffect
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class AsymmetricFriction(StaticJointEffect):
+    """tau = a |dq| + b dq^2: viscous friction that differs with the direction.
+
+    Coulomb friction that differs is the base model's torque offset, and cannot be told from it.
+    """
+
+    name: ClassVar[str] = "asymmetric_friction"
+    title: ClassVar[str] = "friction that differs with the direction"
+    rivals: ClassVar[tuple[str, ...]] = ("spring", "torque_sensor_drift", "torque_constant_error", "encoder_offset")
+    experiments: ClassVar[tuple[str, ...]] = ("mirrored", "sweep")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes half the difference of viscous and of quadratic friction."""
+        assert joint is not None
+        force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
+        return (
+            Coefficient("viscous_asymmetry", f"{force} s/{length}"),
+            Coefficient("quadratic_asymmetry", f"{force} s2/{length}2"),
+        )
+
+    def row(
+        self,
+        robot: Robot,
+        joint: int,
+        q: casadi.SX,
+        dq: casadi.SX,
+        ddq: casadi.SX,
+        rigid: casadi.SX,
+        torque: casadi.SX,
+        sign: casadi.SX,
+        shape: casadi.SX,
+    ) -> casadi.SX:
+        """Builds |dq| and dq^2."""
+        return casadi.horzcat(dq * sign, dq * dq)
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        way = "forward" if coefficients[0] + coefficients[1] > 0 else "backward"
+        return (
+            f"Joint {joint} has more friction {way}: it differs from the mean of both ways by {coefficients[0]:.3g} "
+            f"{force} s/{length} of speed and {coefficients[1]:.3g} {force} s2/{length}2 of squared speed."
+        )
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the velocity."""
+        assert joint is not None
+        return f"velocity of joint {joint} [rad/s]", situation.dq[:, joint - 1]

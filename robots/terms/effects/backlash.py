@@ -1,0 +1,108 @@
+"""Play in a gear: the link changes sides when its load changes sign."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import length_unit
+from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effects.joint_elasticity import link_inertia, link_torque, windup
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+QUICKEST, SLOWEST = 0.004, 0.1
+"""Times [s] between which a crossing of the gap takes; a log shows nothing quicker than a sample."""
+
+
+class Backlash(Effect):
+    """The link lags its encoder by (b / 2) side: the side changes from where the load changes sign, over a time T.
+
+    A load that grows by r per second carries the link's inertia M over the gap b in T = (6 b M / r)^(1/3). The torque
+    follows from the lag as for an elastic gear: bursts at zero crossings of the load, not of the velocity.
+    """
+
+    name: ClassVar[str] = "backlash"
+    title: ClassVar[str] = "play in the gear (backlash)"
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("gap_crossed", "rad", 1e-7, 0.2, "log"),)
+    rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "presliding_hysteresis", "load_dependent_friction")
+    experiments: ClassVar[tuple[str, ...]] = ("payload", "micro_reversals")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes half the play."""
+        assert joint is not None
+        return (Coefficient("half_play", length_unit(robot, joint - 1), 0.0, 0.05),)
+
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists gaps that take 6, 12, 25 and 50 ms; none for a load that hardly ever changes sign."""
+        assert joint is not None
+        crossings = _crossings(situation, joint)
+        if len(crossings[0]) < 2:
+            return ()
+        _, _, quickness = crossings
+        middle = float(np.median(quickness))
+        gaps = [time**3 * middle / 6.0 for time in (0.006, 0.012, 0.025, 0.05)]
+        return tuple((gap,) for gap in gaps if self.shapes[0].lower <= gap <= self.shapes[0].upper)
+
+    def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the torque of all joints per half play of one."""
+        assert joint is not None
+        times, ways, quickness = _crossings(situation, joint)
+        durations = np.clip((6.0 * shape[0] / quickness) ** (1 / 3), max(QUICKEST, situation.period), SLOWEST)
+        side, rate, curve = (np.zeros(len(situation)) for _ in range(3))
+        load = link_torque(situation, joint)
+        for run in situation.runs:
+            t = situation.t[run]
+            side[run] = np.sign(load[run.start])
+            inside = (times >= t[0]) & (times <= t[-1])
+            for start, way, duration in zip(times[inside], ways[inside], durations[inside], strict=True):
+                first, last = np.searchsorted(t, (start, start + duration))
+                s = (t[first:last] - start) / duration
+                during = slice(run.start + first, run.start + last)
+                side[during] += 2 * way * (10 * s**3 - 15 * s**4 + 6 * s**5)
+                rate[during] += 2 * way * (30 * s**2 - 60 * s**3 + 30 * s**4) / duration
+                curve[during] += 2 * way * (60 * s - 180 * s**2 + 120 * s**3) / duration**2
+                side[run.start + last : run.stop] += 2 * way
+        return windup(situation, joint, side, rate, curve)[:, :, None]
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        return (
+            f"The gear of joint {joint} has a play of {2 * coefficients[0]:.3g} {length}: its link changes sides when "
+            f"the load changes sign."
+        )
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the gear's load."""
+        assert joint is not None
+        return f"load of joint {joint} [N m]", link_torque(situation, joint)
+
+
+def _crossings(situation: Situation, joint: int) -> tuple[Array, Array, Array]:
+    """Finds where the load changes sign: times [s], the new sign, and its rate over the link's inertia [rad/s3]."""
+    load = link_torque(situation, joint)
+    inertia = np.maximum(link_inertia(situation, joint)[:, joint - 1], 1e-12)
+    small = 1e-4 * float(np.abs(load).max(initial=0.0))
+    at = []
+    for run in situation.runs:
+        part = load[run]
+        # A load that only grazes zero, as a vertical axis' at rest, has no sides.
+        at.append(run.start + np.flatnonzero((part[:-1] * part[1:] < 0) & (np.abs(np.diff(part)) > small)))
+    i = np.concatenate(at) if at else np.zeros(0, dtype=np.intp)
+    step = situation.t[i + 1] - situation.t[i]
+    change = load[i + 1] - load[i]
+    times = situation.t[i] - load[i] / np.where(change == 0, 1.0, change) * step
+    return times, np.sign(change), np.abs(change) / step / inertia[i]

@@ -1,0 +1,61 @@
+"""A base that does not stand level."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.effects.base import Coefficient, Effect, Place, Situation
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class BaseTilt(Effect):
+    """tau = (d rigid/dg) (g x e1) a + (d rigid/dg) (g x e2) b: gravity turned by small angles about two level axes."""
+
+    name: ClassVar[str] = "base_tilt"
+    title: ClassVar[str] = "a base that is not level"
+    whole_robot: ClassVar[bool] = True
+    rivals: ClassVar[tuple[str, ...]] = ("spring", "encoder_offset", "torque_constant_error", "payload_change")
+    experiments: ClassVar[tuple[str, ...]] = ("static_hold", "second_base_pose")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the base's rotations about its two level axes (x and y where gravity is along z)."""
+        return Coefficient("tilt_1", "rad", -0.5, 0.5), Coefficient("tilt_2", "rad", -0.5, 0.5)
+
+    def joints(self, robot: Robot) -> tuple[Place, ...]:
+        """Names the whole robot, if there is gravity."""
+        return (None,) if np.any(robot.chain.gravity) else ()
+
+    def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the torque of all joints per angle."""
+        gravity = np.asarray(situation.robot.chain.gravity, dtype=float)
+        return situation.sensitivity("gravity") @ np.cross(gravity, level_axes(gravity)).T
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        angle = np.degrees(np.hypot(*coefficients))
+        return f"The base is tilted by {angle:.3g} deg: gravity does not pull where the description says."
+
+
+def level_axes(gravity: Array) -> Array:
+    """Gives two unit axes (2, 3) across gravity (3,): x and y where it is along z."""
+    down = gravity / np.linalg.norm(gravity)
+    nearest = np.eye(3)[np.argsort(np.abs(down), kind="stable")[:2]]
+    first = nearest[0] - (nearest[0] @ down) * down
+    first /= np.linalg.norm(first)
+    second = nearest[1] - (nearest[1] @ down) * down - (nearest[1] @ first) * first
+    return np.stack([first, second / np.linalg.norm(second)])

@@ -1,0 +1,52 @@
+"""A drive that logs its torque late, on one joint."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
+from robots.terms.effects.time_delay import SHIFT, lateness
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class CurrentLag(JointEffect):
+    """tau_j(t - d) - tau_j(t): as a delay, but of one joint: its current's filter."""
+
+    name: ClassVar[str] = "current_lag"
+    title: ClassVar[str] = "torque of one joint that is logged late (filter)"
+    rare: ClassVar[bool] = True
+    shapes: ClassVar[tuple[Shape, ...]] = (SHIFT,)
+    rivals: ClassVar[tuple[str, ...]] = ("time_delay", "presliding_hysteresis", "joint_elasticity")
+    experiments: ClassVar[tuple[str, ...]] = ("multisine", "micro_reversals")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the lag; more than 50 ms is no drive's."""
+        return (Coefficient("lag", "s", -0.05, 0.05),)
+
+    def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the change of the joint's torque per delay."""
+        return lateness(situation, shape[0])[:, joint - 1 : joint]
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        return f"The torque of joint {joint} is logged {1000 * coefficients[0]:.2f} ms late: its drive filters it."
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the rate of the joint's torque."""
+        assert joint is not None
+        return f"rate of the torque of joint {joint} [N m/s]", -lateness(situation, shape[0])[:, joint - 1]

@@ -1,0 +1,52 @@
+"""An encoder that is mounted a little turned."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import length_unit
+from robots.terms.effects.base import Coefficient, Effect, Place, Situation
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class EncoderOffset(Effect):
+    """tau = (d rigid/dq_j) o: joint j stands at q + o when it reports q."""
+
+    name: ClassVar[str] = "encoder_offset"
+    title: ClassVar[str] = "a joint zero that is off"
+    rivals: ClassVar[tuple[str, ...]] = ("base_tilt", "torque_constant_error", "spring", "encoder_eccentricity")
+    experiments: ClassVar[tuple[str, ...]] = ("second_base_pose", "payload")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the offset."""
+        assert joint is not None
+        return (Coefficient("offset", length_unit(robot, joint - 1), -0.5, 0.5),)
+
+    def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the torque of all joints per offset of one."""
+        assert joint is not None
+        return situation.sensitivity("position")[:, :, joint - 1 : joint].copy()
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        return f"Joint {joint} stands {coefficients[0]:.3g} {length} further than its encoder says."
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the position."""
+        assert joint is not None
+        return f"position of joint {joint} [rad]", situation.q[:, joint - 1]

@@ -1,0 +1,105 @@
+"""Somebody or something that pushes the flange for a moment."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import force_unit
+from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class ExternalContact(Effect):
+    """tau_j = c_j p(t): a pulse of each joint's torque from the time t_0 for the duration d, p = sin(pi s)^0.6.
+
+    A force anywhere on the arm: during so short a time the pose, and with it what each joint feels, stays nearly the
+    same. The pulse lies between a half sine and a hold.
+    """
+
+    name: ClassVar[str] = "external_contact"
+    title: ClassVar[str] = "an external contact"
+    whole_robot: ClassVar[bool] = True
+    depends_on: ClassVar[Literal["state", "time"]] = "time"
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("start", "s", -np.inf, np.inf, "linear"),
+        Shape("duration", "s", 0.03, 60.0, "log", (0.2, 0.5, 1.25, 3.2)),
+    )
+    rivals: ClassVar[tuple[str, ...]] = ("payload_change", "hand_guiding", "friction_step", "torque_sensor_drift")
+    experiments: ClassVar[tuple[str, ...]] = ("repeat",)
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes what each joint feels at the peak."""
+        return tuple(Coefficient(f"peak_on_joint_{j + 1}", force_unit(robot, j)) for j in range(robot.n))
+
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists durations, each starting every half of it."""
+        return tuple(
+            (float(start), duration)
+            for duration in self.shapes[1].grid
+            for run in situation.runs
+            for start in np.arange(situation.t[run.start], situation.t[run.stop - 1] - duration / 2, duration / 2)
+        )
+
+    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
+        """Keeps the contact within the data."""
+        first, last = float(situation.t[0]), float(situation.t[-1])
+        return (first, last), (self.shapes[1].lower, min(self.shapes[1].upper, max(last - first, 0.1)))
+
+    def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates a pulse on each joint."""
+        n = situation.robot.n
+        X = np.zeros((len(situation), n, n))
+        X[:, range(n), range(n)] = pulse(situation.t, shape)[:, None]
+        return X
+
+    def propose(
+        self, situation: Situation, joint: Place, residual: Array, count: int = 8
+    ) -> tuple[tuple[float, ...], ...]:
+        """Ranks all times at once, by the residual's energy that a constant explains in each window."""
+        grid = self.grid(situation, joint)
+        if len(grid) <= count:
+            return grid
+        level = np.sqrt(np.mean(residual**2, axis=0))
+        scaled = residual * np.divide(1.0, level, out=np.zeros_like(level), where=level > 0)
+        sums = np.concatenate([np.zeros((1, scaled.shape[1])), np.cumsum(scaled, axis=0)])
+        starts, durations = np.array(grid).T
+        first = np.searchsorted(situation.t, starts + 0.1 * durations)
+        last = np.searchsorted(situation.t, starts + 0.9 * durations)
+        scores = ((sums[last] - sums[first]) ** 2).sum(axis=1) / np.maximum(last - first, 1)
+        return tuple(grid[i] for i in np.argsort(-scores)[:count])
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        size = np.abs(coefficients)
+        most, last = int(np.argmax(size)) + 1, int(np.flatnonzero(size > 0.05 * size.max())[-1]) + 1
+        return (
+            f"Something pushed the arm from t = {shape[0]:.2f} s for {shape[1]:.2g} s: joint {most} felt "
+            f"{size.max():.3g} {force}, and joint {last} is the last that felt it."
+        )
+
+
+def pulse(t: Array, shape: tuple[float, ...]) -> Array:
+    """Evaluates sin(pi s)^0.6 (N,) with s from 0 to 1 during the contact, and zero elsewhere.
+
+    Args:
+        t: time (N,) [s].
+        shape: start and duration [s].
+    """
+    s = (t - shape[0]) / shape[1]
+    during = (s > 0.0) & (s < 1.0)
+    return np.where(during, np.sin(np.pi * np.where(during, s, 0.5)) ** 0.6, 0.0)

@@ -1,0 +1,63 @@
+"""Friction that changes from one moment to the next: damage, a lost seal, a dragging brake."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import force_unit, length_unit
+from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
+from robots.terms.effects.states import change_times
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class FrictionStep(JointEffect):
+    """tau = (a sign(dq) + b dq) from the time t_c on."""
+
+    name: ClassVar[str] = "friction_step"
+    title: ClassVar[str] = "friction that changed at one moment"
+    depends_on: ClassVar[Literal["state", "time"]] = "time"
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("change_time", "s", -np.inf, np.inf, "linear"),)
+    rivals: ClassVar[tuple[str, ...]] = ("thermal_friction", "load_heat", "payload_change", "external_contact")
+    experiments: ClassVar[tuple[str, ...]] = ("pause", "repeat")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the steps of Coulomb and of viscous friction."""
+        assert joint is not None
+        force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
+        return Coefficient("coulomb_step", force), Coefficient("viscous_step", f"{force} s/{length}")
+
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists times through the data, and the pauses between logs."""
+        return tuple((time,) for time in change_times(situation))
+
+    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
+        """Keeps the change within the data."""
+        return ((float(situation.t[0]), float(situation.t[-1])),)
+
+    def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates sign(dq) and dq after the change."""
+        after = (situation.t >= shape[0]).astype(float)
+        return np.column_stack([after * situation.sign[:, joint - 1], after * situation.dq[:, joint - 1]])
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        change = "rose" if coefficients[0] + coefficients[1] > 0 else "fell"
+        return (
+            f"The friction of joint {joint} {change} at t = {shape[0]:.2f} s: Coulomb by {coefficients[0]:.3g} "
+            f"{force}, viscous by {coefficients[1]:.3g} {force} s/{length}."
+        )

@@ -1,0 +1,86 @@
+"""A hand that guides the robot through a log: an external force on all of its motion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import force_unit, length_unit
+from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class HandGuiding(Effect):
+    """tau_j = w(t) (a_j sign(dq_j) + b_j dq_j - s_j tau_M,j), w one during a log and tau_M the torque without gravity.
+
+    A hand that moves the robot takes over what friction and inertia need; what gravity needs stays with the drives.
+    The friction's columns are free of the base model's values, which such a log has spoilt.
+    """
+
+    name: ClassVar[str] = "hand_guiding"
+    title: ClassVar[str] = "an external force that moved the robot (by hand)"
+    whole_robot: ClassVar[bool] = True
+    depends_on: ClassVar[Literal["state", "time"]] = "time"
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("start", "s", -np.inf, np.inf, "linear"),
+        Shape("end", "s", -np.inf, np.inf, "linear"),
+    )
+    rivals: ClassVar[tuple[str, ...]] = ("external_contact", "payload_change", "friction_step")
+    experiments: ClassVar[tuple[str, ...]] = ("repeat",)
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes, joint after joint, Coulomb and viscous friction taken over, and the share of inertia."""
+        result: list[Coefficient] = []
+        for j in range(robot.n):
+            force, length = force_unit(robot, j), length_unit(robot, j)
+            result += [
+                Coefficient(f"coulomb_by_hand_{j + 1}", force),
+                Coefficient(f"viscous_by_hand_{j + 1}", f"{force} s/{length}"),
+                Coefficient(f"inertia_by_hand_{j + 1}", "1"),
+            ]
+        return tuple(result)
+
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists the logs, where there are several: a hand on all of them is what the base model was fitted to."""
+        if len(situation.starts) < 2:
+            return ()
+        return tuple((float(situation.t[run.start]), float(situation.t[run.stop - 1])) for run in situation.runs)
+
+    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
+        """Keeps start and end within the data."""
+        span = (float(situation.t[0]), float(situation.t[-1]))
+        return span, span
+
+    def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates three columns per joint, each on that joint alone."""
+        n = situation.robot.n
+        during = (situation.t >= shape[0]) & (situation.t <= shape[1])
+        gravity = np.asarray(situation.robot.chain.gravity, dtype=float)
+        moving = situation.rigid[during] - situation.sensitivity("gravity")[during] @ gravity
+        X = np.zeros((len(situation), n, n, 3))
+        for j in range(n):
+            X[during, j, j, 0] = situation.sign[during, j]
+            X[during, j, j, 1] = situation.dq[during, j]
+            X[during, j, j, 2] = -moving[:, j]
+        return X.reshape(len(situation), n, 3 * n)
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        return (
+            f"An external force moved the robot from t = {shape[0]:.2f} s to {shape[1]:.2f} s, as a hand does: the "
+            f"drives carried its weight, not its friction and inertia."
+        )

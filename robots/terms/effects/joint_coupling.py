@@ -1,0 +1,98 @@
+"""Two wrist joints whose drives run through each other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import force_unit, length_unit
+from robots.terms.effects.base import Coefficient, Place, Situation, StaticEffect
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class JointCoupling(StaticEffect):
+    """Of joint k and j = k - 1: tau_j = I ddq_k + a dq_k + F s, tau_k = I ddq_j + b dq_j + F s, s = sign(dq_j + dq_k).
+
+    The rotor of a drive that passes through another (Gautier 1995). Rotors and seals that both motions turn give a = b;
+    each is free, so that drag one way is seen as well. Counted at the outer joint.
+    """
+
+    name: ClassVar[str] = "joint_coupling"
+    title: ClassVar[str] = "drives that run through each other (coupling)"
+    rivals: ClassVar[tuple[str, ...]] = ("torque_crosstalk", "position_dependent_friction", "load_dependent_friction")
+    experiments: ClassVar[tuple[str, ...]] = ("single_joint",)
+
+    def joints(self, robot: Robot) -> tuple[Place, ...]:
+        """Lists the last two joints, each with the one before it."""
+        return tuple(range(max(2, robot.n - 1), robot.n + 1))
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes inertia, viscous friction each way, and Coulomb friction."""
+        assert joint is not None
+        force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
+        return (
+            Coefficient("coupled_inertia", f"{force} s2/{length}"),
+            Coefficient("viscous_on_inner", f"{force} s/{length}"),
+            Coefficient("viscous_on_outer", f"{force} s/{length}"),
+            Coefficient("coupled_coulomb", force),
+        )
+
+    def expression(
+        self,
+        robot: Robot,
+        joint: Place,
+        q: casadi.SX,
+        dq: casadi.SX,
+        ddq: casadi.SX,
+        rigid: casadi.SX,
+        torque: casadi.SX,
+        sign: casadi.SX,
+        shape: casadi.SX,
+    ) -> casadi.SX:
+        """Builds the four columns on both joints."""
+        assert joint is not None
+        outer, inner = joint - 1, joint - 2
+        X = casadi.SX(robot.n, 4)
+        X[inner, 0], X[outer, 0] = ddq[outer], ddq[inner]
+        X[inner, 1], X[outer, 2] = dq[outer], dq[inner]
+        # Two smooth signs are not the sign of a sum: it has the same slope at rest, a millirad per second wide.
+        X[inner, 3] = X[outer, 3] = casadi.tanh((dq[inner] + dq[outer]) / COULOMB_SCALE)
+        return X
+
+    def acts_on(self, robot: Robot, joint: Place) -> tuple[int, ...]:
+        """Names both joints."""
+        assert joint is not None
+        return joint - 2, joint - 1
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        assert joint is not None
+        return (
+            f"Joints {joint - 1} and {joint} drag each other: the motion of one costs torque of the other "
+            f"({coefficients[1]:.3g} and {coefficients[2]:.3g} {force} s/{length}, {coefficients[3]:.3g} {force} of "
+            f"common Coulomb friction)."
+        )
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the velocity of the inner joint, which the outer one should not feel."""
+        assert joint is not None
+        return f"velocity of joint {joint - 1} [rad/s]", situation.dq[:, joint - 2]
+
+
+COULOMB_SCALE = 5e-3
+"""Velocity [rad/s or m/s] below which the common Coulomb friction fades."""

@@ -1,0 +1,72 @@
+"""Friction that falls as the motor, not the gear, heats the joint."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import force_unit, length_unit
+from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
+from robots.terms.effects.states import relaxation
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class LoadHeat(JointEffect):
+    """tau = -x (a sign(dq) + b dq), dx/dt = tau^2 - x / T: x is copper heat, at rest as in motion."""
+
+    name: ClassVar[str] = "load_heat"
+    title: ClassVar[str] = "friction that falls as the motor's current heats the joint"
+    rare: ClassVar[bool] = True
+    depends_on: ClassVar[Literal["state", "time"]] = "time"
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("time_constant", "s", 5.0, 7200.0, "log", (45.0, 400.0, 3600.0)),)
+    rivals: ClassVar[tuple[str, ...]] = ("thermal_friction", "friction_step", "torque_constant_heat")
+    experiments: ClassVar[tuple[str, ...]] = ("static_hold", "pause")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the fall of Coulomb and of viscous friction per squared torque and time."""
+        assert joint is not None
+        force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
+        heat = f"(({force})2 ks)"
+        return Coefficient("coulomb_fall", f"{force}/{heat}"), Coefficient("viscous_fall", f"{force} s/{length}/{heat}")
+
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists time constants up to three times the data's duration."""
+        duration = float(situation.t[-1] - situation.t[0])
+        values = [value for value in self.shapes[0].grid if value <= 3.0 * duration]
+        return tuple((value,) for value in values) or ((self.shapes[0].grid[0],),)
+
+    def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates -x sign(dq) and -x dq."""
+        x = copper_heat(situation, joint, shape[0])
+        return np.column_stack([-x * situation.sign[:, joint - 1], -x * situation.dq[:, joint - 1]])
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        return (
+            f"Joint {joint} loses friction as its motor's current heats it, also at rest; the heat goes with a time "
+            f"constant of {shape[0]:.0f} s."
+        )
+
+
+def copper_heat(situation: Situation, joint: int, time_constant: float) -> Array:
+    """Integrates the squared torque into heat kept (N,) [(N m)2 ks]."""
+
+    def integrate() -> Array:
+        return relaxation(situation, situation.torque[:, joint - 1] ** 2, time_constant) / 1000.0
+
+    known = time_constant in LoadHeat.shapes[0].grid
+    return situation.cached(("copper heat", joint, time_constant), integrate) if known else integrate()

@@ -1,0 +1,77 @@
+"""Break-away friction that grows with the load."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.effects.base import Coefficient, Place, Shape, Situation, StaticJointEffect
+from robots.terms.effects.states import moving_speed
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class LoadStribeck(StaticJointEffect):
+    """tau = c |tau_L| exp(-|dq| / v_s) sign(dq) (Bittencourt and Gunnarsson 2012)."""
+
+    name: ClassVar[str] = "load_stribeck"
+    title: ClassVar[str] = "break-away friction that grows with the load"
+    rare: ClassVar[bool] = True
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("stribeck_velocity", "rad/s", 1e-3, 2.0, "log"),)
+    rivals: ClassVar[tuple[str, ...]] = ("stribeck", "load_dependent_friction", "presliding_hysteresis")
+    experiments: ClassVar[tuple[str, ...]] = ("payload", "sweep")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the share of the load."""
+        return (Coefficient("share_of_load", "1"),)
+
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists velocities, by factors of 3, up to half the fastest."""
+        assert joint is not None
+        slow, top = moving_speed(situation, joint)
+        if top == 0.0:
+            return ()
+        lowest = min(max(slow, self.shapes[0].lower, top / 200), 0.5 * top)
+        count = max(2, 1 + round(np.log(max(0.5 * top / lowest, 1.0)) / np.log(3)))
+        return tuple((float(v),) for v in np.geomspace(lowest, 0.5 * top, count))
+
+    def row(
+        self,
+        robot: Robot,
+        joint: int,
+        q: casadi.SX,
+        dq: casadi.SX,
+        ddq: casadi.SX,
+        rigid: casadi.SX,
+        torque: casadi.SX,
+        sign: casadi.SX,
+        shape: casadi.SX,
+    ) -> casadi.SX:
+        """Builds |tau_L| exp(-|dq| / v_s) sign(dq)."""
+        return casadi.fabs(rigid) * casadi.exp(-dq * sign / shape[0]) * sign
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        return (
+            f"Joint {joint} needs {100 * coefficients[0]:.3g} % of its load more to break away; that fades as it "
+            f"speeds up past {shape[0]:.3g} {length}/s."
+        )
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the velocity."""
+        assert joint is not None
+        return f"velocity of joint {joint} [rad/s]", situation.dq[:, joint - 1]

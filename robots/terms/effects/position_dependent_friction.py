@@ -1,0 +1,77 @@
+"""Friction that differs round the turn: a bent shaft, a worn spot, a bearing out of true."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import force_unit
+from robots.terms.effects.base import Coefficient, Place, Shape, Situation, StaticJointEffect
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class PositionDependentFriction(StaticJointEffect):
+    """tau = sign(dq) (a cos(h q) + b sin(h q)), h periods per turn."""
+
+    name: ClassVar[str] = "position_dependent_friction"
+    title: ClassVar[str] = "friction that depends on the position"
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("order", "periods per turn", 0.5, 12.0, "linear", (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)),
+    )
+    rivals: ClassVar[tuple[str, ...]] = ("load_dependent_friction", "torque_ripple", "presliding_hysteresis")
+    experiments: ClassVar[tuple[str, ...]] = ("sweep", "payload")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the two phases' amplitudes."""
+        assert joint is not None
+        force = force_unit(robot, joint - 1)
+        return Coefficient("cosine", force), Coefficient("sine", force)
+
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists the orders of which the joint travels at least a sixth of a period."""
+        assert joint is not None
+        reach = float(np.ptp(situation.q[:, joint - 1]))
+        return tuple((order,) for order in self.shapes[0].grid if order * reach > 1.0)
+
+    def row(
+        self,
+        robot: Robot,
+        joint: int,
+        q: casadi.SX,
+        dq: casadi.SX,
+        ddq: casadi.SX,
+        rigid: casadi.SX,
+        torque: casadi.SX,
+        sign: casadi.SX,
+        shape: casadi.SX,
+    ) -> casadi.SX:
+        """Builds sign(dq) cos(h q) and sign(dq) sin(h q)."""
+        return casadi.horzcat(sign * casadi.cos(shape[0] * q), sign * casadi.sin(shape[0] * q))
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        size, peak = np.hypot(*coefficients), np.arctan2(coefficients[1], coefficients[0]) / shape[0]
+        return (
+            f"The friction of joint {joint} varies by {size:.3g} {force} up and down, {shape[0]:.3g} times a turn, and "
+            f"is highest at {peak:.3g} {length}."
+        )
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the position."""
+        assert joint is not None
+        return f"position of joint {joint} [rad]", situation.q[:, joint - 1]

@@ -1,0 +1,89 @@
+"""Friction that turns round over a travel, not at once, when the motion reverses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import force_unit
+from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
+from robots.terms.effects.states import bristle
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class PreslidingHysteresis(JointEffect):
+    """tau = F (z / z_s - sign(dq)), z' = dq - |dq| z / z_s (Dahl 1968; LuGre at low speed).
+
+    The base model's Coulomb friction jumps at each reversal; the contacts' bristles bend first.
+    """
+
+    name: ClassVar[str] = "presliding_hysteresis"
+    title: ClassVar[str] = "friction that turns round gradually at reversals (presliding)"
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("presliding_travel", "rad", 1e-5, 0.2, "log"),)
+    rivals: ClassVar[tuple[str, ...]] = ("stribeck", "backlash", "time_delay", "current_lag", "spring")
+    experiments: ClassVar[tuple[str, ...]] = ("micro_reversals", "sweep")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the part of Coulomb friction that turns round gradually."""
+        assert joint is not None
+        return (Coefficient("presliding_torque", force_unit(robot, joint - 1)),)
+
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists travels, by factors of 2.5, between what the samples resolve and a tenth of the range."""
+        assert joint is not None
+        q = situation.q[:, joint - 1]
+        reach = float(np.ptp(q))
+        if reach < 1e-9:
+            return ()
+        # At a reversal the joint moves by half the acceleration times the squared period from sample to sample.
+        step = 0.5 * float(np.quantile(np.abs(situation.ddq[:, joint - 1]), 0.5)) * situation.period**2
+        lowest, highest = max(2.0 * step, 1e-5), min(0.1 * reach, 0.2)
+        if highest <= lowest:
+            return ((highest,),)
+        count = max(2, 1 + round(np.log(highest / lowest) / np.log(2.5)))
+        return tuple((float(value),) for value in np.geomspace(lowest, highest, count))
+
+    def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates z / z_s - sign(dq)."""
+        q, dq = situation.q[:, joint - 1], situation.dq[:, joint - 1]
+        z = bristle(situation.t, q, dq, situation.runs, shape[0])
+        return (z - situation.sign[:, joint - 1])[:, None]
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        return (
+            f"After each reversal, {coefficients[0]:.3g} {force} of the friction of joint {joint} turn round over a "
+            f"travel of {shape[0]:.3g} {length} instead of at once."
+        )
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the travel since the last reversal."""
+        assert joint is not None
+        q = situation.q[:, joint - 1]
+        return f"travel of joint {joint} since it reversed [rad]", travel_since_reversal(q, situation.runs)
+
+
+def travel_since_reversal(q: Array, runs: tuple[slice, ...]) -> Array:
+    """Gives the signed way (N,) from the last reversal of a joint's positions (N,)."""
+    travel = np.zeros(len(q))
+    for run in runs:
+        part = q[run]
+        way = np.sign(np.diff(part, prepend=part[0]))
+        turned = np.flatnonzero(way[1:] * way[:-1] < 0)
+        marks = np.concatenate([[0], turned])
+        travel[run] = part - part[marks[np.searchsorted(marks, np.arange(len(part)), side="right") - 1]]
+    return travel

@@ -1,0 +1,68 @@
+"""Grease that thins as it is sheared."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import force_unit
+from robots.terms.effects.base import Coefficient, Place, Shape, Situation, StaticJointEffect
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class ShearThinning(StaticJointEffect):
+    """tau = F |dq / v_r|^p sign(dq), v_r = 1 rad/s (Waiboer et al. 2005)."""
+
+    name: ClassVar[str] = "shear_thinning"
+    title: ClassVar[str] = "viscous friction that grows less than the speed"
+    rare: ClassVar[bool] = True
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("power", "1", 0.2, 0.9, "linear", (0.3, 0.5, 0.7)),)
+    rivals: ClassVar[tuple[str, ...]] = ("stribeck", "presliding_hysteresis")
+    experiments: ClassVar[tuple[str, ...]] = ("sweep",)
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the friction at 1 rad/s."""
+        assert joint is not None
+        return (Coefficient("friction_at_one", force_unit(robot, joint - 1)),)
+
+    def row(
+        self,
+        robot: Robot,
+        joint: int,
+        q: casadi.SX,
+        dq: casadi.SX,
+        ddq: casadi.SX,
+        rigid: casadi.SX,
+        torque: casadi.SX,
+        sign: casadi.SX,
+        shape: casadi.SX,
+    ) -> casadi.SX:
+        """Builds |dq|^p sign(dq)."""
+        return casadi.sqrt(dq**2 + 1e-10) ** shape[0] * sign
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        return (
+            f"The friction of joint {joint} grows with the power {shape[0]:.2g} of its speed: its grease thins "
+            f"as it is sheared."
+        )
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the velocity."""
+        assert joint is not None
+        return f"velocity of joint {joint} [rad/s]", situation.dq[:, joint - 1]

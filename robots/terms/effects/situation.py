@@ -1,0 +1,190 @@
+"""What an effect may depend on: the motion, the base model's torque in it, and how that torque would change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from robots.common.errors import InputError
+from robots.robot import Robot
+
+if TYPE_CHECKING:
+    from robots.regressor import TorqueModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Situation:
+    """What the robot did, all logs one after the other, and what the base model says of it.
+
+    Attributes:
+        model: the base model.
+        parameters: its standard parameters (p,), zero where a base parameter stands for several.
+        t: time [s], (N,): one clock for all logs.
+        starts: indices at which a new log begins, 0 first. Derivatives, filters and presliding states do not cross
+            them; heat does, cooling in the pause.
+        q: positions (N, n) [rad or m], free of noise.
+        dq: velocities (N, n) [rad/s or m/s].
+        ddq: accelerations (N, n) [rad/s2 or m/s2].
+        rigid: torque of rigid body and rotors (N, n) [N m or N].
+        friction: torque of the base model's friction (N, n) [N m or N].
+        torque: torque of the whole base model (N, n) [N m or N].
+        velocity_scale: (n,) v0 [rad/s or m/s] of the sign, tanh(dq / v0); 0 for the sharp sign.
+    """
+
+    model: TorqueModel
+    parameters: Array
+    t: Array
+    starts: tuple[int, ...]
+    q: Array
+    dq: Array
+    ddq: Array
+    rigid: Array
+    friction: Array
+    torque: Array
+    velocity_scale: Array
+    _cache: dict[object, Array] = field(default_factory=dict, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.model.robot
+
+    @property
+    def runs(self) -> tuple[slice, ...]:
+        """The logs' samples."""
+        return tuple(slice(a, b) for a, b in pairwise((*self.starts, len(self.t))))
+
+    @cached_property
+    def period(self) -> float:
+        """The median sample period within the logs [s]; 0 for a single sample."""
+        steps = np.concatenate([np.diff(self.t[run]) for run in self.runs])
+        return float(np.median(steps)) if len(steps) else 0.0
+
+    @cached_property
+    def sign(self) -> Array:
+        """The sign of the velocities as the base model takes it (N, n)."""
+        v0 = np.broadcast_to(self.velocity_scale, self.dq.shape)
+        return np.where(v0 > 0, np.tanh(self.dq / np.where(v0 > 0, v0, 1.0)), np.sign(self.dq))
+
+    def friction_at(self, dq: Array) -> Array:
+        """Evaluates the base model's friction (N, n) [N m or N] at other velocities (N, n)."""
+        columns = [i for i, c in enumerate(self.model.columns) if c.term == "friction" and self.parameters[i]]
+        if not columns:
+            return np.zeros_like(self.q)
+        return self.model.torque(self.q, dq, self.ddq, self.parameters[columns], columns=columns)
+
+    def derivatives(self, values: Array) -> tuple[Array, Array]:
+        """Differentiates samples (N, ...) once and twice by time, within each log.
+
+        Central differences of sixth order, of second order near the ends and where samples are uneven.
+        """
+        first, second = np.zeros_like(values), np.zeros_like(values)
+        for run in self.runs:
+            t, x = self.t[run], values[run]
+            if len(t) < 3:
+                continue
+            first[run] = np.gradient(x, t, axis=0)
+            second[run] = np.gradient(first[run], t, axis=0)
+            steps = np.diff(t)
+            h = float(steps.mean())
+            if len(t) > 7 and np.abs(steps - h).max() < 1e-3 * h:
+                a, b, c = x[4:-2] - x[2:-4], x[5:-1] - x[1:-5], x[6:] - x[:-6]
+                first[run.start + 3 : run.stop - 3] = (45 * a - 9 * b + c) / (60 * h)
+                a, b, c = x[4:-2] + x[2:-4], x[5:-1] + x[1:-5], x[6:] + x[:-6]
+                second[run.start + 3 : run.stop - 3] = (270 * a - 27 * b + 2 * c - 490 * x[3:-3]) / (180 * h**2)
+        return first, second
+
+    def sensitivity(self, kind: str) -> Array:
+        """Evaluates how the base model's rigid-body torque would change; kept for the next caller.
+
+        Args:
+            kind: ``position`` d rigid/dq (N, n, n), ``velocity`` d rigid/d(dq) (N, n, n), ``inertia`` (N, n, n) without
+                rotors, ``gravity`` d rigid/d(gravity in the base frame) (N, n, 3), ``tool`` torque per inertial
+                parameter of a body on the flange, in its frame (N, n, 10), ``jacobian`` of the flange in the base
+                frame, linear then angular (N, 6, n).
+        """
+        from robots.terms.effects.sensitivities import evaluate
+
+        if kind not in self._cache:
+            self._cache[kind] = evaluate(kind, self)
+        return self._cache[kind]
+
+    def cached(self, key: object, compute: object) -> Array:
+        """Gives `compute()`, computed once per key: a state that several columns share."""
+        if key not in self._cache:
+            self._cache[key] = compute()  # type: ignore[operator]
+        return self._cache[key]
+
+
+def situation(
+    model: TorqueModel,
+    parameters: ArrayLike,
+    t: ArrayLike,
+    q: ArrayLike,
+    dq: ArrayLike,
+    ddq: ArrayLike,
+    *,
+    starts: tuple[int, ...] = (0,),
+    columns: tuple[int, ...] | None = None,
+) -> Situation:
+    """Evaluates the base model on a motion.
+
+    Args:
+        model: the base model with p columns.
+        parameters: their values (p,), or those of `columns` only.
+        t: time [s], (N,).
+        q: positions (N, n), free of noise.
+        dq: velocities (N, n).
+        ddq: accelerations (N, n).
+        starts: indices at which a new log begins.
+        columns: indices of the model's columns that `parameters` are of; the others are zero.
+
+    Raises:
+        InputError: arrays that do not fit together.
+    """
+    times = np.asarray(t, dtype=float)
+    q, dq, ddq = (np.ascontiguousarray(np.atleast_2d(np.asarray(a, dtype=float))) for a in (q, dq, ddq))
+    given = np.asarray(parameters, dtype=float)
+    chosen = range(model.size) if columns is None else columns
+    if given.shape != (len(chosen),) or q.shape != (len(times), model.robot.n) or not q.shape == dq.shape == ddq.shape:
+        raise InputError(
+            f"{given.shape} parameters and motions of shape {q.shape}", allowed="arrays that fit the model"
+        )
+    full = np.zeros(model.size)
+    full[list(chosen)] = given
+    parts = {term: np.zeros_like(q) for term in ("rigid_body", "rotor_inertia", "friction", "other")}
+    for name in parts:
+        of_term = [
+            i for i, c in enumerate(model.columns) if full[i] and (c.term if c.term in parts else "other") == name
+        ]
+        if of_term:
+            parts[name] = model.torque(q, dq, ddq, full[of_term], columns=of_term)
+    rigid = parts["rigid_body"] + parts["rotor_inertia"]
+    return Situation(
+        model=model,
+        parameters=full,
+        t=times,
+        starts=tuple(int(start) for start in starts),
+        q=q,
+        dq=dq,
+        ddq=ddq,
+        rigid=rigid,
+        friction=parts["friction"],
+        torque=rigid + parts["friction"] + parts["other"],
+        velocity_scale=_velocity_scale(model),
+    )
+
+
+def _velocity_scale(model: TorqueModel) -> Array:
+    scales = [term.velocity_scale for term in model.terms if hasattr(term, "velocity_scale")]
+    return np.broadcast_to(np.asarray(scales[0] if scales else 0.0, dtype=float), (model.robot.n,)).copy()

@@ -1,0 +1,84 @@
+"""Friction that rises as the joint slows down, before it breaks away: the Stribeck effect."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import force_unit
+from robots.terms.effects.base import Coefficient, Place, Shape, Situation, StaticJointEffect
+from robots.terms.effects.states import moving_speed
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class Stribeck(StaticJointEffect):
+    """tau = F exp(-(|dq| / v_s)^d) sign(dq) (Armstrong-Helouvry et al. 1994)."""
+
+    name: ClassVar[str] = "stribeck"
+    title: ClassVar[str] = "more friction at low speed (Stribeck)"
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("stribeck_velocity", "rad/s", 1e-3, 2.0, "log"),
+        Shape("exponent", "1", 0.5, 2.5, "linear", (1.0, 2.0)),
+    )
+    rivals: ClassVar[tuple[str, ...]] = ("shear_thinning", "presliding_hysteresis", "load_dependent_friction")
+    experiments: ClassVar[tuple[str, ...]] = ("sweep", "micro_reversals")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the break-away torque above Coulomb friction."""
+        assert joint is not None
+        return (Coefficient("stribeck_torque", force_unit(robot, joint - 1)),)
+
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists velocities, by factors of 2, between the slowest and half the fastest that the joint moves at."""
+        assert joint is not None
+        slow, top = moving_speed(situation, joint)
+        if top == 0.0:
+            return ()
+        lowest = max(slow, 2.0 * float(situation.velocity_scale[joint - 1]), self.shapes[0].lower, top / 500)
+        count = max(2, 1 + round(np.log2(max(0.5 * top / lowest, 1.0))))
+        velocities = np.geomspace(min(lowest, 0.5 * top), 0.5 * top, count)
+        return tuple((float(v), exponent) for v in velocities for exponent in self.shapes[1].grid)
+
+    def row(
+        self,
+        robot: Robot,
+        joint: int,
+        q: casadi.SX,
+        dq: casadi.SX,
+        ddq: casadi.SX,
+        rigid: casadi.SX,
+        torque: casadi.SX,
+        sign: casadi.SX,
+        shape: casadi.SX,
+    ) -> casadi.SX:
+        """Builds exp(-(|dq| / v_s)^d) sign(dq)."""
+        # The power of zero has no derivative; a thousandth of the velocity does no harm.
+        ratio = casadi.sqrt((dq / shape[0]) ** 2 + 1e-6)
+        return casadi.exp(-(ratio ** shape[1])) * sign
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        return (
+            f"Joint {joint} needs {coefficients[0]:.3g} {force} more than its Coulomb friction to break away; that "
+            f"fades as it speeds up past {shape[0]:.3g} {length}/s."
+        )
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the velocity."""
+        assert joint is not None
+        return f"velocity of joint {joint} [rad/s]", situation.dq[:, joint - 1]

@@ -1,0 +1,89 @@
+"""Friction that changes as the joint's own friction heats it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import force_unit, length_unit
+from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
+from robots.terms.effects.states import relaxation
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class ThermalFriction(JointEffect):
+    """tau = -x (a sign(dq) + b dq), dx/dt = P - x / T: x is the heat kept of the friction power P.
+
+    Temperature is heat over capacity; without a sensor, capacity and the friction's change per degree cannot be told
+    apart, so coefficients are per kilojoule. One heat node: the gear's; the housing's is its slower limit.
+    """
+
+    name: ClassVar[str] = "thermal_friction"
+    title: ClassVar[str] = "friction that falls as the joint warms up"
+    depends_on: ClassVar[Literal["state", "time"]] = "time"
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("time_constant", "s", 5.0, 7200.0, "log", (15.0, 45.0, 135.0, 400.0, 1200.0, 3600.0)),
+    )
+    rivals: ClassVar[tuple[str, ...]] = ("friction_step", "torque_sensor_drift", "torque_constant_heat", "load_heat")
+    experiments: ClassVar[tuple[str, ...]] = ("pause", "single_joint", "static_hold")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the fall of Coulomb and of viscous friction per heat."""
+        assert joint is not None
+        force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
+        return (
+            Coefficient("coulomb_fall", f"{force}/kJ"),
+            Coefficient("viscous_fall", f"{force} s/{length}/kJ"),
+        )
+
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists time constants up to three times the data's duration: all slower ones look like the slowest."""
+        duration = float(situation.t[-1] - situation.t[0])
+        values = [value for value in self.shapes[0].grid if value <= 3.0 * duration]
+        return tuple((value,) for value in values) or ((self.shapes[0].grid[0],),)
+
+    def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates -x sign(dq) and -x dq, x in kJ."""
+        x = heat(situation, joint, shape[0])
+        return np.column_stack([-x * situation.sign[:, joint - 1], -x * situation.dq[:, joint - 1]])
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        return (
+            f"Joint {joint} loses friction as it warms up: {coefficients[0]:.3g} {force} of Coulomb and "
+            f"{coefficients[1]:.3g} {force} s/{length} of viscous friction per kJ of its own friction heat; the heat "
+            f"goes with a time constant of {shape[0]:.0f} s."
+        )
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the heat kept."""
+        assert joint is not None
+        return f"friction heat kept in joint {joint} [kJ]", heat(situation, joint, shape[0])
+
+
+def heat(situation: Situation, joint: int, time_constant: float) -> Array:
+    """Integrates the base model's friction power into heat kept (N,) [kJ]."""
+
+    def integrate() -> Array:
+        j = joint - 1
+        # The fitted friction of a joint that hardly moves may have a wrong sign; friction never cools.
+        power = np.maximum(situation.friction[:, j] * situation.dq[:, j], 0.0)
+        return relaxation(situation, power, time_constant) / 1000.0
+
+    # The points of the grid come again and again; those of a search are as many as they are brief.
+    known = time_constant in ThermalFriction.shapes[0].grid
+    return situation.cached(("heat", joint, time_constant), integrate) if known else integrate()

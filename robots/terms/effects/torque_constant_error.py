@@ -1,0 +1,64 @@
+"""A torque that is scaled wrongly on one joint."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.effects.base import Coefficient, Place, Situation, StaticJointEffect
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class TorqueConstantError(StaticJointEffect):
+    """tau = c tau_L: the joint's rigid-body torque, which it shares with the others, is logged by a factor 1 + c.
+
+    Its friction scales with it unseen. Seen only where one body's parameters show in several joints.
+    """
+
+    name: ClassVar[str] = "torque_constant_error"
+    title: ClassVar[str] = "a wrong torque constant"
+    rivals: ClassVar[tuple[str, ...]] = ("spring", "base_tilt", "encoder_offset", "torque_constant_saturation")
+    experiments: ClassVar[tuple[str, ...]] = ("payload",)
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the relative error."""
+        return (Coefficient("relative_error", "1", -0.9, 9.0),)
+
+    def row(
+        self,
+        robot: Robot,
+        joint: int,
+        q: casadi.SX,
+        dq: casadi.SX,
+        ddq: casadi.SX,
+        rigid: casadi.SX,
+        torque: casadi.SX,
+        sign: casadi.SX,
+        shape: casadi.SX,
+    ) -> casadi.SX:
+        """Builds tau_L."""
+        return rigid
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        return f"The torque of joint {joint} is logged {100 * coefficients[0]:+.3g} % wrong: its torque constant."
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the base model's torque."""
+        assert joint is not None
+        return f"torque of joint {joint} by the base model [N m]", situation.torque[:, joint - 1]

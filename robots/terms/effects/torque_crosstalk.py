@@ -1,0 +1,61 @@
+"""A torque signal that shows a part of its neighbour."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.effects.base import Coefficient, JointEffect, Place, Situation
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class TorqueCrosstalk(JointEffect):
+    """tau_j = c tau_{j-1} + d tau_{j+1}: a sensor that also feels its neighbours' torque."""
+
+    name: ClassVar[str] = "torque_crosstalk"
+    title: ClassVar[str] = "a torque signal that shows its neighbours'"
+    rare: ClassVar[bool] = True
+    rivals: ClassVar[tuple[str, ...]] = ("joint_coupling", "torque_constant_error", "base_tilt")
+    experiments: ClassVar[tuple[str, ...]] = ("single_joint", "payload")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the shares of the neighbours' torque."""
+        assert joint is not None
+        return tuple(Coefficient(f"share_of_joint_{k}", "1", -0.5, 0.5) for k in _neighbours(robot, joint))
+
+    def joints(self, robot: Robot) -> tuple[Place, ...]:
+        """Lists all joints, if there are several."""
+        return tuple(range(1, robot.n + 1)) if robot.n > 1 else ()
+
+    def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the neighbours' torque."""
+        return situation.torque[:, [k - 1 for k in _neighbours(situation.robot, joint)]]
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        shares = " and ".join(f"{100 * c:.3g} %" for c in coefficients)
+        return f"The torque signal of joint {joint} shows {shares} of its neighbours' torque."
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives a neighbour's torque."""
+        assert joint is not None
+        neighbour = _neighbours(situation.robot, joint)[0]
+        return f"torque of joint {neighbour} [N m]", situation.torque[:, neighbour - 1]
+
+
+def _neighbours(robot: Robot, joint: int) -> tuple[int, ...]:
+    return tuple(k for k in (joint - 1, joint + 1) if 1 <= k <= robot.n)

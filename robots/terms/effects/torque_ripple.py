@@ -1,0 +1,145 @@
+"""Torque that ripples with the angle of gear or motor."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import force_unit
+from robots.terms.effects.base import Coefficient, Place, Shape, Situation, StaticJointEffect
+from robots.terms.effects.states import torque_reference
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+SAMPLES_PER_PERIOD = 2.5
+"""A ripple that passes in fewer samples is not resolved."""
+LARGEST = 400
+"""Orders on the grid at most: a longer list costs more in false alarms than its orders are likely."""
+
+
+class TorqueRipple(StaticJointEffect):
+    """tau = (a + c l) cos(h q) + (b + d l) sin(h q), h periods per turn: a wave generator's, the teeth's, the poles'.
+
+    l is the load, as a share of the joint's torque limit (of 100 N m where it has none): teeth mesh harder under it.
+
+    Orders are those that the data resolve, known gear or not. Below 3 per turn, gravity and springs look alike.
+    """
+
+    name: ClassVar[str] = "torque_ripple"
+    title: ClassVar[str] = "torque ripple per turn of gear or motor"
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("order", "periods per turn", 2.5, 1000.0, "linear"),)
+    rivals: ClassVar[tuple[str, ...]] = ("position_dependent_friction", "spring", "encoder_eccentricity")
+    experiments: ClassVar[tuple[str, ...]] = ("sweep",)
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the two phases' amplitudes, and their growth with the load."""
+        assert joint is not None
+        force = force_unit(robot, joint - 1)
+        return tuple(Coefficient(name, force) for name in ("cosine", "sine", "loaded_cosine", "loaded_sine"))
+
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists orders half a resolution apart, up to what a tenth of the samples is slow enough for.
+
+        The resolution is a period over the joint's range. Of a known gear, once, twice and four times per motor turn
+        are listed exactly.
+        """
+        assert joint is not None
+        spacing, top = self._resolution(situation, joint)
+        if not top:
+            return ()
+        low = self.shapes[0].lower
+        count = int(min(max((top - low) / spacing, 0), LARGEST))  # a known gear's orders may lie beyond
+        orders = set((low + spacing * np.arange(count + 1)).tolist())
+        ratio = abs(float(situation.robot.gear_ratio[joint - 1]))
+        orders |= {h * ratio for h in (1, 2, 4) if ratio > 1 and low <= h * ratio <= top}
+        # Whole orders are the likely ones: the nearest point of the grid moves to each.
+        whole = {float(h) for h in range(3, 13) if h <= top}
+        return tuple(
+            (order,) for order in sorted({o for o in orders if all(abs(o - h) > spacing / 2 for h in whole)} | whole)
+        )
+
+    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
+        """Keeps the order within what the samples resolve."""
+        assert joint is not None
+        return ((self.shapes[0].lower, max(self._resolution(situation, joint)[1], 3.0)),)
+
+    def _resolution(self, situation: Situation, joint: int) -> tuple[float, float]:
+        """Gives the grid's spacing and its highest order; zeros for a joint that does not move."""
+        q, speed = situation.q[:, joint - 1], np.abs(situation.dq[:, joint - 1])
+        reach = float(np.ptp(q))
+        moving = speed[speed > 1e-3 * speed.max(initial=0.0)]
+        if reach < 1e-3 or len(moving) < 20:
+            return 0.0, 0.0
+        slow = float(np.quantile(moving, 0.1))
+        top = 2 * np.pi / (SAMPLES_PER_PERIOD * situation.period * slow)
+        return np.pi / reach, float(min(top, self.shapes[0].upper))
+
+    def propose(
+        self, situation: Situation, joint: Place, residual: Array, count: int = 8
+    ) -> tuple[tuple[float, ...], ...]:
+        """Ranks all orders at once, by the residual's spectrum over the angle."""
+        assert joint is not None
+        grid = self.grid(situation, joint)
+        if len(grid) <= count:
+            return grid
+        orders = np.array([order for (order,) in grid])
+        power = angle_spectrum(situation.q[:, joint - 1], residual[:, joint - 1], orders)
+        return tuple(grid[i] for i in np.argsort(-power)[:count])
+
+    def row(
+        self,
+        robot: Robot,
+        joint: int,
+        q: casadi.SX,
+        dq: casadi.SX,
+        ddq: casadi.SX,
+        rigid: casadi.SX,
+        torque: casadi.SX,
+        sign: casadi.SX,
+        shape: casadi.SX,
+    ) -> casadi.SX:
+        """Builds cos(h q) and sin(h q), by themselves and times the load."""
+        wave = casadi.horzcat(casadi.cos(shape[0] * q), casadi.sin(shape[0] * q))
+        return casadi.horzcat(wave, wave * rigid / torque_reference(robot, joint))
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        size = np.hypot(coefficients[0], coefficients[1])
+        return f"The torque of joint {joint} ripples by {size:.3g} {force} up and down, {shape[0]:.4g} times a turn."
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the angle within the ripple's period."""
+        assert joint is not None
+        period = 2 * np.pi / shape[0]
+        return f"position of joint {joint} within 1/{shape[0]:.4g} turn [rad]", situation.q[:, joint - 1] % period
+
+
+def angle_spectrum(q: Array, values: Array, orders: Array) -> Array:
+    """Gives |sum(values exp(-i h q))|^2 for each order h (K,), by binning the angle and one Fourier transform.
+
+    Args:
+        q: positions (N,) [rad].
+        values: (N,).
+        orders: (K,).
+    """
+    reach = float(np.ptp(q)) or 1.0
+    # Eight bins a period of the highest order keep its power to 5 %; the length sets the transform's resolution.
+    bins = int(2 ** np.ceil(np.log2(max(8 * float(orders.max()) * reach / (2 * np.pi), 256))))
+    sums = np.bincount(np.minimum(((q - q.min()) / reach * bins).astype(int), bins - 1), weights=values, minlength=bins)
+    spectrum = np.abs(np.fft.rfft(sums, 4 * bins)) ** 2
+    frequencies = 2 * np.pi * np.arange(len(spectrum)) / (4 * reach)
+    return np.interp(orders, frequencies, spectrum)

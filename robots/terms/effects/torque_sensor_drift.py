@@ -1,0 +1,71 @@
+"""A torque sensor or current loop whose zero wanders."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.terms.base import force_unit
+from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class TorqueSensorDrift(JointEffect):
+    """tau = sum_k b_k clip((t - t_0 - k d) / d, 0, 1): a zero that goes by b_k during the k-th stretch of length d.
+
+    One stretch as long as the data is a straight line; more of them follow a zero that wanders. Then it stays.
+    """
+
+    name: ClassVar[str] = "torque_sensor_drift"
+    title: ClassVar[str] = "a torque sensor's zero that drifts"
+    depends_on: ClassVar[Literal["state", "time"]] = "time"
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("origin", "s", -np.inf, np.inf, "linear"),
+        Shape("stretch", "s", 1e-3, 1e7, "log"),
+    )
+    rivals: ClassVar[tuple[str, ...]] = ("payload_change", "thermal_friction", "torque_constant_heat", "spring")
+    experiments: ClassVar[tuple[str, ...]] = ("repeat", "static_hold")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the drift in each stretch."""
+        assert joint is not None
+        return tuple(Coefficient(f"drift_{k}", force_unit(robot, joint - 1)) for k in range(1, STRETCHES + 1))
+
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists a line, and zeros that wander in more and more stretches."""
+        (origin, _), (_, longest) = self.bounds(situation, joint)
+        return tuple((origin, longest / pieces) for pieces in (1, 2, 4, STRETCHES))
+
+    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
+        """Fixes the origin, which only dates the drift; the stretches cover the data."""
+        origin = float(situation.t[0])
+        duration = max(float(situation.t[-1]) - origin, 1.0)
+        return (origin, origin), (duration / STRETCHES, duration)
+
+    def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates a ramp per stretch; those that begin after the data are zero."""
+        elapsed = (situation.t - shape[0]) / shape[1]
+        return np.asarray(np.clip(elapsed[:, None] - np.arange(STRETCHES), 0.0, 1.0))
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what the values mean."""
+        places = np.concatenate([[0.0], np.cumsum(coefficients)])
+        return f"The torque zero of joint {joint} wanders over {np.ptp(places):.3g} {force}."
+
+
+STRETCHES = 8
+"""Stretches of a zero that wanders."""

@@ -1,0 +1,148 @@
+"""A diagnosis finds what is hidden in logs of a plant that shares no code with it, and nothing where nothing is."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import sys
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation import diagnose
+from oed.cli import main
+from robots import load_robot
+from robots.signals import Log
+from tests.diagnosis_blind.judging import Truth, complaints
+from tests.truth.cases import Case, draw_case, write_log
+from tests.truth.description import write_description
+from tests.truth.effects import friction, strangers, surroundings, transmission
+from tests.truth.effects.base import Effect
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Hide:
+    """A case by what is hidden; sizes are two to three times what the logs can attribute."""
+
+    seed: int
+    effects: tuple[type[Effect], ...] = ()
+    size: float = 0.03
+    kind: str = "er3a"
+    joint: int | None = None
+    periodic: bool = True
+
+    @property
+    def name(self) -> str:
+        """For the test's name."""
+        return "+".join(effect.__name__ for effect in self.effects) or "nothing"
+
+    def draw(self) -> Case:
+        """Draws its logs: 40 s, and 20 s of another motion where something is hidden."""
+        return draw_case(
+            self.seed,
+            hide=self.effects,
+            size=self.size,
+            kind=self.kind,
+            joint=self.joint,
+            periodic=self.periodic,
+            duration=40.0,
+            unseen=20.0 if self.effects else 0.0,
+        )
+
+
+NOTHING = (Hide(seed=7031), Hide(seed=7032, periodic=False))
+SINGLE = (
+    Hide(seed=7001, effects=(friction.Stribeck,), joint=2),
+    Hide(seed=7002, effects=(friction.FrictionStep,), joint=3, periodic=False),
+)
+PAIRS = (Hide(seed=7011, effects=(friction.PositionDependent, surroundings.Payload), joint=1),)
+STRANGE = (Hide(seed=7021, effects=(strangers.CrossWave,), joint=2, size=0.05),)
+MORE = (
+    Hide(seed=7004, effects=(surroundings.Payload,), kind="heavy"),
+    Hide(seed=7033, kind="ur10"),
+    Hide(seed=7003, effects=(transmission.Ripple,), joint=1, kind="ur10"),
+    Hide(seed=7005, effects=(surroundings.Contact,), periodic=False),
+    Hide(seed=7006, effects=(friction.PositionDependent,), joint=4),
+    Hide(seed=7007, effects=(surroundings.Tilt,), kind="ur10"),
+)
+"""Cases for a longer run: with ALL_HIDDEN set in the environment."""
+ALL = bool(os.environ.get("ALL_HIDDEN"))
+
+
+def logs_of(records: Sequence[Any]) -> list[Log]:
+    """What a user has."""
+    return [Log(t=record.t, q=record.q, tau=record.tau) for record in records]
+
+
+@lru_cache(maxsize=32)
+def examined(hide: Hide) -> tuple[Truth, dict[str, Any]]:
+    """The truth of a case and what the diagnosis says of its logs."""
+    case = hide.draw()
+    with TemporaryDirectory() as folder:
+        robot = load_robot(write_description(case.machine, Path(folder)))
+    said = diagnose(robot, logs_of(case.logs), held_out=logs_of(case.unseen) or None).to_dict()
+    return truth_of(case), said
+
+
+def truth_of(case: Case) -> Truth:
+    """What the judge needs to know of a case."""
+    if not case.unseen or not all(effect.lasting for effect in case.effects):
+        return Truth(effects=case.effects)
+    size = np.mean(np.concatenate([record.tau for record in case.unseen]) ** 2, axis=0)
+    before, after = (float((errors / size).sum()) for errors in case.oracle_gain())
+    return Truth(effects=case.effects, before=before, after=after)
+
+
+@pytest.mark.parametrize("hide", SINGLE, ids=lambda hide: hide.name)
+def test_what_is_hidden_is_found(hide: Hide) -> None:
+    """Effects at two to three times the attributable size are named, on their joints, with their values and gain."""
+    assert complaints(*examined(hide)) == []
+
+
+@pytest.mark.parametrize("hide", PAIRS, ids=lambda hide: hide.name)
+def test_two_effects_are_both_found_by_the_command(hide: Hide, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """``oed diagnose``, given files of t, q and tau, names both of two effects and nothing else."""
+    case = hide.draw()
+    described = write_description(case.machine, tmp_path)
+    for record, name in ((case.logs[0], "log.csv"), (case.unseen[0], "unseen.csv")):
+        write_log(record, tmp_path / name)
+    line = ["oed", "diagnose", "--robot", described, "--log", tmp_path / "log.csv", "--quiet"]
+    line += ["--held-out", tmp_path / "unseen.csv", "--out", tmp_path / "said"]
+    monkeypatch.setattr(sys, "argv", [str(word) for word in line])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert not ended.value.code
+    assert complaints(truth_of(case), json.loads((tmp_path / "said" / "diagnosis.json").read_text())) == []
+
+
+@pytest.mark.skipif(not ALL, reason="takes a minute more; set ALL_HIDDEN=1")
+@pytest.mark.parametrize("hide", MORE, ids=lambda hide: f"{hide.name}-{hide.kind}")
+def test_more_cases(hide: Hide) -> None:
+    """The same of other effects, robots and motions."""
+    assert complaints(*examined(hide)) == []
+
+
+@pytest.mark.parametrize("hide", NOTHING, ids=lambda hide: f"{hide.kind}-{hide.seed}")
+def test_nothing_is_found_where_nothing_is(hide: Hide) -> None:
+    """Logs without an effect get the verdict ``none``."""
+    assert complaints(*examined(hide)) == []
+
+
+@pytest.mark.parametrize("hide", STRANGE, ids=lambda hide: hide.name)
+def test_what_no_catalogue_has_is_not_named(hide: Hide) -> None:
+    """An effect outside the catalogue is ``unexplained``, and its extension brings half of the possible gain."""
+    truth, said = examined(hide)
+    assert complaints(truth, said, ratio=0.5) == []
+
+
+def test_swapped_labels_break_the_score() -> None:
+    """Were the labels of two cases swapped, each would be judged wrong: the judge does not pass everything."""
+    first, second, nothing = (examined(hide) for hide in (SINGLE[0], SINGLE[1], NOTHING[0]))
+    for truth, said in ((first[0], second[1]), (second[0], first[1]), (first[0], nothing[1]), (nothing[0], first[1])):
+        assert complaints(truth, said)

@@ -1,0 +1,97 @@
+"""The benchmark's figures and the judge of the hidden cases, on rows whose right score is known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from benchmarks.diagnosis_parts.figures import figures
+from benchmarks.diagnosis_parts.statistics import both, detected, first_is_right, gain_ratios, interval, spurious
+from benchmarks.diagnosis_parts.strata import STRATA, TUNING, tasks
+from tests.diagnosis_blind.judging import Truth, complaints
+from tests.truth.effects.friction import FrictionStep, Stribeck
+from tests.truth.effects.strangers import CrossWave
+
+AFTER = {"after_extension": 3.2e-3, "oracle_before": 4.5e-3, "oracle_after": 3e-3}
+
+
+def row(found: list[tuple[str, int | None]], hidden: list[tuple[str, int | None]], **more: Any) -> dict[str, Any]:
+    """A row of the benchmark."""
+    findings = [
+        {"effect": e, "joint": j, "parameters": [], "p_value": 1e-6, "delta_bic": 50.0, "rivals": []} for e, j in found
+    ]
+    truth = [
+        {"effect": e, "kind": e, "joint": j, "amount": 1.0, "visible": 0.01, "lasting": True, "parameters": {}}
+        for e, j in hidden
+    ]
+    base = {"key": "one-1", "status": "done", "stratum": "one", "seed": 1, "motion": "periodic", "robot": "ur10"}
+    cost = {"cpu": 1.0, "wall": 1.0, "memory": 100.0, "verdict": "named" if found else "none"}
+    return {**base, **cost, "findings": findings, "truth": truth, **more}
+
+
+def test_intervals_are_clopper_and_pearsons() -> None:
+    """Shares come with the exact interval: 1 of 150 gives 0.02 to 3.7 %, none of 300 at most 1.2 %."""
+    assert interval(1, 150) == pytest.approx((0.00017, 0.0366), abs=5e-5)
+    assert interval(0, 300) == pytest.approx((0.0, 0.01222), abs=5e-5)
+    assert interval(300, 300)[1] == 1.0
+
+
+def test_scores_of_known_rows() -> None:
+    """Right and wrong names, both of two effects, a spurious one and the gain are counted as they should be."""
+    right = row([("stribeck", 2)], [("stribeck", 2)], before=4e-3, **AFTER)
+    wrong = row([("stribeck", 3)], [("stribeck", 2)])
+    two = row([("spring", 2), ("stribeck", 1), ("backlash", 4)], [("stribeck", 1), ("spring", 2)])
+    silent = row([], [("stribeck", 2)])
+    assert detected(right)
+    assert not detected(silent)
+    assert first_is_right(right)
+    assert not first_is_right(wrong)
+    assert both(two)
+    assert spurious(two)
+    assert not spurious(right)
+    assert gain_ratios([right, silent]) == pytest.approx([0.8])
+    text = figures([right, wrong, silent])
+    assert "2 of 3" in next(line for line in text.splitlines() if "detected at 1 %" in line)
+    assert "1 of 3" in next(line for line in text.splitlines() if "first name right" in line)
+
+
+def test_benchmark_seeds_are_not_the_tuners() -> None:
+    """The full benchmark has 300 logs without an effect, and all its seeds are below those that tuning may use."""
+    listed = list(tasks(list(STRATA), 1.0, 0))
+    assert sum(task.stratum == "none" for task in listed) == 300
+    assert max(task.seed for task in listed) < TUNING
+    assert len({task.key for task in listed}) == len(listed)
+
+
+def said(verdict: str, found: list[tuple[str, int | None]], gain: float = 0.0) -> dict[str, Any]:
+    """The contents of a diagnosis."""
+    findings = [{"effect": e, "joint": j, "parameters": []} for e, j in found]
+    return {
+        "verdict": verdict,
+        "findings": findings,
+        "baseline": {"nrmse": [0.05]},
+        "extended": {"nrmse": [(0.05**2 - gain) ** 0.5]},
+    }
+
+
+def test_judge_complains_of_what_is_wrong_and_of_nothing_else() -> None:
+    """A right diagnosis passes; a wrong verdict, name, joint, change time or gain does not."""
+    truth = Truth(effects=(Stribeck(joint=2),), before=0.05**2, after=0.05**2 - 1e-4)
+    assert complaints(truth, said("named", [("stribeck", 2)], 1e-4)) == []
+    for verdict, found, gain in (
+        ("none", [], 0.0),
+        ("ambiguous", [("stribeck", 2)], 1e-4),
+        ("named", [("stribeck", 3)], 1e-4),
+        ("named", [("stribeck", 2), ("spring", 2)], 1e-4),
+        ("named", [("stribeck", 2)], 0.2e-4),
+    ):
+        assert complaints(truth, said(verdict, found, gain))
+    step = said("named", [("friction_step", 1)])
+    step["findings"][0]["parameters"] = [{"name": "change_time", "value": 31.0, "ci95": [30.9, 31.1]}]
+    assert complaints(Truth(effects=(FrictionStep(joint=1, moment=31.1),)), step) == []
+    assert complaints(Truth(effects=(FrictionStep(joint=1, moment=32.0),)), step)
+    strange = Truth(effects=(CrossWave(joint=1),))
+    assert complaints(strange, said("unexplained", [("unexplained", 1)])) == []
+    assert complaints(strange, said("named", [("spring", 1)]))
+    assert complaints(Truth(effects=()), said("none", [])) == []

@@ -1,0 +1,75 @@
+"""Specification of extensions and patterns: names that are read again, values that fit, words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.extension import Extension, find_effect, read_extension
+from estimation.diagnosis.patterns import all_patterns, build_pattern
+from robots.common.errors import InputError
+from robots.regressor import default_model
+from robots.robot import Robot
+from robots.terms.effects import Situation, situation
+
+
+@pytest.fixture(scope="module")
+def state(arm: Robot) -> Situation:
+    """Three hundred samples of a smooth motion of the arm."""
+    t = 0.01 * np.arange(300)
+    q = np.column_stack([np.sin(2 * t), np.cos(3 * t)])
+    dq, ddq = np.column_stack([2 * np.cos(2 * t), -3 * np.sin(3 * t)]), -q * [4.0, 9.0]
+    model = default_model(arm, velocity_scale=1e-3)
+    return situation(model, model.nominal, t, q, dq, ddq)
+
+
+def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(arm: Robot, state: Situation) -> None:
+    """A pattern in a model file is the pattern that was found; all its values are finite."""
+    for pattern in all_patterns(arm):
+        assert build_pattern(pattern.name) == pattern
+        for shape in pattern.grid(state, 1)[:2]:
+            X = pattern.columns(state, 1, shape)
+            assert X.shape == (300, 2, len(pattern.parameters(arm, 1)))
+            assert np.isfinite(X).all()
+            assert not X[:, 1].any()
+        assert pattern.describe(1, np.zeros(1), pattern.grid(state, 1)[0]).startswith("The residual torque of joint 1")
+
+
+def test_an_odd_pattern_turns_round_with_the_motion(arm: Robot, state: Situation) -> None:
+    """It is its even sibling times the sign of the velocity."""
+    even, odd = build_pattern("pattern:angle:2:even"), build_pattern("pattern:angle:2:odd")
+    assert even is not None
+    assert odd is not None
+    assert odd.local(state, 1) == pytest.approx(even.local(state, 1) * state.sign[:, :1])
+    assert "direction" in odd.sentence(1)
+
+
+def test_an_extension_survives_plain_data(arm: Robot, state: Situation) -> None:
+    """Effect, joint, shape, coefficients and covariance, unknown variances too."""
+    extension = Extension(
+        effect="friction_step",
+        joint=2,
+        shape=(1.5,),
+        coefficients=np.array([0.3, 0.1]),
+        covariance=np.diag([0.01, np.inf, 0.04]),
+    )
+    again = read_extension(extension.to_dict(arm), arm)
+    assert again.torque(state) == pytest.approx(extension.torque(state))
+    assert np.array_equal(again.covariance, extension.covariance)
+    expected = (state.t >= 1.5) * (0.3 * state.sign[:, 1] + 0.1 * state.dq[:, 1])
+    assert extension.torque(state)[:, 1] == pytest.approx(expected)
+    assert [item["name"] for item in extension.parameters(arm)] == ["coulomb_step", "viscous_step", "change_time"]
+
+
+def test_a_damaged_extension_is_refused(arm: Robot) -> None:
+    """An unknown effect, a joint that the robot has not, and too few values are named."""
+    good = {"effect": "friction_step", "joint": 1, "shape": [1.0], "coefficients": [1, 2], "covariance": np.eye(3)}
+    good["covariance"] = np.eye(3).tolist()
+    with pytest.raises(InputError, match="unknown effect"):
+        find_effect("pattern:nothing:0:even")
+    with pytest.raises(InputError, match="joint 7"):
+        read_extension({**good, "joint": 7}, arm)
+    with pytest.raises(InputError, match="coefficients"):
+        read_extension({**good, "coefficients": [1]}, arm)
+    with pytest.raises(InputError, match="finite"):
+        read_extension({**good, "coefficients": [1, float("inf")]}, arm)

@@ -1,0 +1,128 @@
+"""The next experiment: it must do what it predicts, and stay where the robot has been."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.limits import planned_problem
+from estimation.diagnosis.next_experiment import plan_next
+from estimation.diagnosis.next_experiment_motions import MADE, MAKERS, room_of
+from robots.loading import load_robot
+from robots.plants import Sensors
+from robots.regressor import default_model
+from robots.signals import Motion
+from robots.terms.effects import EFFECTS, EXPERIMENTS
+
+
+@dataclass(frozen=True)
+class Guess:
+    """An effect as a diagnosis leaves it."""
+
+    hypothesis: Hypothesis
+    shape: tuple[float, ...]
+    coefficients: np.ndarray
+
+
+@pytest.fixture(scope="module")
+def problem():
+    friction = np.zeros((6, 4))
+    friction[:, :2] = [[10, 15], [10, 15], [8, 12], [3, 4], [3, 4], [3, 4]]
+    robot = replace(load_robot("ur10"), friction=friction)
+    t = 0.008 * np.arange(3000)
+    random = np.random.default_rng(4)
+    w = 2 * np.pi * 0.1 * np.arange(1, 6)
+    size, phase = 0.5 * random.normal(size=(6, 5)) / np.arange(1, 6), random.uniform(0, 2 * np.pi, (6, 5))
+    angle = t[:, None, None] * w + phase
+    q = (size * np.sin(angle)).sum(axis=2)
+    dq, ddq = (size * w * np.cos(angle)).sum(axis=2), -(size * w**2 * np.sin(angle)).sum(axis=2)
+    model = default_model(robot, velocity_scale=2e-3)
+    return planned_problem(model, model.nominal, [Motion(t, q, dq, ddq)], noise=Sensors(torque_noise=0.025))
+
+
+def _guess(problem, name, joint, shape, share):
+    """An effect of the given share of the joint's torque, its columns alike."""
+    hypothesis = Hypothesis(EFFECTS[name], joint)
+    X = EFFECTS[name].columns(problem.situation, joint, shape)
+    row = (joint or 2) - 1
+    weights = 1 / np.sqrt(np.mean(X**2, axis=(0, 1)))
+    size = np.sqrt(np.mean((X[:, row] @ weights) ** 2))
+    return Guess(hypothesis, shape, weights * share * np.sqrt(np.mean(problem.recording.tau[:, row] ** 2)) / size)
+
+
+def test_every_kind_has_its_motions(problem):
+    """Each kind of experiment that an effect names can be made, and is described."""
+    assert set(MAKERS) == set(EXPERIMENTS)
+
+
+@pytest.mark.parametrize("kind", list(MAKERS))
+def test_motions_stay_where_the_robot_has_been(kind, problem):
+    """No motion leaves the positions of the logs or is much faster, and its derivatives are those of its positions."""
+    room = room_of(problem.situation.robot, problem.recording)
+    for stage in MAKERS[kind](room, 3, 1):
+        m = stage.motion
+        reach = room.upper - room.lower
+        assert (m.q >= room.lower - 1e-6 * reach).all()
+        assert (m.q <= room.upper + 1e-6 * reach).all()
+        assert (np.abs(m.dq) <= 1.05 * room.speed).all()  # sums of sines, and ramps of finite steps
+        assert (np.abs(m.ddq).max(axis=0) <= 1.5 * room.acceleration).all()
+        way = np.cumsum(m.dq[:-1] + m.dq[1:], axis=0) * room.step / 2
+        np.testing.assert_allclose(m.q[1:] - m.q[0], way, atol=5e-3 * reach.max())
+        assert stage.motion.duration > 1.0
+        if kind in MADE:
+            ends = m.dq[[0, -1]]
+            assert np.abs(ends).max() < 0.01 * room.speed.max()
+
+
+def test_a_payload_tells_a_torque_constant(problem):
+    """A wrong torque constant and a turned encoder are told apart by a known payload, as the literature has it."""
+    causes = [
+        _guess(problem, "torque_constant_error", 4, (), 0.02),
+        _guess(problem, "encoder_offset", 4, (), 0.02),
+    ]
+    plan = plan_next(problem, causes)
+    assert plan.kind == "payload"
+    assert plan.resolves > 0.9
+    assert plan.joint == 4
+    assert "torque constant error of joint 4" in plan.why
+    assert {p.kind for p in plan.ranking} == set(EXPERIMENTS)
+    assert max(p.resolves for p in plan.ranking if p.kind not in ("payload", "second_base_pose")) < 0.5
+
+
+def test_the_least_trouble_is_proposed_where_several_would_do(problem):
+    """Causes that any motion tells apart need only be repeated, not a payload or a tilted base."""
+    causes = [
+        _guess(problem, "stribeck", 4, (0.05, 1.0), 0.02),
+        _guess(problem, "presliding_hysteresis", 4, (0.003,), 0.02),
+    ]
+    assert plan_next(problem, causes).kind == "repeat"
+
+
+def test_one_cause_needs_no_experiment(problem):
+    """With a single cause left there is nothing to tell apart."""
+    assert plan_next(problem, [_guess(problem, "stribeck", 4, (0.05, 1.0), 0.02)]) is None
+
+
+def test_the_plan_is_plain_data(problem):
+    """The plan as data is what a diagnosis file holds."""
+    causes = [_guess(problem, "thermal_friction", 4, (20.0,), 0.01), _guess(problem, "friction_step", 4, (10.0,), 0.01)]
+    data = plan_next(problem, causes).to_dict()
+    assert {"kind", "why", "resolves"} <= set(data)
+    assert 0 <= data["resolves"] <= 1
+
+
+def test_limits_of_zero_are_no_limits(problem):
+    """A description that leaves its limits at zero, and a joint that rested, still get their motions."""
+    robot = problem.situation.robot
+    zero = replace(robot, limits=replace(robot.limits, velocity=np.zeros(6)))
+    q = problem.recording.q.copy()
+    q[:, 2] = 0.3
+    still = replace(problem.recording, q=q, dq=np.where(np.arange(6) == 2, 0.0, problem.recording.dq))
+    room = room_of(zero, still)
+    assert (np.delete(room.speed, 2) > 0).all()
+    for make in MAKERS.values():
+        for stage in make(room, 2, 0):
+            assert np.isfinite(stage.motion.q).all()

@@ -1,0 +1,130 @@
+"""Specification of the noise model, of the band that is kept, and of rows whose direction of motion is unknown."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from estimation.diagnosis.states import Recording
+from estimation.diagnosis.whitening import (
+    Band,
+    estimate_whitening,
+    find_gaps,
+    orthonormal,
+    period_differences,
+    period_mean,
+)
+
+STEP = 0.004
+
+
+def _recording(rows: int = 10_000, n: int = 2, unsure: np.ndarray | None = None) -> Recording:
+    zero = np.zeros((rows, n))
+    return Recording(
+        t=STEP * np.arange(rows),
+        starts=(0,),
+        q=zero,
+        dq=zero,
+        ddq=zero,
+        tau=zero,
+        step=STEP,
+        cycles=(None,),
+        cutoff=50.0,
+        floor=np.full(n, 1e-20),
+        unsure=np.zeros((rows, n), dtype=bool) if unsure is None else unsure,
+        names=("log",),
+    )
+
+
+def _noise(rows: int, seed: int = 0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    white = rng.standard_normal((rows, 2))
+    coloured = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], rng.standard_normal((rows, 2)), axis=0)
+    mixed = (white + coloured) * [2.0, 0.5]
+    mixed[:, 1] += 0.1 * mixed[:, 0]
+    return mixed
+
+
+def test_coloured_noise_becomes_white_and_of_unit_density_in_the_band() -> None:
+    """Half AR(1), half white noise has the same power at all frequencies that the band passes, one per row.
+
+    Each of five stretches of the band holds some 700 frequencies: the standard error of its mean power is 4 %.
+    """
+    residual = _noise(10_000)
+    whitening = estimate_whitening(_recording(), residual, 0, np.ones(2))
+    white = whitening.all(residual)[50:]
+    power = np.abs(np.fft.rfft(white, axis=0)) ** 2 / len(white)
+    f = np.fft.rfftfreq(len(white), STEP * whitening.band.stride)
+    edges = np.linspace(0.5, 0.75 * whitening.band.cutoff, 6)
+    for low, high in pairwise(edges):
+        assert power[(f >= low) & (f < high)].mean(axis=0) == pytest.approx([1.0, 1.0], abs=0.2)
+    correlation = np.linalg.inv(whitening.precision)
+    assert correlation[0, 1] == pytest.approx(np.corrcoef(white.T)[0, 1], abs=0.04)
+
+
+def test_the_band_passes_slow_signals_and_stops_fast_ones() -> None:
+    """Below three quarters of the cut-off a signal comes through unchanged, above 1.1 times it is gone."""
+    whitening = estimate_whitening(_recording(), _noise(10_000), 0, np.ones(2))
+    band = whitening.band
+    t = STEP * np.arange(10_000)
+    for frequency, factor in ((0.7 * band.cutoff, 1.0), (1.15 * band.cutoff, 0.0)):
+        wave = np.sin(2 * np.pi * frequency * t)
+        passed = band.passed(wave)[50:-50]
+        # The Kaiser window of shape 6 leaves ripples of 63 dB.
+        assert np.abs(passed - factor * wave[:: band.stride][50:-50]).max() < 2e-3
+
+
+def test_rows_of_unknown_direction_do_not_count() -> None:
+    """A torque of any size within a short gap leaves no trace behind the whitening."""
+    unsure = np.zeros((10_000, 2), dtype=bool)
+    unsure[3000:3006, 0] = True
+    recording = _recording(unsure=unsure)
+    whitening = replace(estimate_whitening(recording, _noise(10_000), 0, np.ones(2)), weights=None)
+    kick = np.zeros(10_000)
+    kick[3001:3005] = 1000.0
+    plain = replace(whitening, gaps=find_gaps(np.zeros_like(unsure), (0,)))
+    assert np.linalg.norm(whitening.apply(kick, 0)) < 0.05 * np.linalg.norm(plain.apply(kick, 0))
+    assert np.linalg.norm(whitening.apply(kick, 1)) == pytest.approx(np.linalg.norm(plain.apply(kick, 1)))
+
+
+def test_a_long_gap_is_bridged_within_its_log() -> None:
+    """A joint at rest is bridged by a straight line; at the end of a log the last known value stands."""
+    unsure = np.zeros((100, 1), dtype=bool)
+    unsure[20:30], unsure[45:50] = True, True
+    gaps = find_gaps(unsure, (0, 50), 3)
+    series = np.arange(100.0)
+    bent = series.copy()
+    bent[20:30], bent[45:50] = 7.0, 7.0
+    bridged = gaps.bridged(bent, 0)
+    assert bridged[20:30] == pytest.approx(series[20:30])
+    assert bridged[45:50] == pytest.approx(44.0)
+    assert bridged[50] == 50.0
+
+
+def test_differences_between_repetitions_hold_the_noise_and_nothing_that_repeats() -> None:
+    """The variance of the differences is that of the noise, whatever repeats; the mean is what repeats."""
+    rng = np.random.default_rng(0)
+    wave = np.tile(100 * rng.standard_normal((250, 1)), (8, 1))
+    series = wave + rng.standard_normal(wave.shape)
+    differences = period_differences(series, 250.0, 8)
+    # 1,750 degrees of freedom: a standard error of 1.7 % of the deviation.
+    assert differences.std() == pytest.approx(1.0, abs=0.07)
+    assert np.abs(period_mean(series, 250.0, 8) - wave).max() < 5 / np.sqrt(8)
+
+
+def test_an_orthonormal_basis_leaves_out_what_is_not_determined() -> None:
+    """Of two equal columns one direction is kept."""
+    x = np.random.default_rng(0).standard_normal((50, 2))
+    basis = orthonormal(np.column_stack([x, x[:, :1]]), 1e-7)
+    assert basis.shape == (50, 2)
+    assert basis.T @ basis == pytest.approx(np.eye(2), abs=1e-12)
+
+
+def test_a_band_without_filter_only_thins() -> None:
+    """Without taps every stride-th row is kept as it is."""
+    series = np.arange(10.0)
+    assert Band(np.zeros(0), 2, 1.0).passed(series) == pytest.approx(series[::2])

@@ -1,0 +1,209 @@
+"""Effects through the rigid body, against pinocchio's torque of the changed robot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from robots.geometry.chain import Chain
+from robots.robot import Robot
+from robots.terms.effects import EFFECTS, situation
+from robots.terms.effects.base_tilt import level_axes
+from robots.terms.effects.joint_elasticity import followed, link_torque, rotor_inertia
+
+STEP = 1e-5
+SOME = slice(100, 1400, 65)
+
+
+@pytest.fixture(params=[1, 3, 6])
+def now(request, seen):
+    return seen(5, seed=request.param)
+
+
+def _slope(torque, now, direction):
+    """The central difference of pinocchio's torque along a change of q, dq and ddq, at some samples."""
+    state = (now.q[SOME], now.dq[SOME], now.ddq[SOME])
+    plus = torque(*(s + STEP * d for s, d in zip(state, direction, strict=True)))
+    minus = torque(*(s - STEP * d for s, d in zip(state, direction, strict=True)))
+    return (plus - minus) / (2 * STEP)
+
+
+@pytest.fixture
+def torque(now, twin):
+    return lambda q, dq, ddq: twin(now.robot).torque(q, dq, ddq, now.robot.inertia)
+
+
+def test_an_encoder_offset_moves_the_joint(now, torque):
+    """An offset changes all torques as a joint that stands further does."""
+    for joint in range(1, 6):
+        step = np.eye(5)[joint - 1]
+        expected = _slope(torque, now, (step, 0.0, 0.0))
+        X = EFFECTS["encoder_offset"].columns(now, joint)
+        np.testing.assert_allclose(X[SOME, :, 0], expected, rtol=1e-5, atol=1e-5)  # the difference's own error
+
+
+def test_an_elastic_gear_lets_its_link_lag(now, torque):
+    """A stiff gear changes all torques as a link does that lags by its load, with its velocity and acceleration."""
+    for joint in (1, 3, 5):
+        spline = CubicSpline(now.t, link_torque(now, joint))
+        step = -np.eye(5)[joint - 1]
+        change = [spline(now.t[SOME], order)[:, None] * step for order in range(3)]
+        # Large lags (c = 1) would leave the difference's range: it is scaled to the largest.
+        size = max(float(np.abs(part).max()) for part in change)
+        expected = _slope(torque, now, [part / size for part in change]) * size
+        X = EFFECTS["joint_elasticity"].columns(now, joint, (1000.0,))[SOME, :, 0]
+        # A spline's second derivative is of second order: (2 pi 4 Hz 4 ms)^2 / 12 at the motion's fastest products.
+        assert np.abs(X - expected).max() < 2e-3 * np.abs(expected).max()
+
+
+def test_a_tilted_base_turns_gravity(now, twin):
+    """A small tilt changes the torques as gravity from another direction does."""
+    X = EFFECTS["base_tilt"].columns(now, None)
+    axes = level_axes(np.array(now.robot.chain.gravity))
+    np.testing.assert_allclose(axes @ axes.T, np.eye(2), atol=1e-12)
+    for k, axis in enumerate(axes):
+        torques = []
+        for sign in (1, -1):
+            # Seen from a base that turned by +angle, gravity turned by -angle.
+            gravity = Rotation.from_rotvec(np.array(-sign * STEP * axis)).apply(np.array(now.robot.chain.gravity))
+            tilted = Robot(
+                name="tilted",
+                chain=Chain(now.robot.chain.joints, gravity=gravity),
+                limits=now.robot.limits,
+                inertia=now.robot.inertia,
+            )
+            torques.append(twin(tilted).torque(now.q[SOME], now.dq[SOME], now.ddq[SOME], now.robot.inertia))
+        expected = (torques[0] - torques[1]) / (2 * STEP)
+        np.testing.assert_allclose(X[SOME, :, k], expected, rtol=1e-5, atol=1e-5)
+
+
+def test_level_axes_are_x_and_y_of_an_upright_robot():
+    """Where gravity is along z, the tilts are about x and y."""
+    np.testing.assert_array_equal(level_axes(np.array([0.0, 0.0, -9.81])), [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+
+def test_a_payload_is_a_body_on_the_flange(now, twin, catalogue_robot, seen):
+    """A body's mass, moments and inertia change the torques as a heavier link does; its products are left out."""
+    pin = pytest.importorskip("pinocchio")
+    ours = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]  # pinocchio lists Iyy before Ixz
+    for robot in (now.robot, catalogue_robot("ur10")):
+        seen_by = seen(robot=robot)
+        body = pin.Inertia(2.0, np.array([0.03, -0.05, 0.12]), np.diag([0.02, 0.03, 0.025]))
+        heavier = np.array(robot.inertia)
+        on_link = pin.SE3(np.array(robot.chain.tip)).act(body)
+        heavier[-1] += on_link.toDynamicParameters()[ours]
+        states = (seen_by.q[SOME], seen_by.dq[SOME], seen_by.ddq[SOME])
+        expected = twin(robot).torque(*states, heavier) - twin(robot).torque(*states, robot.inertia)
+        tool = seen_by.sensitivity("tool")
+        got = tool[SOME] @ body.toDynamicParameters()[ours]
+        np.testing.assert_allclose(got, expected, atol=1e-9 * np.abs(expected).max())
+        X = EFFECTS["payload_change"].columns(seen_by, None, (3.0,))
+        np.testing.assert_array_equal(
+            X, np.where(seen_by.t[:, None, None] >= 3.0, tool[:, :, [0, 1, 2, 3, 4, 7, 9]], 0.0)
+        )
+
+
+def test_a_push_anywhere_is_felt_by_each_joint(now, twin):
+    """A force on the flange during a push of a third of a second is a pulse on each joint, to some per cent."""
+    pin = pytest.importorskip("pinocchio")
+    model = twin(now.robot).model
+    data = model.createData()
+    shape = (2.0, 0.3)
+    during = np.flatnonzero((now.t > 2.0) & (now.t < 2.3))
+    torque = np.zeros_like(now.q)
+    for i in during:
+        jacobian = pin.computeJointJacobian(model, data, now.q[i], 5)
+        wrench = np.array([30.0, -10.0, 20.0, 0.0, 0.0, 0.0]) * np.sin(np.pi * (now.t[i] - 2.0) / 0.3)
+        torque[i] = jacobian.T @ wrench
+    X = EFFECTS["external_contact"].columns(now, None, shape)
+    assert not X[now.t >= 2.3].any()
+    flat = X.reshape(-1, 5)
+    left = torque.reshape(-1) - flat @ np.linalg.lstsq(flat, torque.reshape(-1), rcond=None)[0]
+    # The pulse lies between a half sine and a hold: 2 % of a half sine's energy, and what the pose changes.
+    assert np.sum(left**2) < 0.1 * np.sum(torque**2)
+
+
+def test_a_search_for_pushes_finds_the_moment(now):
+    """Ranked by what a constant explains, the windows of a push come first, in noise twice its size."""
+    X = EFFECTS["external_contact"].columns(now, None, (3.1, 0.8))
+    torque = X @ np.array([20.0, 30.0, -10.0, 5.0, 5.0])
+    noise = np.random.default_rng(1).normal(size=torque.shape) * 2 * np.sqrt(np.mean(torque**2, axis=0))
+    start, duration = EFFECTS["external_contact"].propose(now, None, torque + noise, 3)[0]
+    assert abs(start + duration / 2 - 3.5) < 0.4
+
+
+def test_a_hand_takes_what_motion_needs(seen, twin):
+    """A hand that guides the robot through a log leaves the drives what gravity needs, by pinocchio, and offsets."""
+    t = np.concatenate([0.004 * np.arange(700), 60 + 0.004 * np.arange(800)])
+    now = seen(times=t, starts=(0, 700))
+    guiding = EFFECTS["hand_guiding"]
+    window = next(point for point in guiding.grid(now, None) if point[0] > 50)
+    X = guiding.columns(now, None, window)
+    assert not X[:700].any()
+    f1, f2 = np.array(now.robot.friction)[:, :2].T
+    taken = X @ np.column_stack([-f1, -f2, np.ones(now.robot.n)]).reshape(-1)
+    state, rest = (now.q[700:], now.dq[700:]), np.zeros_like(now.q[700:])
+    moving = twin(now.robot).torque(*state, now.ddq[700:], now.robot.inertia)
+    moving -= twin(now.robot).torque(now.q[700:], rest, rest, now.robot.inertia)
+    moving += np.array(now.robot.rotor_inertia) * now.ddq[700:]
+    expected = -moving - f1 * np.sign(now.dq[700:]) - f2 * now.dq[700:]
+    np.testing.assert_allclose(taken[700:], expected, atol=1e-9 * np.abs(now.rigid).max())
+
+
+def test_a_hand_on_the_only_log_shows_nowhere(seen):
+    """Where there is one log, a hand that guides the robot all through it is what the model was fitted to."""
+    assert EFFECTS["hand_guiding"].grid(seen(), None) == ()
+
+
+def test_a_loose_gear_lets_its_link_cross(seen):
+    """Where the load changes sign the link crosses the play, over the time that the growing load needs for it."""
+    now = seen(5, seed=1)
+    loads = [link_torque(now, joint) for joint in range(1, 6)]
+    joint = 1 + int(np.argmax([np.count_nonzero(np.diff(np.sign(load))) for load in loads]))
+    load = loads[joint - 1]
+    inertia = now.sensitivity("inertia")[:, joint - 1, joint - 1]
+    i = int(np.flatnonzero(np.diff(np.sign(load)))[0])
+    quickness = abs(load[i + 1] - load[i]) / 0.004 / inertia[i]
+    gap = 0.05**3 * quickness / 6  # crossed in 50 ms
+    X = EFFECTS["backlash"].columns(now, joint, (gap,))[:, joint - 1, 0]
+    start = now.t[i] - load[i] / (load[i + 1] - load[i]) * 0.004
+    s = (now.t - start) / 0.05
+    during = (s > 0) & (s < 1)
+    expected = -2 * np.sign(load[i + 1]) * inertia * (60 * s - 180 * s**2 + 120 * s**3) / 0.05**2
+    # The lag's own torque, through d rigid/dq, is small beside what its acceleration takes.
+    assert np.abs(X[during] - expected[during]).max() < 0.1 * np.abs(expected[during]).max()
+
+
+def test_a_rotor_within_its_link_is_told_from_it(seen):
+    """Where one base parameter holds rotor and link, the gear's load is without the rotor that the maker describes."""
+    now = seen(4, seed=1)
+    rotor = float(now.robot.rotor_inertia[0])
+    names = list(now.model.names)
+    parameters = now.parameters.copy()
+    parameters[names.index("Im_1")] = 0.0
+    merged = situation(now.model, parameters, now.t, now.q, now.dq, now.ddq)
+    # As a fit does, the link's own torque takes the rotor's on.
+    merged = replace(merged, rigid=merged.rigid + np.outer(now.ddq[:, 0], np.eye(4)[0] * rotor))
+    np.testing.assert_allclose(link_torque(merged, 1), link_torque(now, 1), atol=1e-9)
+    assert rotor_inertia(now, 1) == (rotor, 0.0)
+    assert rotor_inertia(merged, 1) == (0.0, rotor)
+
+
+def test_a_soft_gear_keeps_its_link_behind(seen):
+    """The link's load is that of a mass behind a spring, by an integrator of scipy."""
+    now = seen(2, seed=2)
+    load = np.sin(9.0 * now.t) + 0.3 * np.sin(31.0 * now.t)
+    w = 2 * np.pi * 8.0
+
+    def rate(t, state):
+        drive = np.sin(9.0 * t) + 0.3 * np.sin(31.0 * t)
+        return [state[1], w**2 * (drive - state[0]) - 2 * 0.05 * w * state[1]]
+
+    exact = solve_ivp(rate, (0, now.t[-1]), [0.0, 0.0], t_eval=now.t, rtol=1e-8, max_step=0.01).y[0]
+    # The bilinear rule bends frequencies: at 31 rad/s of 4 ms by 0.1 %, near a resonance that answers a hundredfold.
+    np.testing.assert_allclose(followed(now, load, 8.0), exact, atol=0.05)

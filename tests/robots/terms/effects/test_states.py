@@ -1,0 +1,127 @@
+"""Effects with a memory, against integrators of scipy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from robots.terms.effects import EFFECTS
+from robots.terms.effects.states import bristle, change_times
+from robots.terms.effects.thermal_friction import heat
+
+
+@pytest.mark.parametrize("travel", [0.02, 2e-4])
+def test_the_bristle_follows_dahls_equation(travel):
+    """The bristle's deflection is that of Dahl's equation through reversals, even within a sample's travel."""
+    T = 4.0
+    t = np.linspace(0, T, 1001)
+
+    def speed(t):
+        return 0.05 * 2 * np.pi * np.cos(2 * np.pi * t) + 0.03 * 6.4 * np.pi * np.cos(6.4 * np.pi * t)
+
+    q = 0.05 * np.sin(2 * np.pi * t) + 0.03 * np.sin(6.4 * np.pi * t)
+    rate = lambda t, z: (speed(t) - abs(speed(t)) * z) / travel  # noqa: E731
+    exact = solve_ivp(rate, (0, T), [1.0], t_eval=t, rtol=1e-8, atol=1e-9, max_step=2e-3).y[0]
+    got = bristle(t, q, speed(t), (slice(0, len(q)),), travel)
+    # Where it turns is known to the third order of 4 ms at 20 rad/s2: some 1e-6 rad, of the travel.
+    np.testing.assert_allclose(got, exact, atol=2e-3 if travel > 1e-3 else 3e-2)
+
+
+def test_a_joint_that_rests_keeps_its_bristle():
+    """At rest the bristle stays as it is, and a log at rest begins with an unstrained one."""
+    t = 0.01 * np.arange(120)
+    dq = np.concatenate([[0.0], np.full(49, 0.2), np.zeros(30), np.full(40, -0.1)])
+    q = np.concatenate([[0.0], np.cumsum(dq[1:]) * 0.01])
+    z = bristle(t, q, dq, (slice(0, len(q)),), 0.01)
+    assert z[0] == 0.0
+    np.testing.assert_allclose(z[49:80], z[49])
+    assert z[-1] == pytest.approx(-1.0, abs=0.04)  # 2 e^-4 of a whole turn-round
+    assert not bristle(t, q, 0 * dq, (slice(0, len(q)),), 0.01).any()
+
+
+@pytest.mark.parametrize("time_constant", [5.0, 60.0])
+def test_heat_is_kept_and_lost(seen, time_constant):
+    """The heat follows dx/dt = P - x / T, through an uneven log and the pause between two."""
+    random = np.random.default_rng(0)
+    even = 0.004 * np.arange(1500)
+    uneven = 20 + np.cumsum(random.uniform(0.002, 0.006, 1200))
+    now = seen(times=np.concatenate([even, uneven]), starts=(0, 1500))
+    power = np.maximum(now.friction[:, 1] * now.dq[:, 1], 0) / 1000
+
+    def integrate(t, p, start):
+        rate = lambda s, x: np.interp(s, t, p) - x / time_constant  # noqa: E731
+        return solve_ivp(rate, (t[0], t[-1]), [start], t_eval=t, rtol=1e-8, max_step=0.05).y[0]
+
+    first = integrate(even, power[:1500], 0.0)
+    cooled = first[-1] * np.exp(-(uneven[0] - even[-1]) / time_constant)
+    second = integrate(uneven, power[1500:], cooled)
+    got = heat(now, 2, time_constant)
+    # The uneven log is interpolated to an even one, by its own spacing.
+    np.testing.assert_allclose(got, np.concatenate([first, second]), atol=1e-3 * first.max())
+
+
+def test_change_times_cover_the_data_and_its_pauses(seen):
+    """A change is looked for all through the data, and in each pause between logs."""
+    t = np.concatenate([0.004 * np.arange(700), 60 + 0.004 * np.arange(800)])
+    now = seen(times=t, starts=(0, 700))
+    times = np.array(change_times(now))
+    assert 60.0 in times
+    assert times.min() > 0
+    assert times.max() < t[-1]
+    samples = np.searchsorted(t, times)
+    assert np.diff(np.concatenate([[0], samples, [len(t)]])).max() <= 1500 / 24 + 1
+
+
+def test_a_friction_step_begins_at_its_time(seen):
+    """A step leaves what was before it alone."""
+    now = seen()
+    X = EFFECTS["friction_step"].columns(now, 2, (2.5,))
+    before = now.t < 2.5
+    assert not X[before].any()
+    np.testing.assert_array_equal(X[~before, 1, 1], now.dq[~before, 1])
+
+
+def test_flat_tops_are_flagged(seen):
+    """Samples at a torque that is cut off are flagged, and noise that reaches its largest once is not."""
+    now = seen()
+    clipping = EFFECTS["current_clipping"]
+    torque = now.torque + np.random.default_rng(0).normal(size=now.torque.shape)
+    assert not clipping.gate(now, 2, torque).any()
+    level = float(np.quantile(np.abs(torque[:, 1]), 0.9))
+    cut = torque.copy()
+    cut[:, 1] = np.clip(cut[:, 1], -level, level)
+    flagged = clipping.gate(now, 2, cut)
+    assert not flagged[:, [0, 2, 3]].any()
+    assert not flagged[np.abs(torque[:, 1]) < 0.999 * level, 1].any()
+    assert flagged[:, 1].sum() > 0.7 * np.sum(np.abs(torque[:, 1]) > level)  # all but tops of one or two samples
+
+
+@pytest.mark.parametrize(("delay", "sharp"), [(0.003, 0.2), (0.003, 2e-3), (0.0003, 2e-3), (-0.001, 2e-3)])
+def test_a_delayed_torque_is_the_one_before(seen, motion, delay, sharp):
+    """A delay changes the torque as taking it a moment earlier does, also where friction turns round in a sample."""
+    now = seen(velocity_scale=sharp)
+    X = EFFECTS["time_delay"].columns(now, None, (delay,))[:, :, 0]
+    early = seen(velocity_scale=sharp, times=now.t - delay)
+    change = early.torque - now.torque
+    error = delay * X - change
+    assert np.sqrt(np.mean(error[2:-2] ** 2)) < 0.05 * np.sqrt(np.mean(change**2))  # the second order of the delay
+
+
+def test_a_zero_that_wanders_is_followed(seen):
+    """Drifts of each stretch add up to straight lines between knots, constant after the last."""
+    now = seen()
+    duration = float(now.t[-1])
+    X = EFFECTS["torque_sensor_drift"].local(now, 1, (0.0, duration / 4))
+    steps = np.array([1.0, -2.0, 0.5, 3.0, 9.0, 9.0, 9.0, 9.0])
+    knots = np.linspace(0, duration, 5)
+    np.testing.assert_allclose(X @ steps, np.interp(now.t, knots, [0, 1, -1, -0.5, 2.5]), atol=1e-9)
+
+
+def test_the_documentation_lists_every_effect():
+    """The page of the diagnosis names each effect of the catalogue."""
+    text = (Path(__file__).parents[4] / "docs" / "diagnosis.md").read_text()
+    missing = [name for name in EFFECTS if f"`{name}`" not in text]
+    assert not missing

@@ -1,0 +1,56 @@
+"""Ripple, and the spectrum over the angle that finds its order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robots.terms.effects import EFFECTS, situation
+from robots.terms.effects.torque_ripple import angle_spectrum
+
+RIPPLE = EFFECTS["torque_ripple"]
+
+
+def test_the_spectrum_is_the_sum_over_the_angle(seen):
+    """Binned and transformed at once, the spectrum equals the sum of cosines and sines."""
+    q = seen().q[:, 1]
+    values = np.random.default_rng(0).normal(size=len(q))
+    orders = np.linspace(3, 60, 40)
+    exact = np.array([abs(np.sum(values * np.exp(-1j * h * q))) ** 2 for h in orders])
+    # Bins of an eighth of a period, and interpolation in a spectrum four times as fine as its resolution.
+    np.testing.assert_allclose(angle_spectrum(q, values, orders), exact, atol=0.12 * exact.max())
+
+
+@pytest.mark.parametrize("order", [4.0, 17.3, 60.0])
+def test_an_unknown_order_is_found(seen, order):
+    """Of all resolvable orders, a hidden one is proposed first, to its resolution, in noise as large as it is."""
+    now = seen(2, seed=2)
+    joint = 1 + int(np.argmax(np.ptp(now.q, axis=0)))
+    q = now.q[:, joint - 1]
+    residual = np.random.default_rng(1).normal(size=now.q.shape)
+    residual[:, joint - 1] += np.cos(order * q + 0.7)
+    found = RIPPLE.propose(now, joint, residual, 8)
+    assert min(abs(point[0] - order) for point in found[:3]) <= np.pi / np.ptp(q)
+
+
+def test_a_known_gear_gives_its_orders(random_robot, seen):
+    """Once, twice and four times a motor turn are on the grid, where the samples resolve them."""
+    robot = replace(random_robot(3, 4), gear_ratio=np.full(4, 30.0))
+    now = seen(robot=robot)
+    assert {30.0, 60.0, 120.0} <= {order for (order,) in RIPPLE.grid(now, 2)}
+
+
+def test_an_order_too_fast_for_the_samples_is_left_out(seen):
+    """An order that passes between two samples is not looked for."""
+    slow = seen()
+    fast = situation(slow.model, slow.parameters, 10 * slow.t, slow.q, 20 * slow.dq, slow.ddq)
+    assert RIPPLE.bounds(fast, 2)[0][1] < RIPPLE.bounds(slow, 2)[0][1] <= 1000
+
+
+def test_a_joint_that_does_not_move_has_no_order(seen):
+    """A joint at rest shows no ripple: there is nothing to scan."""
+    now = seen()
+    still = situation(now.model, now.parameters, now.t, 0 * now.q, 0 * now.dq, 0 * now.ddq)
+    assert RIPPLE.grid(still, 2) == ()

@@ -1,0 +1,234 @@
+"""Cases drawn from one seed: a robot, its motions, and effects hidden in its logs at a stated visible size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from tests.truth.dynamics import Projection, base_regressor
+from tests.truth.effects import KNOWN, STRANGERS, Effect
+from tests.truth.machines import KINDS, Machine, draw_machine
+from tests.truth.noise import Noise, draw_noise
+from tests.truth.plant import Record, open_loop, parts_links, play, projection_of
+from tests.truth.references import Reference, draw_aperiodic, draw_periodic
+
+SEARCH_STEP = 0.008
+SEARCHES = 12
+CLOSE = 0.02
+AGREED = 0.1
+ROUNDS = 5
+TOO_FAINT = 1.4
+
+
+class Hidden(Exception):
+    """An effect that cannot reach the wanted visible size with plausible values."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """One blind case: what happened, and what the logs of it are."""
+
+    seed: int
+    machine: Machine
+    noise: Noise
+    references: tuple[Reference, ...]
+    training: int
+    effects: tuple[Effect, ...]
+    size: float
+    records: tuple[Record, ...]
+
+    @property
+    def logs(self) -> tuple[Record, ...]:
+        """Logs to diagnose."""
+        return self.records[: self.training]
+
+    @property
+    def unseen(self) -> tuple[Record, ...]:
+        """Logs of other motions, to measure a gain on."""
+        return self.records[self.training :]
+
+    def visible(self) -> list[float]:
+        """The share of its torque's RMS that each effect shows beyond the base model, in the logs as they became."""
+        level = self.level()
+        every = 2
+        stack = [np.concatenate([getattr(r, key)[::every] for r in self.logs]) for key in _MOTION]
+        projection = Projection(base_regressor(self.machine.known, *stack), level)
+        parts = [np.concatenate([r.parts[k][::every] for r in self.logs]) for k in range(len(self.effects))]
+        return [float(projection.visible(part).max()) for part in parts]
+
+    def level(self) -> np.ndarray:
+        """RMS of each joint's torque (n,) without noise."""
+        return np.sqrt(np.concatenate([r.clean for r in self.logs]).__pow__(2).mean(axis=0))
+
+    def oracle_gain(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean squared errors (n,) on the unseen logs of the base model, and of it with the effects' own torques.
+
+        Both are least squares on the logs, with the motion as it was and each effect's own torque as one column.
+        """
+        level = self.level()
+        errors = []
+        for columns in (False, True):
+            Y, y, parts = self._stack(self.logs, columns)
+            if columns:
+                Y = np.concatenate([Y, parts], axis=2)
+            fit = Projection(Y, level).fit(y)
+            Y, y, parts = self._stack(self.unseen, columns)
+            if columns:
+                Y = np.concatenate([Y, parts], axis=2)
+            errors.append(((y - Y @ fit) ** 2).mean(axis=0))
+        return errors[0], errors[1]
+
+    def _stack(self, records: Sequence[Record], parts: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+        every = 2
+        stack = [np.concatenate([getattr(r, key)[::every] for r in records]) for key in _MOTION]
+        Y = base_regressor(self.machine.known, *stack)
+        y = np.concatenate([r.tau[::every] for r in records])
+        if not parts:
+            return Y, y, None
+        own = [np.concatenate([r.parts[k][::every] for r in records]) for k in range(len(self.effects))]
+        return Y, y, np.stack(own, axis=2)
+
+
+_MOTION = ("q_true", "v_true", "a_true", "sign")
+
+
+def draw_case(
+    seed: int,
+    *,
+    hide: Sequence[type[Effect]] | int | str = 0,
+    size: float = 0.01,
+    kind: str | None = None,
+    joint: int | None = None,
+    periodic: bool | None = None,
+    duration: float = 60.0,
+    unseen: float = 30.0,
+    noise_level: float = 0.025,
+    stream: int = 0,
+) -> Case:
+    """Draws a case.
+
+    Args:
+        seed: everything follows from it.
+        hide: classes of effects to hide, or how many of the known ones to draw, or "stranger".
+        size: visible size of each, as a share of its joint's torque RMS.
+        kind: robot; drawn where None.
+        joint: joint of the (first) effect; drawn where None.
+        periodic: kind of motion; drawn where None.
+        duration: length of the log [s].
+        unseen: length of the log of another motion [s]; 0 for none.
+        noise_level: torque noise, as a share of the torque's RMS.
+        stream: another case of the same seed.
+
+    Raises:
+        Hidden: when no effect that is asked for can reach the size.
+    """
+    rng = np.random.default_rng([seed, stream] if stream else seed)
+    machine = draw_machine(kind or KINDS[int(rng.integers(len(KINDS)))], rng)
+    periodic = bool(rng.random() < 0.5) if periodic is None else periodic
+    references = [_reference(machine, rng, periodic, length) for length in (duration, unseen) if length > 0]
+    base = open_loop(machine, references[:1], [], step=SEARCH_STEP)
+    level = np.sqrt((base.base_torque() ** 2).mean(axis=0))
+    projection = projection_of(base, level)
+
+    def sized(choice: type[Effect], where: int | None, tries: int) -> Effect | None:
+        for _ in range(tries):
+            joints = choice.joints(machine)
+            place = where if where is not None else joints[int(rng.integers(len(joints)))]
+            drawn = choice.draw(machine, rng, place, duration)
+            amount = _amount(machine, references[:1], drawn, size, level, projection)
+            if amount is not None:
+                return drawn.of(amount)
+        return None
+
+    effects: list[Effect] = []
+    if isinstance(hide, (int, str)):
+        pool = STRANGERS if hide == "stranger" else KNOWN
+        for _ in range(60):
+            if len(effects) == (1 if hide == "stranger" else hide):
+                break
+            found = sized(pool[int(rng.integers(len(pool)))], joint, 1)
+            if found is not None and all((e.name, e.joint) != (found.name, found.joint) for e in effects):
+                effects.append(found)
+    else:
+        for choice in hide:
+            found = sized(choice, joint if not effects else None, 12)
+            if found is None:
+                raise Hidden(f"{choice.__name__} cannot reach {size}")
+            effects.append(found)
+    noise = draw_noise(machine.n, machine.gear, rng, level=noise_level)
+    for _ in range(ROUNDS):
+        case = Case(
+            seed=seed,
+            machine=machine,
+            noise=noise,
+            references=tuple(references),
+            training=1,
+            effects=tuple(effects),
+            size=size,
+            records=tuple(play(machine, references, effects, noise, np.random.default_rng([seed, 1]))),
+        )
+        # A closed loop moves more sharply than its reference, which some effects show more in.
+        ratios = [size / share for share in case.visible()]
+        if all(abs(ratio - 1) < AGREED for ratio in ratios):
+            return case
+        effects = [
+            effect.of(float(np.clip(effect.amount * ratio ** (1 / effect.power), effect.smallest, effect.largest)))
+            for effect, ratio in zip(effects, ratios, strict=True)
+        ]
+    if max(ratios) > TOO_FAINT:
+        raise Hidden(f"{effects[int(np.argmax(ratios))].name} shows {size / max(ratios):.2g} at most")
+    return case
+
+
+def write_log(record: Record, path: Path) -> None:
+    """Writes what a user has: t, q and tau as CSV."""
+    n = record.q.shape[1]
+    header = ",".join(["t", *(f"q{j + 1}" for j in range(n)), *(f"tau{j + 1}" for j in range(n))])
+    table = np.column_stack([record.t, record.q, record.tau])
+    np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.9g")
+
+
+def _reference(machine: Machine, rng: np.random.Generator, periodic: bool, duration: float) -> Reference:
+    if not periodic:
+        return draw_aperiodic(machine, rng, duration=duration)
+    period = 10.0 if duration >= 20.0 else duration / 2
+    return draw_periodic(machine, rng, period=period, cycles=max(round(duration / period), 1))
+
+
+def _amount(
+    machine: Machine,
+    references: Sequence[Reference],
+    effect: Effect,
+    size: float,
+    level: np.ndarray,
+    projection: Projection,
+) -> float | None:
+    """Finds the amount that shows the wanted size, by secants in the logarithms; None beyond the plausible.
+
+    An effect on one joint must show on that joint.
+    """
+    row = level[effect.joint - 1] if effect.joint else level.max()
+    amount = 0.02 * row if np.isinf(effect.largest) else 0.01 * effect.largest
+    tried: list[tuple[float, float]] = []
+    for _ in range(SEARCHES):
+        ride = open_loop(machine, references, [effect.of(amount)], step=SEARCH_STEP)
+        shown = projection.visible(ride.parts[0])
+        share = float(shown.max())
+        if abs(share / size - 1) < CLOSE:
+            return amount
+        if share <= 0 or (share < size and amount >= effect.largest):
+            # The closed loop moves more sharply, and shows more of a gear that gives way.
+            return amount if parts_links(effect) and share > size / 5 else None
+        tried.append((np.log(amount), np.log(share)))
+        power = effect.power
+        for (x0, y0), (x1, y1) in pairwise(tried[-2:]):
+            power = float(np.clip((y1 - y0) / (x1 - x0), 0.3, 3.0)) if x1 != x0 else power
+        if share > size and amount <= effect.smallest:
+            return None
+        step = float(np.clip((size / share) ** (1 / power), 0.02, 50.0))
+        amount = float(np.clip(amount * step, effect.smallest, effect.largest))
+    return None

@@ -1,0 +1,45 @@
+"""Effects of the truth, by the names of the vocabulary."""
+
+from __future__ import annotations
+
+from tests.truth.effects.actuator import Clipping, Delay, Drift, EncoderOffset, Saturation, TorqueConstant
+from tests.truth.effects.base import Effect
+from tests.truth.effects.friction import (
+    Asymmetric,
+    FrictionStep,
+    LoadDependent,
+    LuGre,
+    PositionDependent,
+    Stribeck,
+    Warming,
+)
+from tests.truth.effects.strangers import CrossWave, FloorVibration, Interpolation, Slosh, TiredCable
+from tests.truth.effects.surroundings import Contact, Payload, Tilt
+from tests.truth.effects.transmission import Backlash, Balancer, Cable, Elastic, Ripple, WristCoupling
+
+KNOWN: tuple[type[Effect], ...] = (
+    Stribeck,
+    LuGre,
+    Asymmetric,
+    LoadDependent,
+    PositionDependent,
+    FrictionStep,
+    Warming,
+    Ripple,
+    Elastic,
+    Backlash,
+    WristCoupling,
+    Balancer,
+    Cable,
+    TorqueConstant,
+    Saturation,
+    Clipping,
+    Drift,
+    Delay,
+    EncoderOffset,
+    Payload,
+    Tilt,
+    Contact,
+)
+STRANGERS: tuple[type[Effect], ...] = (CrossWave, TiredCable, FloorVibration, Interpolation, Slosh)
+__all__ = ["KNOWN", "STRANGERS", "Effect"]

@@ -1,0 +1,134 @@
+"""Motors and signals that don't say what they do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline, PchipInterpolator
+
+from tests.truth.effects.base import Effect
+from tests.truth.machines import Machine
+from tests.truth.ride import Ride
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueConstant(Effect):
+    """One joint's torque is logged too large by the share amount."""
+
+    name = "torque_constant_error"
+    largest = 0.3
+
+    def signal(self, ride: Ride, torque: np.ndarray) -> np.ndarray:
+        return torque + self.on_joint(ride, self.amount * torque[:, self.j])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Saturation(Effect):
+    """Iron that saturates: at the largest torque the motor gives the share amount less than its current says."""
+
+    name = "torque_constant_saturation"
+    largest = 0.35
+
+    def signal(self, ride: Ride, torque: np.ndarray) -> np.ndarray:
+        top = np.abs(torque[:, self.j]).max()
+        x = torque[:, self.j] / top
+        # x = y (1 - amount y^2), solved for y, the logged torque, by Newton's method.
+        y = x.copy()
+        for _ in range(8):
+            y -= (y - self.amount * y**3 - x) / np.maximum(1 - 3 * self.amount * y**2, 0.1)
+        return torque + self.on_joint(ride, top * (y - x))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clipping(Effect):
+    """The logged torque stops at a limit: amount is the share of the largest torque that is cut off."""
+
+    limit: float = np.inf
+
+    name = "current_clipping"
+    largest = 0.6
+    power = 1.5
+
+    def signal(self, ride: Ride, torque: np.ndarray) -> np.ndarray:
+        limit = (1 - self.amount) * np.abs(torque[ride.runs[0], self.j]).max()
+        object.__setattr__(self, "limit", float(limit))
+        clipped = torque.copy()
+        clipped[:, self.j] = np.clip(torque[:, self.j], -limit, limit)
+        return clipped
+
+    def last(self, torque: np.ndarray) -> np.ndarray:
+        clipped = torque.copy()
+        clipped[:, self.j] = np.clip(torque[:, self.j], -self.limit, self.limit)
+        return clipped
+
+    def truths(self) -> dict[str, float]:
+        return {"limit": self.limit}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drift(Effect):
+    """A torque signal whose zero wanders, along a line or at random: amount [N m] per span of the logs."""
+
+    span: float = 60.0
+    path: tuple[float, ...] = ()
+
+    name = "torque_sensor_drift"
+    lasting = False
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Drift:
+        path: tuple[float, ...] = ()
+        if rng.random() < 0.5:
+            walk = np.cumsum(rng.normal(size=200))
+            path = tuple((walk / np.ptp(walk[:21])).tolist())
+        return cls(joint=joint, span=span, path=path)
+
+    def signal(self, ride: Ride, torque: np.ndarray) -> np.ndarray:
+        if self.path:
+            knots = np.arange(len(self.path)) * self.span / 20
+            zero = PchipInterpolator(knots, np.array(self.path))(ride.t)
+        else:
+            zero = ride.t / self.span
+        return torque + self.on_joint(ride, self.amount * zero)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Delay(Effect):
+    """Torque logged amount [s] after the position, all joints alike."""
+
+    name = "time_delay"
+    largest = 0.02
+
+    @classmethod
+    def joints(cls, machine: Machine) -> tuple[int | None, ...]:
+        return (None,)
+
+    def signal(self, ride: Ride, torque: np.ndarray) -> np.ndarray:
+        late = np.empty_like(torque)
+        for run in ride.runs:
+            clock = ride.t[run] - self.amount
+            late[run] = CubicSpline(ride.t[run], torque[run])(np.maximum(clock, ride.t[run.start]))
+        return late
+
+    def truths(self) -> dict[str, float]:
+        return {"delay": self.amount}
+
+
+@dataclass(frozen=True, kw_only=True)
+class EncoderOffset(Effect):
+    """A joint's zero is off by amount [rad]."""
+
+    name = "encoder_offset"
+    largest = 0.15
+
+    @classmethod
+    def joints(cls, machine: Machine) -> tuple[int | None, ...]:
+        return tuple(range(2, machine.n + 1))
+
+    def position(self, ride: Ride) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        none = np.zeros_like(ride.q)
+        return self.on_joint(ride, np.full(len(ride.t), self.amount)), none, none
+
+    def truths(self) -> dict[str, float]:
+        return {"offset": self.amount}

@@ -1,0 +1,154 @@
+"""Effects that no catalogue has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from scipy.signal import lfilter
+
+from tests.truth.dynamics import point_force_torque, rigid_torque, with_gravity
+from tests.truth.effects.base import Effect, log_uniform
+from tests.truth.machines import Machine
+from tests.truth.ride import Ride
+
+
+@dataclass(frozen=True, kw_only=True)
+class CrossWave(Effect):
+    """amount cos(2 q_j) sin(1.5 q_k) on joint j, k its neighbour."""
+
+    other: int = 1
+
+    name = "unexplained"
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> CrossWave:
+        others = [k for k in range(1, machine.n + 1) if k != joint]
+        return cls(joint=joint, other=int(rng.choice(others)))
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        wave = np.cos(2 * ride.q[:, self.j]) * np.sin(1.5 * ride.q[:, self.other - 1])
+        return self.on_joint(ride, self.amount * wave)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TiredCable(Effect):
+    """A cable whose pull relaxes: torque amount * x, x' = v - x / memory; it depends on how fast it was bent."""
+
+    memory: float = 0.8
+
+    name = "unexplained"
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> TiredCable:
+        return cls(joint=joint, memory=log_uniform(rng, 0.3, 1.2))
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        keep = np.exp(-ride.step / self.memory)
+        pull = np.zeros(len(ride.t))
+        for run in ride.runs:
+            pull[run] = lfilter([self.memory * (1 - keep)], [1, -keep], ride.v[run, self.j])
+        return self.on_joint(ride, self.amount * pull)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FloorVibration(Effect):
+    """A floor that shakes along a line: amount [m/s2] at a steady frequency."""
+
+    frequency: float = 6.0
+    direction: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    phase: float = 0.0
+
+    name = "unexplained"
+    largest = 20.0
+
+    @classmethod
+    def joints(cls, machine: Machine) -> tuple[int | None, ...]:
+        return (None,)
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> FloorVibration:
+        direction = rng.normal(size=3)
+        return cls(
+            frequency=rng.uniform(2.0, 9.0),
+            direction=tuple((direction / np.linalg.norm(direction)).tolist()),
+            phase=rng.uniform(0, 2 * np.pi),
+        )
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        field = with_gravity(ride.machine.model, -np.array(self.direction))
+        still = np.zeros_like(ride.q)
+        shake = np.cos(2 * np.pi * self.frequency * ride.t + self.phase)
+        return self.amount * shake[:, None] * rigid_torque(field, ride.link_q, still, still)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Interpolation(Effect):
+    """A joint-side encoder that errs 2^k times a turn: amount [rad]."""
+
+    order: int = 16
+    phase: float = 0.0
+
+    name = "unexplained"
+    largest = 5e-3
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Interpolation:
+        return cls(joint=joint, order=int(2 ** rng.integers(3, 5)), phase=rng.uniform(0, 2 * np.pi))
+
+    def position(self, ride: Ride) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        h = self.order
+        angle, v, a = h * ride.q[:, self.j] + self.phase, ride.v[:, self.j], ride.a[:, self.j]
+        s, c = np.sin(angle), np.cos(angle)
+        errors = (c, -h * v * s, -h * a * s - (h * v) ** 2 * c)
+        return tuple(self.on_joint(ride, self.amount * error) for error in errors)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slosh(Effect):
+    """Liquid in a tank at the flange: a mass amount [kg] on weak springs, driven by the flange's acceleration."""
+
+    frequency: float = 1.5
+    damping: float = 0.05
+
+    name = "unexplained"
+    largest = 100.0
+
+    @classmethod
+    def joints(cls, machine: Machine) -> tuple[int | None, ...]:
+        return (None,)
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Slosh:
+        return cls(frequency=rng.uniform(0.8, 2.5), damping=log_uniform(rng, 0.02, 0.1))
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        machine, point = ride.machine, np.array([0.0, 0.0, 0.1])
+        every = max(round(0.004 / ride.step), 1)
+        place = _places(machine, ride.link_q, point)
+        w, force = 2 * np.pi * self.frequency, np.zeros((len(ride.t), 3))
+        h = ride.step
+        # x'' + 2 d w x' + w^2 x = -p'' in the horizontal plane, by the bilinear rule; the tank feels w^2 x + 2 d w x'.
+        k = 2 / h
+        den = np.array(
+            [k**2 + 2 * self.damping * w * k + w**2, 2 * w**2 - 2 * k**2, k**2 - 2 * self.damping * w * k + w**2]
+        )
+        num = np.array([2 * self.damping * w * k + w**2, 2 * w**2, w**2 - 2 * self.damping * w * k])
+        for run in ride.runs:
+            speed = np.gradient(place[run], h, axis=0)
+            pull = np.gradient(speed, h, axis=0)
+            force[run, :2] = lfilter(num, den, -pull[:, :2], axis=0)
+        force[np.arange(len(force)) % every > 0] = 0.0
+        torque = point_force_torque(machine.model, ride.link_q, machine.n, point, self.amount * force)
+        rows = np.arange(0, len(force), every)
+        return np.column_stack([np.interp(np.arange(len(force)), rows, column) for column in torque[rows].T])
+
+
+def _places(machine: Machine, q: np.ndarray, point: np.ndarray) -> np.ndarray:
+    data = machine.model.createData()
+    places = np.empty((len(q), 3))
+    for k in range(len(q)):
+        pin.forwardKinematics(machine.model, data, q[k])
+        places[k] = data.oMi[machine.n].act(point)
+    return places

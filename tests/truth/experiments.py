@@ -1,0 +1,89 @@
+"""Further experiments on the robot of a case: the same effects and states, on the same clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from scipy.interpolate import make_interp_spline
+
+from tests.truth.cases import Case
+from tests.truth.dynamics import massless, rigid_torque, with_gravity, with_tool
+from tests.truth.effects.base import Effect
+from tests.truth.plant import PAUSE, Record, play
+from tests.truth.references import Reference, Spline
+from tests.truth.ride import Ride
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """One motion of an experiment.
+
+    Args:
+        t: time (N,) [s].
+        q: positions (N, n) [rad].
+        pause: rest before it [s].
+        payload: mass of a point that is hung on the last link for it, 0.1 m along that link's z axis [kg].
+        gravity: (3,) field of gravity in the frame of a base that was tilted for it [m/s2].
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    pause: float = PAUSE
+    payload: float = 0.0
+    gravity: np.ndarray | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class KnownChange(Effect):
+    """A payload and a field of gravity that the user sets between two times."""
+
+    stage: Stage
+    start: float
+    end: float
+
+    name = "known change"
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        rows = (ride.t >= self.start) & (ride.t <= self.end)
+        motion = ride.link_q[rows], ride.link_v[rows], ride.link_a[rows]
+        model = ride.machine.model
+        torque = np.zeros_like(ride.q)
+        if self.stage.gravity is not None:
+            still = np.zeros_like(motion[0])
+            change = with_gravity(model, self.stage.gravity - model.gravity.linear)
+            torque[rows] += rigid_torque(change, motion[0], still, still)
+        if self.stage.payload:
+            point = pin.Inertia(float(self.stage.payload), np.array([0.0, 0.0, 0.1]), np.zeros((3, 3)))
+            body = with_tool(massless(model), point)
+            if self.stage.gravity is not None:
+                body = with_gravity(body, self.stage.gravity)
+            torque[rows] += rigid_torque(body, *motion)
+        return torque
+
+
+def follow_up(case: Case, stages: Sequence[Stage]) -> tuple[Record, ...]:
+    """Plays an experiment after a case's logs, which come out as they were; returns the new logs alone."""
+    references = list(case.references[: case.training])
+    clock = sum(reference.duration for reference in references) + PAUSE * (len(references) - 1)
+    pauses = [PAUSE] * (len(references) - 1)
+    changes = []
+    for stage in stages:
+        reference = tabulated(stage.t, stage.q)
+        references.append(reference)
+        pauses.append(stage.pause)
+        start = clock + stage.pause
+        clock = start + reference.duration
+        changes.append(KnownChange(stage=stage, start=start - stage.pause / 2, end=clock + 0.1))
+    rng = np.random.default_rng([case.seed, 1])
+    records = play(case.machine, references, [*case.effects, *changes], case.noise, rng, pause=pauses)
+    return tuple(records[case.training :])
+
+
+def tabulated(t: np.ndarray, q: np.ndarray) -> Reference:
+    """A motion through samples, as a quintic spline; the robot stands still before and after."""
+    clock = np.asarray(t, dtype=float) - t[0]
+    curve = Spline(curve=make_interp_spline(clock, q, k=5), start=0.0, end=float(clock[-1]))
+    return Reference(duration=float(clock[-1]), period=None, kind="tabulated", curve=curve)

@@ -1,0 +1,205 @@
+"""The truth shares no code with what it judges, and its logs obey the mechanics that they claim to."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.integrate import solve_ivp
+
+from tests.truth.cases import Hidden, draw_case
+from tests.truth.description import urdf_of, write_description
+from tests.truth.dynamics import rigid_torque
+from tests.truth.effects import KNOWN, STRANGERS
+from tests.truth.effects.friction import LuGre, Stribeck, _bristles
+from tests.truth.effects.strangers import CrossWave
+from tests.truth.effects.surroundings import Payload
+from tests.truth.effects.transmission import Elastic
+from tests.truth.machines import KINDS, draw_machine
+from tests.truth.plant import measure, open_loop
+from tests.truth.references import draw_aperiodic, draw_periodic
+
+ALLOWED = {"numpy", "scipy", "pinocchio", "tests"} | set(sys.stdlib_module_names)
+
+
+def test_imports_numpy_scipy_and_pinocchio_alone() -> None:
+    """No file of the truth, its tests apart, imports anything but numpy, scipy, pinocchio and the truth itself."""
+    files = [path for path in Path(__file__).parent.rglob("*.py") if not path.name.startswith("test_")]
+    assert len(files) > 10
+    for path in files:
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = []
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                assert node.level == 0, path
+                names = [node.module or ""]
+            for name in names:
+                assert name.split(".")[0] in ALLOWED, f"{path.name} imports {name}"
+                assert not name.startswith("tests") or name.startswith("tests.truth"), f"{path.name} imports {name}"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_description_is_the_known_robot_and_not_the_true_one(kind: str, tmp_path: Path) -> None:
+    """The URDF that a user gets moves as the robot does, but weighs up to 8 % otherwise."""
+    machine = draw_machine(kind, np.random.default_rng(1))
+    write_description(machine, tmp_path)
+    read = pin.buildModelFromXML(urdf_of(machine.known, kind))
+    rng = np.random.default_rng(2)
+    q, v, a = rng.normal(size=(3, 20, machine.n))
+    told = rigid_torque(read, q, v, a)
+    # The file holds 9 to 12 digits.
+    np.testing.assert_allclose(told, rigid_torque(machine.known, q, v, a), rtol=1e-6, atol=1e-6 * np.abs(told).max())
+    off = rigid_torque(machine.model, q, v, a) - told
+    assert 0.005 < np.sqrt((off**2).mean() / (told**2).mean()) < 0.15
+
+
+@pytest.mark.parametrize("draw", [draw_periodic, draw_aperiodic])
+def test_references_are_smooth_and_within_limits(draw: object) -> None:
+    """A reference's velocity and acceleration are its derivatives, and it stays within the robot's limits."""
+    machine = draw_machine("er3a", np.random.default_rng(3))
+    reference = draw(machine, np.random.default_rng(4))
+    t = np.arange(5.0, 15.0, 1e-3)
+    q, v, a = reference.at(t)
+    # Central differences err by h^2/6 times the third derivative, below 1e3 here.
+    np.testing.assert_allclose(np.gradient(q, t, axis=0)[1:-1], v[1:-1], atol=1e-3)
+    np.testing.assert_allclose(np.gradient(v, t, axis=0)[1:-1], a[1:-1], atol=1e-2)
+    assert (np.abs(v) < machine.speed).all()
+    assert (q > machine.lower - 0.1).all()
+    assert (q < machine.upper + 0.1).all()
+
+
+def test_log_obeys_inverse_dynamics() -> None:
+    """Without effect and noise the logged torque is the true robot's inverse dynamics of the motion."""
+    case = draw_case(1, kind="er3a", periodic=False, duration=10.0, unseen=0.0)
+    record, machine = case.logs[0], case.machine
+    wanted = rigid_torque(machine.model, record.q_true, record.v_true, record.a_true) + machine.rotor * record.a_true
+    friction = machine.friction
+    v = record.v_true
+    wanted += friction[:, 0] * record.sign + friction[:, 1] * v + friction[:, 2] * v * np.abs(v) + friction[:, 3] * v**3
+    np.testing.assert_allclose(record.clean, wanted + machine.offset, rtol=1e-9, atol=1e-9)
+    # The position is quantised and nothing else.
+    assert np.abs(record.q - record.q_true).max() <= 1.01 * np.pi / case.noise.counts.min()
+    # The loop's motion is its own derivative: to the control step's second order, but for the friction's jumps.
+    numeric = np.gradient(record.q_true, record.t, axis=0)
+    assert np.median(np.abs(numeric - record.v_true)) < 1e-3 * np.abs(record.v_true).max()
+
+
+def test_size_is_what_shows_beyond_the_base_model() -> None:
+    """An effect drawn at 1 % shows 1 % of its joint's torque after a least-squares fit of the base model."""
+    case = draw_case(7, hide=[Stribeck], size=0.01, kind="ur10", periodic=True, duration=20.0, unseen=0.0)
+    assert case.visible()[0] == pytest.approx(0.01, rel=0.1)
+    # It is larger before the base model takes its share.
+    effect = case.effects[0]
+    whole = np.sqrt((case.logs[0].parts[0][:, effect.j] ** 2).mean()) / case.level()[effect.j]
+    assert whole > 0.012
+
+
+def test_every_effect_changes_the_log_and_is_reproducible() -> None:
+    """Every effect can be drawn, adds torque, and the same seed gives the same log."""
+    machine = draw_machine("panda", np.random.default_rng(5))
+    reference = draw_periodic(machine, np.random.default_rng(6), cycles=2)
+    for choice in (*KNOWN, *STRANGERS):
+        joints = choice.joints(machine)
+        effect = choice.draw(machine, np.random.default_rng(8), joints[-1], 10.0)
+        effect = effect.of(min(effect.largest / 4, 1.0))
+        ride = open_loop(machine, [reference], [effect], step=0.01)
+        assert np.isfinite(ride.parts[0]).all(), choice
+        assert np.abs(ride.parts[0]).max() > 0.0, choice
+    first, second = (draw_case(11, hide=1, kind="er3a", duration=10.0, unseen=0.0) for _ in range(2))
+    np.testing.assert_array_equal(first.logs[0].tau, second.logs[0].tau)
+
+
+def test_too_large_a_size_is_refused() -> None:
+    """A size that no plausible value reaches is said to be hidden."""
+    with pytest.raises(Hidden):
+        draw_case(2, hide=[Elastic], size=0.5, kind="er3a", periodic=True, duration=20.0, unseen=0.0)
+
+
+def test_elastic_gear_obeys_both_inertias() -> None:
+    """The link of an elastic joint, integrated by itself behind the motor's logged motion, moves as the truth says."""
+    machine = draw_machine("heavy", np.random.default_rng(9))
+    reference = draw_periodic(machine, np.random.default_rng(10))
+    effect = Elastic(joint=6, amount=1e-5)
+    ride = open_loop(machine, [reference], [effect], step=0.001)
+    rows = slice(2000, 2600)
+    t, motor = ride.t[rows], ride.q[rows, 5]
+
+    def link(time: float, state: np.ndarray) -> list[float]:
+        q, v, a = (np.array([np.interp(time, t, x[rows, j]) for j in range(6)]) for x in _link(ride))
+        q[5], v[5] = state
+        through = (np.interp(time, t, motor) - state[0]) / effect.amount
+        a[5] = 0.0
+        data = machine.model.createData()
+        still = pin.rnea(machine.model, data, q, v, a)[5]
+        inertia = pin.crba(machine.model, data, q)[5, 5]
+        return [state[1], (through - still) / inertia]
+
+    start = [ride.link_q[2000, 5], ride.link_v[2000, 5]]
+    # A step of 0.2 ms is a tenth of the shortest vibration's period over 2 pi.
+    solved = solve_ivp(link, (t[0], t[-1]), start, max_step=2e-4, t_eval=t[::50])
+    twist = np.abs(ride.link_q[:, 5] - ride.q[:, 5]).max()
+    # Linear interpolation of the motor's motion excites the undamped spring by a part of the twist.
+    assert np.abs(solved.y[0] - ride.link_q[rows, 5][::50]).max() < 0.03 * twist
+
+
+def _link(ride: object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return ride.link_q, ride.link_v, ride.link_a
+
+
+def test_bristles_follow_their_equation() -> None:
+    """The presliding state is the solution of z' = v - |v| z / reach that an adaptive integrator finds."""
+    t = np.arange(0.0, 2.0, 1e-3)
+    v = 0.2 * np.cos(2 * np.pi * t)
+    reach = 5e-3
+    solved = solve_ivp(
+        lambda time, z: 0.2 * np.cos(2 * np.pi * time) * np.ones(1) - abs(0.2 * np.cos(2 * np.pi * time)) * z / reach,
+        (0.0, t[-1]),
+        [reach],
+        t_eval=t,
+        rtol=1e-8,
+        atol=1e-12,
+    )
+    # Four sub-steps of a quarter millisecond: first order in v.
+    assert np.abs(_bristles(v, 1e-3, reach) - solved.y[0] / reach).max() < 0.01
+
+
+def test_payload_acts_on_all_joints_from_its_moment() -> None:
+    """A payload's torque is zero before it is taken up, and that of a heavier last link afterwards."""
+    machine = draw_machine("ur10", np.random.default_rng(12))
+    reference = draw_periodic(machine, np.random.default_rng(13), cycles=1)
+    ride = open_loop(machine, [reference], [Payload(amount=3.0, moment=4.0)], step=0.01)
+    torque = ride.parts[0]
+    assert np.abs(torque[ride.t < 4.0]).max() == 0.0
+    heavier = pin.Model(machine.model)
+    tool = pin.Inertia.FromBox(3.0, 0.1, 0.1, 0.1)
+    tool.lever = np.array([0.0, 0.0, 0.1])
+    heavier.inertias[6] += tool
+    after = ride.t > 4.1
+    wanted = rigid_torque(heavier, ride.q[after], ride.v[after], ride.a[after]) - ride.rigid[after]
+    np.testing.assert_allclose(torque[after], wanted, atol=1e-9)
+
+
+def test_a_stranger_shows_beyond_the_base_model_and_its_own_column_brings_a_gain() -> None:
+    """An effect outside every catalogue shows beyond the base model, on motion that the fit has not seen, too."""
+    case = draw_case(17, hide=[CrossWave], size=0.03, kind="er3a", periodic=True, duration=20.0, unseen=20.0)
+    assert case.visible()[0] == pytest.approx(0.03, rel=0.15)
+    before, after = case.oracle_gain()
+    # 3 % squared is 9e-4 in the logs; another motion shows more or less of it, and 20 s of noise change it by 1e-4.
+    assert 3e-4 < ((before - after) / case.level() ** 2)[case.effects[0].j] < 5e-3
+
+
+def test_presliding_starts_where_it_slips() -> None:
+    """In steady sliding LuGre and Coulomb friction are one and the same."""
+    machine = draw_machine("er3a", np.random.default_rng(16))
+    reference = draw_periodic(machine, np.random.default_rng(17), cycles=1)
+    ride = open_loop(machine, [reference], [LuGre(joint=1, amount=1e-3, damping=0.0)], step=0.001)
+    measure(ride, [LuGre(joint=1, amount=1e-3, damping=0.0)])
+    fast = np.abs(ride.v[:, 0]) > 0.7 * np.abs(ride.v[:, 0]).max()
+    coulomb = machine.friction[0, 0]
+    # e^-10 of a bristle's reach is left ten reaches after a reversal.
+    assert np.abs(ride.parts[0][fast, 0]).max() < 1e-4 * coulomb
