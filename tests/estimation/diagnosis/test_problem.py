@@ -11,6 +11,7 @@ from scipy.stats import chi2
 from estimation.diagnosis.baseline import base_parameters, build_baseline, inertia_of
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem, accept, fit_values, pose, score
+from estimation.diagnosis.regularisation import pull_of
 from estimation.diagnosis.scan import measure, scan, surprise
 from estimation.diagnosis.states import record
 from estimation.diagnosis.whitening import estimate_whitening
@@ -25,7 +26,7 @@ def problem(arm: Robot, arm_log: Callable[..., Log]) -> Problem:
     """A log of the arm without effects, white."""
     recording = record(arm, [arm_log(torque_noise=0.02)])
     baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
-    values = fit_values(baseline, recording.tau.std(axis=0), recording.unsure, recording.tau)
+    values = fit_values(baseline, recording.tau.std(axis=0), recording.unsure, recording.tau, pull_of(baseline, recording))
     residual = recording.tau - baseline.regressor @ values
     whitening = estimate_whitening(recording, residual, baseline.base.size, inertia_of(baseline, recording, values))
     return pose(recording, baseline, whitening, draws=300, rng=np.random.default_rng(0))

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from estimation.thermal import ThermalEstimate, ThermalRun, fit_thermal, load_thermal_model
+from estimation.thermal.structure import find_structure
 from robots.common.errors import InputError, NotIdentifiableError
-from robots.thermal import Fractional
+from robots.thermal import Fractional, SecondOrder
 
 TRUTH = {"alpha": -0.0141, "beta": 0.9971, "K1": 4.41, "K2": 4.57, "C1": 737.61, "C2": 9163.45}
 # Least standard errors of an unbiased estimate: computed from finite differences of a matrix exponential [%].
@@ -241,3 +242,15 @@ def test_bad_input_is_named(heated: Callable[..., ThermalRun]) -> None:
         fit_thermal([])
     with pytest.raises(InputError, match="zone T7"):
         fit_thermal(ThermalRun(**common, temperatures={"T7": np.full(len(run.t), 25.0)}))
+
+
+def test_a_rest_between_measurements_counts_as_cooling() -> None:
+    """Friction measured after a rest of ten minutes shows cooling; a pause of a minute does not."""
+    t = np.arange(0.0, 3600.0, 20.0)
+    for rest, told in ((600.0, False), (60.0, True)):
+        power = np.where((t > 1800.0) & (t <= 1800.0 + rest), 0.0, 60.0)
+        under = np.append(True, power[:-1] > 0.0) & (power > 0.0)
+        friction = np.where(under, 1.0 - 0.3 * (1.0 - np.exp(-t / 900.0)), np.nan)
+        run = ThermalRun(t=t, power=power, friction=friction, cold_friction=1.0)
+        notes = find_structure(SecondOrder, [run], None, {}).notes
+        assert any(note.startswith("Heating only") for note in notes) == told

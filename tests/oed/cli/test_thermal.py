@@ -76,7 +76,7 @@ def done(robot: Path, logs: Path, tmp_path_factory: pytest.TempPathFactory) -> P
 
 
 def test_the_model_predicts_cold_and_warm(done: Path, robot: Path, logs: Path) -> None:
-    """model.json has a thermal model a joint, with the time constants of the truth; the file is a model like any other."""
+    """model.json is a model like any other, with a thermal model a joint that has the true time constants."""
     data = json.loads((done / "model.json").read_text())
     model = load_model(done)
     ttm = thermal_from_dict(model, data)
@@ -84,9 +84,41 @@ def test_the_model_predicts_cold_and_warm(done: Path, robot: Path, logs: Path) -
     truth = load_plant(logs.parent / "plant.yaml", load_robot(robot)).heat
     assert truth is not None
     for fitted, true in zip(ttm.thermal, truth.models, strict=True):
-        assert fitted is not None and true is not None
+        assert fitted is not None
+        assert true is not None
         # Ten minutes of two joints at 1 % of noise: some percent, and the fast one is a few bins long.
         assert fitted.time_constants(5.0)[0] == pytest.approx(true.time_constants(5.0)[0], rel=0.25)
+
+
+def test_predictions_follow_the_heat(run: Callable[..., Any], done: Path, logs: Path, tmp_path: Path) -> None:
+    """The last log, 14 minutes in, is predicted better after the logs before it than as a cold start; both are said."""
+    errors = []
+    for options, told in (
+        ((), "begin cold"),
+        (("--before", logs / "0.parquet", "--before", logs / "1.parquet"), "2 logs"),
+    ):
+        ended = run(
+            "predict", "--model", done, "--log", logs / "2.parquet", "--ambient", 20, "--out", tmp_path / "tau.csv",
+            *options, "--force", "--json",
+        )  # fmt: skip
+        assert ended.code == 0, ended.err
+        assert told in ended.data["heat"]
+        errors.append(ended.data["error_rms"])
+    # The band is that of ten minutes; a quarter of a minute, warm and slower, may differ by some percent.
+    assert np.all(np.abs(np.array(ended.data["band95_coverage"]) - 0.95) < 0.05)
+    assert np.all(np.array(errors[1]) < 0.9 * np.array(errors[0]))
+
+
+def test_what_warmed_the_robot_needs_a_model_with_heat(
+    run: Callable[..., Any], done: Path, experiment: Path, logs: Path, tmp_path: Path
+) -> None:
+    """--before with a model without heat, or with logs that come later, is refused with code 2."""
+    line = ("predict", "--log", logs / "0.parquet", "--before", logs / "1.parquet", "--out", tmp_path / "tau.csv")
+    for model, message in ((experiment, "the model has no heat"), (done, "overlap in time")):
+        ended = run(*line, "--model", model)
+        assert ended.code == 2
+        assert message in ended.err
+    assert not (tmp_path / "tau.csv").exists()
 
 
 def test_the_page_shows_time_powers_and_curves(done: Path) -> None:

@@ -50,10 +50,11 @@ def html(estimate: Estimate) -> str:
 def test_tells_every_parameter(estimate: Estimate, html: str) -> None:
     """Each parameter has its value, its standard error and its unit on the page; an undetermined one says so."""
     model = estimate.model
+    table = html[html.index("Values rounded to two digits") :].partition("</table>")[0]
     rows = {
         cells[0]: cells
         for cells in (
-            re.findall(r"<td[^>]*>\s*(.*?)\s*</td>", row, re.S) for row in re.findall(r"<tr>.*?</tr>", html, re.S)
+            re.findall(r"<td[^>]*>\s*(.*?)\s*</td>", row, re.S) for row in re.findall(r"<tr>.*?</tr>", table, re.S)
         )
         if cells
     }

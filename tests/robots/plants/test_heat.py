@@ -98,7 +98,8 @@ def test_thermometers_are_logged_where_the_plant_has_them(er3a: Robot) -> None:
     for kind, around, joints in (("none", False, False), ("ambient", True, False), ("all", True, True)):
         log = simulate(plant_of(er3a, known=True, start=35.0, ambient=25.0, thermometers=kind), motion)
         assert (log.ambient is not None, log.temperature is not None) == (around, joints)
-    assert log.ambient is not None and log.temperature is not None
+    assert log.ambient is not None
+    assert log.temperature is not None
     assert log.ambient[0] == 25.0
     assert log.temperature[0].tolist() == [35.0] * 6
 
@@ -131,7 +132,9 @@ def test_a_wrong_section_is_told(er3a: Robot, tmp_path: Path, text: str, message
 def test_a_plant_file_states_heat(er3a: Robot, tmp_path: Path) -> None:
     """Published models, one joint's own before them, another temperature at the start."""
     path = tmp_path / "plant.yaml"
-    path.write_text("thermal:\n  known: true\n  start: 30\n  joints:\n    2: {model: first, alpha: -0.02, K: 2, C: 900}\n")
+    path.write_text(
+        "thermal:\n  known: true\n  start: 30\n  joints:\n    2: {model: first, alpha: -0.02, K: 2, C: 900}\n"
+    )
     heat = load_plant(path, er3a).heat
     assert heat is not None
     assert [model.name if model else None for model in heat.models] == ["second", "first", *["second"] * 4]
