@@ -12,6 +12,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from estimation.identification import identify
 from estimation.model import Model
+from estimation.thermal.band import error_band
 from estimation.thermal.campaign_estimate import CampaignEstimate
 from estimation.thermal.condensed import Condensed, JointSums, condense
 from estimation.thermal.estimate import ThermalEstimate
@@ -133,12 +134,18 @@ class _Turns:
         covariance, errors = self._joint_covariance(final)
         finished = [None if fit is None else _with_errors(fit, errors[j]) for j, fit in enumerate(final)]
         model = replace(self.model, values=self.values, covariance=covariance)
+        thermal = tuple(None if fit is None else fit.model for fit in finished)
+        residuals = self._residuals()
+        provenance = {
+            **model.provenance,
+            "residual_rms": residuals.tolist(),
+            "residual_rms_without_heat": without.tolist(),
+            "band95": error_band(ThermalTorqueModel(model=model, thermal=thermal), self.condensed, self.factors),
+        }
         return CampaignEstimate(
-            torque_model=ThermalTorqueModel(
-                model=model, thermal=tuple(None if fit is None else fit.model for fit in finished)
-            ),
+            torque_model=ThermalTorqueModel(model=replace(model, provenance=provenance), thermal=thermal),
             thermal=tuple(finished),
-            residual_rms=self._residuals(),
+            residual_rms=residuals,
             residual_without=without,
             rounds=rounds,
             notes=tuple(notes),

@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 # Surroundings that differ by less [K] between the runs say nothing of the slope of the friction.
 AMBIENT_CHANGE = 2.0
 
+# A joint has cooled down after so long [s] at no more than this share of its largest power.
+RESTED, QUIET = 120.0, 0.05
+
 
 @dataclass(frozen=True, kw_only=True)
 class Structure:
@@ -123,11 +126,24 @@ def _still(run: ThermalRun) -> bool:
     return run.power is not None and float(run.held_power.max()) <= 1e-6
 
 
+def _cooled(run: ThermalRun, seen: NDArray[np.bool_]) -> bool:
+    """Whether something was measured after a long rest of a joint that had been under power."""
+    quiet = run.held_power <= QUIET * float(run.held_power.max())
+    warmed, rested = False, 0.0
+    for step, rests, known in zip(np.diff(run.t), quiet, seen[1:], strict=True):
+        rested += float(step) if rests else 0.0
+        if warmed and rested >= RESTED and known:
+            return True
+        if not rests:
+            warmed, rested = True, 0.0
+    return False
+
+
 def _coverage(runs: Sequence[ThermalRun]) -> list[str]:
     notes = []
     measured = [np.isfinite(run.ratio) | _any_reading(run) for run in runs]
     if runs[0].power is not None and not any(
-        (~run.heating & seen).any() for run, seen in zip(runs, measured, strict=True)
+        (~run.heating & seen).any() or _cooled(run, seen) for run, seen in zip(runs, measured, strict=True)
     ):
         notes.append(
             "Heating only: no run was measured while it cooled down. What heat exchanges and what the falling power do "

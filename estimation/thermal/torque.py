@@ -111,5 +111,8 @@ def thermal_from_dict(model: Model, data: Mapping[str, Any]) -> ThermalTorqueMod
     entry = data.get("thermal")
     if entry is None:
         return None
-    joints = tuple(None if item is None else build_thermal_model(item) for item in entry["joints"])
+    try:
+        joints = tuple(None if item is None else build_thermal_model(item) for item in entry["joints"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"thermal is damaged: {type(error).__name__} {error}", column="thermal") from error
     return ThermalTorqueModel(model=model, thermal=joints)

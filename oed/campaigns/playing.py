@@ -14,6 +14,7 @@ from robots.common.errors import InputError
 from robots.common.files import ResultFolder
 from robots.common.progress import SILENT, Progress
 from robots.plants import Plant, nominal_plant, simulate
+from robots.plants.heat import Warmth, heat_piece, reference_friction
 from robots.signals import Log, Motion
 
 
@@ -27,7 +28,8 @@ def play(campaign: Campaign, plant: Plant | None = None, seed: int = 0) -> Itera
 
     Yields:
         A log for each cycle in which something is played: t on the campaign's clock, q, tau, cycle, and segment,
-        which is the number of the stage in `Campaign.stages`, counted from 1.
+        which is the number of the stage in `Campaign.stages`, counted from 1. Of a plant with heat also temperatures;
+        its joints go on warming up and cooling down from cycle to cycle.
 
     Raises:
         InputError: a plant of another robot.
@@ -37,6 +39,7 @@ def play(campaign: Campaign, plant: Plant | None = None, seed: int = 0) -> Itera
         raise InputError(f"a plant of {virtual.robot.n} joints", allowed=f"{campaign.robot.n}, as the campaign has")
     numbers = {stage.name: number for number, stage in enumerate(campaign.stages, start=1)}
     stages = campaign.stages_by_name
+    warmth = _warmth(campaign, virtual)
     for cycle, slots in groupby(campaign.slots, key=lambda slot: slot.cycle):
         played = [(slot, stages[slot.stage]) for slot in slots if slot.stage is not None]
         if not played:
@@ -48,12 +51,14 @@ def play(campaign: Campaign, plant: Plant | None = None, seed: int = 0) -> Itera
             ddq=np.concatenate([stage.motion.ddq for _, stage in played]),
         )
         noise = int(np.random.SeedSequence([seed, cycle]).generate_state(1)[0])
-        log = simulate(virtual, motion, seed=noise)
+        log = simulate(virtual, motion, seed=noise, warmth=warmth)
         first = played[0][0]
         yield Log(
             t=log.t,
             q=log.q,
             tau=log.tau,
+            temperature=log.temperature,
+            ambient=log.ambient,
             segment=np.concatenate([np.full(len(stage.motion), float(numbers[stage.name])) for _, stage in played]),
             cycle=np.full(len(log), float(cycle)),
             name=f"cycle {cycle}",
@@ -65,6 +70,18 @@ def play(campaign: Campaign, plant: Plant | None = None, seed: int = 0) -> Itera
                 "stages": {str(numbers[stage.name]): stage.name for _, stage in played},
             },
         )
+
+
+def _warmth(campaign: Campaign, plant: Plant) -> Warmth | None:
+    """Follows the joints of a plant with heat through the whole timetable, rests too."""
+    if plant.heat is None:
+        return None
+    pieces = {
+        name: heat_piece(stage.motion, reference_friction(plant.model, plant.parameters, stage.motion))
+        for name, stage in campaign.stages_by_name.items()
+    }
+    played = [slot for slot in campaign.slots if slot.stage is not None]
+    return plant.heat.follow([pieces[slot.stage].shifted(slot.start) for slot in played if slot.stage is not None])
 
 
 def record(

@@ -30,7 +30,10 @@ def predict(
     ] = None,
     ambient: Annotated[
         float | None,
-        typer.Option(help="Of a model with heat: temperature of the surroundings [degC].", show_default=False),
+        typer.Option(
+            help="Of a model with heat: temperature of the surroundings, where logs do not state it [degC].",
+            show_default=False,
+        ),
     ] = None,
     out: Annotated[Path, typer.Option("--out", help="The table to write: t, tau1..taun.")] = Path("predicted.csv"),
     band: Annotated[bool, typer.Option("--band", help="Also write band1..bandn, half-widths of 95 %.")] = False,
@@ -63,14 +66,11 @@ class _Heat:
     assumed: str = ""
 
 
-def _heat(
-    path: Path, model: Model, log: Log, before: list[Path], ambient: float | None, mapping: Path | None
-) -> _Heat:
+def _heat(path: Path, model: Model, log: Log, before: list[Path], ambient: float | None, mapping: Path | None) -> _Heat:
     import json as codec
 
     from estimation import read_logs
     from estimation.thermal import start_temperatures, thermal_from_dict
-    from estimation.thermal.history import surroundings
     from robots.common.errors import InputError
 
     file = path / "model.json" if path.is_dir() else path
@@ -88,4 +88,4 @@ def _heat(
         assumed = f"friction with heat: warmed by {len(earlier)} logs before, the first of which began cold"
     else:
         assumed = "friction with heat: the motion is taken to begin cold; --before says what warmed the robot"
-    return _Heat(options={"thermal": thermal, "start": start, "ambient": around(log, ambient)}, assumed=assumed)
+    return _Heat(options={"thermal": thermal, "start": start, "ambient": ambient}, assumed=assumed)

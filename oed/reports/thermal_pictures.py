@@ -74,7 +74,7 @@ def friction_time_picture(fits: Fits, *, joint_names: Sequence[str] | None = Non
         panels=tuple(panels),
         shared_x=True,
         panel_height=150,
-        caption="Points are averages of ten seconds; 1 is the friction at T0.",
+        caption="Points are averages of ten seconds, 1 is the friction at T0; across a rest the line joins them.",
     )
 
 
@@ -111,7 +111,7 @@ def time_constant_picture(fits: Fits, *, joint_names: Sequence[str] | None = Non
             continue
         known = _time_constants(fit)
         most = max((power for points in known.values() for power, _, _ in points), default=0.0)
-        W = np.linspace(0.0, 1.25 * most if most > 0.0 else 100.0, 60)
+        W = np.linspace(0.0, 2.0 * most if most > 0.0 else 100.0, 60)
         curves = fit.model.time_constants(W) / 60.0
         names = ("slow", "fast") if curves.shape[1] > 1 else ("time constant",)
         series = [Series(x=W, y=curves[:, k], name=name, role=sequence_role(k)) for k, name in enumerate(names)]
@@ -120,7 +120,7 @@ def time_constant_picture(fits: Fits, *, joint_names: Sequence[str] | None = Non
             if len(points):
                 x, y, error = points.T
                 series.append(Series(x=x, y=y / 60.0, error=1.96 * error / 60.0, kind="markers", role=sequence_role(k)))
-        panels.append(Panel(title=title, x_label="W [W]", y_label="[min]", series=tuple(series), y_log=True))
+        panels.append(Panel(title=title, x_label="W [W]", y_label="[min]", series=tuple(series)))
     return Picture(
         title="Time constants against friction power",
         name="time_constants",

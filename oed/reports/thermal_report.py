@@ -55,8 +55,8 @@ def thermal_page(
     moving = [fit for fit in fits if fit is not None]
     open_ = sorted({q.name for fit in moving for q in fit.parameters if not q.determined})
     verdict = (
-        f"With heat, the torque error of the median joint is {100 * np.median(gain):.0f} % smaller than with one friction "
-        f"for cold and warm. {_open_text(open_)}"
+        f"With heat, the torque error of the median joint is {100 * np.median(gain):.0f} % smaller than with one "
+        f"friction for cold and warm. {_open_text(open_)}"
     )
     coefficients = _coefficients(estimate)
     fit = fits[joint - 1]
@@ -66,7 +66,7 @@ def thermal_page(
         Section(title="Friction against time", pictures=tuple(first), tables=(_joints(estimate),)),
         Section(
             title="Time constants",
-            paragraphs=("Time constants fall as the power rises: friction that falls with heat is a brake on itself.",),
+            paragraphs=("Time constants fall as the power rises: friction that falls with heat holds itself back.",),
             pictures=(time_constant_picture(fits, joint_names=names),),
         ),
         Section(
@@ -78,9 +78,9 @@ def thermal_page(
         Section(
             title="Parameters",
             paragraphs=(
-                "Without a thermometer in the joint only ratios of alpha to exchanges and capacities are determined: a joint "
-                "that gets twice as warm and whose friction falls half as much per degree makes the same torques. "
-                "Predictions of friction need none of what is marked as not determined.",
+                "Without a thermometer in the joint only ratios of alpha to exchanges and capacities are determined: a "
+                "joint that gets twice as warm and whose friction falls half as much per degree makes the same "
+                "torques. Predictions of friction need none of what is marked as not determined.",
             ),
             tables=tuple(_parameters(item, j) for j, item in enumerate(fits, start=1) if item is not None),
             folded=True,
@@ -100,7 +100,7 @@ def thermal_page(
             Fact(label="Smallest gain", value=f"{100 * gain[worst]:.0f} %", note=f"joint {worst + 1}"),
             Fact(label="Turns of the two fits", value=estimate.rounds),
         ),
-        warnings=(*estimate.notes, *_still(fits)),
+        warnings=(*_notes(estimate), *_still(fits)),
         sections=tuple(sections),
         footer=footer(),
     )
@@ -110,6 +110,17 @@ def _open_text(names: Sequence[str]) -> str:
     if not names:
         return "All thermal parameters are determined."
     return f"Not determined by these logs: {', '.join(names)}; time constants and friction ratios are."
+
+
+def _notes(estimate: CampaignEstimate) -> tuple[str, ...]:
+    """Remarks, with the joints that they are about where they are not about all."""
+    fits = estimate.thermal
+    moving = sum(fit is not None for fit in fits)
+    found = []
+    for note in estimate.notes:
+        joints = [str(j) for j, fit in enumerate(fits, start=1) if fit is not None and note in fit.notes]
+        found.append(f"Joint {', '.join(joints)}: {note}" if 0 < len(joints) < moving else note)
+    return tuple(found)
 
 
 def _still(fits: Sequence[ThermalEstimate | None]) -> tuple[str, ...]:
@@ -151,8 +162,8 @@ def _joints(estimate: CampaignEstimate) -> Table:
         "bounds (95 %)",
     )
     caption = (
-        "RMS of the torque's error [N m or N]; time constants at the power of the warm-up, with standard errors; friction "
-        "at T0 over that at the steady state of that power."
+        "RMS of the torque's error [N m or N]; time constants at the largest power, with standard errors; friction at "
+        "T0 over that at the steady state of that power."
     )
     return Table(headings=headings, rows=tuple(rows), caption=caption)
 

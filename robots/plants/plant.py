@@ -168,19 +168,14 @@ def simulate(plant: Plant, motion: Motion, *, seed: int = 0, warmth: Warmth | No
         raise InputError(f"a motion of {motion.n} joints", allowed=f"{plant.robot.n}, as {plant.robot.name} has")
     now = plant.warmth(motion) if warmth is None else warmth
     tau = plant.torque(motion, now)
+    seen = "none" if plant.heat is None else plant.heat.thermometers
     rng = np.random.default_rng(seed)
     period = float(np.median(np.diff(motion.t))) if len(motion) > 1 else 0.0
     return Log(
         t=motion.t,
         q=plant.sensors.position(motion.q, np.asarray(plant.robot.gear_ratio)),
         tau=plant.sensors.torque(tau, period, rng),
-        **_readings(plant, motion, now),
+        temperature=now.at(motion.t) if now is not None and seen == "all" else None,
+        ambient=np.full(len(motion), plant.heat.ambient) if plant.heat is not None and seen != "none" else None,
         name=f"virtual {plant.robot.name}",
     )
-
-
-def _readings(plant: Plant, motion: Motion, warmth: Warmth | None) -> dict[str, Array]:
-    if plant.heat is None or warmth is None or plant.heat.thermometers == "none":
-        return {}
-    around = {"ambient": np.full(len(motion), plant.heat.ambient)}
-    return around if plant.heat.thermometers == "ambient" else {**around, "temperature": warmth.at(motion.t)}

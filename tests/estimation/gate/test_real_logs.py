@@ -5,7 +5,7 @@ import pytest
 
 from estimation import read_log
 from estimation.gate import check_log
-from robots.common.errors import InputError
+from robots.common.errors import NotIdentifiableError
 from robots.loading import load_robot
 
 
@@ -68,5 +68,5 @@ def test_simple_pendulum_runs_are_told_apart(data):
         assert not check_log(robot, read_log(folder / f"{run}.parquet")).refused
     by_hand = check_log(robot, read_log(folder / "gravity_comp.parquet"))
     assert names(by_hand, "refuse") == {"moved_by_others"}
-    with pytest.raises(InputError, match=r"sysid\.parquet.*badly excited"):
+    with pytest.raises(NotIdentifiableError, match=r"sysid\.parquet.*badly excited"):
         check_log(robot, read_log(folder / "sysid.parquet")).raise_if_refused()

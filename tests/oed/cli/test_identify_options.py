@@ -136,3 +136,14 @@ def test_mapping(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     bare = run("predict", "--model", out, "--log", log, "--mapping", mapping, "--out", tmp_path / "p.csv", "--json")
     assert bare.code == 0, bare.err
     assert max(bare.data["nrmse"]) < 0.1
+
+
+def test_torque_that_does_not_follow_from_the_motion(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
+    """A log in good order whose torque is noise is not bad input: code 1, with the reason, and nothing written."""
+    table = pd.read_csv(experiment / "log.csv", comment="#")
+    table[["tau1", "tau2"]] = np.random.default_rng(0).normal(scale=20.0, size=(len(table), 2))
+    table.to_csv(tmp_path / "noise.csv", index=False)
+    done = run("identify", "--robot", robot, "--log", tmp_path / "noise.csv", "--out", tmp_path / "out")
+    assert done.code == 1, done.err
+    assert "badly excited" in done.err
+    assert [path.name for path in tmp_path.iterdir()] == ["noise.csv"]

@@ -113,6 +113,18 @@ def test_torque_titles_tell_the_error_in_spite_of_gaps() -> None:
     assert picture.panels[1].title == "Joint 1 residual: 1.00 N m RMS (50.0 % of the torque)"
 
 
+def test_torque_band_is_drawn_about_the_prediction() -> None:
+    """A joint's band lies about its predicted torque and about a residual of zero; a joint without one has none."""
+    torque = np.zeros((3, 2))
+    panels = torque_picture([0.0, 1.0, 2.0], torque, torque, band=[0.5, np.nan]).panels
+    assert list(panels[0].series[1].error) == [0.5, 0.5, 0.5]
+    assert [(band.low, band.high) for band in panels[1].bands] == [(-0.5, 0.5)]
+    assert panels[2].series[1].error is None
+    assert panels[3].bands == ()
+    with pytest.raises(InputError, match="band"):
+        torque_picture([0.0, 1.0, 2.0], torque, torque, band=[0.5])
+
+
 @pytest.mark.parametrize("gaps", [False, True])
 def test_autocorrelation_is_that_of_its_definition(gaps: bool) -> None:
     """The correlations by FFT equal the sums over pairs, to rounding; pairs with a gap count for nothing."""
