@@ -12,6 +12,7 @@ _EXPORTS = {
     "Prediction": "estimation.prediction",
     "ThermalEstimate": "estimation.thermal",
     "ThermalRun": "estimation.thermal",
+    "bootstrap": "estimation.bootstrapping",
     "check_log": "estimation.gate",
     "choose_thermal": "estimation.thermal",
     "compare_methods": "estimation.method_table",

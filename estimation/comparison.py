@@ -39,7 +39,7 @@ MOST_HARMONICS = 120
 # A left-out error below this share of a constant's is rounding.
 EXACT = 1e-9
 # More rows than this do not choose better, only slower: evenly spread stretches then stand for the log.
-MOST_ROWS, STRETCHES = 40_000, 10
+MOST_ROWS, STRETCHES = 24_000, 10
 # Both sides are averaged over so much time [s], which leaves the noise above 25 Hz out of the comparison, ...
 AVERAGED = 0.02
 # ... as long as so many averages remain.
@@ -119,6 +119,7 @@ class Comparison:
         """Chooses the smoothing, by some settings of the regularisation, and gives its blocks."""
         rate = 1 / self.period
         usable = [cutoff for cutoff in self.candidates.cutoffs if cutoff <= 0.4 * rate] or [0.4 * rate]
+        # All of them: an elastic drive makes a second minimum far above the first.
         tried = [(cutoff, blocks, self._best(blocks)) for cutoff in usable for blocks in [self.blocks(LowPass(cutoff))]]
         lowest = min(cost for _, _, cost in tried)
         cutoff, blocks, cost = min((t for t in tried if t[2] <= lowest + CUTOFF_SLACK), key=lambda t: t[0])

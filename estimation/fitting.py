@@ -167,7 +167,11 @@ def _part(joints: JointRegressor, part: Rows, error: Array, begin: int, end: int
         at = slice(begin + start, begin + stop)
         return joints.base.regressor(motion.q[at], motion.dq[at], motion.ddq[at])
 
-    return Part(end - begin, regressor, mask, error[begin:end], joints.used)
+    def split(start: int, stop: int) -> tuple[Array, ...]:
+        at = slice(begin + start, begin + stop)
+        return joints(motion.q[at], motion.dq[at], motion.ddq[at])
+
+    return Part(end - begin, regressor, mask, error[begin:end], joints.used, split)
 
 
 def _scores(regressor: JointRegressor, rows: Sequence[Rows], errors: Sequence[Array], weights: Array) -> Array:

@@ -82,7 +82,7 @@ def identify(
 
     Raises:
         InputError: logs of another robot, without torque, too short, or refused by the gate; unknown options.
-        NotIdentifiableError: logs in which no joint's torque can be predicted.
+        NotIdentifiableError: logs in which no joint moves, or no joint's torque can be predicted.
     """
     chosen = choose_estimator(method)
     data = [logs] if isinstance(logs, Log) else list(logs)

@@ -152,7 +152,7 @@ def predict(
     *,
     thermal: ThermalTorqueModel | None = None,
     start: Sequence[Array | None] | None = None,
-    ambient: Array | float | None = None,
+    ambient: float | None = None,
 ) -> Prediction:
     """Predicts the torques of a log's motion.
 
@@ -161,8 +161,7 @@ def predict(
         log: positions over time; its torque, if any, is compared with the prediction and not used otherwise.
         thermal: this model with its thermal models: friction falls as the motion heats the joints.
         start: temperatures of each joint's zones at first [degC]; those of the surroundings by default.
-        ambient: temperature of the surroundings, a number or one at each time of the motion [degC]; each thermal
-            model's by default.
+        ambient: temperature of the surroundings where the log does not state it [degC]; each model's by default.
 
     Returns:
         The torques at the log's own times.
@@ -181,7 +180,9 @@ def predict(
     if thermal is None:
         predicted = model.torque(motion.q, motion.dq, motion.ddq, motion.t)
     else:
-        predicted, _ = thermal.simulate(motion, ambient=ambient, start=start)
+        from estimation.thermal.history import surroundings
+
+        predicted, _ = thermal.simulate(motion, ambient=surroundings(log, motion.t, ambient), start=start)
     return Prediction(
         motion=motion,
         predicted=predicted,

@@ -17,6 +17,7 @@ from estimation.diagnosis.problem import Problem, pose, visible_root
 from estimation.diagnosis.scan import Entry, measure
 from estimation.diagnosis.states import Recording
 from estimation.diagnosis.whitening import Band, Gaps, Whitening
+from estimation.pulls import Pull
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError
 from robots.plants.sensors import Sensors
@@ -114,8 +115,18 @@ def planned_limits(
     return find_limits(problem, measure(problem, all_hypotheses(model.robot, list(EFFECTS.values()))))
 
 
-def planned_problem(model: TorqueModel, parameters: Array, motions: Sequence[Motion], *, noise: Sensors) -> Problem:
-    """Poses the diagnosis of an experiment that has not been made: its torque is the model's."""
+def planned_problem(
+    model: TorqueModel,
+    parameters: Array,
+    motions: Sequence[Motion],
+    *,
+    noise: Sensors,
+    level: Array | None = None,
+) -> Problem:
+    """Poses the diagnosis of an experiment that has not been made: its torque is the model's.
+
+    `level` (n,) [N m or N] is the noise's standard deviation where it is known, else the share that `noise` says.
+    """
     if not np.isfinite(parameters).all():
         missing = model.columns[int(np.argmin(np.isfinite(parameters)))]
         raise InputError(
@@ -140,14 +151,20 @@ def planned_problem(model: TorqueModel, parameters: Array, motions: Sequence[Mot
         floor=np.zeros(joined.q.shape[1]),
         names=tuple(f"motion {i}" for i in range(1, len(motions) + 1)),
     )
-    whitening = expected_whitening(recording, noise)
+    whitening = expected_whitening(recording, noise, level)
     baseline = build_baseline(find_base_parameters(model), recording, whitening.scale)
-    return pose(recording, baseline, whitening, draws=0, rng=np.random.default_rng(0))
+    # The parameters are known: the motion's own torque gives them back, and nothing is to hold them elsewhere.
+    size = baseline.base.size + baseline.nuisance.shape[2]
+    free = Pull(np.zeros((size, size)), np.zeros(size))
+    return pose(recording, baseline, whitening, draws=0, rng=np.random.default_rng(0), pull=free)
 
 
-def expected_whitening(recording: Recording, noise: Sensors) -> Whitening:
-    """Whitens the noise that sensors are expected to have: white and first-order coloured, a share of the torque."""
-    size = noise.torque_noise * np.sqrt(np.mean(recording.tau**2, axis=0))
+def expected_whitening(recording: Recording, noise: Sensors, level: Array | None = None) -> Whitening:
+    """Whitens the noise that sensors are expected to have: white and first-order coloured, a share of the torque.
+
+    `level` (n,) [N m or N] is its standard deviation where that is known.
+    """
+    size = noise.torque_noise * np.sqrt(np.mean(recording.tau**2, axis=0)) if level is None else level
     size = np.maximum(size, 1e-3 * max(float(size.max()), 1e-9))
     rho = float(np.exp(-recording.step / noise.correlation_time)) if noise.correlation_time else 0.0
     lags = noise.coloured_share * rho ** np.arange(ORDER + 1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -118,7 +119,7 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
     joint = next((c.hypothesis.joint for c in possible if c.hypothesis.joint is not None), None)
     index = joint - 1 if joint is not None else int(np.argmax(np.ptp(problem.recording.q, axis=0)))
     room = room_of(robot, problem.recording)
-    grams = _Grams(problem, possible)
+    grams = Grams(problem, possible)
     proposals, made = [], {}
     for kind, make in MAKERS.items():
         stages = make(room, index, 0)
@@ -145,7 +146,7 @@ def _duration(stages: Sequence[Stage]) -> float:
     return float(sum(stage.pause + stage.motion.duration for stage in stages))
 
 
-class _Grams:
+class Grams:
     """Gram matrices of base columns and all causes' columns, whitened: of the logs, and of any experiment."""
 
     def __init__(self, problem: Problem, causes: Sequence[Cause]) -> None:
@@ -155,17 +156,30 @@ class _Grams:
         self.model: TorqueModel = now.model
         self.columns = tuple(int(i) for i in problem.baseline.base.independent)
         self.sizes = [len(c.coefficients) for c in causes]
-        base = problem.baseline.regressor
-        effects = [c.hypothesis.effect.columns(now, c.hypothesis.joint, c.shape) for c in causes]
-        self.old = self._gram(base, effects, problem.whitening)
+
+    @cached_property
+    def old(self) -> Array:
+        """Of the logs that there are."""
+        now = self.problem.situation
+        effects = [c.hypothesis.effect.columns(now, c.hypothesis.joint, c.shape) for c in self.causes]
+        return self._gram(self.problem.baseline.regressor, effects, self.problem.whitening)
 
     def chance(self, stages: Sequence[Stage]) -> float:
         """Gives the chance that each cause, were it true, would be told from every other."""
-        total = self.old.copy()
+        total = self.old + self.of(stages, float(self.problem.recording.t[-1]) + LATER)
+        return min(
+            chance_to_resolve(self._left(total, true, rival))
+            for true in range(len(self.causes))
+            for rival in range(len(self.causes))
+            if true != rival
+        )
+
+    def of(self, stages: Sequence[Stage], begin: float = 0.0) -> Array:
+        """Evaluates an experiment that begins at a time [s] of the logs' clock: the Gram matrix of all columns."""
         bases: list[Array] = []
         effects: list[list[Array]] = [[] for _ in self.causes]
         starts: list[int] = []
-        t0, rows = float(self.problem.recording.t[-1]) + LATER, 0
+        t0, rows = begin, 0
         for part in _joined(stages):
             robot = _changed(self.model.robot, part.gravity)
             model = replace(self.model, robot=robot)
@@ -186,13 +200,13 @@ class _Grams:
             t0 = float(now.t[-1]) + 60.0
         base = np.concatenate(bases)
         whitening = replace(self.problem.whitening, starts=tuple(starts), gaps=no_gaps(base.shape[1]), weights=None)
-        total += self._gram(base, [np.concatenate(own) for own in effects], whitening)
-        return min(
-            chance_to_resolve(self._left(total, true, rival))
-            for true in range(len(self.causes))
-            for rival in range(len(self.causes))
-            if true != rival
-        )
+        return self._gram(base, [np.concatenate(own) for own in effects], whitening)
+
+    def block(self, gram: Array, cause: int) -> Array:
+        """The energy of a cause's columns (k, k), nothing projected out."""
+        edges = len(self.columns) + np.concatenate([[0], np.cumsum(self.sizes)])
+        own = slice(int(edges[cause]), int(edges[cause + 1]))
+        return gram[own, own]
 
     def _parameters(self, payload: float) -> Array:
         parameters = np.array(self.problem.situation.parameters)
@@ -216,18 +230,24 @@ class _Grams:
         return gram
 
     def _left(self, gram: Array, true: int, rival: int) -> float:
-        """What base model and rival leave of the true cause."""
+        theta = self.causes[true].coefficients
+        return max(float(theta @ self.remainder(gram, true, rival) @ theta), 0.0)
+
+    def remainder(self, gram: Array, true: int, rival: int | None) -> Array:
+        """What base model and rival, or the base model alone, leave of the true cause's columns (k, k)."""
         b = len(self.columns)
         edges = b + np.concatenate([[0], np.cumsum(self.sizes)])
-        own, other = (np.arange(edges[i], edges[i + 1]) for i in (true, rival))
-        beside = np.concatenate([np.arange(b), other])
+        own = np.arange(edges[true], edges[true + 1])
+        beside = np.arange(b)
+        if rival is not None:
+            beside = np.concatenate([beside, np.arange(edges[rival], edges[rival + 1])])
         scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
         unit = gram / scale[:, None] / scale
         values, vectors = np.linalg.eigh(unit[np.ix_(beside, beside)])
         kept = values > 1e-9 * values[-1]
-        theta = self.causes[true].coefficients * scale[own]
-        cross = theta @ unit[np.ix_(own, beside)] @ vectors[:, kept] / np.sqrt(values[kept])
-        return max(float(theta @ unit[np.ix_(own, own)] @ theta - cross @ cross), 0.0)
+        cross = unit[np.ix_(own, beside)] @ vectors[:, kept] / np.sqrt(values[kept])
+        left: Array = (unit[np.ix_(own, own)] - cross @ cross.T) * np.outer(scale[own], scale[own])
+        return left
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,28 +43,41 @@ class Delay:
     saved: float
 
 
-def estimate_delay(rows: Rows, fit: JointFit, joint: int, period: float, cutoff: float, unexplained: float) -> Delay:
-    """Finds the delay at which the torque fits the motion best, to a part of a sample.
+def estimate_delays(
+    rows: Rows, fits: Mapping[int, JointFit], period: float, cutoff: float, unexplained: Array
+) -> list[Delay | None]:
+    """Finds for each joint the delay at which the torque fits the motion best, to a part of a sample.
 
     Args:
         rows: the excerpts.
-        fit: of the joint.
-        joint: counted from 0.
+        fits: of the joints to look at, counted from 0.
         period: [s].
         cutoff: of the smoothing [Hz].
-        unexplained: torque error over the torque's standard deviation, without a delay.
+        unexplained: torque errors over the torques' standard deviations, without a delay (n,).
+
+    Returns:
+        The delays (n,), None of joints without a fit.
     """
-    reach = max(SAMPLES * period, SECONDS) * (LONGER if unexplained > UNEXPLAINED else 1.0)
-    half = int(np.clip(np.ceil(reach * cutoff / STEP), 6, 60))
-    shifts = np.linspace(-reach, reach, 2 * half + 1)
+    delays: list[Delay | None] = [None] * len(unexplained)
+    for factor in (1.0, LONGER):
+        chosen = {j: fit for j, fit in fits.items() if (LONGER if unexplained[j] > UNEXPLAINED else 1.0) == factor}
+        if not chosen:
+            continue
+        reach = max(SAMPLES * period, SECONDS) * factor
+        half = int(np.clip(np.ceil(reach * cutoff / STEP), 6, 60))
+        shifts = np.linspace(-reach, reach, 2 * half + 1)
+        errors = np.empty((len(shifts), len(chosen)))
+        for k, shift in enumerate(shifts):
+            tau = rows.torques(float(shift))
+            errors[k] = [_remaining(fit, tau[:, j]) for j, fit in chosen.items()]
+        for (joint, fit), error in zip(chosen.items(), errors.T, strict=True):
+            delays[joint] = _refined(rows, fit, joint, shifts, error)
+    return delays
 
-    def remaining(shift: float) -> float:
-        tau = rows.torque(joint, shift)
-        tau = tau - tau.mean()
-        return _remainder(fit, tau) / max(float(tau @ tau), 1e-300)
 
-    errors = np.array([remaining(shift) for shift in shifts])
-    best = int(np.argmin(errors))
+def _refined(rows: Rows, fit: JointFit, joint: int, shifts: Array, errors: Array) -> Delay:
+    """The delay between the shifts that were tried, with its standard error."""
+    best, half = int(np.argmin(errors)), len(shifts) // 2
     zero = errors[half]
     if best in (0, 2 * half):
         return Delay(float(shifts[best]), np.inf, float(1 - errors[best] / zero) if zero > 0 else 0.0)
@@ -71,15 +85,14 @@ def estimate_delay(rows: Rows, fit: JointFit, joint: int, period: float, cutoff:
     bend = left - 2 * middle + right
     value = float(shifts[best] + 0.5 * (left - right) / bend * (shifts[1] - shifts[0])) if bend > 0 else shifts[best]
     # Gauss-Newton at the optimum gives the standard error, block by block.
-    rate = rows.torque_rate(joint, value)
-    tau = rows.torque(joint, value)
+    rate, tau = rows.torques(value, 1)[:, joint], rows.torques(value)[:, joint]
     slope = rate - fit.Y @ (fit.inverse @ (fit.Y.T @ rate))
     residual = tau - fit.Y @ (fit.inverse @ (fit.Y.T @ tau))
     starts = np.flatnonzero(np.diff(rows.block, prepend=-1))
     scores = np.add.reduceat(slope * residual, starts)
     curvature = float(slope @ slope)
     error = float(np.sqrt(scores @ scores)) / curvature if curvature > 0 else np.inf
-    return Delay(value, error, float(1 - np.sqrt(remaining(value) / zero)) if zero > 0 else 0.0)
+    return Delay(value, error, float(1 - np.sqrt(_remaining(fit, tau) / zero)) if zero > 0 else 0.0)
 
 
 def delay_findings(delays: list[Delay | None], period: float) -> list[Finding]:
@@ -131,6 +144,8 @@ def _finding(value: float, error: float, joint: int | None, period: float, joint
     )
 
 
-def _remainder(fit: JointFit, tau: Array) -> float:
-    cross = fit.Y.T @ tau
-    return float(tau @ tau - cross @ (fit.inverse @ cross))
+def _remaining(fit: JointFit, tau: Array) -> float:
+    """Share of the torque's variance that the fit leaves."""
+    tau = tau - tau.mean()
+    cross, square = fit.Y.T @ tau, float(tau @ tau)
+    return float(square - cross @ (fit.inverse @ cross)) / max(square, 1e-300)

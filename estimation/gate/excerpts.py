@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import sosfiltfilt
 
+from estimation.preprocessing.smoothing import butterworth
 from robots.signals import Log
 
 Array = NDArray[np.float64]
 
 # Rows of the log that are looked at, and into how many stretches they are spread where the log is longer.
-ROWS, STRETCHES = 40_000, 16
+ROWS, STRETCHES = 24_000, 12
 # Cut-offs of the smoothing to choose from [Hz], up to this share of the sampling rate.
 CUTOFFS, NYQUIST_SHARE = (1.5, 3.0, 6.0, 12.0, 24.0), 0.25
 # Samples kept per period of the cut-off.
@@ -142,5 +143,5 @@ def _at(grid: Array, t: Array, values: Array) -> Array:
 def _low_pass(x: Array, period: float, cutoff: float) -> Array:
     own = min(cutoff / (np.sqrt(2) - 1) ** (1 / (2 * ORDER)), 0.45 / period)
     padding = int(min(len(x) - 1, max(3 * (2 * ORDER + 1), round(2 / (cutoff * period)))))
-    sections = butter(ORDER, 2 * own * period, output="sos")
+    sections = butterworth(ORDER, 2 * own * period)
     return np.asarray(sosfiltfilt(sections, x, axis=0, padtype="odd", padlen=padding))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -159,16 +159,30 @@ class Rows:
         """Torque of a joint (M,), counted from 0, as it was logged."""
         return np.concatenate([part.raw[:, joint] for part in self.excerpts if part.raw is not None])
 
-    def torque(self, joint: int, shift: float = 0.0) -> Array:
-        """Torque of a joint (M,), counted from 0, as it is logged so much later [s]."""
-        return np.concatenate([_evaluate(part, part.t + shift)[:, joint] for part in self.excerpts])
+    def torques(self, shift: float = 0.0, order: int = 0) -> Array:
+        """Torques (M, n) as they are logged so much later [s], or their derivatives of some order."""
+        return np.concatenate([_evaluate(part, part.t + shift, order) for part in self.excerpts])
 
-    def torque_rate(self, joint: int, shift: float = 0.0) -> Array:
-        """Its rate of change (M,) [N m/s]."""
-        return np.concatenate([_evaluate(part, part.t + shift, 1)[:, joint] for part in self.excerpts])
+    @cached_property
+    def _torques(self) -> Array:
+        return self.torques()
+
+    def torque(self, joint: int) -> Array:
+        """Torque of a joint (M,), counted from 0."""
+        return np.ascontiguousarray(self._torques[:, joint])
 
     def columns(self, joint: int) -> tuple[Array, NDArray[np.intp]]:
-        """Regressor of a joint (M, k) with its own columns: rotor inertia, Coulomb, viscous, offset."""
+        """Regressor of a joint (M, k) with its own columns, to be read only, and which of the rigid body's they are."""
+        if joint not in self._columns:
+            self._columns[joint] = self._joined(joint)
+        return self._columns[joint]
+
+    @cached_property
+    def _columns(self) -> dict[int, tuple[Array, NDArray[np.intp]]]:
+        return {}
+
+    def _joined(self, joint: int) -> tuple[Array, NDArray[np.intp]]:
+        # Rotor inertia, Coulomb, viscous, offset.
         body = self.Y[:, joint]
         used = np.flatnonzero(np.any(body != 0.0, axis=0))
         dq = self.dq[:, joint]

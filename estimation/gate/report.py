@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.finding import SEVERITIES, Finding, Severity
-from robots.common.errors import InputError
+from robots.common.errors import InputError, NotIdentifiableError
 from robots.signals import Log
 
 if TYPE_CHECKING:
@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 # Fewer samples than this carry no derivatives.
 FEWEST = 20
+# Findings of a log that is in order and still does not determine what is asked for.
+UNTOLD = frozenset({"badly_excited"})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,14 +75,16 @@ class GateReport:
         """Refuses the log with its first reason and the number of the others.
 
         Raises:
-            InputError: the log cannot carry an identification.
+            NotIdentifiableError: nothing is wrong with the log but that no joint's torque follows from its motion.
+            InputError: anything else that would be fitted wrongly.
         """
         reasons = self.of("refuse")
         if not reasons:
             return
         first = reasons[0]
         more = f" (and {len(reasons) - 1} more: {', '.join(_names(reasons[1:]))})" if len(reasons) > 1 else ""
-        raise InputError(
+        kind = NotIdentifiableError if all(reason.name in UNTOLD for reason in reasons) else InputError
+        raise kind(
             f"{first.text}{more}",
             file=self.log or None,
             column=first.column,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,13 +68,24 @@ def own_cutoff(cutoff: float) -> float:
     return cutoff / (np.sqrt(2) - 1) ** (1 / (2 * ORDER))
 
 
+@lru_cache(maxsize=64)
+def butterworth(order: int, share: float) -> Array:
+    """Designs a low-pass in second-order sections, kept: short stretches are filtered faster than it is designed.
+
+    Args:
+        order: of the filter.
+        share: its cut-off over the Nyquist frequency.
+    """
+    return np.asarray(butter(order, share, output="sos"))
+
+
 def low_pass(x: Array, period: float, cutoff: float) -> Array:
     """Passes signals (N, n) on a grid forward and backward through a Butterworth filter, together 3 dB at `cutoff`."""
     own = own_cutoff(cutoff)
     nyquist = 0.5 / period
     if own >= 0.95 * nyquist:
         return x
-    sections = butter(ORDER, own / nyquist, output="sos")
+    sections = butterworth(ORDER, own / nyquist)
     # Four periods of the cut-off: by then the filter has forgotten how the padding began, to a part in 10^7.
     padding = int(min(len(x) - 1, max(3 * (2 * ORDER + 1), round(4 / (cutoff * period)))))
     return np.asarray(sosfiltfilt(sections, x, axis=0, padtype="odd", padlen=padding))

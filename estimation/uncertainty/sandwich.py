@@ -32,6 +32,7 @@ class Part:
         mask: (N, n).
         residual: (N, n), as the fit left it.
         used: per joint the indices of the columns that act on it; None for all.
+        split: (start, stop) -> each joint's own columns, n arrays (stop - start, p_j); None to take them out of Y.
     """
 
     rows: int
@@ -39,6 +40,15 @@ class Part:
     mask: Array
     residual: Array
     used: Sequence[NDArray[np.intp]] | None = None
+    split: Callable[[int, int], Sequence[Array]] | None = None
+
+    def columns(self, start: int, stop: int) -> list[tuple[Array, NDArray[np.intp]]]:
+        """Evaluates each joint's columns (stop - start, p_j), with their indices."""
+        if self.split is not None and self.used is not None:
+            return list(zip(self.split(start, stop), self.used, strict=True))
+        Y = self.regressor(start, stop)
+        used = self.used or [np.arange(Y.shape[2])] * Y.shape[1]
+        return [(Y[:, joint, columns], columns) for joint, columns in enumerate(used)]
 
     def chunks(self) -> Iterator[slice]:
         """Cuts the rows into pieces."""
@@ -68,7 +78,7 @@ def covariance(parts: Sequence[Part], weights: Array, inverse: Array, seed: int 
     plain = _noise(parts, np.zeros((len(weights), HIGHEST_ORDER + 1)))
     # Of a long log the fit eats too little of the noise to matter.
     noise = _corrected(parts, weights, inverse, plain, np.random.default_rng(seed)) if share == 1 else plain
-    model, robust = (meat / share for meat in _meats(parts, weights, noise))
+    model, robust = (meat / share for meat in _meats(parts, weights, noise, len(inverse)))
     scale = float(np.mean(np.diag(noise.covariance) / np.diag(plain.covariance)))
     first, second = inverse @ model @ inverse, scale * (inverse @ robust @ inverse)
     errors = np.sqrt(np.maximum(np.diag(first), 0))
@@ -156,40 +166,33 @@ def _lost(parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, r
     return lost / DRAWS
 
 
-def _meats(parts: Sequence[Part], weights: Array, noise: Noise) -> tuple[Array, Array]:
+def _meats(parts: Sequence[Part], weights: Array, noise: Noise, size: int) -> tuple[Array, Array]:
     """The sandwich's meat from the model, and from the products of innovations (p, p)."""
-    model = robust = np.zeros((0, 0))
+    products = robust = np.zeros((0, 0))
+    owner, gather = np.zeros(0, dtype=np.intp), np.zeros((0, size))
     for part in parts:
         innovations = noise.whitened(part.residual)
         states: list[Array] = []
         # Gamma = A^-1 C A^-T: the transposed inverse filter runs from the last row to the first.
         for rows in reversed(list(part.chunks())):
-            Y = part.regressor(rows.start, rows.stop)
-            size = Y.shape[2]
-            used = part.used or [np.arange(size)] * Y.shape[1]
-            if not model.size:
-                model, robust = np.zeros((2, size, size))
+            found = part.columns(rows.start, rows.stop)
+            if not products.size:
+                owner = np.repeat(np.arange(len(found)), [len(columns) for _, columns in found])
+                gather = np.eye(size)[np.concatenate([columns for _, columns in found])]
+                products, robust = np.zeros((len(owner), len(owner))), np.zeros((size, size))
             if not states:
-                states = [np.zeros((len(a), len(k))) for a, k in zip(noise.coefficients, used, strict=True)]
-            filtered = []
-            scores = np.zeros((len(Y), size))
-            for j, (a, columns) in enumerate(zip(noise.coefficients, used, strict=True)):
-                backward = (Y[:, j, columns] * (weights[j] * part.mask[rows, j, None]))[::-1]
+                states = [np.zeros((len(a), len(k))) for a, (_, k) in zip(noise.coefficients, found, strict=True)]
+            filtered = np.empty((rows.stop - rows.start, len(owner)))
+            end = 0
+            for j, (a, (Y, columns)) in enumerate(zip(noise.coefficients, found, strict=True)):
+                backward = (Y * (weights[j] * part.mask[rows, j, None]))[::-1]
                 if len(a):
                     backward, states[j] = lfilter([1.0], np.concatenate([[1.0], -a]), backward, axis=0, zi=states[j])
-                filtered.append(backward[::-1])
-                scores[:, columns] += filtered[j] * innovations[rows, j, None]
-            _add_products(model, filtered, used, noise.covariance)
+                begin, end = end, end + len(columns)
+                filtered[:, begin:end] = backward[::-1]
+            products += filtered.T @ filtered
+            filtered *= innovations[rows][:, owner]
+            scores = filtered @ gather
             robust += scores.T @ scores
-    return model, robust
-
-
-def _add_products(meat: Array, filtered: list[Array], used: Sequence[NDArray[np.intp]], covariance: Array) -> None:
-    """Adds sum_jk C_jk F_j'F_k to the meat (p, p), of filtered columns F_j (N, p_j)."""
-    products = np.hstack(filtered)
-    products = products.T @ products
-    ends = np.cumsum([0, *(len(columns) for columns in used)])
-    for j, left in enumerate(used):
-        for k, right in enumerate(used):
-            block = products[ends[j] : ends[j + 1], ends[k] : ends[k + 1]]
-            meat[np.ix_(left, right)] += covariance[j, k] * block
+    # sum_jk C_jk F_j'F_k, each column put where it belongs.
+    return gather.T @ (noise.covariance[np.ix_(owner, owner)] * products) @ gather, robust

@@ -11,7 +11,7 @@ def main() -> None:
     from robots.common.errors import OedError
 
     try:
-        app()
+        app(prog_name="oed")
     except OedError as error:
         print(f"oed: {error}", file=sys.stderr)
         sys.exit(error.exit_code)

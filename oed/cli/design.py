@@ -26,6 +26,7 @@ from oed.cli.options import (
 
 
 def design(
+    context: typer.Context,
     robot: RobotOption,
     criterion: Annotated[str, typer.Option(help="cond, d (log det), a, e, i (with --task), or cond-d.")] = "cond",
     friction: Annotated[str, typer.Option(help="The model to fit: polynomial or coulomb-viscous.")] = "polynomial",
@@ -68,6 +69,12 @@ def design(
     task: Annotated[
         Path | None, typer.Option(help="A trajectory.csv whose torques are to be predicted.", show_default=False)
     ] = None,
+    discriminate: Annotated[
+        str | None,
+        typer.Option(
+            help="Instead: tell two effects apart, such as stribeck:2,load_dependent_friction:2.", show_default=False
+        ),
+    ] = None,
     effort: Annotated[str, typer.Option(help="How long to search: quick, standard or thorough.")] = "standard",
     time_limit: Annotated[
         float | None, typer.Option(help="Stop searching after so many seconds and keep the best.", show_default=False)
@@ -86,6 +93,25 @@ def design(
     """Designs an excitation experiment: trajectory.csv, design.json and report.html."""
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
+        if discriminate is not None:
+            from oed.cli.discriminating import discriminating, refuse_others
+
+            refuse_others(context)
+            summary, data = discriminating(
+                robot_from(robot, tip, joints, lock),
+                discriminate,
+                noise=numbers("--noise", noise),
+                friction=friction,
+                home=numbers("--home", home),
+                velocity_fraction=velocity_fraction,
+                seed=seed,
+                out=out,
+                png=png,
+                force=force,
+                progress=progress,
+            )
+            console.result(f"{summary}\nwritten to {out.resolve()}", data)
+            return
         from oed.cli.priors import prior_from
         from oed.cli.spaces import spaces_from
         from oed.experiments import design as run

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -53,12 +54,16 @@ def identify(
     with console.working() as progress:
         from estimation import identify as run
         from estimation import read_logs
-        from estimation.exports import export_c, export_urdf
+        from estimation.exports import c_code as c_text
+        from estimation.exports import urdf_text
         from estimation.method_table import compare_methods
         from oed.reports import save_estimate_report
-        from robots.common.files import ResultFolder
+        from robots.common.files import ResultFolder, open_atomic
 
-        with ResultFolder(out, force, names=["model.json", "report.html"]) as folder:
+        with ExitStack() as files:
+            folder = files.enter_context(ResultFolder(out, force, names=["model.json", "report.html"]))
+            # Opened before the work, so that a file in the way ends it early and an error leaves none of them.
+            streams = {path: files.enter_context(open_atomic(path, force=force)) for path in (urdf, c_code) if path}
             described = robot_from(robot, tip, joints, lock)
             logs = read_logs(log, n=described.n, mapping=mapping, joints=described.joint_names)
             options: dict[str, Any] = {
@@ -74,9 +79,9 @@ def identify(
             result.save(folder.path("model.json").parent)
             save_estimate_report(result, folder, png=png, methods=table)
             if urdf is not None:
-                export_urdf(result.model, urdf, robot=described, force=force)
+                streams[urdf].write(urdf_text(result.model, described).encode())
             if c_code is not None:
-                export_c(result.model, c_code, force=force)
+                streams[c_code].write(c_text(result.model).encode())
     found = "\n".join(gate.summary() for gate in result.gates if gate.findings)
     console.result(
         "\n".join(

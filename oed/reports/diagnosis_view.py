@@ -145,8 +145,7 @@ def _finding(finding: Finding, trace: Trace, coordinate: Array) -> FindingView:
         sentence=finding.sentence,
         joint=finding.joint,
         parameters=tuple(
-            (p.name, p.value, p.unit, *(p.ci95 if p.determined else (np.nan, np.nan)))
-            for p in finding.parameters
+            (p.name, p.value, p.unit, *(p.ci95 if p.determined else (np.nan, np.nan))) for p in finding.parameters
         ),
         p_value=finding.p_value,
         delta_bic=finding.delta_bic,

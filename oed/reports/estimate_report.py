@@ -58,7 +58,14 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
             ),
             pictures=(
                 _errors(estimate),
-                torque_picture(estimate.t, estimate.measured, estimate.predicted, joint_names=names, kinds=kinds),
+                torque_picture(
+                    estimate.t,
+                    estimate.measured,
+                    estimate.predicted,
+                    band=[joint.band for joint in joints],
+                    joint_names=names,
+                    kinds=kinds,
+                ),
             ),
             tables=(_joints(estimate),),
         ),

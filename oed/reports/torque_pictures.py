@@ -25,6 +25,7 @@ def torque_picture(
     measured: ArrayLike,
     predicted: ArrayLike,
     *,
+    band: ArrayLike | None = None,
     joint_names: Sequence[str] | None = None,
     kinds: Sequence[str] | None = None,
     name: str = "torque",
@@ -35,6 +36,8 @@ def torque_picture(
         t: time [s], (N,).
         measured: torques [N m, or N of a prismatic joint], (N, n); NaN where there is none.
         predicted: torques of the model, (N, n).
+        band: half-widths of a band about the prediction that holds 95 % of new errors, (n,) or (N, n); NaN where
+            none is known.
         joint_names: names, (n,).
         kinds: "revolute" or "prismatic" of each joint, (n,); None where all are revolute.
         name: the stem of the file name.
@@ -47,9 +50,11 @@ def torque_picture(
     if truth.shape != model.shape or len(times) != len(truth):
         raise InputError(f"shapes {times.shape}, {truth.shape} and {model.shape}", allowed="(N,), (N, n) and (N, n)")
     count = truth.shape[1]
+    widths = _widths(band, truth.shape)
     titles, units = joint_titles(joint_names, count), joint_units(kinds, count)
     panels = []
     for joint in range(count):
+        width = None if widths is None or not np.isfinite(widths[:, joint]).all() else widths[:, joint]
         residual = truth[:, joint] - model[:, joint]
         level, size = _rms(residual), _rms(truth[:, joint][np.isfinite(residual)])
         unit = units[joint].torque
@@ -61,7 +66,14 @@ def torque_picture(
                 y_label=f"[{unit}]",
                 series=(
                     Series(x=times, y=truth[:, joint], name="measured", role="measured"),
-                    Series(x=times, y=model[:, joint], name="predicted", role="predicted", opacity=0.9),
+                    Series(
+                        x=times,
+                        y=model[:, joint],
+                        name="predicted" if width is None else "predicted, 95 % band",
+                        role="predicted",
+                        opacity=0.9,
+                        error=width,
+                    ),
                 ),
             ),
             Panel(
@@ -70,6 +82,9 @@ def torque_picture(
                 y_label=f"[{unit}]",
                 series=(Series(x=times, y=residual, name="residual", role="residual"),),
                 lines=(Line(value=0.0, role="neutral", dash="solid"),),
+                bands=()
+                if width is None
+                else (Band(low=-float(width.mean()), high=float(width.mean()), label="95 % band", role="predicted"),),
             ),
         ]
     return Picture(
@@ -79,7 +94,8 @@ def torque_picture(
         columns=2,
         shared_x=True,
         panel_height=150,
-        caption="Left: both torques. Right: measured less predicted, on a scale of its own.",
+        caption="Left: both torques. Right: measured less predicted, on a scale of its own."
+        + ("" if widths is None else " The band held 95 % of the errors on data left out of the fit."),
     )
 
 
@@ -212,6 +228,15 @@ def _against_velocity(errors: FloatArray, speeds: FloatArray, title: str, units:
         ),
         lines=(Line(value=0.0, role="neutral", dash="solid"),),
     )
+
+
+def _widths(band: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray | None:
+    if band is None:
+        return None
+    widths = np.asarray(band, dtype=np.float64)
+    if widths.shape not in (shape, shape[1:]):
+        raise InputError(f"shape {widths.shape}", column="band", allowed=f"{shape[1:]} or {shape}")
+    return np.broadcast_to(widths, shape)
 
 
 def _rms(values: FloatArray) -> float:

@@ -65,7 +65,7 @@ def test_moving_blocks_and_logs_agree_with_the_sandwich(arm, coloured):
 
 
 def test_a_mean_has_its_textbook_error():
-    """Resampled white noise gives a mean the error s / sqrt(N), to the 3 % that 500 draws allow (four deviations: 13 %)."""
+    """Resampled white noise gives a mean the error s / sqrt(N), to what 500 draws allow (four deviations: 13 %)."""
     values = np.random.default_rng(0).normal(size=400)
     refits = _refits(np.ones((400, 1, 1)), values[:, None], 1, 500, np.random.default_rng(1))
     assert refits.std() == pytest.approx(values.std() / 20, rel=0.13)

@@ -1,0 +1,88 @@
+"""``oed design --discriminate``: the experiment that tells two possible causes apart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from robots.common.errors import InputError
+from robots.common.progress import Progress
+from robots.robot import Robot
+
+APPLY = {
+    "robot",
+    "discriminate",
+    "friction",
+    "home",
+    "velocity_fraction",
+    "noise",
+    "seed",
+    "out",
+    "tip",
+    "joints",
+    "lock",
+    "png",
+    "force",
+    "json",
+    "quiet",
+}
+"""Options of ``oed design`` that mean something beside ``--discriminate``."""
+
+
+def refuse_others(context: typer.Context) -> None:
+    """Refuses options that an experiment of this kind has no use for.
+
+    Raises:
+        InputError: naming them.
+    """
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    given = [
+        f"--{name.replace('_', '-')}"
+        for name, source in sources.items()
+        if name not in APPLY and source is not None and source.name == "COMMANDLINE"
+    ]
+    if given:
+        verb = "does" if len(given) == 1 else "do"
+        raise InputError(
+            f"{', '.join(given)} {verb} not apply with --discriminate, which judges by the chance to tell them apart",
+            remedy="leave out one or the other",
+        )
+
+
+def discriminating(
+    robot: Robot,
+    rivals: str,
+    *,
+    noise: list[float] | None,
+    friction: str,
+    home: list[float] | None,
+    velocity_fraction: float,
+    seed: int,
+    out: Path,
+    png: bool,
+    force: bool,
+    progress: Progress,
+) -> tuple[str, dict[str, Any]]:
+    """Writes trajectory.csv, design.json and report.html; gives the summary and the data."""
+    from oed.campaigns.discriminating import discriminate
+    from oed.reports.discrimination_report import save_discrimination_report
+    from robots.common.files import ResultFolder
+
+    with ResultFolder(out, force, names=["trajectory.csv", "design.json", "report.html"]) as folder:
+        result = discriminate(
+            robot,
+            rivals,
+            noise=noise,
+            friction=friction,
+            home=home,
+            velocity_fraction=velocity_fraction,
+            seed=seed,
+            progress=progress,
+        )
+        result.save(folder.path("trajectory.csv").parent)
+        save_discrimination_report(result, folder, png=png)
+    data = result.to_dict()
+    del data["segments"], data["quality"]
+    return result.summary(), data
