@@ -1,10 +1,10 @@
 """A two-hour campaign: read, checked, filtered and identified, against what the machine's linear algebra could do.
 
 Run it with ``python benchmarks/large_log.py [HOURS [FOLDER]]``. A virtual six-joint arm moves for two hours (1.8
-million samples at 250 Hz); its Parquet log is written once. The whole way from the file to the parameters runs in a process of
-its own, for a quarter of the time and for all of it: time must grow with the length, and memory must not hold the
-regressor (10.8 million rows of 70 columns are 6 GB). Beside it stands the time that one thread of this machine's BLAS
-takes for the symmetric product of a dense regressor of that size.
+million samples at 250 Hz); its Parquet log is written once. The whole way from the file to the parameters runs in a
+process of its own, for a quarter of the time and for all of it: time must grow with the length, and memory must not
+hold the regressor (10.8 million rows of 70 columns are 6 GB). Beside it stands the time that one thread of this
+machine's BLAS takes for the symmetric product of a dense regressor of that size.
 """
 
 from __future__ import annotations
