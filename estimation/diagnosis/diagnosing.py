@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from estimation.diagnosis.baseline import Baseline, base_parameters, build_baseline, inertia_of
 from estimation.diagnosis.diagnosis import Diagnosis
 from estimation.diagnosis.excess import residual_shares
-from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
+from estimation.diagnosis.extending import dense
+from estimation.diagnosis.hypotheses import all_hypotheses
 from estimation.diagnosis.limits import find_limits
 from estimation.diagnosis.patterns import all_patterns
 from estimation.diagnosis.problem import Problem, fit_values, pose
+from estimation.diagnosis.regularisation import held, pull_of
 from estimation.diagnosis.reporting import Told, assemble
 from estimation.diagnosis.scan import Entry, measure
 from estimation.diagnosis.selection import Selection, select
@@ -34,6 +36,8 @@ Array = NDArray[np.float64]
 DRAWS = 200
 # After an effect is found the noise is estimated anew; where it changes by less than this the search stands.
 CALMER = 0.03
+# So does it where the base model beside the effects makes a torque different by less than this share.
+MOVED = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,18 +152,19 @@ def _search(
     base = base_parameters(robot, friction, (0.001,) * robot.n)
     baseline = build_baseline(base, recording)
     tau = recording.tau
-    values = fit_values(baseline, tau.std(axis=0) + 1e-12, recording.unsure, tau)
+    values = fit_values(baseline, tau.std(axis=0) + 1e-12, recording.unsure, tau, pull_of(baseline, recording))
     residual = tau - baseline.regressor @ values
     search: Search | None = None
+    extra: Array | None = None
     known = 0
     for attempt in range(2):
         share = 0.1 + 0.3 * attempt
         inertia = inertia_of(baseline, recording, values)
         whitening = estimate_whitening(recording, residual, baseline.base.size + known, inertia)
-        if search is not None and not _calmer(search.problem, whitening.scale):
+        if search is not None and not (_calmer(search.problem, whitening.scale) or _moved(search.problem, values)):
             break
         rng = np.random.default_rng(seed)
-        problem = pose(recording, baseline, whitening, draws=DRAWS, rng=rng)
+        problem = pose(recording, baseline, whitening, draws=DRAWS, rng=rng, extra=extra)
         entries = measure(problem, hypotheses, _teller(bar, share, 0.2))
         selection = select(
             problem,
@@ -171,7 +176,7 @@ def _search(
         search = Search(problem, entries, selection)
         if not selection.found:
             break
-        residual, values = _cleaned(problem, baseline, selection)
+        residual, values, extra = _cleaned(problem, baseline, selection)
         known = sum(found.member.degrees for found in selection.found)
     assert search is not None
     return search
@@ -190,30 +195,31 @@ def _calmer(problem: Problem, scale: Array) -> bool:
     return bool(np.max(np.log(problem.whitening.scale / scale)) > CALMER)
 
 
-def _cleaned(problem: Problem, baseline: Baseline, selection: Selection) -> tuple[Array, Array]:
-    """Residual (N, n) of base model and effects found, fitted together, and the base parameters."""
-    blocks = [baseline.regressor]
+def _moved(problem: Problem, values: Array) -> bool:
+    """Whether the base model's torque beside what was found differs from that without by a share that effects feel.
+
+    Effects that grow with load or friction were measured by a base model that had taken what it could of others.
+    """
+    base = problem.baseline.base
+    full = np.zeros(base.model.size)
+    full[list(base.independent)] = values
+    change = problem.baseline.regressor @ (full - problem.situation.parameters)[list(base.independent)]
+    torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
+    return bool(np.max(np.sqrt(np.mean(change**2, axis=0)) / np.maximum(torque, 1e-12)) > MOVED)
+
+
+def _cleaned(problem: Problem, baseline: Baseline, selection: Selection) -> tuple[Array, Array, Array]:
+    """Residual (N, n) of base model and effects found, fitted together, the base parameters, the effects' torque."""
+    blocks = [baseline.regressor, baseline.nuisance]
     for found in selection.found:
-        blocks.append(_dense(problem, found.member.hypothesis, found.member.shape))
+        blocks.append(dense(problem, found.member.hypothesis, found.member.shape))
     full = np.concatenate(blocks, axis=2)
     weights = ~problem.recording.unsure / problem.whitening.scale
     flat = (full * weights[:, :, None]).reshape(-1, full.shape[2])
-    norms = np.linalg.norm(flat, axis=0)
-    norms[norms == 0] = 1.0
-    target = (problem.recording.tau * weights).reshape(-1)
-    gram_values, vectors = np.linalg.eigh((flat.T @ flat) / norms[:, None] / norms)
-    kept = gram_values > 1e-12 * gram_values[-1]
-    right = vectors[:, kept].T @ (flat.T @ target / norms)
-    values = vectors[:, kept] @ (right / gram_values[kept]) / norms
-    return problem.recording.tau - full @ values, values[: baseline.base.size]
-
-
-def _dense(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Array:
-    joints, columns = problem.columns_of(hypothesis, shape)
-    X = np.zeros((len(problem.recording), problem.n, columns[0].shape[1]))
-    for j, part in zip(joints, columns, strict=True):
-        X[:, j] = part
-    return X
+    values = held(flat.T @ flat, flat.T @ (problem.recording.tau * weights).reshape(-1), problem.pull)
+    known = len(problem.pull.target)
+    extra = full[:, :, known:] @ values[known:]
+    return problem.recording.tau - full @ values, values[: baseline.base.size], extra
 
 
 __all__ = ["Judgement", "Search", "diagnose"]

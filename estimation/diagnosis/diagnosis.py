@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.findings import Finding, finite, number, read_finding
 from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment
 from estimation.model import Model, load_model
@@ -24,103 +25,6 @@ Array = NDArray[np.float64]
 
 DIAGNOSIS, MODEL = "diagnosis.json", "model.json"
 VERDICTS = ("none", "named", "ambiguous", "unexplained")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Parameter:
-    """A parameter of an effect.
-
-    Attributes:
-        name: as the effect names it.
-        value: the estimate.
-        unit: its unit.
-        standard_error: NaN where the data do not determine it.
-        ci95: 95 % interval; infinite where the data do not determine it.
-        determined: whether they do.
-    """
-
-    name: str
-    value: float
-    unit: str
-    standard_error: float
-    ci95: tuple[float, float]
-    determined: bool
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes it as plain data; what is not determined is None."""
-        return {
-            "name": self.name,
-            "value": self.value,
-            "unit": self.unit,
-            "ci95": [_finite(bound) for bound in self.ci95],
-            "standard_error": _finite(self.standard_error),
-            "determined": self.determined,
-        }
-
-
-@dataclass(frozen=True, kw_only=True)
-class Gain:
-    """What an effect brings on unseen data, on its joint, or averaged over the joints of the whole robot.
-
-    Attributes:
-        nrmse_before: residual RMS over torque RMS without it.
-        nrmse_after: with it.
-        ci95: interval of the fall.
-    """
-
-    nrmse_before: float
-    nrmse_after: float
-    ci95: tuple[float, float]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Finding:
-    """One cause.
-
-    Attributes:
-        effect: its name in the vocabulary; ``unexplained`` for a pattern without a known cause.
-        joint: counted from 1; None for the whole robot.
-        parameters: coefficients, then shape.
-        p_value: family-wise: the chance that noise alone has an effect this strong found.
-        delta_bic: how much better the model with it is (Schwarz).
-        gain: on unseen data.
-        rivals: other causes in its place, ``(name, how much worse their BIC is)``, the closest first.
-        sentence: what it means, in words.
-        visible: share of its energy that the base model does not absorb.
-        coordinate: label of the axis on which it shows.
-        pattern: the description of an unexplained pattern; empty for a named effect.
-    """
-
-    effect: str
-    joint: int | None
-    parameters: tuple[Parameter, ...]
-    p_value: float
-    delta_bic: float
-    gain: Gain
-    rivals: tuple[tuple[str, float], ...]
-    sentence: str
-    visible: float
-    coordinate: str = ""
-    pattern: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes it as plain data."""
-        return {
-            "effect": self.effect,
-            "joint": self.joint,
-            "parameters": [parameter.to_dict() for parameter in self.parameters],
-            "p_value": self.p_value,
-            "delta_bic": self.delta_bic,
-            "gain": {
-                "nrmse_before": self.gain.nrmse_before,
-                "nrmse_after": self.gain.nrmse_after,
-                "ci95": list(self.gain.ci95),
-            },
-            "rivals": [[name, worse] for name, worse in self.rivals],
-            "sentence": self.sentence,
-            "visible": self.visible,
-            **({"pattern": self.pattern} if self.pattern else {}),
-        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +145,7 @@ class Diagnosis:
             "extended": {"nrmse": self.extended.tolist()},
             "explained": self.explained,
             "excess": [
-                dict(zip(("noise", "state", "time"), map(_finite, row), strict=True)) for row in self.excess.tolist()
+                dict(zip(("noise", "state", "time"), map(finite, row), strict=True)) for row in self.excess.tolist()
             ],
             "limits": [limit.to_dict() for limit in self.limits],
             "next_experiment": None if self.next_experiment is None else self.next_experiment.to_dict(),
@@ -298,11 +202,11 @@ def _from_dict(data: dict[str, Any], model: Model) -> Diagnosis:
     following = data["next_experiment"]
     return Diagnosis(
         verdict=data["verdict"],
-        findings=tuple(_finding(item) for item in data["findings"]),
+        findings=tuple(read_finding(item) for item in data["findings"]),
         baseline=np.array(data["baseline"]["nrmse"], dtype=float),
         extended=np.array(data["extended"]["nrmse"], dtype=float),
         explained=float(data["explained"]),
-        excess=np.array([[_number(row[key]) for key in ("noise", "state", "time")] for row in data["excess"]]),
+        excess=np.array([[number(row[key]) for key in ("noise", "state", "time")] for row in data["excess"]]),
         limits=tuple(_limit(item) for item in data["limits"]),
         next_experiment=None if following is None else _next(following),
         model=model,
@@ -311,46 +215,12 @@ def _from_dict(data: dict[str, Any], model: Model) -> Diagnosis:
     )
 
 
-def _finding(item: dict[str, Any]) -> Finding:
-    parameters = tuple(
-        Parameter(
-            name=p["name"],
-            value=float(p["value"]),
-            unit=p["unit"],
-            standard_error=_number(p["standard_error"]),
-            ci95=(
-                -np.inf if p["ci95"][0] is None else float(p["ci95"][0]),
-                np.inf if p["ci95"][1] is None else float(p["ci95"][1]),
-            ),
-            determined=bool(p["determined"]),
-        )
-        for p in item["parameters"]
-    )
-    gain = item["gain"]
-    return Finding(
-        effect=item["effect"],
-        joint=item["joint"],
-        parameters=parameters,
-        p_value=float(item["p_value"]),
-        delta_bic=float(item["delta_bic"]),
-        gain=Gain(
-            nrmse_before=float(gain["nrmse_before"]),
-            nrmse_after=float(gain["nrmse_after"]),
-            ci95=(float(gain["ci95"][0]), float(gain["ci95"][1])),
-        ),
-        rivals=tuple((str(name), float(worse)) for name, worse in item["rivals"]),
-        sentence=item["sentence"],
-        visible=float(item["visible"]),
-        pattern=item.get("pattern", ""),
-    )
-
-
 def _limit(item: dict[str, Any]) -> Limit:
     return Limit(
         effect=item["effect"],
         joint=item["joint"],
-        detectable=_number(item["detectable"], np.inf),
-        attributable=_number(item["attributable"], np.inf),
+        detectable=number(item["detectable"], np.inf),
+        attributable=number(item["attributable"], np.inf),
         toughest=item["toughest_rival"],
         visible=float(item["visible"]),
         note=item["note"],
@@ -374,14 +244,6 @@ _VERDICTS = {
     "ambiguous": "the model lacks a cause, and more than one fits",
     "unexplained": "the model lacks something that no effect of the catalogue explains",
 }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-def _number(value: float | None, missing: float = np.nan) -> float:
-    return missing if value is None else float(value)
 
 
 def _p(value: float) -> str:

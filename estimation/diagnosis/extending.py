@@ -12,6 +12,7 @@ from estimation.diagnosis.extension import Extension
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem, accept, score
 from estimation.diagnosis.refinement import Member
+from estimation.diagnosis.regularisation import held
 from estimation.identification import NEGLIGIBLE, RELATIVE
 from estimation.model import Model
 
@@ -66,8 +67,9 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
     for start, size, shapes in slices:
         linear[start + size : start + size + shapes] = False
     values = np.zeros(columns.shape[2])
-    values[linear] = _solve(flat[:, linear], tau)[0]
-    covariance = _solve(flat, tau)[1]
+    free = flat[:, linear]
+    values[linear] = held(free.T @ free, free.T @ tau, problem.pull)
+    covariance = _covariance(flat)
     lower_upper = [m.hypothesis.coefficient_bounds(problem.situation.robot) for m in members]
     extensions, known = [], []
     for member, (start, size, shapes), steps, (lower, upper) in zip(
@@ -76,7 +78,11 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         rows = slice(start, start + size + shapes)
         own = covariance[rows, rows].copy()
         scale = np.concatenate([np.ones(size), np.abs(steps)])
+        # What is not known at all stays so, whatever its slope's covariance.
+        open_ = ~np.isfinite(scale)
+        scale[open_] = 1.0
         own = own * scale[:, None] * scale
+        own[open_, open_] = np.inf
         coefficients = np.clip(values[start : start + size], lower, upper)
         errors = np.sqrt(np.maximum(np.diag(own), 0.0))
         determined = np.concatenate(
@@ -175,15 +181,14 @@ def _slope(problem: Problem, member: Member, k: int, step: float) -> Array:
     return ((above - below) @ member.coefficients * (h / (up - down)))[:, :, None]
 
 
-def _solve(matrix: Array, right: Array) -> tuple[Array, Array]:
-    """Least squares of least norm over unit columns, and its covariance; infinite where nothing is known."""
+def _covariance(matrix: Array) -> Array:
+    """Covariance of least squares of least norm over unit columns: by the data alone, without the pull."""
     norms = np.linalg.norm(matrix, axis=0)
     norms[norms == 0] = 1.0
     values, vectors = np.linalg.eigh((matrix.T @ matrix) / norms[:, None] / norms)
     kept = values > FAINT**1.5 * values[-1]
     inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
-    solution = inverse @ ((matrix.T @ right) / norms) / norms
-    return solution, inverse / norms[:, None] / norms
+    return np.asarray(inverse / norms[:, None] / norms)
 
 
 def _determined(problem: Problem, values: Array, errors: Array) -> NDArray[np.bool_]:

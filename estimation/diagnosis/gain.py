@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.regularisation import held
 from estimation.diagnosis.states import Recording
 
 Array = NDArray[np.float64]
@@ -17,7 +18,6 @@ Array = NDArray[np.float64]
 PARTS = 5
 RESAMPLES = 500
 BLOCK = 1.0  # [s], and five times the errors' correlation time
-FAINT = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ def cross_validated(problem: Problem, effects: Sequence[Array]) -> Unseen:
     for fold, (gram, cross) in zip(folds, grams, strict=True):
         rest = (total[0] - gram, total[1] - cross)
         for error, chosen in zip(errors, models(base.shape[2], effects), strict=True):
-            values = _solve(rest[0][np.ix_(chosen, chosen)], rest[1][chosen])
+            values = held(rest[0][np.ix_(chosen, chosen)], rest[1][chosen], problem.pull)
             error[fold] = recording.tau[fold] - full[fold][:, :, chosen] @ values
     return Unseen(how, recording.t, recording.step, recording.tau, tuple(errors), ~recording.unsure)
 
@@ -137,7 +137,7 @@ def on_held_out(
     other = np.concatenate([unseen_base, *unseen_effects], axis=2)
     errors = []
     for chosen in models(base.shape[2], effects):
-        values = _solve(gram[np.ix_(chosen, chosen)], cross[chosen])
+        values = held(gram[np.ix_(chosen, chosen)], cross[chosen], problem.pull)
         errors.append(unseen.tau - other[:, :, chosen] @ values)
     how = f"{len(unseen.runs)} log{'s' if len(unseen.runs) > 1 else ''} that the fit has not seen"
     return Unseen(how, unseen.t, unseen.step, unseen.tau, tuple(errors), ~unseen.unsure)
@@ -154,12 +154,3 @@ def models(base: int, effects: Sequence[Array]) -> list[NDArray[np.intp]]:
 def _moments(Y: Array, target: Array) -> tuple[Array, Array]:
     flat = Y.reshape(-1, Y.shape[2])
     return flat.T @ flat, flat.T @ target.reshape(-1)
-
-
-def _solve(gram: Array, cross: Array) -> Array:
-    scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
-    scale[scale == 0] = 1.0
-    values, vectors = np.linalg.eigh(gram / scale[:, None] / scale)
-    kept = values > FAINT * values[-1]
-    result: Array = vectors[:, kept] @ ((vectors[:, kept].T @ (cross / scale)) / values[kept]) / scale
-    return result

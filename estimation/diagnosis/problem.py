@@ -11,8 +11,10 @@ from scipy.optimize import lsq_linear
 
 from estimation.diagnosis.baseline import FAINT, Baseline
 from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.regularisation import held, pull_of
 from estimation.diagnosis.states import Recording
 from estimation.diagnosis.whitening import Whitening, orthonormal
+from estimation.pulls import Pull
 from robots.terms.effects import Situation
 
 Array = NDArray[np.float64]
@@ -20,8 +22,6 @@ Small = NDArray[np.float32]
 
 # A direction of a hypothesis shows only where this share of its energy is left beside the base model.
 VISIBLE = 1e-3
-# Bounds give way by so many standard errors: a truth at its bound is estimated beyond it half of the time.
-GIVE = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +67,7 @@ class Problem:
         energy: <r, r> of the residual.
         nulls: P times white noise (n, N, draws), and its products with Q (b, draws).
         remainder: torque less base model (N0, n) [N m or N], at the recording's own rows.
+        pull: what holds base parameters that the data leave open, in units of rows over the noise's scale.
     """
 
     recording: Recording
@@ -79,6 +80,7 @@ class Problem:
     energy: float
     nulls: tuple[Small, Array]
     remainder: Array
+    pull: Pull
 
     @property
     def n(self) -> int:
@@ -209,19 +211,17 @@ class Score:
         return np.asarray(self.root.T @ (self.root @ self.cross))
 
     def bounded(self, lower: Array, upper: Array) -> tuple[float, Array]:
-        """Squared residual explained, and coefficients (k,), within bounds that give way by `GIVE` standard errors."""
+        """Squared residual explained, and coefficients (k,), within bounds (k,)."""
         c = self.coefficients()
         if not self.degrees:
             return 0.0, c
-        error = np.sqrt(np.sum(self.root**2, axis=0))
-        low, high = lower - GIVE * error, upper + GIVE * error
-        if np.all((c >= low) & (c <= high)):
+        if np.all((c >= lower) & (c <= upper)):
             return self.gain, c
         # min |A c - y|^2 with A'A the Gram matrix in its visible directions.
         A = np.linalg.pinv(self.root.T)
         y = self.root @ self.cross
-        c = np.asarray(lsq_linear(A, y, bounds=(np.minimum(low, high - 1e-12), high), method="bvls").x)
-        return float(y @ y - np.sum((A @ c - y) ** 2)), c
+        c = np.asarray(lsq_linear(A, y, bounds=(lower, upper), method="bvls").x)
+        return max(float(y @ y - np.sum((A @ c - y) ** 2)), 0.0), c
 
 
 def score(problem: Problem, group: Group, accepted: Accepted) -> Score:
@@ -251,6 +251,7 @@ def pose(
     draws: int,
     rng: np.random.Generator,
     extra: Array | None = None,
+    pull: Pull | None = None,
 ) -> Problem:
     """Fits the base model to white data and prepares the null.
 
@@ -261,6 +262,7 @@ def pose(
         draws: noise drawn for the null; 0 for none.
         rng: draws it.
         extra: torque (N, n) of effects that are known already, taken off before the base model's situation is computed.
+        pull: what holds base parameters that the data leave open; by default `pull_of`.
     """
     n = recording.n
     root = np.linalg.cholesky(whitening.precision)  # P = L L'
@@ -282,8 +284,11 @@ def pose(
         if draws:
             projected += (Q[:, k].astype(np.float32).T @ part).astype(float)
         pressed[k] = sum(P[j, k] * noise[:, j] for j in range(n) if P[j, k])
-    tau = recording.tau - (0.0 if extra is None else extra)
-    values = fit_values(baseline, whitening.scale, recording.unsure, tau)
+    pull = pull or pull_of(baseline, recording, whitening)
+    values = fit_values(baseline, whitening.scale, recording.unsure, recording.tau, pull)
+    remainder = recording.tau - baseline.regressor @ values
+    if extra is not None:
+        values = fit_values(baseline, whitening.scale, recording.unsure, recording.tau - extra, pull)
     return Problem(
         recording=recording,
         baseline=baseline,
@@ -294,25 +299,18 @@ def pose(
         white=np.linalg.solve(root.T, tilted.T).T,
         energy=float(np.sum(tilted**2)),
         nulls=(pressed, projected),
-        remainder=recording.tau - baseline.regressor @ values,
+        remainder=remainder,
+        pull=pull,
     )
 
 
-def fit_values(baseline: Baseline, scale: Array, unsure: NDArray[np.bool_], tau: Array) -> Array:
+def fit_values(baseline: Baseline, scale: Array, unsure: NDArray[np.bool_], tau: Array, pull: Pull) -> Array:
     """Fits base parameters (b,) to torque (N, n), each joint weighed by its noise.
 
-    Directions that the log does not determine stay at zero: the fit is that of least norm.
+    Directions that the log does not determine go where the pull has them.
     """
     weights = 1.0 / scale
     counts = weights * ~unsure
     Y = np.concatenate([baseline.regressor, baseline.nuisance], axis=2) * counts[:, :, None]
     flat = Y.reshape(-1, Y.shape[2])
-    norms = np.linalg.norm(flat, axis=0)
-    norms[norms == 0] = 1.0
-    gram = (flat.T @ flat) / norms[:, None] / norms
-    values, vectors = np.linalg.eigh(gram)
-    kept = values > 1e-12 * values[-1]
-    right = (flat.T @ (tau * counts).reshape(-1)) / norms
-    solution = vectors[:, kept] @ ((vectors[:, kept].T @ right) / values[kept]) / norms
-    result: Array = solution[: baseline.base.size]
-    return result
+    return held(flat.T @ flat, flat.T @ (tau * counts).reshape(-1), pull)[: baseline.base.size]

@@ -32,7 +32,7 @@ class Member:
         group: its columns there.
         gain: squared residual explained beside the others, coefficients within their bounds.
         coefficients: (k,) beside the others.
-        degrees: coefficients that show, and shape parameters.
+        degrees: coefficients that show, and shape parameters that are free: one whose bounds are equal is known.
         visible: largest share of a column's energy that the model before leaves.
     """
 
@@ -62,6 +62,7 @@ def refine(
     lower, upper = hypothesis.coefficient_bounds(situation.robot)
     bounds = hypothesis.effect.bounds(situation, hypothesis.joint)
     scales = [shape.scale for shape in hypothesis.effect.shapes]
+    free = [k for k, (low, high) in enumerate(bounds) if high > low]
     best: list[Member] = []
 
     def evaluate(shape: tuple[float, ...]) -> float:
@@ -70,13 +71,20 @@ def refine(
         result = score(problem, group, accepted)
         gain, coefficients = result.bounded(lower, upper)
         if not best or gain > best[0].gain:
-            member = Member(hypothesis, shape, group, gain, coefficients, result.degrees + len(shape), result.visible)
+            member = Member(hypothesis, shape, group, gain, coefficients, result.degrees + len(free), result.visible)
             best[:] = [member]
         return gain
 
     evaluate(start)
-    if start and effort:
-        _search(evaluate, start, bounds, scales, effort)
+    if free and effort:
+
+        def along(values: tuple[float, ...]) -> float:
+            shape = list(start)
+            for k, value in zip(free, values, strict=True):
+                shape[k] = value
+            return evaluate(tuple(shape))
+
+        _search(along, tuple(start[k] for k in free), tuple(bounds[k] for k in free), [scales[k] for k in free], effort)
     return best[0]
 
 

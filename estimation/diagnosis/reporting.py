@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.diagnosis import Diagnosis, Finding, Gain, Parameter, Trace
+from estimation.diagnosis.diagnosis import Diagnosis, Trace
 from estimation.diagnosis.extending import Fitted, dense, fit_extended
+from estimation.diagnosis.findings import Finding, Gain, Parameter
 from estimation.diagnosis.gain import Unseen, cross_validated, on_held_out
 from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
@@ -18,17 +19,18 @@ from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found, Selection
 from estimation.diagnosis.states import Recording, record
-from estimation.diagnosis.verdict import CLOSE, Judgement
+from estimation.diagnosis.verdict import CLOSE, Judgement, is_open
 from robots.common.files import sha256
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.situation import situation
+from robots.terms.effects.situation import Situation, situation
 from robots.version import VERSION
 
 Array = NDArray[np.float64]
 
 SHOWN = 4000  # rows of the curves kept for pictures
+SHORTEST_UNSEEN = 1.0  # [s] of held-out logs
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,18 +54,20 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     unexplained = judgement.verdict == "unexplained"
     founds = [] if unexplained else list(told.selection.found)
     members = list(judgement.patterns) if unexplained else [found.member for found in founds]
-    unseen, gains = _measured(robot, told, members)
+    p_values = list(judgement.p_values) if unexplained else [found.p_value for found in founds]
+    unseen, gains, seen_as = _measured(robot, told, members)
     dropped = []
-    while not unexplained and (harmful := [i for i, gain in enumerate(gains) if gain.ci95[1] < 0]):
+    while harmful := [i for i, gain in enumerate(gains) if gain.ci95[1] < 0]:
         # What makes unseen errors surely larger is no cause, however well it fits: a few rows at the end of a log.
         worst = min(harmful, key=lambda i: gains[i].ci95[1])
         dropped.append(members.pop(worst).hypothesis.label)
-        founds.pop(worst)
-        unseen, gains = _measured(robot, told, members)
+        p_values.pop(worst)
+        if not unexplained:
+            founds.pop(worst)
+        unseen, gains, seen_as = _measured(robot, told, members)
     verdict = judgement.verdict
-    if dropped:
-        close = any(worse < CLOSE for found in founds for _, worse in found.rivals)
-        verdict = "none" if not members else "ambiguous" if close else "named"
+    if dropped and not (unexplained and members):
+        verdict = "none" if not members else "ambiguous" if any(map(is_open, founds)) else "named"
     fitted = fit_extended(problem, members, _provenance(told))
     findings = tuple(
         _finding(
@@ -72,7 +76,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
             member,
             fitted,
             i,
-            judgement.p_values[i] if unexplained else founds[i].p_value,
+            p_values[i],
             None if unexplained else founds[i],
             gains[i],
         )
@@ -92,19 +96,19 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         model=fitted.model,
         how_unseen=unseen.how,
         notes=(*_notes(told, findings, before, after), *(_DROPPED.format(name) for name in dropped)),
-        trace=_trace(problem, members, unseen),
+        trace=_trace(members, unseen, seen_as),
     )
 
 
 _DROPPED = "A fit of {} stood out of the noise, but makes the error on unseen data larger: left out."
 
 
-def _measured(robot: Robot, told: Told, members: Sequence[Member]) -> tuple[Unseen, list[Gain]]:
-    """Errors on unseen data, and what each member brings there."""
+def _measured(robot: Robot, told: Told, members: Sequence[Member]) -> tuple[Unseen, list[Gain], tuple[Array, ...]]:
+    """Errors on unseen data, what each member brings there, and the coordinate on which it shows there (M,)."""
     effects = [dense(told.problem, member.hypothesis, member.shape) for member in members]
-    unseen = _unseen(robot, told, members, effects)
+    unseen, coordinates = _unseen(robot, told, members, effects)
     rng = np.random.default_rng(told.seed + 3)
-    return unseen, [_gain(unseen, i, member, rng) for i, member in enumerate(members)]
+    return unseen, [_gain(unseen, i, member, rng) for i, member in enumerate(members)], coordinates
 
 
 def _gain(unseen: Unseen, i: int, member: Member, rng: np.random.Generator) -> Gain:
@@ -185,12 +189,14 @@ def _parameters(
     return tuple(result)
 
 
-def _unseen(robot: Robot, told: Told, members: Sequence[Member], effects: Sequence[Array]) -> Unseen:
+def _unseen(
+    robot: Robot, told: Told, members: Sequence[Member], effects: Sequence[Array]
+) -> tuple[Unseen, tuple[Array, ...]]:
     problem = told.problem
     if not told.held_out:
-        return cross_validated(problem, effects)
+        return cross_validated(problem, effects), _coordinates(problem.situation, members)
     recording = problem.recording
-    other = record(robot, told.held_out, step=recording.step)
+    other = record(robot, told.held_out, step=recording.step, shortest=SHORTEST_UNSEEN)
     # One clock: where the unseen logs come later, the heat of the ones before is still there.
     later = bool(other.t[0] > recording.t[-1])
     whole = _joined(recording, other) if later else other
@@ -214,7 +220,12 @@ def _unseen(robot: Robot, told: Told, members: Sequence[Member], effects: Sequen
     baseline = problem.baseline
     base = baseline.base.regressor(other.q, other.dq, other.ddq)
     nuisance = np.zeros((len(other), robot.n, baseline.nuisance.shape[2]))
-    return on_held_out(problem, effects, other, np.concatenate([base, nuisance], axis=2), columns)
+    unseen = on_held_out(problem, effects, other, np.concatenate([base, nuisance], axis=2), columns)
+    return unseen, tuple(values[there] for values in _coordinates(now, members))
+
+
+def _coordinates(now: Situation, members: Sequence[Member]) -> tuple[Array, ...]:
+    return tuple(m.hypothesis.effect.coordinate(now, m.hypothesis.joint, m.shape)[1] for m in members)
 
 
 def _joined(first: Recording, second: Recording) -> Recording:
@@ -257,7 +268,7 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
             "judged; what gravity and the other joints ask of them can."
         )
     for finding in findings:
-        lost = [p for p in finding.parameters if not p.determined and p.unit == "s"]
+        lost = [p for p in finding.parameters if not p.determined and p.unit == "s" and np.isnan(p.standard_error)]
         for parameter in lost:
             notes.append(
                 f"{parameter.name} of {finding.effect} is not determined by {recording.duration:.0f} s of logs: the "
@@ -274,19 +285,12 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
     return tuple(notes)
 
 
-def _trace(problem: Problem, members: Sequence[Member], unseen: Unseen) -> Trace:
-    now = problem.situation
-    # Pictures show the rows of the fit where errors are of the same rows, as in cross-validation.
-    same = len(unseen.t) == len(now.t) and bool(np.all(unseen.t == now.t))
-    stride = max(1, len(unseen.t) // SHOWN)
-    rows = slice(None, None, stride)
+def _trace(members: Sequence[Member], unseen: Unseen, seen_as: Sequence[Array]) -> Trace:
+    rows = slice(None, None, max(1, len(unseen.t) // SHOWN))
     hidden = ~unseen.counts
     before, after = (np.where(hidden, np.nan, unseen.errors[k]) for k in (0, -1))
-    coordinates = []
-    for member in members:
-        values = member.hypothesis.effect.coordinate(now, member.hypothesis.joint, member.shape)[1]
-        coordinates.append(values[rows] if same else np.full(len(unseen.t[rows]), np.nan))
-    return Trace(unseen.t[rows], unseen.measured[rows], before[rows], after[rows], tuple(coordinates))
+    coordinates = tuple(values[rows] for values in seen_as)
+    return Trace(unseen.t[rows], unseen.measured[rows], before[rows], after[rows], coordinates)
 
 
 def _provenance(told: Told) -> dict[str, object]:

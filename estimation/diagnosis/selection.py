@@ -21,6 +21,8 @@ NEAR = 0.3
 # true to some per cent of an effect, and what they leave must not be taken for another.
 BEYOND = 0.03
 MOST = 4  # effects at once
+# What is reported must be worth its parameters by so much (Schwarz): strong evidence, beside a small p-value.
+LEAST = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +80,7 @@ def select(
             break
         advance(f"{result.outcomes[0].hypothesis.label}")
         best = _best(problem, contenders(problem, result, members), accepted)
-        if not best or best[0].bic(problem.rows) <= 0 or not _beyond(best[0], members):
+        if not best or best[0].bic(problem.rows) <= LEAST or not _beyond(best[0], members):
             break
         members.append(best[0])
         p_values.append(p)
@@ -87,7 +89,8 @@ def select(
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
     found = _found(problem, entries, members, p_values, rng)
-    order = sorted(found, key=lambda f: -f.member.gain)
+    sure = [f for f in found if f.member.bic(problem.rows) > LEAST]
+    order = sorted(sure, key=lambda f: -f.member.gain)
     last = result if members else first
     return Selection(tuple(order), first, last, accept(problem, tuple(f.member.group for f in order)))
 
@@ -136,7 +139,7 @@ def _polished(
             members[i] = best
         if not changed:
             break
-    keep = [i for i, m in enumerate(members) if m.bic(problem.rows) > 0]
+    keep = [i for i, m in enumerate(members) if m.bic(problem.rows) > LEAST]
     return [members[i] for i in keep], [p_values[i] for i in keep]
 
 

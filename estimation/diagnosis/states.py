@@ -100,7 +100,7 @@ class Recording:
         return all(cycle is not None for cycle in self.cycles)
 
 
-def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None) -> Recording:
+def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shortest: float = SHORTEST) -> Recording:
     """Reads logs into noise-free motion on a common grid.
 
     Positions of a repeated motion are projected on its harmonics. Others are low-passed, joint by joint, where their
@@ -111,6 +111,7 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None) -> R
         robot: the robot.
         logs: of t, q and tau or current.
         step: sample period to take [s]; by default that of the slowest log, longer where there are too many rows.
+        shortest: least time of all logs together [s].
 
     Raises:
         InputError: logs of another robot, without torque, or too short.
@@ -130,8 +131,8 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None) -> R
     parts = [_part(log, step) for log in prepared]
     lengths = [len(part[0]) for part in parts]
     total = sum(lengths) * step
-    if total < SHORTEST:
-        raise InputError(f"{total:.1f} s of logs", allowed=f"{SHORTEST:g} s or more", remedy="record a longer log")
+    if total < shortest:
+        raise InputError(f"{total:.1f} s of logs", allowed=f"{shortest:g} s or more", remedy="record a longer log")
     joined = [np.concatenate([part[k] for part in parts]) for k in range(5)]
     return Recording(
         t=joined[0],

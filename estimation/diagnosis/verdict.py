@@ -10,7 +10,7 @@ import numpy as np
 from estimation.diagnosis.problem import Problem, accept
 from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scan import Entry, scan
-from estimation.diagnosis.selection import Selection
+from estimation.diagnosis.selection import Found, Selection
 
 # Named effects that explain less than this share of what stands out of the noise do not explain it.
 ENOUGH = 0.7
@@ -57,7 +57,7 @@ def judge(
         verdict = "unexplained"
     elif not named:
         verdict = "none"
-    elif any(worse < CLOSE for found in selection.found for _, worse in found.rivals):
+    elif any(is_open(found) for found in selection.found):
         verdict = "ambiguous"
     else:
         verdict = "named"
@@ -67,6 +67,11 @@ def judge(
         # Names that do not fit would only distort the patterns: those start anew, beside the base model alone.
         members, p_values = _patterns(problem, patterns, [], false_alarm, rng)
     return Judgement(verdict, tuple(members), tuple(p_values), float(share))
+
+
+def is_open(found: Found) -> bool:
+    """Whether an effect has rivals that fit about as well; one that robots seldom have does not count alone."""
+    return any(worse < CLOSE and not rival.hypothesis.effect.rare for rival, worse in found.rivals)
 
 
 def _patterns(

@@ -42,7 +42,7 @@ class HandGuiding(Effect):
             result += [
                 Coefficient(f"coulomb_by_hand_{j + 1}", force),
                 Coefficient(f"viscous_by_hand_{j + 1}", f"{force} s/{length}"),
-                Coefficient(f"inertia_by_hand_{j + 1}", "1"),
+                Coefficient(f"inertia_by_hand_{j + 1}", "1", lower=0.0),
             ]
         return tuple(result)
 

@@ -33,7 +33,7 @@ class Stribeck(StaticJointEffect):
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the break-away torque above Coulomb friction."""
         assert joint is not None
-        return (Coefficient("stribeck_torque", force_unit(robot, joint - 1)),)
+        return (Coefficient("stribeck_torque", force_unit(robot, joint - 1), lower=0.0),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists velocities, by factors of 2, between the slowest and half the fastest that the joint moves at."""

@@ -26,7 +26,8 @@ def problem(arm: Robot, arm_log: Callable[..., Log]) -> Problem:
     """A log of the arm without effects, white."""
     recording = record(arm, [arm_log(torque_noise=0.02)])
     baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
-    values = fit_values(baseline, recording.tau.std(axis=0), recording.unsure, recording.tau, pull_of(baseline, recording))
+    pull = pull_of(baseline, recording)
+    values = fit_values(baseline, recording.tau.std(axis=0), recording.unsure, recording.tau, pull)
     residual = recording.tau - baseline.regressor @ values
     whitening = estimate_whitening(recording, residual, baseline.base.size, inertia_of(baseline, recording, values))
     return pose(recording, baseline, whitening, draws=300, rng=np.random.default_rng(0))
@@ -86,6 +87,17 @@ def test_bounds_hold_a_coefficient_back(problem: Problem) -> None:
     gain, held = result.bounded(far, 2 * far)
     assert np.all(held >= far - 3.01 * np.sqrt(np.sum(result.root**2, axis=0)))
     assert gain < result.gain
+
+
+def test_a_coefficient_of_the_wrong_sign_explains_nothing(problem: Problem) -> None:
+    """Where the data ask for a negative value of what can only be positive, its gain is zero: it raises no alarm."""
+    entry = next(e for e in measure(problem, [Hypothesis(EFFECTS["asymmetric_friction"], 1)]) if e.groups)
+    result = score(problem, entry.groups[0], accept(problem, ()))
+    c = result.coefficients()
+    one_sided = np.where(c < 0, 0.0, -np.inf), np.where(c < 0, np.inf, 0.0)
+    gain, kept = result.bounded(*one_sided)
+    assert gain < result.gain
+    assert np.all((kept >= one_sided[0]) & (kept <= one_sided[1]))
 
 
 def test_the_null_has_the_size_it_promises(problem: Problem) -> None:

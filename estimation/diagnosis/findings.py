@@ -1,0 +1,150 @@
+"""A cause that was found: its parameters, what it brings, its rivals, as values and as plain data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """A parameter of an effect.
+
+    Attributes:
+        name: as the effect names it.
+        value: the estimate.
+        unit: its unit.
+        standard_error: NaN where the data do not determine it.
+        ci95: 95 % interval; infinite where the data do not determine it.
+        determined: whether they do.
+    """
+
+    name: str
+    value: float
+    unit: str
+    standard_error: float
+    ci95: tuple[float, float]
+    determined: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes it as plain data; what is not determined is None."""
+        return {
+            "name": self.name,
+            "value": self.value,
+            "unit": self.unit,
+            "ci95": [finite(bound) for bound in self.ci95],
+            "standard_error": finite(self.standard_error),
+            "determined": self.determined,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gain:
+    """What an effect brings on unseen data, on its joint, or averaged over the joints of the whole robot.
+
+    Attributes:
+        nrmse_before: residual RMS over torque RMS without it.
+        nrmse_after: with it.
+        ci95: interval of the fall.
+    """
+
+    nrmse_before: float
+    nrmse_after: float
+    ci95: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One cause.
+
+    Attributes:
+        effect: its name in the vocabulary; ``unexplained`` for a pattern without a known cause.
+        joint: counted from 1; None for the whole robot.
+        parameters: coefficients, then shape.
+        p_value: family-wise: the chance that noise alone has an effect this strong found.
+        delta_bic: how much better the model with it is (Schwarz).
+        gain: on unseen data.
+        rivals: other causes in its place, ``(name, how much worse their BIC is)``, the closest first.
+        sentence: what it means, in words.
+        visible: share of its energy that the base model does not absorb.
+        coordinate: label of the axis on which it shows.
+        pattern: the description of an unexplained pattern; empty for a named effect.
+    """
+
+    effect: str
+    joint: int | None
+    parameters: tuple[Parameter, ...]
+    p_value: float
+    delta_bic: float
+    gain: Gain
+    rivals: tuple[tuple[str, float], ...]
+    sentence: str
+    visible: float
+    coordinate: str = ""
+    pattern: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes it as plain data."""
+        return {
+            "effect": self.effect,
+            "joint": self.joint,
+            "parameters": [parameter.to_dict() for parameter in self.parameters],
+            "p_value": self.p_value,
+            "delta_bic": self.delta_bic,
+            "gain": {
+                "nrmse_before": self.gain.nrmse_before,
+                "nrmse_after": self.gain.nrmse_after,
+                "ci95": list(self.gain.ci95),
+            },
+            "rivals": [[name, worse] for name, worse in self.rivals],
+            "sentence": self.sentence,
+            "visible": self.visible,
+            **({"pattern": self.pattern} if self.pattern else {}),
+        }
+
+
+def read_finding(item: dict[str, Any]) -> Finding:
+    """Reads what `Finding.to_dict` wrote."""
+    parameters = tuple(
+        Parameter(
+            name=p["name"],
+            value=float(p["value"]),
+            unit=p["unit"],
+            standard_error=number(p["standard_error"]),
+            ci95=(
+                -np.inf if p["ci95"][0] is None else float(p["ci95"][0]),
+                np.inf if p["ci95"][1] is None else float(p["ci95"][1]),
+            ),
+            determined=bool(p["determined"]),
+        )
+        for p in item["parameters"]
+    )
+    gain = item["gain"]
+    return Finding(
+        effect=item["effect"],
+        joint=item["joint"],
+        parameters=parameters,
+        p_value=float(item["p_value"]),
+        delta_bic=float(item["delta_bic"]),
+        gain=Gain(
+            nrmse_before=float(gain["nrmse_before"]),
+            nrmse_after=float(gain["nrmse_after"]),
+            ci95=(float(gain["ci95"][0]), float(gain["ci95"][1])),
+        ),
+        rivals=tuple((str(name), float(worse)) for name, worse in item["rivals"]),
+        sentence=item["sentence"],
+        visible=float(item["visible"]),
+        pattern=item.get("pattern", ""),
+    )
+
+
+def finite(value: float) -> float | None:
+    """Gives None for what JSON has no number for."""
+    return float(value) if np.isfinite(value) else None
+
+
+def number(value: float | None, missing: float = np.nan) -> float:
+    """Gives back what `finite` made None."""
+    return missing if value is None else float(value)

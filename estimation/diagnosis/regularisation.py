@@ -1,0 +1,82 @@
+"""What holds base parameters that a log leaves open, so that another motion is not predicted absurdly."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.baseline import Baseline
+from estimation.diagnosis.states import Recording
+from estimation.diagnosis.whitening import Whitening
+from estimation.pulls import OWN, SILENT, Pull, description_pull, friction_levels
+
+Array = NDArray[np.float64]
+
+# Speed that a joint exceeds in a thousandth of the time only.
+FASTEST = 0.999
+# Directions below this share of the largest are not determined.
+FAINT = 1e-12
+
+
+def pull_of(baseline: Baseline, recording: Recording, whitening: Whitening | None = None) -> Pull:
+    """Pulls base parameters as `identify` does, as strongly as the noise makes right.
+
+    Parameters scatter about the robot's description by their own size (`description_pull`). Against rows that count by
+    their noise's inverse variance the pull is then their a-priori precision, and the fit is that of the largest
+    posterior density. Coloured noise makes rows tell less than their number: the pull counts by the noise's power
+    density at rest over that of white noise.
+
+    Where nothing is described, no base parameter is to make more than some times the torque that its joints have.
+
+    Args:
+        baseline: the base model on the data.
+        recording: the data.
+        whitening: knows the colour; without, noise counts as white.
+
+    Returns:
+        Of base parameters and the baseline's nuisance (b + m), in units of rows over the scale of `whitening`.
+    """
+    counts = ~recording.unsure
+    number = np.maximum(counts.sum(axis=0), 1)
+    torque = np.sqrt((recording.tau**2 * counts).sum(axis=0) / number)
+    torque = np.maximum(torque, 1e-3 * max(float(torque.max()), 1e-12))
+    levels = np.sqrt(np.einsum("njb,nj->jb", baseline.regressor**2, counts.astype(float)) / number[:, None])
+    own = np.array([column.joint - 1 for column in baseline.base.columns])
+    raised = friction_levels(
+        baseline.base, levels[own, np.arange(len(own))], np.quantile(np.abs(recording.dq), FASTEST, axis=0)
+    )
+    pull = description_pull(baseline.base, torque, raised)
+    if pull is None:
+        levels[own, np.arange(len(own))] = raised
+        share = (levels / torque[:, None]).max(axis=0) / OWN
+        pull = Pull(np.diag(np.maximum(share, SILENT) ** 2), np.zeros(len(own)))
+    strength = 1.0 if whitening is None else _colour(whitening)
+    b, m = len(pull.target), baseline.nuisance.shape[2]
+    precision = np.zeros((b + m, b + m))
+    precision[:b, :b] = pull.precision
+    # A sign may be less sharp by so much; without a bound, rows that hardly show it would say anything.
+    precision[range(b, b + m), range(b, b + m)] = 1.0 / (OWN * torque[:m]) ** 2
+    return Pull(strength * precision, np.concatenate([pull.target, np.zeros(m)]))
+
+
+def _colour(whitening: Whitening) -> float:
+    """Power density of the noise at rest, over that of white noise of its innovations, a row of the log each."""
+    gains = [1.0 / max(abs(1.0 - float(np.sum(a))), 0.01) for a in whitening.coefficients]
+    return whitening.band.stride * float(np.mean(np.square(gains)))
+
+
+def held(gram: Array, cross: Array, pull: Pull) -> Array:
+    """Solves normal equations (p, p), (p,) whose first columns are base model and nuisance, with the pull on those.
+
+    Directions that neither determines stay at zero: the fit is that of least norm.
+    """
+    b = len(pull.target)
+    gram, cross = gram.copy(), cross.copy()
+    gram[:b, :b] += pull.precision
+    cross[:b] += pull.precision @ pull.target
+    scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    scale[scale == 0] = 1.0
+    values, vectors = np.linalg.eigh(gram / scale[:, None] / scale)
+    kept = values > FAINT * values[-1]
+    result: Array = vectors[:, kept] @ ((vectors[:, kept].T @ (cross / scale)) / values[kept]) / scale
+    return result
