@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.base import Coefficient, Place, Situation, StaticJointEffect
+from robots.terms.effects.base import Coefficient, Instant, Place, Situation, StaticJointEffect
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -37,20 +37,9 @@ class AsymmetricFriction(StaticJointEffect):
             Coefficient("quadratic_asymmetry", f"{force} s2/{length}2"),
         )
 
-    def row(
-        self,
-        robot: Robot,
-        joint: int,
-        q: casadi.SX,
-        dq: casadi.SX,
-        ddq: casadi.SX,
-        rigid: casadi.SX,
-        torque: casadi.SX,
-        sign: casadi.SX,
-        shape: casadi.SX,
-    ) -> casadi.SX:
+    def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds |dq| and dq^2."""
-        return casadi.horzcat(dq * sign, dq * dq)
+        return casadi.horzcat(at.dq * at.sign, at.dq * at.dq)
 
     def describe(
         self,

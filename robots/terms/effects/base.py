@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import casadi
 import numpy as np
@@ -190,6 +190,38 @@ class JointEffect(Effect):
         return (joint - 1,)
 
 
+class Instant(NamedTuple):
+    """What a static effect depends on, symbolic.
+
+    Attributes:
+        q: positions (n,) [rad or m].
+        dq: velocities (n,) [rad/s or m/s].
+        ddq: accelerations (n,) [rad/s2 or m/s2].
+        rigid: torque of the rigid body and the rotors (n,) [N m or N].
+        torque: torque of the whole base model (n,) [N m or N].
+        sign: sign of the velocities as the base model takes it (n,): smooth where that is.
+        shape: one value per entry of the effect's `shapes`.
+    """
+
+    q: casadi.SX
+    dq: casadi.SX
+    ddq: casadi.SX
+    rigid: casadi.SX
+    torque: casadi.SX
+    sign: casadi.SX
+    shape: casadi.SX
+
+    @staticmethod
+    def symbols(joints: int, shapes: int) -> Instant:
+        """Makes symbols for so many joints and shape values."""
+        sizes = [*(joints for _ in Instant._fields[:-1]), shapes]
+        return Instant._make(casadi.SX.sym(name, size) for name, size in zip(Instant._fields, sizes, strict=True))
+
+    def of(self, joint: int) -> Instant:
+        """Picks one joint's scalars, counted from 0; the shape is for all."""
+        return Instant._make([*(symbol[joint] for symbol in self[:-1]), self.shape])
+
+
 class StaticEffect(Effect):
     """An effect that depends on this instant alone: its columns are one symbolic expression.
 
@@ -197,39 +229,20 @@ class StaticEffect(Effect):
     """
 
     @abstractmethod
-    def expression(
-        self,
-        robot: Robot,
-        joint: Place,
-        q: casadi.SX,
-        dq: casadi.SX,
-        ddq: casadi.SX,
-        rigid: casadi.SX,
-        torque: casadi.SX,
-        sign: casadi.SX,
-        shape: casadi.SX,
-    ) -> casadi.SX:
+    def expression(self, robot: Robot, joint: Place, at: Instant) -> casadi.SX:
         """Builds X (n, k), symbolic.
 
         Args:
             robot: the robot with n joints.
             joint: where the effect acts, counted from 1; None for the whole robot.
-            q: positions (n,) [rad or m].
-            dq: velocities (n,) [rad/s or m/s].
-            ddq: accelerations (n,) [rad/s2 or m/s2].
-            rigid: torque of the rigid body and the rotors (n,) [N m or N].
-            torque: torque of the whole base model (n,) [N m or N].
-            sign: sign of the velocities as the base model takes it (n,): smooth where that is.
-            shape: one value per entry of `shapes`.
+            at: what the columns are built from.
         """
 
     def function(self, robot: Robot, joint: Place) -> casadi.Function:
         """Builds (q, dq, ddq, rigid, torque, sign, shape) -> X (n, k) as a CasADi function."""
-        names = ("q", "dq", "ddq", "rigid", "torque", "sign")
-        inputs = [casadi.SX.sym(name, robot.n) for name in names]
-        shape = casadi.SX.sym("shape", len(self.shapes))
-        X = self.expression(robot, joint, *(*inputs, shape))
-        return casadi.Function(self.name, [*inputs, shape], [casadi.densify(X)], [*names, "shape"], ["X"])
+        at = Instant.symbols(robot.n, len(self.shapes))
+        X = self.expression(robot, joint, at)
+        return casadi.Function(self.name, list(at), [casadi.densify(X)], list(Instant._fields), ["X"])
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates `expression` on all samples."""
@@ -242,36 +255,14 @@ class StaticJointEffect(StaticEffect, JointEffect):
     """An effect of one joint on its own torque, that depends on this instant alone."""
 
     @abstractmethod
-    def row(
-        self,
-        robot: Robot,
-        joint: int,
-        q: casadi.SX,
-        dq: casadi.SX,
-        ddq: casadi.SX,
-        rigid: casadi.SX,
-        torque: casadi.SX,
-        sign: casadi.SX,
-        shape: casadi.SX,
-    ) -> casadi.SX:
-        """Builds (1, k) from the joint's own scalars; `shape` as in `expression`."""
+    def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
+        """Builds (1, k) from the joint's own scalars in `at`; all of `at.shape`."""
 
-    def expression(
-        self,
-        robot: Robot,
-        joint: Place,
-        q: casadi.SX,
-        dq: casadi.SX,
-        ddq: casadi.SX,
-        rigid: casadi.SX,
-        torque: casadi.SX,
-        sign: casadi.SX,
-        shape: casadi.SX,
-    ) -> casadi.SX:
+    def expression(self, robot: Robot, joint: Place, at: Instant) -> casadi.SX:
         """Places `row` into the joint's row."""
         assert joint is not None
         j = joint - 1
-        row = self.row(robot, joint, q[j], dq[j], ddq[j], rigid[j], torque[j], sign[j], shape)
+        row = self.row(robot, joint, at.of(j))
         X = casadi.SX(robot.n, row.shape[1])
         X[j, :] = row
         return X
@@ -295,10 +286,19 @@ def _evaluator(effect: StaticEffect, robot: Robot, joint: Place) -> BatchFunctio
 
 @lru_cache(maxsize=512)
 def _row_evaluator(effect: StaticJointEffect, robot: Robot, joint: int) -> BatchFunction:
-    inputs = [casadi.SX.sym(name) for name in ("q", "dq", "ddq", "rigid", "torque", "sign")]
-    shape = casadi.SX.sym("shape", len(effect.shapes))
-    row = effect.row(robot, joint, *(*inputs, shape))
-    return batch_function(casadi.Function(effect.name, [*inputs, shape], [casadi.densify(row)]), "vectorised")
+    at = Instant.symbols(1, len(effect.shapes))
+    row = effect.row(robot, joint, at)
+    return batch_function(casadi.Function(effect.name, list(at), [casadi.densify(row)]), "vectorised")
 
 
-__all__ = ["Coefficient", "Effect", "JointEffect", "Place", "Shape", "Situation", "StaticEffect", "StaticJointEffect"]
+__all__ = [
+    "Coefficient",
+    "Effect",
+    "Instant",
+    "JointEffect",
+    "Place",
+    "Shape",
+    "Situation",
+    "StaticEffect",
+    "StaticJointEffect",
+]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.base import Coefficient, Place, Situation, StaticEffect
+from robots.terms.effects.base import Coefficient, Instant, Place, Situation, StaticEffect
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -44,26 +44,15 @@ class JointCoupling(StaticEffect):
             Coefficient("coupled_coulomb", force),
         )
 
-    def expression(
-        self,
-        robot: Robot,
-        joint: Place,
-        q: casadi.SX,
-        dq: casadi.SX,
-        ddq: casadi.SX,
-        rigid: casadi.SX,
-        torque: casadi.SX,
-        sign: casadi.SX,
-        shape: casadi.SX,
-    ) -> casadi.SX:
+    def expression(self, robot: Robot, joint: Place, at: Instant) -> casadi.SX:
         """Builds the four columns on both joints."""
         assert joint is not None
         outer, inner = joint - 1, joint - 2
         X = casadi.SX(robot.n, 4)
-        X[inner, 0], X[outer, 0] = ddq[outer], ddq[inner]
-        X[inner, 1], X[outer, 2] = dq[outer], dq[inner]
+        X[inner, 0], X[outer, 0] = at.ddq[outer], at.ddq[inner]
+        X[inner, 1], X[outer, 2] = at.dq[outer], at.dq[inner]
         # Two smooth signs are not the sign of a sum: it has the same slope at rest, a millirad per second wide.
-        X[inner, 3] = X[outer, 3] = casadi.tanh((dq[inner] + dq[outer]) / COULOMB_SCALE)
+        X[inner, 3] = X[outer, 3] = casadi.tanh((at.dq[inner] + at.dq[outer]) / COULOMB_SCALE)
         return X
 
     def acts_on(self, robot: Robot, joint: Place) -> tuple[int, ...]:

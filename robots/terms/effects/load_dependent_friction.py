@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import length_unit
-from robots.terms.effects.base import Coefficient, Place, Situation, StaticJointEffect
+from robots.terms.effects.base import Coefficient, Instant, Place, Situation, StaticJointEffect
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -40,21 +40,10 @@ class LoadDependentFriction(StaticJointEffect):
             "viscous_per_load", f"s/{length_unit(robot, joint - 1)}"
         )
 
-    def row(
-        self,
-        robot: Robot,
-        joint: int,
-        q: casadi.SX,
-        dq: casadi.SX,
-        ddq: casadi.SX,
-        rigid: casadi.SX,
-        torque: casadi.SX,
-        sign: casadi.SX,
-        shape: casadi.SX,
-    ) -> casadi.SX:
+    def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds |tau_L| sign(dq) and |tau_L| dq."""
-        load = casadi.fabs(rigid)
-        return casadi.horzcat(load * sign, load * dq)
+        load = casadi.fabs(at.rigid)
+        return casadi.horzcat(load * at.sign, load * at.dq)
 
     def describe(
         self,

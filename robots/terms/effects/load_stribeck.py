@@ -8,7 +8,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.effects.base import Coefficient, Place, Shape, Situation, StaticJointEffect
+from robots.terms.effects.base import Coefficient, Instant, Place, Shape, Situation, StaticJointEffect
 from robots.terms.effects.states import moving_speed
 
 if TYPE_CHECKING:
@@ -41,20 +41,9 @@ class LoadStribeck(StaticJointEffect):
         count = max(2, 1 + round(np.log(max(0.5 * top / lowest, 1.0)) / np.log(3)))
         return tuple((float(v),) for v in np.geomspace(lowest, 0.5 * top, count))
 
-    def row(
-        self,
-        robot: Robot,
-        joint: int,
-        q: casadi.SX,
-        dq: casadi.SX,
-        ddq: casadi.SX,
-        rigid: casadi.SX,
-        torque: casadi.SX,
-        sign: casadi.SX,
-        shape: casadi.SX,
-    ) -> casadi.SX:
+    def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds |tau_L| exp(-|dq| / v_s) sign(dq)."""
-        return casadi.fabs(rigid) * casadi.exp(-dq * sign / shape[0]) * sign
+        return casadi.fabs(at.rigid) * casadi.exp(-at.dq * at.sign / at.shape[0]) * at.sign
 
     def describe(
         self,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit
-from robots.terms.effects.base import Coefficient, Place, Shape, Situation, StaticJointEffect
+from robots.terms.effects.base import Coefficient, Instant, Place, Shape, Situation, StaticJointEffect
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -40,20 +40,9 @@ class PositionDependentFriction(StaticJointEffect):
         reach = float(np.ptp(situation.q[:, joint - 1]))
         return tuple((order,) for order in self.shapes[0].grid if order * reach > 1.0)
 
-    def row(
-        self,
-        robot: Robot,
-        joint: int,
-        q: casadi.SX,
-        dq: casadi.SX,
-        ddq: casadi.SX,
-        rigid: casadi.SX,
-        torque: casadi.SX,
-        sign: casadi.SX,
-        shape: casadi.SX,
-    ) -> casadi.SX:
+    def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds sign(dq) cos(h q) and sign(dq) sin(h q)."""
-        return casadi.horzcat(sign * casadi.cos(shape[0] * q), sign * casadi.sin(shape[0] * q))
+        return casadi.horzcat(at.sign * casadi.cos(at.shape[0] * at.q), at.sign * casadi.sin(at.shape[0] * at.q))
 
     def describe(
         self,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit
-from robots.terms.effects.base import Coefficient, Place, Shape, Situation, StaticJointEffect
+from robots.terms.effects.base import Coefficient, Instant, Place, Shape, Situation, StaticJointEffect
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -32,20 +32,9 @@ class ShearThinning(StaticJointEffect):
         assert joint is not None
         return (Coefficient("friction_at_one", force_unit(robot, joint - 1)),)
 
-    def row(
-        self,
-        robot: Robot,
-        joint: int,
-        q: casadi.SX,
-        dq: casadi.SX,
-        ddq: casadi.SX,
-        rigid: casadi.SX,
-        torque: casadi.SX,
-        sign: casadi.SX,
-        shape: casadi.SX,
-    ) -> casadi.SX:
+    def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds |dq|^p sign(dq)."""
-        return casadi.sqrt(dq**2 + 1e-10) ** shape[0] * sign
+        return casadi.sqrt(at.dq**2 + 1e-10) ** at.shape[0] * at.sign
 
     def describe(
         self,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.base import Coefficient, Place, Situation, StaticJointEffect
+from robots.terms.effects.base import Coefficient, Instant, Place, Situation, StaticJointEffect
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -39,21 +39,10 @@ class Spring(StaticJointEffect):
             Coefficient("stiffness_3", f"{force}/{length}3"),
         )
 
-    def row(
-        self,
-        robot: Robot,
-        joint: int,
-        q: casadi.SX,
-        dq: casadi.SX,
-        ddq: casadi.SX,
-        rigid: casadi.SX,
-        torque: casadi.SX,
-        sign: casadi.SX,
-        shape: casadi.SX,
-    ) -> casadi.SX:
+    def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds x, x^2 and x^3."""
         # The offset and the lower orders belong together: any middle spans the same torques, this one conditions well.
-        x = q - _middle(robot, joint)
+        x = at.q - _middle(robot, joint)
         return casadi.horzcat(x, x**2, x**3)
 
     def describe(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit
-from robots.terms.effects.base import Coefficient, Place, Shape, Situation, StaticJointEffect
+from robots.terms.effects.base import Coefficient, Instant, Place, Shape, Situation, StaticJointEffect
 from robots.terms.effects.states import moving_speed
 
 if TYPE_CHECKING:
@@ -46,22 +46,11 @@ class Stribeck(StaticJointEffect):
         velocities = np.geomspace(min(lowest, 0.5 * top), 0.5 * top, count)
         return tuple((float(v), exponent) for v in velocities for exponent in self.shapes[1].grid)
 
-    def row(
-        self,
-        robot: Robot,
-        joint: int,
-        q: casadi.SX,
-        dq: casadi.SX,
-        ddq: casadi.SX,
-        rigid: casadi.SX,
-        torque: casadi.SX,
-        sign: casadi.SX,
-        shape: casadi.SX,
-    ) -> casadi.SX:
+    def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds exp(-(|dq| / v_s)^d) sign(dq)."""
         # The power of zero has no derivative; a thousandth of the velocity does no harm.
-        ratio = casadi.sqrt((dq / shape[0]) ** 2 + 1e-6)
-        return casadi.exp(-(ratio ** shape[1])) * sign
+        ratio = casadi.sqrt((at.dq / at.shape[0]) ** 2 + 1e-6)
+        return casadi.exp(-(ratio ** at.shape[1])) * at.sign
 
     def describe(
         self,

@@ -8,7 +8,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.effects.base import Coefficient, Place, Situation, StaticJointEffect
+from robots.terms.effects.base import Coefficient, Instant, Place, Situation, StaticJointEffect
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -31,20 +31,9 @@ class TorqueConstantError(StaticJointEffect):
         """Describes the relative error."""
         return (Coefficient("relative_error", "1", -0.9, 9.0),)
 
-    def row(
-        self,
-        robot: Robot,
-        joint: int,
-        q: casadi.SX,
-        dq: casadi.SX,
-        ddq: casadi.SX,
-        rigid: casadi.SX,
-        torque: casadi.SX,
-        sign: casadi.SX,
-        shape: casadi.SX,
-    ) -> casadi.SX:
+    def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds tau_L."""
-        return rigid
+        return at.rigid
 
     def describe(
         self,

@@ -8,7 +8,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.effects.base import Coefficient, Place, Shape, Situation, StaticJointEffect
+from robots.terms.effects.base import Coefficient, Instant, Place, Shape, Situation, StaticJointEffect
 from robots.terms.effects.states import torque_reference
 
 if TYPE_CHECKING:
@@ -33,21 +33,10 @@ class TorqueConstantSaturation(StaticJointEffect):
         """Describes the relative error at the torque limit."""
         return (Coefficient("error_at_limit", "1"),)
 
-    def row(
-        self,
-        robot: Robot,
-        joint: int,
-        q: casadi.SX,
-        dq: casadi.SX,
-        ddq: casadi.SX,
-        rigid: casadi.SX,
-        torque: casadi.SX,
-        sign: casadi.SX,
-        shape: casadi.SX,
-    ) -> casadi.SX:
+    def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds tau |tau / tau_r|^p."""
-        ratio = casadi.sqrt((torque / torque_reference(robot, joint)) ** 2 + 1e-12)
-        return torque * ratio ** shape[0]
+        ratio = casadi.sqrt((at.torque / torque_reference(robot, joint)) ** 2 + 1e-12)
+        return at.torque * ratio ** at.shape[0]
 
     def describe(
         self,

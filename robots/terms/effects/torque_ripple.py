@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit
-from robots.terms.effects.base import Coefficient, Place, Shape, Situation, StaticJointEffect
+from robots.terms.effects.base import Coefficient, Instant, Place, Shape, Situation, StaticJointEffect
 from robots.terms.effects.states import torque_reference
 
 if TYPE_CHECKING:
@@ -92,21 +92,10 @@ class TorqueRipple(StaticJointEffect):
         power = angle_spectrum(situation.q[:, joint - 1], residual[:, joint - 1], orders)
         return tuple(grid[i] for i in np.argsort(-power)[:count])
 
-    def row(
-        self,
-        robot: Robot,
-        joint: int,
-        q: casadi.SX,
-        dq: casadi.SX,
-        ddq: casadi.SX,
-        rigid: casadi.SX,
-        torque: casadi.SX,
-        sign: casadi.SX,
-        shape: casadi.SX,
-    ) -> casadi.SX:
+    def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds cos(h q) and sin(h q), by themselves and times the load."""
-        wave = casadi.horzcat(casadi.cos(shape[0] * q), casadi.sin(shape[0] * q))
-        return casadi.horzcat(wave, wave * rigid / torque_reference(robot, joint))
+        wave = casadi.horzcat(casadi.cos(at.shape[0] * at.q), casadi.sin(at.shape[0] * at.q))
+        return casadi.horzcat(wave, wave * at.rigid / torque_reference(robot, joint))
 
     def describe(
         self,
