@@ -3,6 +3,11 @@
 Run it with ``python benchmarks/coverage.py [SEEDS [WORKERS]]``. Each case plays random Fourier motions on a virtual
 robot whose parameters are 10 % off its description, identifies it from the log, and counts how many of the true base
 parameters lie within 1.96 and within 3 standard errors. With honest standard errors that is 95 % and 99.7 %.
+
+Of 200 draws a share of 95 % is known to 1.5 % only, and the worst of 70 parameters lies 3 % below it by chance.
+The noise is ours, so that the fit's exact standard errors are known besides: Y'W Gamma W Y with the autocovariance that
+the plant's noise has, sigma^2 (1 - s + s rho^k). Stated over exact errors tell a parameter's true coverage to a
+thousandth, and the share within 1.96 exact errors tells what is luck of the draws.
 """
 
 from __future__ import annotations
@@ -16,15 +21,21 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
+from scipy.stats import norm
 
-from estimation import identify
+from estimation import Estimate, identify
+from estimation.estimators import WeightedLeastSquares
+from estimation.fitting import sum_moments
+from estimation.preparation import prepare
+from estimation.regression import JointRegressor
 from robots import load_robot, nominal_plant, simulate
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import AssumedValueWarning
 from robots.common.parallel import parallel_map
 from robots.plants import Plant, Sensors
 from robots.robot import Robot
-from robots.signals import Motion
+from robots.signals import Log, Motion
 
 Array = NDArray[np.float64]
 
@@ -89,6 +100,8 @@ class Run:
     z: Array
     chi_square: float
     determined: NDArray[np.bool_]
+    stated: Array
+    exact: Array
 
 
 def run(task: tuple[Case, int]) -> Run:
@@ -97,12 +110,37 @@ def run(task: tuple[Case, int]) -> Run:
     case, seed = task
     plant = plant_of(case)
     log = simulate(plant, fourier_motion(plant.robot, seed % MOTIONS), seed=seed)
-    model = identify(plant.robot, log).model
+    estimate = identify(plant.robot, log)
+    model = estimate.model
     error = model.values - find_base_parameters(plant.model).from_standard(plant.parameters)
     scale = np.sqrt(np.diag(model.covariance))
     z = error / scale
     correlation = model.covariance / scale[:, None] / scale
-    return Run(z, float(z @ np.linalg.solve(correlation, z)) / len(z), model.determined)
+    chi_square = float(z @ np.linalg.solve(correlation, z)) / len(z)
+    return Run(z, chi_square, model.determined, scale, exact_errors(plant, log, estimate, seed % MOTIONS))
+
+
+def exact_errors(plant: Plant, log: Log, estimate: Estimate, motion: int) -> Array:
+    """Standard errors (b,) of that fit under the noise that the plant really has."""
+    sensors = plant.sensors
+    quiet = replace(plant, sensors=replace(sensors, torque_noise=0.0))
+    tau = simulate(quiet, fourier_motion(plant.robot, motion)).tau
+    assert tau is not None
+    level = sensors.torque_noise * np.sqrt(np.mean(tau**2, axis=0))
+    rho, share = np.exp(-PERIOD / sensors.correlation_time), sensors.coloured_share
+    regressor = JointRegressor(find_base_parameters(estimate.model.torque_model))
+    rows = prepare(plant.robot, log).rows(estimate.choice.smoother)
+    moments = sum_moments(regressor, [rows])
+    _, weights = WeightedLeastSquares().solve(moments, estimate.choice.ridge)
+    inverse = moments.inverse(weights, 1e-13)
+    meat = np.zeros_like(inverse)
+    state = rows.motion.q, rows.motion.dq, rows.motion.ddq
+    for joint, (Y, used) in enumerate(zip(regressor(*state), regressor.used, strict=True)):
+        X = Y * (weights[joint] * rows.mask[:, joint, None])
+        before, after = (lfilter([1.0], [1.0, -rho], part, axis=0) for part in (X, X[::-1]))
+        coloured = before + after[::-1] - X  # sum_k rho^|k| X(t + k)
+        meat[np.ix_(used, used)] += level[joint] ** 2 * X.T @ ((1 - share) * X + share * coloured)
+    return np.asarray(np.sqrt(np.diag(inverse @ meat @ inverse)))
 
 
 def table(case: Case, seeds: range, workers: int | None = None) -> str:
@@ -128,6 +166,17 @@ def table(case: Case, seeds: range, workers: int | None = None) -> str:
             f"{np.mean(z[:, of] ** 2):9.2f}  {columns[worst].name}: {z[:, worst].mean():+.2f}, "
             f"{100 * inside[:, worst].mean():.1f} %"
         )
+    ratio = np.median([result.stated / result.exact for result in runs], axis=0)
+    least, most = int(np.argmin(ratio)), int(np.argmax(ratio))
+    coverage = 2 * norm.cdf(NORMAL_95 * ratio) - 1
+    lucky = (np.abs(z * np.array([result.stated / result.exact for result in runs])) <= NORMAL_95).mean(axis=0)
+    lines += [
+        f"  stated over exact standard errors: {np.median(ratio):.3f} at the median parameter, {ratio[least]:.3f} "
+        f"({columns[least].name}) to {ratio[most]:.3f} ({columns[most].name}); without luck 1.96 of them hold "
+        f"{100 * coverage.min():.1f} to {100 * coverage.max():.1f} %",
+        f"  of these draws {100 * lucky.mean():.1f} % lie within 1.96 exact errors, of the worst parameter "
+        f"{100 * lucky.min():.1f} %",
+    ]
     lines.append(f"  chi^2 of all together, over their number: {np.mean([result.chi_square for result in runs]):.2f}")
     return "\n".join(lines)
 

@@ -95,7 +95,7 @@ def figaroh(urdf: str, known: Path, unseen: Path | None, cutoff: float) -> dict[
 
 def ours(urdf: str, known: Path, unseen: Path | None) -> dict[str, Any]:
     """Runs ours: the gate, all choices and standard errors included."""
-    from estimation import identify, predict
+    from estimation import identify
     from robots import load_robot
     from robots.signals import Log
 
@@ -105,6 +105,8 @@ def ours(urdf: str, known: Path, unseen: Path | None) -> dict[str, Any]:
     estimate = identify(robot, logs[0])
     result: dict[str, Any] = {"wall": time.perf_counter() - start[0], "cpu": time.process_time() - start[1]}
     if unseen is not None:
+        from estimation import predict
+
         result["error"] = predict(estimate.model, logs[1]).error_rms.tolist()
     return result | {"memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6}
 

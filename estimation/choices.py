@@ -29,7 +29,8 @@ class Choice:
         ridge: of the fit.
         velocity_scales: of each joint's Coulomb column (n,) [rad/s or m/s].
         pull: what the ridge pulls to; None for zero.
-        held_out: RMS of the torque error on blocks left out of the fit (n,) [N m or N].
+        held_out: RMS of the torque error on blocks left out of the fit (n,) [N m or N], joints at rest and the logs'
+            ends besides: what a prediction is judged on.
         spread: standard deviation of the torque (n,): the error of a constant.
         band: half-width (n,) [N m or N] of a band that holds 95 % of the left-out errors.
         band_coverage: share (n,) of each block's errors within the band that the other blocks' errors give.
@@ -68,12 +69,13 @@ def choose(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator,
         good as the best; a pull towards the description where it clearly helps.
     """
     comparison = Comparison(base, logs, estimator, candidates)
-    smoother, blocks = comparison.smoother()
+    smoother = comparison.smoother()
     # On torque as it was logged: a ridge biases, and must gain something that stands out of the noise.
-    if comparison.averaged > 1:
-        blocks = comparison.blocks(smoother, 1)
-    choices = []
+    blocks = comparison.blocks(smoother, 1)
+    choices: list[Choice] = []
     for trial in comparison.regularisation(blocks):
+        if choices and trial.ridge == choices[0].ridge and trial.pull is None:
+            return choices[0]
         band, covered = comparison.band(smoother, blocks, trial)
         choices.append(
             Choice(
@@ -89,4 +91,4 @@ def choose(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator,
             )
         )
     plain, best = choices
-    return plain if best.ridge == plain.ridge and best.pull is None else replace(best, plain=plain)
+    return replace(best, plain=plain)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
 from itertools import pairwise
-from operator import add
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.blocks import Blocks, Sides, side_products
 from estimation.estimators import Estimator
-from estimation.moments import Moments
-from estimation.preparation import Prepared, Rows
+from estimation.preparation import Prepared, Rows, rows_of
 from estimation.preprocessing import Harmonics, LowPass, Smoother, SmoothingSpline
 from estimation.pulls import Pull, description_pull, friction_levels
 from estimation.regression import JointRegressor, threaded
@@ -23,6 +21,7 @@ Array = NDArray[np.float64]
 
 # tanh(dq / v0): the first is the sign in practice, and stays unless the data ask for a wider one.
 VELOCITY_SCALES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
+WIDER = np.array(VELOCITY_SCALES[1:])
 # Share of its residual that a wider sign must save a joint. Cross-validation would prefer wide ones even where the
 # truth is a sign, and bias the friction by many standard errors.
 SAVING = 0.03
@@ -88,6 +87,15 @@ def _smallest(trials: Sequence[Trial]) -> Trial:
     return next(trial for trial in trials if trial.cost <= best + RIDGE_SLACK)
 
 
+def _strongest(trials: Sequence[Trial]) -> Trial:
+    """The largest ridge that is as good as the best: another motion asks for more than blocks of the same one do.
+
+    Of a pull towards zero the smallest is taken, which biases least; a description is where open directions belong.
+    """
+    best = min(trial.cost for trial in trials)
+    return [trial for trial in trials if trial.cost <= best + RIDGE_SLACK][-1]
+
+
 def _fastest(log: Prepared) -> Array:
     """Speed (n,) that a joint exceeds in a thousandth of the time only: noise makes single larger ones."""
     grid = log.positions
@@ -103,34 +111,36 @@ class Comparison:
     ) -> None:
         self.base, self.estimator, self.candidates = base, estimator, candidates
         self.regressor = JointRegressor(base)
+        self._latest: tuple[Smoother, list[Rows]] | None = None
         count = sum(len(log.log) for log in logs)
         tau = np.concatenate([log.tau for log in logs]) if len(logs) > 1 else logs[0].tau
         self.spread = np.maximum(tau.std(axis=0), 1e-9 * np.maximum(1.0, np.abs(tau).max(axis=0)))
+        self.sampled = count > MOST_ROWS
         self.logs: list[Prepared] = []
         for log in logs:
-            number = max(1, round(STRETCHES * len(log.log) / count)) if count > MOST_ROWS else 1
+            number = max(1, round(STRETCHES * len(log.log) / count)) if self.sampled else 1
             self.logs += log.stretches(number, -(-min(len(log.log), round(MOST_ROWS / count * len(log.log))) // number))
         self.period = float(np.median([log.positions.period for log in self.logs]))
         self.fastest = np.max([_fastest(log) for log in self.logs], axis=0)
         kept = sum(len(log.log) for log in self.logs)
         self.averaged = max(1, min(round(AVERAGED / self.period), kept // LEAST_AVERAGES))
 
-    def smoother(self) -> tuple[Smoother, list[Moments]]:
-        """Chooses the smoothing, by some settings of the regularisation, and gives its blocks."""
+    def smoother(self) -> Smoother:
+        """Chooses the smoothing, by some settings of the regularisation."""
         rate = 1 / self.period
         usable = [cutoff for cutoff in self.candidates.cutoffs if cutoff <= 0.4 * rate] or [0.4 * rate]
         # All of them: an elastic drive makes a second minimum far above the first.
-        tried = [(cutoff, blocks, self._best(blocks)) for cutoff in usable for blocks in [self.blocks(LowPass(cutoff))]]
-        lowest = min(cost for _, _, cost in tried)
-        cutoff, blocks, cost = min((t for t in tried if t[2] <= lowest + CUTOFF_SLACK), key=lambda t: t[0])
+        tried = [(cutoff, self._best(self.blocks(LowPass(cutoff)))) for cutoff in usable]
+        lowest = min(cost for _, cost in tried)
+        cutoff, cost = min((t for t in tried if t[1] <= lowest + CUTOFF_SLACK), key=lambda t: t[0])
         chosen: Smoother = LowPass(cutoff)
         for other in self._others(cutoff):
-            found = self.blocks(other)
-            if self._best(found) < cost - SMOOTHER_GAIN:
-                chosen, blocks, cost = other, found, self._best(found)
-        return chosen, blocks
+            found = self._best(self.blocks(other))
+            if found < cost - SMOOTHER_GAIN:
+                chosen, cost = other, found
+        return chosen
 
-    def regularisation(self, blocks: list[Moments]) -> tuple[Trial, Trial]:
+    def regularisation(self, blocks: Sides) -> tuple[Trial, Trial]:
         """Chooses pull and ridge: towards the description where that clearly helps, else to zero as far as it helps.
 
         Returns:
@@ -144,43 +154,46 @@ class Comparison:
             # No joint pays for the others: small torques are lost in a mean that big ones gain.
             fair = [trial for trial in pulled if (trial.logs <= tried[0].logs + UNFAIR).all()]
             if fair and min(trial.cost for trial in fair) < tried[0].cost - PULL_GAIN:
-                return tried[0], _smallest(fair)
+                return tried[0], _strongest(fair)
         return tried[0], _smallest(tried)
 
-    def blocks(self, smoother: Smoother, averaged: int | None = None) -> list[Moments]:
-        """Moments of each block, the sign columns of the wider scales appended after the base columns."""
+    def blocks(self, smoother: Smoother, averaged: int | None = None) -> Sides:
+        """Normal equations of each block, the sign columns of the wider scales appended after the base columns."""
         size = averaged or self.averaged
+        pieces = [(part, piece) for part in self._rows(smoother) for piece in self._pieces(part)]
+        sides = Sides.empty(len(self.spread), len(pieces), self.base.size + len(self.spread) * len(WIDER))
+        for _ in threaded(lambda item: self._fill(sides, item[0], *item[1], size), enumerate(pieces)):
+            pass
+        return sides
 
-        def of(log: Prepared) -> list[Moments]:
-            part = log.rows(smoother)
-            return [self._moments(part, piece, size) for piece in self._pieces(part)]
+    def _rows(self, smoother: Smoother) -> list[Rows]:
+        """All rows of each log; the latest are kept, which the chosen smoothing is asked for more than once.
 
-        return [block for found in threaded(of, self.logs) for block in found]
+        The ends of a log are predicted as well as the rest; those of a stretch of a long one are of our making.
+        """
+        if self._latest is None or self._latest[0] != smoother:
+            self._latest = smoother, rows_of(self.logs, smoother, ends=not self.sampled)
+        return self._latest[1]
 
-    def _moments(self, part: Rows, piece: slice, size: int) -> Moments:
+    def _fill(self, sides: Sides, block: int, part: Rows, piece: slice, size: int) -> None:
+        """Sums the normal equations of one block: of the rows that count in a fit, and of all rows."""
         rows = piece.stop - piece.start
         whole = rows // size * size
         place = slice(piece.start, piece.start + (whole or rows))
         size = size if whole else rows
-        motion, mask = part.motion, part.mask[place]
+        motion, mask, tau = part.motion, part.mask[place], part.tau[place]
         dq = motion.dq[place]
-        n, extra = motion.n, len(VELOCITY_SCALES) - 1
-        columns = self.base.size + n * extra
-        gram, cross, square, count = np.zeros((n, columns, columns)), np.zeros((n, columns)), np.zeros(n), np.zeros(n)
         joints = zip(self.regressor(motion.q[place], dq, motion.ddq[place]), self.regressor.used, strict=True)
         for joint, (own, used) in enumerate(joints):
-            wide = np.tanh(dq[:, joint, None] / np.array(VELOCITY_SCALES[1:]))
-            Y = np.hstack([own, wide, part.tau[place, joint, None]]) * mask[:, joint, None]
-            if size > 1:
-                # Rows that do not count are zero on both sides: what is left is still an equation.
-                Y = Y.reshape(-1, size, Y.shape[1]).mean(axis=1)
-            products = Y.T @ Y
-            chosen = np.concatenate([used, self.base.size + joint * extra + np.arange(extra)])
-            gram[joint][np.ix_(chosen, chosen)] = products[:-1, :-1]
-            cross[joint, chosen] = products[:-1, -1]
-            square[joint] = products[-1, -1]
-            count[joint] = mask[:, joint].sum() / size
-        return Moments(gram, cross, square, count)
+            wide = np.tanh(dq[:, joint] / WIDER[:, None])
+            products = side_products(own, wide, tau[:, joint], mask[:, joint], size)
+            chosen = np.concatenate([used, self.base.size + joint * len(WIDER) + np.arange(len(WIDER))])
+            for side, sums in zip((sides.fitted, sides.judged), products, strict=True):
+                side.gram[joint, block][np.ix_(chosen, chosen)] = sums[:-1, :-1]
+                side.cross[joint, block, chosen] = sums[:-1, -1]
+                side.square[joint, block] = sums[-1, -1]
+        sides.fitted.count[:, block] = mask.sum(axis=0) / size
+        sides.judged.count[:, block] = len(mask) / size
 
     def _others(self, cutoff: float) -> list[Smoother]:
         """Smoothers of other kinds and about that cut-off."""
@@ -199,43 +212,38 @@ class Comparison:
                 others += [Harmonics(period, order) for order in orders if order / period < 0.4 / self.period]
         return others
 
-    def _best(self, blocks: list[Moments]) -> float:
+    def _best(self, blocks: Sides) -> float:
         ridges = sorted(self.candidates.ridges)
         middle = ridges[len(ridges) // 2]
         settings = [(ridges[0], None), (middle, None), (middle, self._description(blocks))]
         return min(self._try(blocks, *setting).cost for setting in settings)
 
-    def _try(self, blocks: list[Moments], ridge: float, pull: Pull | None) -> Trial:
-        total = reduce(add, blocks)
-        sharp = total.columns(np.arange(self.base.size)).pulled(pull)
-        trial = Trial(ridge, pull, tuple(self._scales(total, sharp, ridge)), np.zeros(0))
+    def _try(self, blocks: Sides, ridge: float, pull: Pull | None) -> Trial:
+        trial = Trial(ridge, pull, tuple(self._scales(blocks, ridge, pull)), np.zeros(0))
         return replace(trial, logs=np.log(np.maximum(self.left_out(blocks, trial) / self.spread, EXACT)))
 
-    def left_out(self, blocks: list[Moments], trial: Trial) -> Array:
-        """RMS error of each block predicted from the others (n,) [N m or N]."""
-        columns = self._columns(trial.scales)
-        parts = [block.columns(columns).pulled(trial.pull) for block in blocks]
-        total = reduce(add, parts)
-        _, weights = self.estimator.solve(total, trial.ridge)
-        error = np.zeros_like(self.spread)
-        for part in parts:
-            rest = total - part if len(parts) > 1 else total
-            error += part.residual(rest.solve(weights, trial.ridge))
-        return np.sqrt(error / np.maximum(total.count, 1))
+    def left_out(self, blocks: Sides, trial: Trial) -> Array:
+        """RMS error of all rows of each block, predicted from the others (n,) [N m or N]."""
+        columns, judged = self._columns(trial.scales), blocks.judged
+        values = np.zeros(judged.cross.shape[1:])
+        # Columns that are not chosen have no part in the torque.
+        values[:, columns] = self._without(blocks.fitted.columns(columns.tolist()), trial)
+        return np.asarray(np.sqrt(judged.squares(values) / np.maximum(judged.count.sum(axis=1), 1)))
 
-    def band(self, smoother: Smoother, blocks: list[Moments], trial: Trial) -> tuple[Array, Array]:
+    def _without(self, chosen: Blocks, trial: Trial) -> Array:
+        """Parameters (B, b) of the fit without each block."""
+        _, weights = self.estimator.solve(chosen.total.pulled(trial.pull), trial.ridge)
+        return chosen.without(weights, trial.ridge, trial.pull)
+
+    def band(self, smoother: Smoother, blocks: Sides, trial: Trial) -> tuple[Array, Array]:
         """Half-width (n,) that holds `BAND` of the left-out errors, and the share that it holds on unseen blocks (n,).
 
         Each block's share is counted with the quantile of the other blocks' errors: what a user sees who takes the
         band to a motion of the same kind (a split conformal interval, block by block).
         """
-        columns = self._columns(trial.scales)
-        parts = [block.columns(columns).pulled(trial.pull) for block in blocks]
-        total = reduce(add, parts)
-        _, weights = self.estimator.solve(total, trial.ridge)
-        left = (total - part if len(parts) > 1 else total for part in parts)
-        values = (rest.solve(weights, trial.ridge) for rest in left)
-        errors = [np.abs(error) for log in self.logs for error in self._errors(log, smoother, trial.scales, values)]
+        values = iter(self._without(blocks.fitted.columns(self._columns(trial.scales).tolist()), trial))
+        rows = self._rows(smoother)
+        errors = [np.abs(error) for part in rows for error in self._errors(part, trial.scales, values)]
         levels = np.array([np.quantile(error, BAND, axis=0) for error in errors])
         whole = np.quantile(np.concatenate(errors), BAND, axis=0)
         if len(errors) == 1:
@@ -247,11 +255,8 @@ class Comparison:
             shares.append((error <= level).mean(axis=0) * len(error))
         return whole, np.asarray(np.sum(shares, axis=0) / sum(len(error) for error in errors))
 
-    def _errors(
-        self, log: Prepared, smoother: Smoother, scales: Sequence[int], values: Iterator[Array]
-    ) -> Iterator[Array]:
+    def _errors(self, part: Rows, scales: Sequence[int], values: Iterator[Array]) -> Iterator[Array]:
         """Errors (N, n) of each block of a log by the next of the values."""
-        part = log.rows(smoother)
         motion = part.motion
         for piece in self._pieces(part):
             rows = self.regressor(motion.q[piece], motion.dq[piece], motion.ddq[piece])
@@ -275,13 +280,11 @@ class Comparison:
         bounds = np.linspace(0, len(part.motion), pieces + 1).astype(int).tolist()
         return [slice(first, stop) for first, stop in pairwise(bounds)]
 
-    def _scales(self, total: Moments, sharp: Moments, ridge: float) -> list[int]:
+    def _scales(self, blocks: Sides, ridge: float, pull: Pull | None) -> list[int]:
         """Per joint the index of its velocity scale: the widest saving, if it is worth it."""
-        joints = len(total.count)
-        errors = np.empty((len(VELOCITY_SCALES), joints))
-        for k in range(len(VELOCITY_SCALES)):
-            moments = total.columns(self._columns([k] * joints)).pulled(sharp.pull) if k else sharp
-            errors[k] = moments.residual(moments.solve(np.ones(joints), ridge))
+        total = blocks.fitted.total
+        choices = np.array([self._columns([k] * len(total.count)) for k in range(len(VELOCITY_SCALES))])
+        errors = np.array([total.residual(values) for values in blocks.fitted.fitted(choices, ridge, pull)])
         worth = errors.min(axis=0) < (1 - SAVING) ** 2 * errors[0]
         return [int(k) if yes else 0 for k, yes in zip(errors.argmin(axis=0), worth, strict=True)]
 
@@ -294,10 +297,10 @@ class Comparison:
                 chosen[position] = self.base.size + (column.joint - 1) * extra + scale - 1
         return chosen
 
-    def _description(self, blocks: list[Moments]) -> Pull | None:
+    def _description(self, blocks: Sides) -> Pull | None:
         if not self.candidates.pull:
             return None
-        total = reduce(add, blocks)
+        total = blocks.fitted.total
         count = np.maximum(total.count, 1)
         own = [column.joint - 1 for column in self.base.columns]
         squares = np.array([total.gram[joint, i, i] / count[joint] for i, joint in enumerate(own)])

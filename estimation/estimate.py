@@ -33,8 +33,8 @@ class JointFit:
         name: the joint's name.
         torque_rms: of the measured torque [N m or N].
         torque_spread: its standard deviation: the error of the best constant.
-        residual_rms: error on the fitted rows in which the joint is not almost at rest.
-        held_out_rms: error on such rows of blocks that were left out of the fit.
+        residual_rms: error on the fitted logs, rows besides in which the joint is at rest, which no fit counts.
+        held_out_rms: error on all rows of blocks that were left out of the fit: what to expect of a prediction.
         nominal_rms: error of the robot description's own parameters; NaN where it has none.
         noise_floor: what no model of the motion can predict: what differs from period to period where the motion is
             periodic, else the level of white noise that explains the residual's fastest part.
@@ -118,12 +118,19 @@ class Estimate:
         if self.choice.pull is not None:
             found.append(
                 f"The data leave directions of the parameters open; a pull of {self.choice.ridge:g} towards the "
-                "robot's description fills them, and helps on data left out. Standard errors are those without it."
+                "robot's description fills them, and helps on data left out. Standard errors are those without it, and "
+                "what it moves each value by."
             )
         elif self.choice.ridge > 1e-6:
             found.append(
                 f"The data leave directions of the parameters open; a ridge of {self.choice.ridge:g} keeps predictions "
-                "sane and pulls those directions towards zero. Standard errors are those without it."
+                "sane and pulls those directions towards zero. Standard errors are those without it, and what it moves "
+                "each value by."
+            )
+        if bounds := self.model.provenance.get("at_bounds"):
+            found.append(
+                f"At their bounds: {', '.join(bounds)}. Standard errors are those of a fit without bounds: too large "
+                "there rather than too small."
             )
         if self.colour > COLOURED:
             found.append(

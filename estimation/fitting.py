@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,10 @@ Array = NDArray[np.float64]
 FAINT = 1e-13
 # Of a longer log, evenly spread stretches stand for the colour of the noise and for the sandwich's meat.
 MOST_ROWS, STRETCHES = 100_000, 24
+# For the sandwich the rows of a long log are averaged over so much time [s], ...
+AVERAGED = 0.02
+# ... as long as so many averages remain.
+LEAST_AVERAGES = 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +41,9 @@ class Fit:
         solution: parameters and weights.
         moments: normal equations of the rows that count.
         rows: what was fitted, in order.
-        predicted: torque (N, n) of each of the rows.
+        torque: predicted, of all rows (N, n).
+        predicted: the same, part by part.
+        nominal: sum of each joint's squared errors (n,) by the robot's description, over all rows; NaN without one.
         covariance: of the parameters (b, b).
         white: standard errors (b,) that white noise would have.
     """
@@ -46,7 +53,9 @@ class Fit:
     solution: Solution
     moments: Moments
     rows: Sequence[Rows]
+    torque: Array
     predicted: Sequence[Array]
+    nominal: Array
     covariance: Array
     white: Array
 
@@ -75,22 +84,30 @@ def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, ch
         smoother=choice.smoother,
     )
     solution = estimator.refine(data, values, weights)
-    predicted = [predict_rows(regressor, part, solution.values) for part in rows]
-    errors = [(part.tau - torque) * part.mask for part, torque in zip(rows, predicted, strict=True)]
+    # One array for all parts, which the estimate keeps: of millions of rows a copy counts.
+    torque = np.empty((sum(len(part.motion) for part in rows), rows[0].tau.shape[1]))
+    predicted = np.split(torque, np.cumsum([len(part.motion) for part in rows])[:-1])
+    passes = [_pass(regressor, part, solution, into) for part, into in zip(rows, predicted, strict=True)]
+    scores = np.concatenate([found.scores for found in passes])
+    fitted = [_Fitted(part, torque, None) for part, torque in zip(rows, predicted, strict=True)]
     if solution.row_weights is not None:
         factors = [solution.row_weights(part.tau - torque) for part, torque in zip(rows, predicted, strict=True)]
         weighted = [replace(part, mask=part.mask * factor) for part, factor in zip(rows, factors, strict=True)]
         moments = sum_moments(regressor, weighted).pulled(choice.pull)
         # An M-estimator's scores are its weights times its errors (Huber 1967).
-        errors = [error * factor for error, factor in zip(errors, factors, strict=True)]
-    full, white = _covariances(regressor, rows, errors, moments, solution, seed)
+        fitted = [_Fitted(*some) for some in zip(rows, predicted, factors, strict=True)]
+        scores = _scores(regressor, fitted, solution.weights)
+    averaged = round(AVERAGED / float(np.median([log.positions.period for log in logs])))
+    full, white = _covariances(regressor, fitted, scores, moments, solution, averaged, seed)
     return Fit(
         base=base,
         choice=choice,
         solution=solution,
         moments=moments,
         rows=rows,
+        torque=torque,
         predicted=predicted,
+        nominal=np.sum([found.nominal for found in passes], axis=0),
         covariance=full,
         white=white,
     )
@@ -107,25 +124,60 @@ def sum_moments(regressor: JointRegressor, rows: Sequence[Rows]) -> Moments:
     return reduce(add, threaded(of, ((part, at) for part in rows for at in chunks(len(part.motion)))))
 
 
-def predict_rows(regressor: JointRegressor, part: Rows, values: Array) -> Array:
-    """Predicts the torque (N, n) of rows by base parameters (b,)."""
-    motion = part.motion
-    torque = np.empty_like(part.tau)
+class _Fitted(NamedTuple):
+    """Rows, the torque (N, n) that a fit predicts of them, and how much each counts (N, n), None for alike."""
 
-    def of(at: slice) -> None:
-        torque[at] = regressor.torque(motion.q[at], motion.dq[at], motion.ddq[at], values)
+    rows: Rows
+    torque: Array
+    factor: Array | None
 
-    for _ in threaded(of, chunks(len(motion))):
-        pass
-    return torque
+    def errors(self, at: slice) -> Array:
+        """Errors of some rows, zero where a row does not count."""
+        errors = (self.rows.tau[at] - self.torque[at]) * self.rows.mask[at]
+        return errors if self.factor is None else errors * self.factor[at]
+
+
+class _Pass(NamedTuple):
+    """What one look at the rows gives, besides the torque that the fit predicts.
+
+    Attributes:
+        nominal: sum of each joint's squared errors (n,) by the robot's description.
+        scores: Y' W e of the fit over each chunk (chunks, b), of the rows that count.
+    """
+
+    nominal: Array
+    scores: Array
+
+
+def _pass(regressor: JointRegressor, part: Rows, solution: Solution, torque: Array) -> _Pass:
+    """Looks at all rows once more, now that the parameters are known, and writes the predicted torque (N, n)."""
+    motion, base = part.motion, regressor.base
+    described = base.from_standard(base.model.nominal)
+    both = np.column_stack([solution.values, described])
+
+    def of(at: slice) -> tuple[Array, Array]:
+        nominal, score = np.empty(part.tau.shape[1]), np.zeros(base.size)
+        for joint, Y in enumerate(regressor(motion.q[at], motion.dq[at], motion.ddq[at])):
+            used = regressor.used[joint]
+            fitted, expected = (Y @ both[used]).T
+            torque[at, joint] = fitted
+            measured = part.tau[at, joint]
+            expected = measured - expected
+            nominal[joint] = expected @ expected
+            score[used] += ((measured - fitted) * part.mask[at, joint] * solution.weights[joint]) @ Y
+        return nominal, score
+
+    nominal, scores = zip(*threaded(of, chunks(len(motion))), strict=True)
+    return _Pass(np.sum(nominal, axis=0), np.array(scores))
 
 
 def _covariances(
     regressor: JointRegressor,
-    rows: Sequence[Rows],
-    errors: Sequence[Array],
+    fitted: Sequence[_Fitted],
+    scores: Array,
     moments: Moments,
     solution: Solution,
+    averaged: int,
     seed: int,
 ) -> tuple[Array, Array]:
     weights = solution.weights
@@ -135,33 +187,34 @@ def _covariances(
     white = np.sqrt(np.maximum(np.diag(textbook), 0.0))
     if solution.covariance is not None:
         return solution.covariance, white
-    parts = _parts(regressor, rows, errors)
-    total = sum(len(part.motion) for part in rows)
-    share = sum(part.rows for part in parts) / total
-    full = covariance(parts, weights, inverse, seed, share=share)
+    parts = _parts(regressor, fitted)
+    total = sum(len(some.torque) for some in fitted)
+    seen = sum(part.rows for part in parts)
+    share = seen / total
+    full = covariance(parts, weights, inverse, seed, share=share, averaged=min(averaged, seen // LEAST_AVERAGES))
     if share < 1:
-        factors = batch_factors(_scores(regressor, rows, errors, weights), inverse, full)
+        factors = batch_factors(scores, inverse, full)
         full = full * factors[:, None] * factors
     return full, white
 
 
-def _parts(regressor: JointRegressor, rows: Sequence[Rows], errors: Sequence[Array]) -> list[Part]:
+def _parts(regressor: JointRegressor, fitted: Sequence[_Fitted]) -> list[Part]:
     """The rows as the sandwich wants them, of a long log some stretches."""
-    total = sum(len(part.motion) for part in rows)
+    total = sum(len(some.torque) for some in fitted)
     parts = []
-    for part, error in zip(rows, errors, strict=True):
-        count = len(part.motion)
+    for some in fitted:
+        count = len(some.torque)
         places = [(0, count)]
         if total > MOST_ROWS:
             number = max(1, round(STRETCHES * count / total))
             length = min(count, max(CHUNK, MOST_ROWS // STRETCHES))
             places = [(begin, begin + length) for begin in np.linspace(0, count - length, number).astype(int).tolist()]
-        parts += [_part(regressor, part, error, *place) for place in places]
+        parts += [_part(regressor, some, *place) for place in places]
     return parts
 
 
-def _part(joints: JointRegressor, part: Rows, error: Array, begin: int, end: int) -> Part:
-    motion, mask = part.motion, part.mask[begin:end]
+def _part(joints: JointRegressor, fitted: _Fitted, begin: int, end: int) -> Part:
+    motion, mask = fitted.rows.motion, fitted.rows.mask[begin:end]
 
     def regressor(start: int, stop: int) -> Array:
         at = slice(begin + start, begin + stop)
@@ -171,20 +224,20 @@ def _part(joints: JointRegressor, part: Rows, error: Array, begin: int, end: int
         at = slice(begin + start, begin + stop)
         return joints(motion.q[at], motion.dq[at], motion.ddq[at])
 
-    return Part(end - begin, regressor, mask, error[begin:end], joints.used, split)
+    return Part(end - begin, regressor, mask, fitted.errors(slice(begin, end)), joints.used, split)
 
 
-def _scores(regressor: JointRegressor, rows: Sequence[Rows], errors: Sequence[Array], weights: Array) -> Array:
+def _scores(regressor: JointRegressor, fitted: Sequence[_Fitted], weights: Array) -> Array:
     """Sums Y' W e over each chunk (chunks, b)."""
 
-    def of(item: tuple[Rows, Array, slice]) -> Array:
-        part, residual, at = item
-        motion = part.motion
-        error = residual[at] * weights
+    def of(item: tuple[_Fitted, slice]) -> Array:
+        some, at = item
+        motion = some.rows.motion
+        error = some.errors(at) * weights
         score = np.zeros(regressor.base.size)
         for joint, Y in enumerate(regressor(motion.q[at], motion.dq[at], motion.ddq[at])):
             score[regressor.used[joint]] += error[:, joint] @ Y
         return score
 
-    items = ((p, error, at) for p, error in zip(rows, errors, strict=True) for at in chunks(len(p.motion)))
+    items = ((some, at) for some in fitted for at in chunks(len(some.torque)))
     return np.array(list(threaded(of, items)))

@@ -12,12 +12,11 @@ from estimation.choices import VELOCITY_SCALES, Candidates, Choice, choose
 from estimation.estimate import Estimate, JointFit, colour_of
 from estimation.estimators import Estimator
 from estimation.estimators import estimator as choose_estimator
-from estimation.fitting import Fit, fit, predict_rows
+from estimation.fitting import Fit, fit
 from estimation.gate import GateReport, check_log
 from estimation.model import Model
 from estimation.preparation import Prepared, prepare
 from estimation.preprocessing import Harmonics
-from estimation.regression import JointRegressor
 from estimation.uncertainty import fast_noise, period_noise
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
@@ -105,23 +104,31 @@ def identify(
     predictable = _predictable(prepared, choice)
     bar.update(2.0, "fitting")
 
-    def fitted(setting: Choice) -> tuple[Fit, tuple[JointFit, ...], NDArray[np.bool_]]:
-        scales = setting.velocity_scales
-        model = default_model(robot, friction=friction, velocity_scale=scales, rotor=rotor, offset=offset)
-        found = fit(replace(base, model=model), prepared, chosen, setting, seed)
+    def fitted(setting: Choice, free: Array | None = None) -> tuple[Fit, tuple[JointFit, ...], NDArray[np.bool_]]:
+        scales, own = setting.velocity_scales, base
+        if set(scales) != {VELOCITY_SCALES[0]}:
+            model = default_model(robot, friction=friction, velocity_scale=scales, rotor=rotor, offset=offset)
+            own = replace(base, model=model)
+        found = fit(own, prepared, chosen, setting, seed)
+        if free is not None:
+            # The covariance is that of the fit without regularisation; how far that has moved each value comes on top.
+            moved = found.solution.values - free
+            found = replace(found, covariance=found.covariance + np.outer(moved, moved))
         joints = _joint_fits(found, predictable)
         return found, joints, _determined(found, joints)
 
     found, joints, determined = fitted(choice.plain or choice)
     if choice.plain is not None and determined.mean() < ENOUGH:
         bar.update(3.0, "fitting with regularisation")
-        found, joints, determined = fitted(choice)
+        found, joints, determined = fitted(choice, found.solution.values)
     bar.finish()
     colour = colour_of(np.sqrt(np.maximum(np.diag(found.covariance), 0.0)), found.white, determined)
     base, rows = found.base, found.rows
     provenance = {**_provenance(data, chosen, found.choice, joints, seed), "colour": colour}
     if "standard" in found.solution.extras:
         provenance["standard_parameters"] = np.asarray(found.solution.extras["standard"], dtype=float).tolist()
+    if found.solution.extras.get("active"):
+        provenance["at_bounds"] = list(found.solution.extras["active"])
     return Estimate(
         model=Model(
             torque_model=base.model,
@@ -138,7 +145,7 @@ def identify(
         t=np.concatenate([part.motion.t for part in rows]),
         dq=np.concatenate([part.motion.dq for part in rows]),
         measured=np.concatenate([part.tau for part in rows]),
-        predicted=np.concatenate(found.predicted),
+        predicted=found.torque,
         dropped_rows=sum(log.positions.dropped for log in prepared),
         gates=tuple(gates),
     )
@@ -178,14 +185,10 @@ def _joint_fits(found: Fit, predictable: NDArray[np.bool_]) -> tuple[JointFit, .
     base, choice = found.base, found.choice
     total = sum(len(part.motion) for part in found.rows)
     rms = np.sqrt(sum(np.einsum("tj,tj->j", part.tau, part.tau) for part in found.rows) / total)
-    # On the rows that count, as the left-out errors are: of a standing joint's friction no model knows the sign.
-    pairs = list(zip(found.rows, found.predicted, strict=True))
-    squares = sum(np.einsum("tj,tj->j", part.mask * (part.tau - torque), part.tau - torque) for part, torque in pairs)
-    fitted = np.sqrt(squares / np.maximum(sum(part.mask.sum(axis=0) for part in found.rows), 1))
-    nominal = np.full(len(rms), np.nan)
-    description = base.model.nominal
-    if np.isfinite(description).all():
-        nominal = np.sqrt(_squares(found, base.from_standard(description)) / total)
+    # On all rows, as the left-out errors are: those of a joint at rest do not count in the fit, but in its verdict.
+    errors = (part.tau - torque for part, torque in zip(found.rows, found.predicted, strict=True))
+    fitted = np.sqrt(sum(np.einsum("tj,tj->j", error, error) for error in errors) / total)
+    nominal = np.sqrt(found.nominal / total)
     floor = _noise_floor(found)
     return tuple(
         JointFit(
@@ -217,13 +220,6 @@ def _noise_floor(found: Fit) -> Array:
         if known:
             return np.asarray(np.sqrt(np.mean(known, axis=0)))
     return fast_noise(residuals)
-
-
-def _squares(found: Fit, values: Array) -> Array:
-    """Sums each joint's squared errors (n,) over all rows by other parameters."""
-    regressor = JointRegressor(found.base)
-    errors = ((part.tau - predict_rows(regressor, part, values)) for part in found.rows)
-    return np.asarray(sum(np.einsum("tj,tj->j", error, error) for error in errors))
 
 
 def _determined(found: Fit, joints: Sequence[JointFit]) -> NDArray[np.bool_]:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
+from estimation.positive import solve_positive
 from estimation.pulls import Pull
 
 Array = NDArray[np.float64]
@@ -83,31 +83,24 @@ class Moments:
                 once its columns have unit length; with one, a ridge of 1 weighs an error of a parameter's own size
                 as much as all of the torque.
         """
-        scale, matrix = self._scaled(weights)
-        right = (weights @ self.cross) / scale
-        if self.pull is None:
-            matrix = matrix + ridge * np.eye(len(scale))
-        else:
-            precision = ridge * (weights @ self.square) * self.pull.precision
-            matrix = matrix + precision / scale[:, None] / scale + FAINT * np.eye(len(scale))
-            right = right + (precision @ self.pull.target) / scale + FAINT * scale * self.pull.target
-        return cho_solve(cho_factor(matrix), right) / scale
+        gram, cross = self._weighted(weights), weights @ self.cross
+        return solve_all(gram[None], cross[None], np.array([weights @ self.square]), ridge, self.pull)[0]
 
     def inverse(self, weights: Array, ridge: float) -> Array:
         """Inverts the weighted Gram matrix (p, p) with the ridge of `solve`."""
-        scale, matrix = self._scaled(weights)
-        inverse = cho_solve(cho_factor(matrix + ridge * np.eye(len(scale))), np.eye(len(scale)))
-        return inverse / scale[:, None] / scale
-
-    def _scaled(self, weights: Array) -> tuple[Array, Array]:
-        matrix = np.tensordot(weights, self.gram, axes=1)
+        matrix = self._weighted(weights)
         scale = np.sqrt(np.diag(matrix))
         scale = np.where(scale > 0, scale, 1.0)
-        return scale, matrix / scale[:, None] / scale
+        unit = np.eye(len(scale))
+        inverse = solve_positive(matrix / scale[:, None] / scale + ridge * unit, unit)
+        return inverse / scale[:, None] / scale
+
+    def _weighted(self, weights: Array) -> Array:
+        return np.asarray((weights @ self.gram.reshape(len(self.gram), -1)).reshape(self.gram.shape[1:]))
 
     def residual(self, parameters: Array) -> Array:
         """Sums each joint's squared residuals (n,)."""
-        quadratic = np.einsum("p,jpq,q->j", parameters, self.gram, parameters, optimize=True)
+        quadratic = (self.gram @ parameters) @ parameters
         return np.maximum(self.square - 2 * self.cross @ parameters + quadratic, 0.0)
 
     def level(self, parameters: Array) -> Array:
@@ -115,3 +108,34 @@ class Moments:
         rows = np.maximum(self.count, 1)
         floor = 1e-6 * self.square / rows
         return np.sqrt(np.maximum(self.residual(parameters) / rows, np.maximum(floor, np.finfo(float).tiny)))
+
+
+def solve_all(gram: Array, cross: Array, square: Array, ridge: float, pull: Pull | None) -> Array:
+    """Solves several weighted normal equations with one ridge, see `Moments.solve`.
+
+    Args:
+        gram: (B, p, p), weighted and summed over the joints.
+        cross: (B, p).
+        square: (B,), of the torques.
+        ridge: how much the pull counts.
+        pull: what it pulls to; None for zero.
+
+    Returns:
+        Parameters (B, p).
+    """
+    diagonal = np.arange(gram.shape[1])
+    scale = np.sqrt(gram[:, diagonal, diagonal])
+    scale = np.where(scale > 0, scale, 1.0)
+    factor = 1.0 / scale
+    right = cross * factor
+    matrix = gram * factor[:, :, None]
+    if pull is None:
+        matrix *= factor[:, None, :]
+        matrix[:, diagonal, diagonal] += ridge
+    else:
+        strength = ridge * square[:, None]
+        matrix += strength[:, :, None] * (factor[:, :, None] * pull.precision)
+        matrix *= factor[:, None, :]
+        matrix[:, diagonal, diagonal] += FAINT
+        right += strength * (pull.precision @ pull.target) * factor + FAINT * scale * pull.target
+    return np.array([solve_positive(*system) for system in zip(matrix, right, strict=True)]) * factor

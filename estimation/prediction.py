@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from estimation.model import Model
 from estimation.preparation import torque_of
-from estimation.preprocessing import resample, smooth
+from estimation.preprocessing import LowPass, Smoother, SmoothingSpline, resample, smooth
 from estimation.preprocessing.smoothing import low_pass
 from estimation.regression import chunks
 from robots.common.errors import InputError
@@ -71,15 +71,19 @@ class Prediction:
 
     @property
     def band_limited_spread(self) -> Array:
-        """`relative_spread` after one low-pass over measured and predicted torque alike (n,).
+        """`relative_spread` after one low-pass at `cutoff` over measured and predicted torque alike (n,).
 
         What the sensors add above the motion's frequencies is left out of both; the whole error is in
-        `relative_spread`.
+        `relative_spread`. Uneven samples are put on a grid first.
         """
         if self.measured is None:
             return self.error_rms
-        period = self.motion.duration / max(len(self.motion) - 1, 1)
-        error, torque = (low_pass(x, period, self.cutoff) for x in (self.measured - self.predicted, self.measured))
+        t = self.motion.t
+        grid = np.linspace(t[0], t[-1], len(t))
+        period = self.motion.duration / max(len(t) - 1, 1)
+        both = (self.measured - self.predicted, self.measured)
+        even = (np.column_stack([np.interp(grid, t, column) for column in x.T]) for x in both)
+        error, torque = (low_pass(x, period, self.cutoff) for x in even)
         return self._over(error.std(axis=0), torque.std(axis=0))
 
     @property
@@ -121,6 +125,7 @@ class Prediction:
         }
         return {
             "samples": len(self.motion),
+            "cutoff_hz": self.cutoff if np.isfinite(self.cutoff) else None,
             **{name: [float(v) if np.isfinite(v) else None for v in values] for name, values in quantities.items()},
         }
 
@@ -175,7 +180,7 @@ def predict(
             f"{log.n} joints", file=log.metadata.get("file"), allowed=f"{robot.n}, as the model of {robot.name} has"
         )
     cutoff = float(model.provenance.get("cutoff_hz", 10.0))
-    motion = smooth(resample(log.t, log.q), cutoff)
+    motion = smooth(resample(log.t, log.q), _smoother(model, cutoff))
     has_torque = log.tau is not None or log.current is not None
     if thermal is None:
         predicted = model.torque(motion.q, motion.dq, motion.ddq, motion.t)
@@ -191,6 +196,13 @@ def predict(
         band=_band(model, motion),
         cutoff=cutoff,
     )
+
+
+def _smoother(model: Model, cutoff: float) -> Smoother:
+    """What smooths another motion as the model's data were; a low-pass in place of a period's harmonics."""
+    smoothing = model.provenance.get("smoothing")
+    kind = smoothing.get("kind") if isinstance(smoothing, Mapping) else None
+    return SmoothingSpline(cutoff) if kind == SmoothingSpline.name else LowPass(cutoff)
 
 
 def _band(model: Model, motion: Motion) -> Array | None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from estimation.preprocessing import LowPass, Resampled, Smoother, period_of, resample, smooth
 from estimation.regression import threaded
 from robots.common.errors import InputError
+from robots.common.parallel import available_cores
 from robots.robot import Robot
 from robots.signals import Log, Motion
 
@@ -66,14 +68,25 @@ class Prepared:
         """Whether the samples themselves are a uniform grid."""
         return self.positions.q is self.positions.fresh_q
 
-    def rows(self, by: float | Smoother) -> Rows:
+    def rows(self, by: float | Smoother, *, ends: bool = False) -> Rows:
         """Smooths the log and leaves out its ends, where the smoothing has nothing to lean on.
 
         Args:
             by: the smoothing; a number is the cut-off of a low-pass [Hz].
+            ends: whether the ends stay, as rows that do not count.
         """
-        (rows,) = self._masked([self._smoothed(self, _smoother(by))])
-        return rows
+        smoother = _smoother(by)
+        return self._seen(smooth(self.positions, smoother), smoother, ends)
+
+    def _seen(self, motion: Motion, smoother: Smoother, ends: bool) -> Rows:
+        """What a fit sees of the smoothed log."""
+        if not ends:
+            (rows,) = self._masked([self._inside(motion, smoother)])
+            return rows
+        (rows,) = self._masked([(motion, self.tau)])
+        edge = smoother.edge(motion.duration)
+        inside = (motion.t >= motion.t[0] + edge) & (motion.t <= motion.t[-1] - edge)
+        return Rows(rows.motion, rows.tau, rows.mask * inside[:, None])
 
     def pieces(self, by: float | Smoother) -> list[Rows]:
         """Smooths the log as `rows` does, a long one in pieces that follow each other."""
@@ -108,13 +121,11 @@ class Prepared:
         for start in np.linspace(0, len(self.log) - rows, count).astype(int).tolist():
             yield self.cut(slice(start, start + rows))
 
-    @staticmethod
-    def _smoothed(log: Prepared, smoother: Smoother) -> tuple[Motion, Array]:
-        motion = smooth(log.positions, smoother)
+    def _inside(self, motion: Motion, smoother: Smoother) -> tuple[Motion, Array]:
         t, edge = motion.t, smoother.edge(motion.duration)
         begin = int(np.searchsorted(t, t[0] + edge))
         end = int(np.searchsorted(t, t[-1] - edge, side="right"))
-        return (motion.slice(begin, end) if (begin, end) != (0, len(t)) else motion), log.tau[begin:end]
+        return (motion.slice(begin, end) if (begin, end) != (0, len(t)) else motion), self.tau[begin:end]
 
     @staticmethod
     def _masked(parts: list[tuple[Motion, Array]]) -> list[Rows]:
@@ -146,6 +157,39 @@ def prepare(robot: Robot, log: Log) -> Prepared:
         raise InputError(
             error.problem, file=file, joint=error.joint, allowed=error.allowed, remedy=error.remedy
         ) from error
+
+
+def rows_of(logs: Sequence[Prepared], by: float | Smoother, *, ends: bool = False) -> list[Rows]:
+    """Smooths logs as `Prepared.rows` does one.
+
+    Stretches of a long log, alike in length and period, are smoothed as columns of one signal: a smoother's set-up
+    takes longer than a short stretch.
+
+    Args:
+        logs: some.
+        by: the smoothing; a number is the cut-off of a low-pass [Hz].
+        ends: whether the ends stay, as rows that do not count.
+    """
+    smoother = _smoother(by)
+    first = logs[0]
+    alike = all(
+        log.even and len(log.tau) == len(first.tau) and np.isclose(log.positions.period, first.positions.period, 1e-9)
+        for log in logs
+    )
+    groups = max(1, min(len(logs), available_cores())) if alike else len(logs)
+    bounds = np.linspace(0, len(logs), groups + 1).astype(int).tolist()
+
+    def group(place: tuple[int, int]) -> list[Rows]:
+        some = logs[slice(*place)]
+        if len(some) == 1:
+            return [some[0].rows(smoother, ends=ends)]
+        q = np.hstack([log.positions.q for log in some])
+        motion = smooth(replace(some[0].positions, q=q, fresh_q=q), smoother)
+        parts = zip(*(np.split(signal, len(some), axis=1) for signal in (motion.q, motion.dq, motion.ddq)), strict=True)
+        pairs = zip(some, parts, strict=True)
+        return [log._seen(Motion(log.positions.original, *signals), smoother, ends) for log, signals in pairs]
+
+    return [rows for found in threaded(group, pairwise(bounds)) for rows in found]
 
 
 def torque_of(robot: Robot, log: Log) -> Array:

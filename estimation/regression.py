@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import islice
 from typing import TypeVar
 
@@ -17,6 +17,7 @@ from estimation.moments import Moments
 from robots.base_parameters import BaseParameters
 from robots.batch import BatchFunction, batch_function
 from robots.common.parallel import available_cores
+from robots.regressor import TorqueModel
 
 Array = NDArray[np.float64]
 Item = TypeVar("Item")
@@ -42,21 +43,15 @@ class JointRegressor:
     @cached_property
     def used(self) -> tuple[NDArray[np.intp], ...]:
         """Which columns act on each joint: n arrays of indices into the base parameters."""
-        sparsity = self.base.model.symbolic(self.base.independent).sparsity_out(0)
-        rows, columns = (np.asarray(part) for part in sparsity.get_triplet())
-        return tuple(np.sort(columns[rows == joint]).astype(np.intp) for joint in range(self.base.model.robot.n))
+        return self._rows[0]
 
     @cached_property
-    def _function(self) -> BatchFunction:
-        n = self.base.model.robot.n
-        inputs = [casadi.SX.sym(name, n) for name in ("q", "dq", "ddq")]
-        Y = self.base.model.symbolic(self.base.independent)(*inputs)
-        rows = [casadi.densify(Y[joint, used.tolist()]) for joint, used in enumerate(self.used)]
-        return batch_function(casadi.Function("joint_rows", inputs, rows), "auto")
+    def _rows(self) -> tuple[tuple[NDArray[np.intp], ...], BatchFunction]:
+        return _joint_rows(self.base.model, tuple(self.base.independent))
 
     def __call__(self, q: Array, dq: Array, ddq: Array) -> tuple[Array, ...]:
         """Evaluates each joint's rows: n arrays (N, p_j)."""
-        rows = self._function(q, dq, ddq)
+        rows = self._rows[1](q, dq, ddq)
         return tuple(part.reshape(len(q), -1) for part in rows)
 
     def moments(self, q: Array, dq: Array, ddq: Array, tau: Array, mask: Array) -> Moments:
@@ -65,8 +60,9 @@ class JointRegressor:
         gram, cross = np.zeros((n, p, p)), np.zeros((n, p))
         for joint, (rows, used) in enumerate(zip(self(q, dq, ddq), self.used, strict=True)):
             weight = np.sqrt(mask[:, joint])
-            if not (weight == 1).all():
-                rows *= weight[:, None]
+            # Few rows do not count in full.
+            part = np.flatnonzero(weight != 1)
+            rows[part] *= weight[part, None]
             gram[joint][np.ix_(used, used)] = rows.T @ rows
             cross[joint, used] = rows.T @ (weight * tau[:, joint])
         return Moments(gram, cross, (mask * tau**2).sum(axis=0), mask.sum(axis=0, dtype=float))
@@ -75,6 +71,19 @@ class JointRegressor:
         """Evaluates tau = Y_b pi_b (N, n) for base parameters (b,)."""
         rows = self(q, dq, ddq)
         return np.stack([y @ parameters[used] for y, used in zip(rows, self.used, strict=True)], axis=1)
+
+
+@lru_cache(maxsize=4)
+def _joint_rows(model: TorqueModel, independent: tuple[int, ...]) -> tuple[tuple[NDArray[np.intp], ...], BatchFunction]:
+    """Builds the evaluator, kept: the choice, the fit and its residuals ask for the same one."""
+    n = model.robot.n
+    symbolic = model.symbolic(independent)
+    rows, columns = (np.asarray(part) for part in symbolic.sparsity_out(0).get_triplet())
+    used = tuple(np.sort(columns[rows == joint]).astype(np.intp) for joint in range(n))
+    inputs = [casadi.SX.sym(name, n) for name in ("q", "dq", "ddq")]
+    Y = symbolic(*inputs)
+    parts = [casadi.densify(Y[joint, columns.tolist()]) for joint, columns in enumerate(used)]
+    return used, batch_function(casadi.Function("joint_rows", inputs, parts), "auto")
 
 
 def chunks(rows: int, size: int = CHUNK) -> Iterator[slice]:

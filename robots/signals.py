@@ -121,9 +121,11 @@ class Log:
         ddq: joint accelerations [rad/s^2], (N, n).
         temperature: joint temperatures [degC], (N, n); NaN where a sensor was silent.
         ambient: temperature of the surroundings [degC], (N,); NaN where the sensor was silent.
-        qlink: positions behind the gears [rad], (N, n).
+        qlink: positions behind the gears [rad], (N, n); NaN throughout for a joint that has no encoder there.
         segment: whole number of the part of an experiment, (N,).
         cycle: whole number of the repetition of an experiment, (N,).
+        payload: a known payload, (10,) in the flange's frame: mass [kg], mass times centre [kg m], inertia about the
+            frame's origin xx xy xz yy yz zz [kg m2]; None for none.
         name: a short name for reports.
         metadata: anything else that is known of the recording.
 
@@ -143,6 +145,7 @@ class Log:
     qlink: FloatArray | None = None
     segment: FloatArray | None = None
     cycle: FloatArray | None = None
+    payload: FloatArray | None = None
     name: str = ""
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
@@ -153,12 +156,16 @@ class Log:
         for name in _PER_JOINT:
             value = getattr(self, name)
             if value is not None:
-                nan_allowed = name == "temperature"
+                nan_allowed = name in ("temperature", "qlink")
                 _freeze(self, **{name: _joint_signal(name, value, len(t), q.shape[1], nan_allowed=nan_allowed)})
+        if self.qlink is not None:
+            _require_finite("qlink", np.where(np.isnan(self.qlink).all(axis=0), 0.0, self.qlink), joints=True)
         for name in _COMMON:
             value = getattr(self, name)
             if value is not None:
                 _freeze(self, **{name: _common_signal(name, value, len(t))})
+        if self.payload is not None:
+            _freeze(self, payload=_body(self.payload))
         object.__setattr__(self, "metadata", dict(self.metadata))
 
     def __len__(self) -> int:
@@ -199,6 +206,17 @@ class Log:
         cut = {"t", "q", *_PER_JOINT, *_COMMON}
         values = {item.name: getattr(self, item.name) for item in fields(self)}
         return Log(**{key: value[part] if key in cut and value is not None else value for key, value in values.items()})
+
+
+def _body(value: ArrayLike) -> FloatArray:
+    body = np.array(value, dtype=float)
+    if body.shape != (10,) or not np.isfinite(body).all() or body[0] < 0:
+        raise InputError(
+            f"a payload of {np.array2string(body, threshold=12)}",
+            column="payload",
+            allowed="ten numbers: a mass of 0 or more, mass times centre, inertia xx xy xz yy yz zz",
+        )
+    return body
 
 
 _PER_JOINT = ("tau", "current", "dq", "ddq", "temperature", "qlink")

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.carried import situation_on
+from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.states import Recording
-from estimation.diagnosis.whitening import orthonormal
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.terms.effects import Situation
-from robots.terms.effects.situation import situation
 
 Array = NDArray[np.float64]
 
@@ -41,16 +41,7 @@ class Baseline:
 
     def situation(self, recording: Recording, values: Array) -> Situation:
         """Gives what effects may depend on, with base parameters (b,)."""
-        return situation(
-            self.base.model,
-            values,
-            recording.t,
-            recording.q,
-            recording.dq,
-            recording.ddq,
-            starts=recording.starts,
-            columns=self.base.independent,
-        )
+        return situation_on(recording, self.base.model, values, self.base.independent)
 
 
 def base_parameters(robot: Robot, friction: str, scales: tuple[float, ...]) -> BaseParameters:
@@ -103,19 +94,20 @@ def _sharpness(
     n = recording.n
     counts = ~recording.unsure[::stride] * weights
     rest = np.delete(Y[::stride], signs, axis=2) * counts[:, :, None]
-    Q = orthonormal(rest.reshape(-1, rest.shape[2]), FAINT)
-    tau = (recording.tau[::stride] * counts).reshape(-1)
-    tau = tau - Q @ (Q.T @ tau)
+    Q = orthonormal(rest.reshape(-1, rest.shape[2]), FAINT).reshape(len(rest), n, -1)
+    tau = recording.tau[::stride] * counts
+    along = np.einsum("njb,nj->b", Q, tau)
     joints = [base.columns[i].joint - 1 for i in signs]
-    columns = np.zeros((len(joints), len(SCALES), len(tau)))
+    size = len(joints) * len(SCALES)
+    gram, cross, against = np.zeros((size, size)), np.zeros(size), np.zeros((size, Q.shape[2]))
     for a, joint in enumerate(joints):
-        for k, v0 in enumerate(SCALES):
-            column = np.zeros((len(tau) // n, n))
-            column[:, joint] = np.tanh(recording.dq[::stride, joint] / v0) * counts[:, joint]
-            series = column.reshape(-1)
-            columns[a, k] = series - Q @ (Q.T @ series)
-    wide = columns.reshape(len(joints) * len(SCALES), -1)
-    gram, cross = wide @ wide.T, wide @ tau
+        # A sign acts on its own joint's rows alone.
+        own = slice(a * len(SCALES), (a + 1) * len(SCALES))
+        columns = np.tanh(recording.dq[::stride, joint, None] / np.array(SCALES)) * counts[:, joint, None]
+        gram[own, own] = columns.T @ columns
+        cross[own] = columns.T @ tau[:, joint]
+        against[own] = columns.T @ Q[:, joint]
+    gram, cross = gram - against @ against.T, cross - against @ along
     picked = [1] * len(joints)
     for _ in range(ROUNDS):
         for a in range(len(joints)):

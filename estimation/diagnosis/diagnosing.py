@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.baseline import Baseline, base_parameters, build_baseline, inertia_of
+from estimation.diagnosis.carried import lightened
 from estimation.diagnosis.diagnosis import Diagnosis
 from estimation.diagnosis.excess import residual_shares
 from estimation.diagnosis.extending import dense
 from estimation.diagnosis.hypotheses import all_hypotheses
 from estimation.diagnosis.limits import find_limits
+from estimation.diagnosis.noise import estimate_whitening
 from estimation.diagnosis.patterns import all_patterns
 from estimation.diagnosis.problem import Problem, fit_values, pose
 from estimation.diagnosis.regularisation import held, pull_of
@@ -23,7 +25,6 @@ from estimation.diagnosis.scan import Entry, measure
 from estimation.diagnosis.selection import Selection, select
 from estimation.diagnosis.states import Recording, record
 from estimation.diagnosis.verdict import Judgement, judge
-from estimation.diagnosis.whitening import estimate_whitening
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
@@ -71,7 +72,7 @@ def diagnose(
 
     Args:
         robot: the robot.
-        logs: one or several, of t, q and tau or current; t is one clock.
+        logs: one or several, of t, q and tau or current; t is one clock. A log that says so carries a known payload.
         held_out: logs of other motions to measure the gain on; without, runs or stretches are kept apart.
         candidates: effects to look for, by name; all by default.
         friction: of the base model: ``polynomial`` or ``coulomb-viscous``.
@@ -97,7 +98,7 @@ def diagnose(
     bar = progress or SILENT
     bar.start("diagnosing", 1.0)
     try:
-        recording = record(robot, data)
+        recording = lightened(robot, record(robot, data))
         if not (np.ptp(recording.q, axis=0) > 0).any():
             raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
         search = _search(robot, recording, effects, friction, false_alarm, seed, bar)

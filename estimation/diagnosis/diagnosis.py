@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from estimation.diagnosis.findings import Finding, finite, number, read_finding
 from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment
+from estimation.diagnosis.simulation import Simulation, read_simulation
 from estimation.model import Model, load_model
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
+from robots.terms.base import length_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,11 +34,13 @@ class Trace:
     """Curves behind a finding, for pictures; all (M,) or (M, n).
 
     Attributes:
-        coordinate: per finding the axis on which it shows.
+        coordinate: per finding in the torque the axis on which it shows.
         measured: torque.
         before: residual of the base model.
         after: residual of the extended model.
         t: time [s].
+        windups: per finding by encoders behind the gears, which follow: load, and position behind the gear, measured
+            less simulated, by a rigid and by an elastic gear.
     """
 
     t: Array
@@ -44,6 +48,7 @@ class Trace:
     before: Array
     after: Array
     coordinate: tuple[Array, ...]
+    windups: tuple[tuple[Array, ...], ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +69,8 @@ class Diagnosis:
         how_unseen: how the unseen data were kept apart.
         notes: what a reader must know.
         trace: curves for pictures; None once loaded from a file.
+        simulation: the motion of a stretch of unseen data, simulated without and with what was found; None where
+            nothing was.
     """
 
     verdict: str
@@ -78,6 +85,7 @@ class Diagnosis:
     how_unseen: str
     notes: tuple[str, ...] = ()
     trace: Trace | None = field(default=None, repr=False)
+    simulation: Simulation | None = None
 
     @property
     def success(self) -> bool:
@@ -92,8 +100,9 @@ class Diagnosis:
             where = f"joint {finding.joint}" if finding.joint else "whole robot"
             gain = finding.gain
             lines.append(f"  {finding.effect} ({where}), p {_p(finding.p_value)}: {finding.sentence}")
+            of = "wind-up" if finding.measured_by else "torque"
             lines.append(
-                f"    unseen error {100 * gain.nrmse_before:.2f} % -> {100 * gain.nrmse_after:.2f} % of the torque "
+                f"    unseen error {100 * gain.nrmse_before:.2f} % -> {100 * gain.nrmse_after:.2f} % of the {of} "
                 f"(fall {100 * gain.ci95[0]:.2f} to {100 * gain.ci95[1]:.2f} %)"
             )
             open_ = [parameter.name for parameter in finding.parameters if not parameter.determined]
@@ -108,6 +117,9 @@ class Diagnosis:
         if self.findings:
             lines.append(f"                          with the extension: {after}")
         lines.append(f"  measured on {self.how_unseen}")
+        if self.simulation is not None:
+            lengths = [length_unit(robot, j) for j in range(robot.n)]
+            lines.append(f"  {self.simulation.summary(lengths)}")
         if self.next_experiment is not None:
             lines.append(f"  next: {self.next_experiment.why}")
         lines += [f"  {note}" for note in self.notes]
@@ -150,6 +162,7 @@ class Diagnosis:
             "limits": [limit.to_dict() for limit in self.limits],
             "next_experiment": None if self.next_experiment is None else self.next_experiment.to_dict(),
             "unseen": self.how_unseen,
+            "simulation": None if self.simulation is None else self.simulation.to_dict(),
             "notes": list(self.notes),
         }
 
@@ -212,6 +225,8 @@ def _from_dict(data: dict[str, Any], model: Model) -> Diagnosis:
         model=model,
         how_unseen=data["unseen"],
         notes=tuple(data["notes"]),
+        # Older files have none.
+        simulation=None if data.get("simulation") is None else read_simulation(data["simulation"]),
     )
 
 

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.whitening import FEWEST, period_differences, period_mean
 
 Array = NDArray[np.float64]
 
+# From fewer repetitions nothing is said of what repeats.
+FEWEST = 3
 # Frequency below which what differs between repetitions is counted as a change with time [cycles per period].
 SLOW = 3.0
 
@@ -49,3 +50,27 @@ def residual_shares(problem: Problem) -> Array:
     safe = np.maximum(totals, 1e-300)
     state, time = np.clip(states / safe, 0, 1), np.clip(times / safe, 0, 1)
     return np.column_stack([np.clip(1 - state - time, 0, 1), state, time])
+
+
+def period_differences(series: Array, period: float, count: int) -> Array:
+    """Subtracts the mean over repetitions, and makes up for the variance that goes with it.
+
+    Args:
+        series: (M, n).
+        period: in samples, not necessarily whole.
+        count: of repetitions P.
+
+    Returns:
+        (r - mean) sqrt(P / (P - 1)), (M', n).
+    """
+    return (series - period_mean(series, period, count)) * np.sqrt(count / (count - 1))
+
+
+def period_mean(series: Array, period: float, count: int) -> Array:
+    """Gives the mean over repetitions, repeated (M, n); rows of a period are matched to the nearest sample."""
+    rows = len(series)
+    samples = max(1, round(period))
+    phase = np.floor(np.mod(np.arange(rows) + 1e-6, period) / period * samples).astype(int) % samples
+    hits = np.bincount(phase, minlength=samples)
+    mean = np.stack([np.bincount(phase, column, samples) for column in series.T], axis=1) / np.maximum(hits, 1)[:, None]
+    return np.asarray(mean[phase])

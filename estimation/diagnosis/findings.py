@@ -71,6 +71,8 @@ class Finding:
         visible: share of its energy that the base model does not absorb.
         coordinate: label of the axis on which it shows.
         pattern: the description of an unexplained pattern; empty for a named effect.
+        measured_by: what it was seen in where that is not the torque: ``qlink``, the encoders behind the gears. Its
+            gain is then of the link's position, over the standard deviation of the wind-up.
     """
 
     effect: str
@@ -84,6 +86,7 @@ class Finding:
     visible: float
     coordinate: str = ""
     pattern: str = ""
+    measured_by: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Writes it as plain data."""
@@ -102,6 +105,7 @@ class Finding:
             "sentence": self.sentence,
             "visible": self.visible,
             **({"pattern": self.pattern} if self.pattern else {}),
+            **({"measured_by": self.measured_by} if self.measured_by else {}),
         }
 
 
@@ -137,6 +141,7 @@ def read_finding(item: dict[str, Any]) -> Finding:
         sentence=item["sentence"],
         visible=float(item["visible"]),
         pattern=item.get("pattern", ""),
+        measured_by=item.get("measured_by", ""),
     )
 
 

@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 
+from estimation.diagnosis.band import Band
 from estimation.diagnosis.baseline import build_baseline
+from estimation.diagnosis.gaps import Gaps
 from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
-from estimation.diagnosis.power import beside, detectable_energy, resolving_energy, size_per_energy
+from estimation.diagnosis.power import beside, detectable_energy, resolving_energy, size_per_energy, unit_mixtures
 from estimation.diagnosis.problem import Problem, pose, visible_root
 from estimation.diagnosis.scan import Entry, measure
 from estimation.diagnosis.states import Recording
-from estimation.diagnosis.whitening import Band, Gaps, Whitening
+from estimation.diagnosis.whitening import Whitening
 from estimation.pulls import Pull
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError
@@ -85,7 +87,6 @@ def find_limits(problem: Problem, entries: Sequence[Entry], *, false_alarm: floa
     """
     tries = sum(entry.tries for entry in entries)
     known = {(entry.hypothesis.name, entry.hypothesis.joint): entry for entry in entries}
-    rms = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
     limits = []
     for hypothesis in all_hypotheses(problem.situation.robot, list(EFFECTS.values())):
         entry = known.get((hypothesis.name, hypothesis.joint))
@@ -93,7 +94,7 @@ def find_limits(problem: Problem, entries: Sequence[Entry], *, false_alarm: floa
             note = "joint hardly moves" if hypothesis.joint else "nothing of it shows in this motion"
             limits.append(_none(hypothesis, note))
         else:
-            limits.append(_limit(problem, entry, known, rms, tries, false_alarm))
+            limits.append(_limit(problem, entry, known, tries, false_alarm))
     return tuple(limits)
 
 
@@ -193,7 +194,6 @@ def _limit(
     problem: Problem,
     entry: Entry,
     known: dict[tuple[str, int | None], Entry],
-    rms: Array,
     tries: int,
     false_alarm: float,
 ) -> Limit:
@@ -205,7 +205,7 @@ def _limit(
     for at in _spread(len(entry.groups), SHAPES):
         group, shape = entry.groups[at], entry.shapes[at]
         root = visible_root(group.gram, group.raw)
-        size = _torque_gram(problem, hypothesis, shape, rms)
+        mixtures = unit_mixtures(entry.sizes[at])
         shares.append(float(np.max(np.diag(group.gram) / np.maximum(group.raw, 1e-300))))
         if not len(root):
             found.append(np.inf)
@@ -213,12 +213,12 @@ def _limit(
             continue
         penalty = (len(root) + len(shape)) * float(np.log(problem.rows * len(group.joints)))
         needed = detectable_energy(len(root), tries, false_alarm=false_alarm, penalty=penalty)
-        smallest = size_per_energy(size, group.gram) * np.sqrt(needed)
+        smallest = size_per_energy(mixtures, group.gram) * np.sqrt(needed)
         found.append(smallest)
         worst: tuple[float, str | None] = (smallest, None)
         for name, rival in _rivals(problem, hypothesis, known):
             per_energy = max(
-                size_per_energy(size, beside(group.gram, problem.product(group, other), other.gram, other.raw))
+                size_per_energy(mixtures, beside(group.gram, problem.product(group, other), other.gram, other.raw))
                 for other in (rival.groups[k] for k in _spread(len(rival.groups), RIVAL_SHAPES))
             )
             if per_energy * np.sqrt(resolving) > worst[0] or worst[1] is None:
@@ -256,19 +256,6 @@ def _rivals(
     joints: list[int | None] = [None, *(range(1, problem.n + 1) if hypothesis.joint is None else [hypothesis.joint])]
     names = [name for name in hypothesis.effect.rivals if hypothesis.effect.rare or not EFFECTS[name].rare]
     return [(name, known[name, joint]) for name in names for joint in joints if (name, joint) in known]
-
-
-def _torque_gram(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...], rms: Array) -> Array:
-    """Mean products of the columns as shares of the torque of the joint where they are largest."""
-    joints, columns = problem.columns_of(hypothesis, shape)
-    best: Array | None = None
-    for j, part in zip(joints, columns, strict=True):
-        scaled = part / max(float(rms[j]), 1e-12)
-        gram = scaled.T @ scaled / len(part)
-        if best is None or np.trace(gram) > np.trace(best):
-            best = gram
-    assert best is not None
-    return best
 
 
 def _spread(count: int, most: int) -> list[int]:

@@ -51,27 +51,42 @@ def chance_to_resolve(energy: float, margin: float = MARGIN) -> float:
     return float(norm.cdf((energy - margin) / (2.0 * np.sqrt(energy)))) if energy > 0 else 0.0
 
 
-def size_per_energy(gram: Array, left: Array) -> float:
-    """Gives the size of an effect whose energy is one: its root mean square torque, of a typical mixture of columns.
+def unit_mixtures(gram: Array) -> Array:
+    """Gives coefficients of an effect of root mean square torque one: mixtures that are spread evenly.
 
     Args:
         gram: mean squares and products of the columns as torque (k, k).
-        left: their energy (k, k), base model and rivals projected out, noise white of variance one.
 
     Returns:
-        sqrt(c' gram c / c' left c), the median over directions c that are spread evenly in the columns' torques;
-        infinite where no energy is left.
+        (`DIRECTIONS`, k); no row where the columns are no torque.
     """
     values, vectors = np.linalg.eigh(gram)
     kept = values > 1e-9 * max(float(values[-1]), 1e-300)
     if not kept.any():
-        return np.inf
+        return np.zeros((0, len(gram)))
     root = vectors[:, kept] / np.sqrt(values[kept])  # c = root u has unit size for unit u
-    directions = np.random.default_rng(0).standard_normal((DIRECTIONS, kept.sum()))
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    c = directions @ root.T
-    energy = np.einsum("ik,kl,il->i", c, left, c)
-    middle = float(np.median(energy))
+    return np.asarray(_directions(int(kept.sum())) @ root.T)
+
+
+@lru_cache(maxsize=64)
+def _directions(count: int) -> Array:
+    directions = np.random.default_rng(0).standard_normal((DIRECTIONS, count))
+    return np.asarray(directions / np.linalg.norm(directions, axis=1)[:, None])
+
+
+def size_per_energy(mixtures: Array, left: Array) -> float:
+    """Gives the size of an effect whose energy is one: its root mean square torque, of a typical mixture of columns.
+
+    Args:
+        mixtures: coefficients c of size one (m, k).
+        left: energy of the columns (k, k), base model and rivals projected out, noise white of variance one.
+
+    Returns:
+        1 / sqrt(c' left c), the median over mixtures; infinite where no energy is left.
+    """
+    if not len(mixtures):
+        return np.inf
+    middle = float(np.median(((mixtures @ left) * mixtures).sum(axis=1)))
     return 1.0 / np.sqrt(middle) if middle > 0 else np.inf
 
 

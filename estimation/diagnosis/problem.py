@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,9 +12,10 @@ from scipy.optimize import lsq_linear
 
 from estimation.diagnosis.baseline import FAINT, Baseline
 from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.regularisation import held, pull_of
 from estimation.diagnosis.states import Recording
-from estimation.diagnosis.whitening import Whitening, orthonormal
+from estimation.diagnosis.whitening import Whitening
 from estimation.pulls import Pull
 from robots.terms.effects import Situation
 
@@ -22,6 +24,9 @@ Small = NDArray[np.float32]
 
 # A direction of a hypothesis shows only where this share of its energy is left beside the base model.
 VISIBLE = 1e-3
+# A column must have this share of its energy in rows whose direction of motion is known: what leaks from the others is
+# mostly the error of the motion there.
+COUNTED = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +38,7 @@ class Group:
         columns: whitened (N, k) of each of the joints.
         against: <X, Q> (k, b), Q the base model's orthonormal columns.
         gram: of what the base model leaves of the columns (k, k).
-        raw: squared norms (k,) before that.
+        raw: squared norms (k,) before that; infinite for columns that are nearly all in rows that do not count.
         cross: with the residual (k,).
     """
 
@@ -88,6 +93,11 @@ class Problem:
         return self.recording.n
 
     @cached_property
+    def rms(self) -> Array:
+        """Root mean square torque (n,) [N m or N]."""
+        return np.asarray(np.sqrt(np.mean(self.recording.tau**2, axis=0)))
+
+    @cached_property
     def rows(self) -> int:
         """Number of white rows N."""
         return len(self.residual)
@@ -98,34 +108,51 @@ class Problem:
 
     def group(self, joints: tuple[int, ...], columns: tuple[Array, ...]) -> Group:
         """Whitens columns (N, k) of some joints and projects the base model out of them."""
-        white = [self.whitening.apply(part, j) for j, part in zip(joints, columns, strict=True)]
-        k = white[0].shape[1]
+        return self.groups(joints, columns, 1)[0]
+
+    def groups(self, joints: tuple[int, ...], columns: tuple[Array, ...], count: int) -> list[Group]:
+        """Does what `group` does for several groups on the same joints at once: columns (N, count k), k of each."""
+        whole = [self.whitening.filtered(part, j) for j, part in zip(joints, columns, strict=True)]
+        white = [self.whitening.counted(part, j) for j, part in zip(joints, whole, strict=True)]
+        total = white[0].shape[1]
+        k = total // count
         P = self.whitening.precision
-        against, gram, cross = np.zeros((k, self.mixed.shape[2])), np.zeros((k, k)), np.zeros(k)
+        power = [sum(P[j, j] * _squares(part) for j, part in zip(joints, kind, strict=True)) for kind in (white, whole)]
+        raw = np.where(power[0] > COUNTED * power[1], power[0], np.inf)
+        against, cross = np.zeros((total, self.mixed.shape[2])), np.zeros(total)
+        gram = np.zeros((count, k, k))
+        split = [part.T.reshape(count, k, -1) for part in white]
         for a, j in enumerate(joints):
             against += white[a].T @ self.mixed[j]
             cross += white[a].T @ self.residual[:, j]
-            gram += P[j, j] * (white[a].T @ white[a])
+            gram += P[j, j] * (split[a] @ split[a].transpose(0, 2, 1))
             for b in range(a):
-                part = P[j, joints[b]] * (white[a].T @ white[b])
-                gram += part + part.T
-        raw = np.maximum(np.diag(gram).copy(), 0.0)
-        return Group(
-            joints=joints,
-            columns=tuple(part.astype(np.float32) for part in white),
-            against=against,
-            gram=gram - against @ against.T,
-            raw=raw,
-            cross=cross,
-        )
+                part = P[j, joints[b]] * (split[a] @ split[b].transpose(0, 2, 1))
+                gram += part + part.transpose(0, 2, 1)
+        small = [np.asfortranarray(part, dtype=np.float32) for part in white]
+        return [
+            Group(
+                joints=joints,
+                columns=tuple(part[:, own] for part in small),
+                against=against[own],
+                gram=gram[i] - against[own] @ against[own].T,
+                raw=np.asarray(raw[own]),
+                cross=cross[own],
+            )
+            for i, own in enumerate(slice(i * k, (i + 1) * k) for i in range(count))
+        ]
 
     def null_cross(self, group: Group) -> Array:
         """Products (k, draws) of a group with noise that the base model was fitted to."""
+        return self.null_crosses([group])[0]
+
+    def null_crosses(self, groups: Sequence[Group]) -> Array:
+        """Does what `null_cross` does for groups of one size on the same joints: (count, k, draws)."""
         noise, projected = self.nulls
-        total = -(group.against @ projected)
-        for j, part in zip(group.joints, group.columns, strict=True):
-            total += (part.T @ noise[j]).astype(float)
-        return total
+        total = -(np.concatenate([group.against for group in groups]) @ projected)
+        for a, j in enumerate(groups[0].joints):
+            total += np.concatenate([group.columns[a] for group in groups], axis=1).T @ noise[j]
+        return np.asarray(total.reshape(len(groups), -1, projected.shape[1]))
 
     def product(self, first: Group, second: Group) -> Array:
         """Inner products (k1, k2) of what the base model leaves of two groups."""
@@ -222,6 +249,10 @@ class Score:
         y = self.root @ self.cross
         c = np.asarray(lsq_linear(A, y, bounds=(lower, upper), method="bvls").x)
         return max(float(y @ y - np.sum((A @ c - y) ** 2)), 0.0), c
+
+
+def _squares(columns: Array) -> Array:
+    return np.asarray(np.einsum("ij,ij->j", columns, columns))
 
 
 def score(problem: Problem, group: Group, accepted: Accepted) -> Score:

@@ -8,29 +8,33 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.carried import situation_on
 from estimation.diagnosis.diagnosis import Diagnosis, Trace
-from estimation.diagnosis.extending import Fitted, dense, fit_extended
+from estimation.diagnosis.extending import Fitted, fit_extended
 from estimation.diagnosis.findings import Finding, Gain, Parameter
-from estimation.diagnosis.gain import Unseen, cross_validated, on_held_out
+from estimation.diagnosis.gain import Unseen
+from estimation.diagnosis.hidden_springs import hidden_springs
 from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.patterns import Pattern
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found, Selection
-from estimation.diagnosis.states import Recording, record
+from estimation.diagnosis.simulating import cut
+from estimation.diagnosis.unseen import Measured, measure_unseen, simulate_unseen, unloaded
 from estimation.diagnosis.verdict import CLOSE, Judgement, is_open
+from estimation.diagnosis.windup import EFFECT as ELASTICITY
+from estimation.diagnosis.windup import Windup, measure_windups
 from robots.common.files import sha256
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.situation import Situation, situation
 from robots.version import VERSION
 
 Array = NDArray[np.float64]
 
 SHOWN = 4000  # rows of the curves kept for pictures
-SHORTEST_UNSEEN = 1.0  # [s] of held-out logs
+HARM = 1.05  # times the unseen error: an effect that makes it so much larger is left out, sure or not
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,22 +55,21 @@ class Told:
 def assemble(robot: Robot, told: Told) -> Diagnosis:
     """Fits the extended model, measures it on unseen data, and puts the findings into words."""
     problem, judgement = told.problem, told.judgement
-    unexplained = judgement.verdict == "unexplained"
-    founds = [] if unexplained else list(told.selection.found)
-    members = list(judgement.patterns) if unexplained else [found.member for found in founds]
-    p_values = list(judgement.p_values) if unexplained else [found.p_value for found in founds]
-    unseen, gains, seen_as = _measured(robot, told, members)
+    founds = list(judgement.kept)
+    members = [*(found.member for found in founds), *judgement.patterns]
+    p_values = [*(found.p_value for found in founds), *judgement.p_values]
+    seen = _seen(robot, told, members)
     dropped = []
-    while harmful := [i for i, gain in enumerate(gains) if gain.ci95[1] < 0]:
-        # What makes unseen errors surely larger is no cause, however well it fits: a few rows at the end of a log.
-        worst = min(harmful, key=lambda i: gains[i].ci95[1])
+    while harmful := [i for i, gain in enumerate(seen.gains) if _harms(gain) and not _elsewhere(told, members[i])]:
+        # What makes unseen errors larger is no cause, however well it fits: a few rows at the end of a log.
+        worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         dropped.append(members.pop(worst).hypothesis.label)
         p_values.pop(worst)
-        if not unexplained:
+        if worst < len(founds):
             founds.pop(worst)
-        unseen, gains, seen_as = _measured(robot, told, members)
+        seen = _seen(robot, told, members)
     verdict = judgement.verdict
-    if dropped and not (unexplained and members):
+    if dropped and len(members) == len(founds):
         verdict = "none" if not members else "ambiguous" if any(map(is_open, founds)) else "named"
     fitted = fit_extended(problem, members, _provenance(told))
     findings = tuple(
@@ -77,11 +80,20 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
             fitted,
             i,
             p_values[i],
-            None if unexplained else founds[i],
-            gains[i],
+            founds[i] if i < len(founds) else None,
+            seen.gains[i],
         )
         for i, member in enumerate(members)
     )
+    unseen = seen.unseen
+    twisted = _windups(told, seen)
+    if twisted and verdict == "none":
+        verdict = "named"
+    findings += tuple(windup.finding for windup in twisted)
+    known = {extension.joint for extension in fitted.model.extensions if extension.effect == ELASTICITY}
+    added = [windup.extension for windup in twisted if windup.extension.joint not in known]
+    simulation = simulate_unseen(problem, members, seen, bool(told.held_out)) if members else None
+    lost = (_LOST,) if members and simulation is None else ()
     before = unseen.nrmse(0)
     after = unseen.nrmse(len(unseen.errors) - 1)
     return Diagnosis(
@@ -93,35 +105,42 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         excess=told.excess,
         limits=told.limits,
         next_experiment=_next(problem, founds) if verdict == "ambiguous" else None,
-        model=fitted.model,
+        model=replace(fitted.model, extensions=(*fitted.model.extensions, *added)),
         how_unseen=unseen.how,
-        notes=(*_notes(told, findings, before, after), *(_DROPPED.format(name) for name in dropped)),
-        trace=_trace(members, unseen, seen_as),
+        notes=(*_notes(told, findings, before, after), *(_DROPPED.format(name) for name in dropped), *lost),
+        trace=_trace(unseen, seen.coordinates, twisted),
+        simulation=simulation,
     )
 
 
+_LOST = "Simulated forward, the fitted robot ran away from the position loop: its fit suits no simulation."
 _DROPPED = "A fit of {} stood out of the noise, but makes the error on unseen data larger: left out."
 
 
-def _measured(robot: Robot, told: Told, members: Sequence[Member]) -> tuple[Unseen, list[Gain], tuple[Array, ...]]:
-    """Errors on unseen data, what each member brings there, and the coordinate on which it shows there (M,)."""
-    effects = [dense(told.problem, member.hypothesis, member.shape) for member in members]
-    unseen, coordinates = _unseen(robot, told, members, effects)
-    rng = np.random.default_rng(told.seed + 3)
-    return unseen, [_gain(unseen, i, member, rng) for i, member in enumerate(members)], coordinates
+def _harms(gain: Gain) -> bool:
+    """Whether unseen errors are surely larger with an effect, or larger by so much that it is no gain to have it."""
+    return gain.ci95[1] < 0 or gain.nrmse_after > HARM * gain.nrmse_before
 
 
-def _gain(unseen: Unseen, i: int, member: Member, rng: np.random.Generator) -> Gain:
-    """The fall of the error by one member, on its joint, or over all it acts on."""
-    own = member.hypothesis.joint
-    joints = [own - 1] if own is not None else list(member.group.joints)
-    last = len(unseen.errors) - 1
-    low, high = unseen.interval(i + 1, last, joints, rng)
-    return Gain(
-        nrmse_before=float(unseen.nrmse(i + 1)[joints].mean()),
-        nrmse_after=float(unseen.nrmse(last)[joints].mean()),
-        ci95=(low, high),
-    )
+def _elsewhere(told: Told, member: Member) -> bool:
+    """Whether the unseen logs say nothing of an effect that belongs to the logs of the fit: a contact, a drift."""
+    return bool(told.held_out) and member.hypothesis.effect.passing
+
+
+def _seen(robot: Robot, told: Told, members: Sequence[Member]) -> Measured:
+    return measure_unseen(robot, told.problem, members, told.held_out, told.seed + 3)
+
+
+def _windups(told: Told, seen: Measured) -> tuple[Windup, ...]:
+    """Gears whose wind-up was logged; on held-out logs their gain is measured where those have it too."""
+    if all(log.qlink is None for log in told.logs):
+        return ()
+    now, unseen = told.problem.situation, None
+    if any(log.qlink is not None for log in told.held_out):
+        other = cut(seen.whole, slice(seen.first, len(seen.whole)))
+        there = situation_on(other, now.model, unloaded(told.problem))
+        unseen = (there, other, told.held_out)
+    return measure_windups(now, told.problem.recording, told.logs, false_alarm=told.false_alarm, unseen=unseen)
 
 
 def _finding(
@@ -189,65 +208,6 @@ def _parameters(
     return tuple(result)
 
 
-def _unseen(
-    robot: Robot, told: Told, members: Sequence[Member], effects: Sequence[Array]
-) -> tuple[Unseen, tuple[Array, ...]]:
-    problem = told.problem
-    if not told.held_out:
-        return cross_validated(problem, effects), _coordinates(problem.situation, members)
-    recording = problem.recording
-    other = record(robot, told.held_out, step=recording.step, shortest=SHORTEST_UNSEEN)
-    # One clock: where the unseen logs come later, the heat of the ones before is still there.
-    later = bool(other.t[0] > recording.t[-1])
-    whole = _joined(recording, other) if later else other
-    now = situation(
-        problem.situation.model,
-        problem.situation.parameters,
-        whole.t,
-        whole.q,
-        whole.dq,
-        whole.ddq,
-        starts=whole.starts,
-    )
-    there = slice(len(recording), None) if later else slice(None)
-    columns = []
-    for member in members:
-        X = np.zeros((len(whole), robot.n, len(member.coefficients)))
-        joints, parts = member.hypothesis.columns(now, member.shape)
-        for j, part in zip(joints, parts, strict=True):
-            X[:, j] = part
-        columns.append(X[there])
-    baseline = problem.baseline
-    base = baseline.base.regressor(other.q, other.dq, other.ddq)
-    nuisance = np.zeros((len(other), robot.n, baseline.nuisance.shape[2]))
-    unseen = on_held_out(problem, effects, other, np.concatenate([base, nuisance], axis=2), columns)
-    return unseen, tuple(values[there] for values in _coordinates(now, members))
-
-
-def _coordinates(now: Situation, members: Sequence[Member]) -> tuple[Array, ...]:
-    return tuple(m.hypothesis.effect.coordinate(now, m.hypothesis.joint, m.shape)[1] for m in members)
-
-
-def _joined(first: Recording, second: Recording) -> Recording:
-    starts = (*first.starts, *(len(first) + start for start in second.starts))
-
-    def both(name: str) -> Array:
-        return np.concatenate([getattr(first, name), getattr(second, name)])
-
-    return replace(
-        first,
-        t=both("t"),
-        q=both("q"),
-        dq=both("dq"),
-        ddq=both("ddq"),
-        tau=both("tau"),
-        unsure=both("unsure").astype(bool),
-        starts=starts,
-        cycles=(*first.cycles, *second.cycles),
-        names=(*first.names, *second.names),
-    )
-
-
 def _next(problem: Problem, founds: Sequence[Found]) -> NextExperiment | None:
     """Plans the experiment that tells the causes that are left apart."""
     for found in founds:
@@ -276,21 +236,28 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
             )
         if finding.gain.ci95[0] <= 0:
             notes.append(f"The gain of {finding.effect} on unseen data is not sure: its interval holds zero.")
-    if told.judgement.verdict == "unexplained":
+    open_ = sorted({member.hypothesis.joint for member in told.judgement.patterns if member.hypothesis.joint})
+    if open_:
+        names = ", ".join(map(str, open_))
         notes.append(
-            "No effect of the catalogue explains what stands out of the noise "
-            f"(the best together {100 * told.judgement.explained:.0f} %): a free function of the inputs named above "
-            "was fitted instead. It predicts where the robot has been, and says nothing elsewhere."
+            f"No effect of the catalogue explains what stands out of the noise on joint{'s' if len(open_) > 1 else ''} "
+            f"{names}: a free function of the inputs named above was fitted there instead. It predicts where the robot "
+            "has been, and says nothing elsewhere."
         )
+    sprung = {finding.joint for finding in findings if finding.effect == "spring"}
+    notes += [text for joint, text in hidden_springs(told.problem, told.false_alarm) if joint not in sprung]
     return tuple(notes)
 
 
-def _trace(members: Sequence[Member], unseen: Unseen, seen_as: Sequence[Array]) -> Trace:
+def _trace(unseen: Unseen, seen_as: Sequence[Array], windups: Sequence[Windup]) -> Trace:
     rows = slice(None, None, max(1, len(unseen.t) // SHOWN))
     hidden = ~unseen.counts
     before, after = (np.where(hidden, np.nan, unseen.errors[k]) for k in (0, -1))
     coordinates = tuple(values[rows] for values in seen_as)
-    return Trace(unseen.t[rows], unseen.measured[rows], before[rows], after[rows], coordinates)
+    curves = tuple(
+        tuple(values[:: max(1, len(values) // SHOWN)] for values in (w.coordinate, w.before, w.after)) for w in windups
+    )
+    return Trace(unseen.t[rows], unseen.measured[rows], before[rows], after[rows], coordinates, curves)
 
 
 def _provenance(told: Told) -> dict[str, object]:

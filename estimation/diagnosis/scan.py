@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +17,17 @@ from estimation.diagnosis.problem import Accepted, Group, Problem, score
 from robots.common.parallel import available_cores
 
 Array = NDArray[np.float64]
+Small = NDArray[np.float32]
 
 # A grid longer than this is not scanned whole: its effect proposes points, and is charged for the whole grid.
 LONG = 60
 PROPOSED = 6
 # Mean of the Gumbel distribution: the largest of m independent -log p is log m + this, on average.
 EULER = 0.5772156649015329
+# Columns that are whitened side by side.
+WIDE = 64
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +39,17 @@ class Entry:
         shapes: the points scanned.
         groups: one a point.
         tries: points that the choice was made from.
+        nulls: products of each group with the null logs (points, k, draws); none where the grid is charged whole.
+        sizes: mean products of each group's columns as shares of the joint's torque (points, k, k), on the joint where
+            they are largest.
     """
 
     hypothesis: Hypothesis
     shapes: tuple[tuple[float, ...], ...]
     groups: tuple[Group, ...]
     tries: int
+    nulls: Small
+    sizes: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,14 +125,48 @@ def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
     tries = len(shapes)
     if tries > LONG:
         shapes = hypothesis.effect.propose(situation, hypothesis.joint, problem.remainder, PROPOSED)
-    groups = []
-    kept = []
+    kept: list[tuple[float, ...]] = []
+    batches: dict[tuple[int, ...], list[tuple[int, tuple[Array, ...]]]] = {}
     for shape in shapes:
         joints, columns = problem.columns_of(hypothesis, shape)
         if any(part.any() for part in columns):
-            groups.append(problem.group(joints, columns))
+            batches.setdefault(joints, []).append((len(kept), columns))
             kept.append(shape)
-    return Entry(hypothesis, tuple(kept), tuple(groups), max(tries, 1)) if groups else None
+    if not kept:
+        return None
+    groups: dict[int, Group] = {}
+    sizes: dict[int, Array] = {}
+    for joints, members in batches.items():
+        # Shapes side by side: one product with the base model and one with the nulls instead of one for each.
+        for chunk in _chunks(members, max(1, WIDE // members[0][1][0].shape[1])):
+            together = tuple(
+                np.concatenate([p.T for p in parts]).T for parts in zip(*(c for _, c in chunk), strict=True)
+            )
+            groups.update(zip((at for at, _ in chunk), problem.groups(joints, together, len(chunk)), strict=True))
+        sizes.update((at, _size(problem, joints, columns)) for at, columns in members)
+    ordered = tuple(groups[at] for at in range(len(kept)))
+    nulls = np.zeros((0, 0, 0), np.float32)
+    if tries <= LONG and problem.nulls[1].shape[1]:
+        nulls = np.empty((len(kept), ordered[0].size, problem.nulls[1].shape[1]), np.float32)
+        for members in batches.values():
+            places = [at for at, _ in members]
+            nulls[places] = problem.null_crosses([groups[at] for at in places])
+    return Entry(
+        hypothesis, tuple(kept), ordered, max(tries, 1), nulls, np.stack([sizes[at] for at in range(len(kept))])
+    )
+
+
+def _chunks(items: list[T], length: int) -> list[list[T]]:
+    return [items[start : start + length] for start in range(0, len(items), length)]
+
+
+def _size(problem: Problem, joints: tuple[int, ...], columns: tuple[Array, ...]) -> Array:
+    best = np.zeros((columns[0].shape[1],) * 2)
+    for j, part in zip(joints, columns, strict=True):
+        gram = part.T @ part / (len(part) * max(float(problem.rms[j]), 1e-12) ** 2)
+        if np.trace(gram) > np.trace(best):
+            best = gram
+    return best
 
 
 def scan(
@@ -159,7 +204,7 @@ def _outcome(problem: Problem, entry: Entry, accepted: Accepted, draws: int) -> 
     lower, upper = entry.hypothesis.coefficient_bounds(problem.situation.robot)
     best: tuple[float, float, tuple[float, ...], float, int] = (-1.0, 0.0, (), 0.0, 0)
     highest: dict[int, Array] = {}
-    for shape, group in zip(entry.shapes, entry.groups, strict=True):
+    for at, (shape, group) in enumerate(zip(entry.shapes, entry.groups, strict=True)):
         result = score(problem, group, accepted)
         if not result.degrees:
             continue
@@ -167,7 +212,7 @@ def _outcome(problem: Problem, entry: Entry, accepted: Accepted, draws: int) -> 
         gain = result.bounded(lower, upper)[0]
         evidence = float(surprise(np.array(gain), result.degrees))
         if draws and entry.tries <= LONG:
-            cross = problem.null_cross(group) - result.onto.T @ accepted.nulls
+            cross = entry.nulls[at] - result.onto.T @ accepted.nulls
             stats = ((result.root @ cross) ** 2).sum(axis=0)
             highest[result.degrees] = np.maximum(highest.get(result.degrees, np.zeros(draws)), stats)
         if evidence > best[0]:

@@ -19,7 +19,7 @@ CONTENDERS = 7
 NEAR = 0.3
 # A further effect on the joints of one that is found must explain this share of what that one explains: formulas are
 # true to some per cent of an effect, and what they leave must not be taken for another.
-BEYOND = 0.03
+BEYOND = 0.08
 MOST = 4  # effects at once
 # What is reported must be worth its parameters by so much (Schwarz): strong evidence, beside a small p-value.
 LEAST = 10.0

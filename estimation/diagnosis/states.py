@@ -12,7 +12,9 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import butter, sosfiltfilt, welch
 
+from estimation.diagnosis.believable import believable_cutoff
 from estimation.diagnosis.periods import Cycle, find_cycle, project
+from estimation.diagnosis.smoothed_motion import smoothed
 from estimation.preparation import SLOW, Prepared, prepare
 from robots.common.errors import InputError
 from robots.robot import Robot
@@ -27,7 +29,7 @@ FASTEST = 260.0  # [Hz] sampling beyond which no effect of the catalogue gains
 STANDS_OUT = 3.0
 # Least and most of the cut-off [Hz, share of the sampling rate].
 LOWEST, HIGHEST = 2.0, 0.4
-ORDER = 8
+ORDER = 8  # of the low-pass before thinning
 SHORTEST = 5.0  # [s] of log below which nothing can be told
 # Spectra are taken of this difference of the positions: the slow motion would leak over all of the band otherwise.
 DIFFERENCE = 3
@@ -61,6 +63,7 @@ class Recording:
         floor: power density of each joint's position noise (n,) [rad^2/Hz].
         unsure: rows (N, n) in which the direction of motion is not known: friction may have either sign there.
         names: of the logs.
+        payloads: per log a known body at the flange (10,), in its frame; empty where no log has one.
     """
 
     t: Array
@@ -75,6 +78,7 @@ class Recording:
     floor: Array
     unsure: NDArray[np.bool_]
     names: tuple[str, ...]
+    payloads: tuple[Array, ...] = ()
 
     def __len__(self) -> int:
         return len(self.t)
@@ -88,6 +92,11 @@ class Recording:
     def runs(self) -> tuple[slice, ...]:
         """Each log's rows."""
         return tuple(slice(a, b) for a, b in pairwise((*self.starts, len(self.t))))
+
+    @property
+    def bodies(self) -> tuple[Array, ...]:
+        """Each log's known payload (10,), zeros for none."""
+        return self.payloads or (np.zeros(10),) * len(self.starts)
 
     @property
     def duration(self) -> float:
@@ -128,7 +137,9 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
             )
     if step is None:
         step = _step(prepared)
-    parts = [_part(log, step) for log in prepared]
+    highest = np.max([_cutoffs(log.positions.q, log.positions.period) for log in prepared], axis=0)
+    cap = believable_cutoff(robot, prepared, highest)
+    parts = [_part(log, step, cap) for log in prepared]
     lengths = [len(part[0]) for part in parts]
     total = sum(lengths) * step
     if total < shortest:
@@ -147,7 +158,14 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
         floor=np.max([part[8] for part in parts], axis=0),
         unsure=np.concatenate([part[7] for part in parts]),
         names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
+        payloads=_payloads(prepared),
     )
+
+
+def _payloads(prepared: Sequence[Prepared]) -> tuple[Array, ...]:
+    if all(log.log.payload is None for log in prepared):
+        return ()
+    return tuple(np.zeros(10) if log.log.payload is None else np.array(log.log.payload) for log in prepared)
 
 
 def _step(prepared: Sequence[Prepared]) -> float:
@@ -158,22 +176,25 @@ def _step(prepared: Sequence[Prepared]) -> float:
 
 
 def _part(
-    log: Prepared, step: float
+    log: Prepared, step: float, cap: float
 ) -> tuple[Array, Array, Array, Array, Array, Cycle | None, float, NDArray[np.bool_], Array]:
-    """One log: t, q, dq, ddq, tau on the working grid, its cycle there, the lowest cut-off, unsure rows, noise."""
+    """One log: t, q, dq, ddq, tau on the working grid, its cycle there, the lowest cut-off, unsure rows, noise.
+
+    Above `cap` [Hz], what the positions have is noise, whatever its power.
+    """
     period, grid = log.positions.period, log.positions.t
     positions = log.positions.q
     spectra = [_spectrum(column, period) for column in positions.T]
-    cutoffs = np.array([_cutoff(*spectrum, period) for spectrum in spectra])
-    q, dq, ddq = _smoothed(positions, period, cutoffs)
+    cutoffs = np.minimum([_cutoff(*spectrum, period) for spectrum in spectra], cap)
+    q, dq, ddq = smoothed(positions, period, cutoffs)
     cycle = find_cycle(positions, period)
     if cycle is not None:
         rows = slice(cycle.start, cycle.stop)
         exact, known = project(positions, period, cycle)
         # One pass alone may be sharper, where the motion does not repeat as exactly as its encoder counts.
-        better = known > SHARPER * cutoffs
+        better = (known > SHARPER * cutoffs) & (known <= cap)
         rest = positions[rows] - exact[0]
-        slow = _smoothed(rest, period, np.array([_cutoff(*_spectrum(x, period), period, none=0.0) for x in rest.T]))
+        slow = smoothed(rest, period, np.array([_cutoff(*_spectrum(x, period), period, none=0.0) for x in rest.T]))
         for whole, harmonic, other in zip((q, dq, ddq), exact, slow, strict=True):
             # What does not repeat is motion too, where it stands out of the noise.
             whole[rows] = np.where(better, harmonic + other, whole[rows])
@@ -194,7 +215,7 @@ def _part(
         start = max(0, int(np.ceil((cycle.start - first) * period / step)))
         stop = min(count, int(np.floor((cycle.stop - first) * period / step)))
         moved = Cycle(start, stop, cycle.period, int((stop - start) * step / cycle.period + 0.1))
-    floor = np.array([spectrum[2] for spectrum in spectra])
+    floor = np.array([spectrum[2] if cap == np.inf else _density_at(cap, *spectrum) for spectrum in spectra])
     if cycle is not None:
         floor = np.where(better, floor / cycle.count, floor)
     ends = [float(np.interp(cutoff, f, density)) for cutoff, (f, density, _) in zip(cutoffs, spectra, strict=True)]
@@ -202,6 +223,15 @@ def _part(
     cut = slice(None) if moved is not None else _moving(states[1], step)
     q, dq, ddq = (array[cut] for array in states)
     return t[cut], q, dq, ddq, tau[cut], moved, float(cutoffs.min()), unsure[cut], floor
+
+
+def _cutoffs(positions: Array, period: float) -> Array:
+    """The frequency at which each position's spectrum meets its noise (n,) [Hz]."""
+    return np.array([_cutoff(*_spectrum(column, period), period) for column in positions.T])
+
+
+def _density_at(frequency: float, f: Array, density: Array, floor: float) -> float:
+    return max(float(np.interp(frequency, f, density)), floor)
 
 
 def _torque(log: Prepared, step: float) -> _Interpolation:
@@ -295,28 +325,3 @@ def spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Lists the stretches [start, stop) of rows (N,) that are flagged."""
     edges = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _smoothed(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array, Array]:
-    """Low-passes each joint without lag and differentiates it (N, n)."""
-    q = np.zeros_like(x)
-    for j, cutoff in enumerate(cutoffs):
-        if cutoff <= 0:
-            continue
-        sections = butter(ORDER, min(cutoff * 2 * period, 0.99), output="sos")
-        padding = min(len(x) - 1, round(6 / (cutoff * period)))
-        q[:, j] = sosfiltfilt(sections, x[:, j], padtype="odd", padlen=padding)
-    dq, ddq = _differentiated(q, period)
-    return q, dq, ddq
-
-
-def _differentiated(x: Array, period: float) -> tuple[Array, Array]:
-    """First and second derivative by sixth-order central differences, lower orders at the ends."""
-    first = np.gradient(x, period, axis=0, edge_order=2)
-    second = np.gradient(first, period, axis=0, edge_order=2)
-    if len(x) > 7:
-        a, b, c = x[4:-2] - x[2:-4], x[5:-1] - x[1:-5], x[6:] - x[:-6]
-        first[3:-3] = (45 * a - 9 * b + c) / (60 * period)
-        a, b, c = x[4:-2] + x[2:-4], x[5:-1] + x[1:-5], x[6:] + x[:-6]
-        second[3:-3] = (270 * a - 27 * b + 2 * c - 490 * x[3:-3]) / (180 * period**2)
-    return first, second

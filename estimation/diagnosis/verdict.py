@@ -25,16 +25,18 @@ LEAST = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """What stays beside the effects found.
+    """What the names explain, and what they do not.
 
     Attributes:
         verdict: ``none``, ``named``, ``ambiguous`` or ``unexplained``.
+        kept: the effects whose names hold.
         patterns: functions of the motion that explain the rest, each measured beside all before.
         p_values: of the patterns.
-        explained: share of what stands out of the noise that the named effects explain.
+        explained: share of what stands out of the noise that the effects found explain.
     """
 
     verdict: str
+    kept: tuple[Found, ...]
     patterns: tuple[Member, ...]
     p_values: tuple[float, ...]
     explained: float
@@ -47,26 +49,65 @@ def judge(
     false_alarm: float,
     rng: np.random.Generator,
 ) -> Judgement:
-    """Looks for functions of the motion in what the named effects leave, and weighs the two against each other."""
+    """Weighs the named effects against functions of the motion, joint by joint.
+
+    A name holds where it leaves little that a free function explains, and where free functions in its place do not
+    explain much more; several names on one joint must fit better than free functions do, all parameters counted.
+    """
     named = [found.member for found in selection.found]
-    members, p_values = _patterns(problem, patterns, named, false_alarm, rng)
-    left = sum(max(member.gain - member.degrees, 0.0) for member in members)
-    explained = selection.accepted.gain
-    share = explained / (explained + left) if explained + left > 0 else 1.0
-    if members and share < ENOUGH:
-        verdict = "unexplained"
-    elif not named:
-        verdict = "none"
-    elif any(is_open(found) for found in selection.found):
-        verdict = "ambiguous"
-    else:
-        verdict = "named"
-    if verdict != "unexplained":
-        members, p_values = [], []
-    elif named:
-        # Names that do not fit would only distort the patterns: those start anew, beside the base model alone.
-        members, p_values = _patterns(problem, patterns, [], false_alarm, rng)
-    return Judgement(verdict, tuple(members), tuple(p_values), float(share))
+    left, p_values = _patterns(problem, patterns, named, false_alarm, rng)
+    explained, rest = selection.accepted.gain, sum(map(_worth, left))
+    share = explained / (explained + rest) if explained + rest > 0 else 1.0
+    kept = selection.found
+    if share < ENOUGH:
+        kept = tuple(found for found in kept if found.member.hypothesis.joint is not None)
+    joints = {found.member.hypothesis.joint for found in kept} - {None}
+    lost = {j for j in joints if not _holds(problem, j, named, patterns, left, false_alarm, rng)}
+    kept = tuple(found for found in kept if found.member.hypothesis.joint not in lost)
+    members = left if share < ENOUGH else []
+    while len(kept) < len(named):
+        # Names that do not fit would only distort the patterns: those start anew, beside the names that hold.
+        members, p_values = _patterns(problem, patterns, [found.member for found in kept], false_alarm, rng)
+        # What is unexplained reaches other joints: names that explain less than it does are not to be trusted.
+        strong = tuple(found for found in kept if found.member.gain > max(map(_worth, members), default=0.0))
+        if len(strong) == len(kept):
+            break
+        kept = strong
+    if members:
+        return Judgement("unexplained", kept, tuple(members), tuple(p_values), float(share))
+    verdict = "none" if not kept else "ambiguous" if any(map(is_open, kept)) else "named"
+    return Judgement(verdict, kept, (), (), float(share))
+
+
+def _holds(
+    problem: Problem,
+    joint: int | None,
+    named: Sequence[Member],
+    patterns: Sequence[Entry],
+    left: Sequence[Member],
+    false_alarm: float,
+    rng: np.random.Generator,
+) -> bool:
+    """Whether the names on a joint explain what is there, beside the names on others."""
+    own = [member for member in named if member.hypothesis.joint == joint]
+    others = [member for member in named if member.hypothesis.joint != joint]
+    gain = accept(problem, tuple(m.group for m in (*others, *own))).gain
+    gain -= accept(problem, tuple(m.group for m in others)).gain
+    degrees = sum(member.degrees for member in own)
+    rest = sum(_worth(member) for member in left if member.hypothesis.joint == joint)
+    if gain - degrees < ENOUGH * (gain - degrees + rest):
+        return False
+    here = [entry for entry in patterns if entry.hypothesis.joint == joint]
+    free, _ = _patterns(problem, here, others, false_alarm, rng)
+    if gain - degrees < ENOUGH * sum(map(_worth, free)):
+        return False
+    price = float(np.log(problem.rows))
+    criterion = sum(member.gain - member.degrees * price for member in free)
+    return len(own) == 1 or not free or gain - degrees * price > criterion
+
+
+def _worth(member: Member) -> float:
+    return max(member.gain - member.degrees, 0.0)
 
 
 def is_open(found: Found) -> bool:
@@ -94,8 +135,8 @@ def _patterns(
         if not p <= false_alarm:
             break
         member = refine(problem, best.hypothesis, best.shape, accepted)
-        worth = member.gain - member.degrees
-        if member.bic(problem.rows) < LEAST or worth < BEYOND * sum(m.gain for m in (*named, *members)):
+        enough = BEYOND * sum(m.gain for m in (*named, *members))
+        if member.bic(problem.rows) < LEAST or _worth(member) < enough:
             break
         members.append(member)
         p_values.append(p)

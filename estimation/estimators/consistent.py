@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 
 # Smallest eigenvalue of a pseudo-inertia, in units in which the reference body's trace is 2.
 EPSILON = 1e-5
+# What is closer to its bound than this share of its own scale lies at it.
+AT = 1e-4
 # Of the pull, in units of the data's whole misfit; chosen from, on blocks that were left out.
 PULLS = (1e-5, 1e-4, 1e-3, 1e-2)
 BLOCKS = 4
@@ -120,7 +122,8 @@ class PhysicallyConsistent(WeightedLeastSquares):
     pull is the largest that predicts left-out blocks as well as the best (Wensing et al. 2018; Lee et al. 2020). The
     data enter as normal equations: a longer log costs no more.
 
-    The solution's extras: ``standard`` (p,), ``pull``, ``eigenvalues`` (n, 4) of the normalised pseudo-inertias.
+    The solution's extras: ``standard`` (p,), ``pull``, ``eigenvalues`` (n, 4) of the normalised pseudo-inertias, and
+    ``active``, the parameters and bodies at their bounds.
 
     Args:
         pull: ``entropic``, ``euclidean``, which are weighted by the data.
@@ -180,10 +183,14 @@ class PhysicallyConsistent(WeightedLeastSquares):
         if not (eigenvalues > 0).all():
             link = int(np.argmin(eigenvalues.min(axis=1))) + 1
             raise SolverError(f"physically consistent fit: link {link} is no body", remedy="give a larger pull weight")
+        margins = problem.rows @ (standard / units.scale)
+        alone = (np.count_nonzero(rows, axis=1) == 1) & (margins < AT)
+        flat = np.flatnonzero((eigenvalues < AT).any(axis=1)) + 1
+        active = [model.names[k] for k in np.flatnonzero(rows[alone].any(axis=0))] + [f"body of link {k}" for k in flat]
         return Solution(
             values=data.base.from_standard(standard),
             weights=weights,
-            extras={"standard": standard, "pull": chosen, "eigenvalues": eigenvalues},
+            extras={"standard": standard, "pull": chosen, "eigenvalues": eigenvalues, "active": tuple(active)},
         )
 
     def _boxes(self, data: RegressionData, units: Scaling) -> dict[int, tuple[Array, Array]]:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from difflib import get_close_matches
+from functools import partial
 
 import numpy as np
+from scipy.linalg import null_space
 
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.data import RegressionData
 from estimation.estimators.regularisation import regularisation
+from estimation.estimators.spread import FAINT as OPEN
+from estimation.estimators.spread import Equations, honest_covariance, regressor_rows
 from estimation.estimators.standard import body_columns, largest_speed, nonnegative_rows, scaling
 from estimation.estimators.wls import WeightedLeastSquares
 from robots.common.errors import InfeasibleError, InputError, SolverError
@@ -17,6 +21,8 @@ from robots.regressor import TorqueModel
 
 # Pulls what the data leave open towards the description, or a plausible arm; far below what they say of the rest.
 FAINT = 1e-8
+# A parameter within this share of its own scale of a bound lies at it.
+AT = 1e-6
 
 
 class ConstrainedLeastSquares(WeightedLeastSquares):
@@ -24,6 +30,10 @@ class ConstrainedLeastSquares(WeightedLeastSquares):
 
     By default masses, rotor inertias, Coulomb and viscous friction are not negative, and friction brakes at every speed
     seen. The solution's extras: ``standard`` (p,), and ``active``, the names of parameters at a bound of their own.
+
+    What is known exactly (a bound whose ends meet, a total mass) takes its share of the uncertainty away: errors move
+    along what stays free. At any other bound they are those without it. A bound that holds takes the estimate nearer to
+    the truth on the torque's scale, never farther: intervals hold more often than stated there, not less.
 
     Args:
         bounds: standard parameters by name, such as ``f1_3`` or ``m_2``, to their lowest and highest value; infinite
@@ -88,9 +98,18 @@ class ConstrainedLeastSquares(WeightedLeastSquares):
         active = np.isclose(standard, limits[:, 0], rtol=1e-6, atol=1e-9) | np.isclose(
             standard, limits[:, 1], rtol=1e-6, atol=1e-9
         )
+        alone = rows[
+            (np.count_nonzero(rows, axis=1) == 1) & (np.abs(rows @ standard - lower) <= AT * (np.abs(rows) @ scale))
+        ]
+        active |= (alone != 0).any(axis=0)
         names = tuple(name for name, bound in zip(model.names, active, strict=True) if bound)
+        values = data.base.from_standard(standard)
+        fixed = np.vstack([np.eye(model.size)[limits[:, 0] == limits[:, 1]], rows[lower == upper]]) * scale
         return Solution(
-            values=data.base.from_standard(standard), weights=weights, extras={"standard": standard, "active": names}
+            values=values,
+            weights=weights,
+            covariance=_covariance(data, values, weights, grouping, fixed) if len(fixed) else None,
+            extras={"standard": standard, "active": names},
         )
 
     def _limits(self, model: TorqueModel) -> Array:
@@ -116,6 +135,26 @@ class ConstrainedLeastSquares(WeightedLeastSquares):
             rows = np.vstack([rows, row])
             lower, upper = np.append(lower, self.total_mass[0]), np.append(upper, self.total_mass[1])
         return rows, lower, upper
+
+
+def _covariance(data: RegressionData, values: Array, weights: Array, grouping: Array, fixed: Array) -> Array:
+    """Covariance (b, b) where fixed @ scaled standard parameters are known: noise moves along their null space only."""
+    gram = np.tensordot(weights, data.moments.gram, axes=1)
+    level = float(np.trace(grouping.T @ gram @ grouping)) / grouping.shape[1]
+    free = null_space(fixed)
+    normal = free.T @ (grouping.T @ gram @ grouping / level + OPEN * np.eye(grouping.shape[1])) @ free
+    moved = grouping @ free
+    inverse = moved @ np.linalg.solve(normal, moved.T) / level
+    equations = [
+        Equations(
+            rows=len(part.motion),
+            regressor=partial(regressor_rows, data.base, part.motion),
+            mask=part.mask,
+            residual=part.tau - data.base.torque(part.motion.q, part.motion.dq, part.motion.ddq, values),
+        )
+        for part in data.parts
+    ]
+    return honest_covariance(equations, weights, gram, (inverse + inverse.T) / 2)
 
 
 def _solve(matrix: Array, target: Array, rows: Array, lower: Array, upper: Array) -> Array:

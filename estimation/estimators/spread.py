@@ -33,20 +33,24 @@ class Equations:
     residual: Array
 
 
-def honest_covariance(equations: Sequence[Equations], weights: Array, gram: Array) -> Array:
+def honest_covariance(
+    equations: Sequence[Equations], weights: Array, gram: Array, inverse: Array | None = None
+) -> Array:
     """Estimates the covariance (b, b) of an estimate under coloured noise.
 
     Args:
         equations: one per part.
         weights: of the joints' rows (n,).
         gram: Z' W Z (b, b); where Z is free of noise, Z' W Y is that on average.
+        inverse: what turns Z' W e into the estimate's error (b, b), where that is not the inverse of `gram`.
 
     Returns:
         The sandwich of `estimation.uncertainty`.
     """
-    scale = np.sqrt(np.diag(gram))
-    scale = np.where(scale > 0, scale, 1.0)
-    inverse = np.linalg.inv(gram / scale[:, None] / scale + FAINT * np.eye(len(scale))) / scale[:, None] / scale
+    if inverse is None:
+        scale = np.sqrt(np.diag(gram))
+        scale = np.where(scale > 0, scale, 1.0)
+        inverse = np.linalg.inv(gram / scale[:, None] / scale + FAINT * np.eye(len(scale))) / scale[:, None] / scale
     parts = [Part(e.rows, e.regressor, e.mask, e.residual * e.mask) for e in equations]
     return covariance(parts, weights, (inverse + inverse.T) / 2)
 

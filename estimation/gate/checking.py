@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from estimation.gate.columns import Columns
 from estimation.gate.delays import Delay, delay_findings, estimate_delays
-from estimation.gate.excerpts import Excerpt, cutoffs, excerpt, stretches
+from estimation.gate.excerpts import Excerpt, cutoffs, excerpt, stretch, stretches
 from estimation.gate.excitation import HOPELESS, check_excitation
 from estimation.gate.finding import Finding
 from estimation.gate.jumps import check_jumps
 from estimation.gate.motion import check_motion
 from estimation.gate.orientations import check_orientations
-from estimation.gate.physics import joint_physics
-from estimation.gate.quick_fit import Rows, fit_all
+from estimation.gate.physics import joint_physics, mean_inertias
+from estimation.gate.quick_fit import Rows
 from estimation.gate.report import FEWEST, GateReport, pick_rows, worst_first
 from estimation.gate.resolution import check_clipping, check_resolution
 from estimation.gate.scales import check_scales, check_size
@@ -34,6 +34,7 @@ from estimation.gate.values import (
     too_short,
 )
 from estimation.gate.velocities import check_velocities
+from estimation.gate.whole_fit import fit_all
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log
@@ -170,10 +171,11 @@ class _Looked:
 
 
 def _look(robot: Robot, log: Log, torque: Array | None, timing: Timing, spread: Array) -> _Looked:
-    pieces = stretches(timing.parts)
+    found = (stretch(log, torque, piece, timing.period) for piece in stretches(timing.parts))
+    pieces = [part for part in found if part is not None]
 
     def at(cutoff: float) -> tuple[Excerpt, ...]:
-        found = (excerpt(log, torque, piece, timing.period, cutoff) for piece in pieces)
+        found = (excerpt(part, timing.period, cutoff) for part in pieces)
         return tuple(part for part in found if part is not None)
 
     candidates = cutoffs(timing.period)
@@ -206,7 +208,8 @@ def _dynamics(
     assert rows is not None
     prefix, joints = columns.prefix, raw_spread > 0
     fits = [rows.fit(j) if joints[j] else None for j in range(robot.n)]
-    physics = [None if fit is None else joint_physics(robot, rows, fit, j) for j, fit in enumerate(fits)]
+    felt = mean_inertias(robot, rows)
+    physics = [None if fit is None else joint_physics(rows, fit, j, felt[j]) for j, fit in enumerate(fits)]
     spread = np.array([rows.torque(j).std() if joints[j] else 0.0 for j in range(robot.n)])
     moments = rows.moments(np.flatnonzero(joints))
     # As it was logged: smoothing would take the noise away that hides a joint's torque.

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.finding import Finding
-from estimation.gate.quick_fit import JointFit, Rows
+from estimation.gate.quick_fit import OWN_RIDGE, JointFit, Rows
+from estimation.gate.whole_fit import solve_scaled
 
 Array = NDArray[np.float64]
 
@@ -17,8 +18,8 @@ Array = NDArray[np.float64]
 SAMPLES, SECONDS = 8.0, 0.04
 # Where much of the torque is unexplained without, longer ones are tried as well.
 UNEXPLAINED, LONGER = 0.15, 12.0
-# They are tried in steps of this share of the smoothing's period.
-STEP = 0.06
+# They are tried in steps of this share of the smoothing's period, on some rows first and about the best then on all.
+STEP, ROWS = 0.06, 3000
 # A delay counts when it is so many standard errors long, ...
 SURE = 4.0
 # ... and matters when it is longer than this share of a sample, and takes this share of the unexplained torque away; of
@@ -65,31 +66,69 @@ def estimate_delays(
             continue
         reach = max(SAMPLES * period, SECONDS) * factor
         half = int(np.clip(np.ceil(reach * cutoff / STEP), 6, 60))
-        shifts = np.linspace(-reach, reach, 2 * half + 1)
-        errors = np.empty((len(shifts), len(chosen)))
-        for k, shift in enumerate(shifts):
-            tau = rows.torques(float(shift))
-            errors[k] = [_remaining(fit, tau[:, j]) for j, fit in chosen.items()]
-        for (joint, fit), error in zip(chosen.items(), errors.T, strict=True):
-            delays[joint] = _refined(rows, fit, joint, shifts, error)
+        search = _Search(rows, chosen, np.linspace(-reach, reach, 2 * half + 1))
+        for joint, fit in chosen.items():
+            delays[joint] = _refined(rows, fit, joint, search)
     return delays
 
 
-def _refined(rows: Rows, fit: JointFit, joint: int, shifts: Array, errors: Array) -> Delay:
+class _Search:
+    """Torques at many shifts against the motion, of some joints.
+
+    Args:
+        rows: the excerpts.
+        fits: of the joints, counted from 0.
+        shifts: that are tried (S,) [s], zero in the middle.
+    """
+
+    def __init__(self, rows: Rows, fits: Mapping[int, JointFit], shifts: Array) -> None:
+        self._rows, self._fits, self.shifts = rows, fits, shifts
+        self._known: dict[int, dict[int, float]] = {}
+        stride = max(1, len(rows.q) // ROWS)
+        kept = rows.thinned(stride)
+        self._starts = {}
+        for joint, fit in fits.items():
+            Y, tau = fit.Y[kept], rows.near_torques(shifts, joint, stride)
+            tau -= tau.mean(axis=1, keepdims=True)
+            cross, square = Y.T @ tau.T, np.einsum("st,st->s", tau, tau)
+            left = square - np.einsum("ks,ks->s", cross, solve_scaled(Y.T @ Y, cross, OWN_RIDGE))
+            self._starts[joint] = int(np.argmin(left / np.maximum(square, 1e-300)))
+
+    def error(self, joint: int, k: int) -> float:
+        """Share of a joint's variance that is left at the k-th shift, by all rows."""
+        if k not in self._known:
+            tau = self._rows.torques(float(self.shifts[k]))
+            self._known[k] = {j: _remaining(fit, tau[:, j]) for j, fit in self._fits.items()}
+        return self._known[k][joint]
+
+    def best(self, joint: int) -> int:
+        """The shift at which least is left, by all rows: found from the best by some of them, step by step."""
+        last = len(self.shifts) - 1
+        k = self._starts[joint]
+        while True:
+            around = range(max(k - 1, 0), min(k + 1, last) + 1)
+            lowest = min(around, key=lambda place: self.error(joint, place))
+            if lowest == k:
+                return k
+            k = lowest
+
+
+def _refined(rows: Rows, fit: JointFit, joint: int, search: _Search) -> Delay:
     """The delay between the shifts that were tried, with its standard error."""
-    best, half = int(np.argmin(errors)), len(shifts) // 2
-    zero = errors[half]
+    shifts, best = search.shifts, search.best(joint)
+    half = len(shifts) // 2
+    zero = search.error(joint, half)
     if best in (0, 2 * half):
-        return Delay(float(shifts[best]), np.inf, float(1 - errors[best] / zero) if zero > 0 else 0.0)
-    left, middle, right = errors[best - 1 : best + 2]
+        left = search.error(joint, best)
+        return Delay(float(shifts[best]), np.inf, float(1 - left / zero) if zero > 0 else 0.0)
+    left, middle, right = (search.error(joint, place) for place in (best - 1, best, best + 1))
     bend = left - 2 * middle + right
     value = float(shifts[best] + 0.5 * (left - right) / bend * (shifts[1] - shifts[0])) if bend > 0 else shifts[best]
     # Gauss-Newton at the optimum gives the standard error, block by block.
     rate, tau = rows.torques(value, 1)[:, joint], rows.torques(value)[:, joint]
     slope = rate - fit.Y @ (fit.inverse @ (fit.Y.T @ rate))
     residual = tau - fit.Y @ (fit.inverse @ (fit.Y.T @ tau))
-    starts = np.flatnonzero(np.diff(rows.block, prepend=-1))
-    scores = np.add.reduceat(slope * residual, starts)
+    scores = np.add.reduceat(slope * residual, rows.starts)
     curvature = float(slope @ slope)
     error = float(np.sqrt(scores @ scores)) / curvature if curvature > 0 else np.inf
     return Delay(value, error, float(1 - np.sqrt(_remaining(fit, tau) / zero)) if zero > 0 else 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,35 +28,85 @@ ORDER, EDGE = 3, 0.35
 
 
 @dataclass(frozen=True, eq=False)
+class Stretch:
+    """Some rows of a log on an even grid, as they were recorded.
+
+    Attributes:
+        t: (N,) [s].
+        q: (N, n).
+        torque: torque or current (N, n); None without.
+        velocity: the log's own (N, n); None without.
+    """
+
+    t: Array
+    q: Array
+    torque: Array | None
+    velocity: Array | None
+
+
+@dataclass(frozen=True, eq=False)
 class Excerpt:
-    """One stretch, on an even grid.
+    """One stretch, smoothed and thinned.
 
     Attributes:
         t: (M,) [s].
         q: (M, n), smoothed.
         dq: (M, n).
         ddq: (M, n).
-        torque: smoothed torque or current as a function of time, (n,) values; None without.
-        raw: torque or current as it was logged (M, n).
+        raw: torque or current as it was logged (M, n); None without.
         column: the log's own velocities, smoothed alike (M, n); None without.
+        place: (M,) of the thinned rows on the grid.
+        grid: all of the stretch's times (N,) [s].
+        smoothed: torque or current on the grid, smoothed (N, n); None without.
     """
 
     t: Array
     q: Array
     dq: Array
     ddq: Array
-    torque: CubicSpline | None
     raw: Array | None
     column: Array | None
+    place: NDArray[np.intp]
+    grid: Array
+    smoothed: Array | None
 
     def thinned(self, stride: int) -> Excerpt:
         """Keeps every so many rows."""
         kept: dict[str, Any] = {
             name: None if array is None else array[::stride]
-            for name in ("t", "q", "dq", "ddq", "raw", "column")
+            for name in ("t", "q", "dq", "ddq", "raw", "column", "place")
             for array in [getattr(self, name)]
         }
         return replace(self, **kept)
+
+    def torque_at(self, t: Array, order: int = 0) -> Array:
+        """Smoothed torque or current (K, n) at times (K,), within the stretch, or its derivative of some order."""
+        return np.asarray(self._spline(np.clip(t, self.grid[0], self.grid[-1]), order))
+
+    def torque_near(self, shift: Array, joint: int, stride: int) -> Array:
+        """Smoothed torque or current of a joint so much later (S,) [s], between the samples by straight lines.
+
+        Args:
+            shift: (S,) [s].
+            joint: counted from 0.
+            stride: every so many rows.
+
+        Returns:
+            (S, M / stride); at the ends the last sample.
+        """
+        assert self.smoothed is not None
+        samples = shift * (len(self.grid) - 1) / (self.grid[-1] - self.grid[0])
+        whole = np.floor(samples)
+        part = (samples - whole)[:, None]
+        before = self.place[None, ::stride] + whole.astype(np.intp)[:, None]
+        column = np.ascontiguousarray(self.smoothed[:, joint])
+        return column.take(before, mode="clip") * (1 - part) + column.take(before + 1, mode="clip") * part
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        # Few excerpts of those that are tried are ever asked for it.
+        assert self.smoothed is not None
+        return CubicSpline(self.grid, self.smoothed)
 
 
 def cutoffs(period: float) -> tuple[float, ...]:
@@ -87,52 +138,67 @@ def stretches(parts: Sequence[tuple[int, int]]) -> list[slice]:
     return chosen
 
 
-def excerpt(log: Log, torque: Array | None, piece: slice, period: float, cutoff: float) -> Excerpt | None:
-    """Smooths one stretch, position and torque by the same filter, and thins it.
+def stretch(log: Log, torque: Array | None, piece: slice, period: float) -> Stretch | None:
+    """Puts some rows on an even grid.
 
     Args:
         log: the log.
         torque: (N, n), or None.
         piece: the rows.
         period: median step of the log [s].
-        cutoff: [Hz].
 
     Returns:
-        The stretch without its ends; None where too little is left.
+        The stretch; None where too little is left.
     """
     t, q = log.t[piece], log.q[piece]
     duration = float(t[-1] - t[0])
     grid = t[0] + period * np.arange(int(duration / period + 1e-6) + 1)
     if len(grid) < 24:
         return None
+    tau, velocity = (None if values is None else values[piece] for values in (torque, log.dq))
     # Messages that came twice: the position of the later one is old.
     fresh = np.concatenate([[True], np.any(q[1:] != q[:-1], axis=1)])
     uneven = np.abs(np.diff(t) - period).max() > 0.02 * period
-    if uneven or not fresh.all():
-        fresh = fresh if fresh.sum() > 0.5 * len(t) else np.ones(len(t), dtype=bool)
-        q = _at(grid, t[fresh], q[fresh])
-        tau = None if torque is None else _at(grid, t, torque[piece])
-        velocity = None if log.dq is None else _at(grid, t, log.dq[piece])
-    else:
-        grid, tau = t, None if torque is None else torque[piece]
-        velocity = None if log.dq is None else log.dq[piece]
-    q = _low_pass(q, period, cutoff)
-    dq = np.gradient(q, period, axis=0, edge_order=2)
-    ddq = np.gradient(dq, period, axis=0, edge_order=2)
-    edge = EDGE / cutoff
+    if not uneven and fresh.all():
+        return Stretch(t, q, tau, velocity)
+    fresh = fresh if fresh.sum() > 0.5 * len(t) else np.ones(len(t), dtype=bool)
+    tau, velocity = (None if values is None else _at(grid, t, values) for values in (tau, velocity))
+    return Stretch(grid, _at(grid, t[fresh], q[fresh]), tau, velocity)
+
+
+def excerpt(part: Stretch, period: float, cutoff: float) -> Excerpt | None:
+    """Smooths one stretch, position and torque by the same filter, and thins it.
+
+    Args:
+        part: the stretch.
+        period: of its grid [s].
+        cutoff: [Hz].
+
+    Returns:
+        The stretch without its ends; None where too little is left.
+    """
+    grid, edge = part.t, EDGE / cutoff
     inside = np.flatnonzero((grid >= grid[0] + edge) & (grid <= grid[-1] - edge))
     inside = inside[:: max(1, int(1.0 / (KEPT * cutoff * period)))]
     if len(inside) < 12:
         return None
-    spline = None if tau is None else CubicSpline(grid, _low_pass(tau, period, cutoff))
+    signals = [signal for signal in (part.q, part.torque, part.velocity) if signal is not None]
+    # One filter for all of them: its set-up costs as much as a column.
+    smooth = iter(np.split(_low_pass(np.hstack(signals), period, cutoff), len(signals), axis=1))
+    q = next(smooth)
+    dq = np.gradient(q, period, axis=0, edge_order=2)
+    ddq = np.gradient(dq, period, axis=0, edge_order=2)
+    tau = None if part.torque is None else next(smooth)
     return Excerpt(
         grid[inside],
         q[inside],
         dq[inside],
         ddq[inside],
-        spline,
-        None if tau is None else tau[inside],
-        None if velocity is None else _low_pass(velocity, period, cutoff)[inside],
+        None if part.torque is None else part.torque[inside],
+        None if part.velocity is None else next(smooth)[inside],
+        inside,
+        grid,
+        tau,
     )
 
 

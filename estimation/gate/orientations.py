@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.excerpts import Excerpt
 from estimation.gate.finding import Finding
-from estimation.gate.quick_fit import Rows, fit_all
+from estimation.gate.quick_fit import Rows
+from estimation.gate.whole_fit import RIDGES, Moments, fit_all
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -18,8 +19,8 @@ Array = NDArray[np.float64]
 WELL = 0.1
 # How much better (mean log error) the torques must be explained with a joint turned to be told, and to be beyond doubt.
 BETTER, CERTAIN = 0.2, 0.5
-# Rows that are enough to see it.
-ROWS = 1500
+# Rows that are enough to see it, and rows and a ridge that rule most joints out: less than half of `BETTER` on those.
+ROWS, FEW, RIDGE = 1500, 500, 1e-5
 
 
 def check_orientations(robot: Robot, rows: Rows, spread: Array) -> list[Finding]:
@@ -31,20 +32,33 @@ def check_orientations(robot: Robot, rows: Rows, spread: Array) -> list[Finding]
         spread: standard deviations of the torques (n,), zero where one does not vary.
     """
     joints = np.flatnonzero(spread > 0)
-    stride = max(1, len(rows.q) // ROWS)
-    thin = tuple(part.thinned(stride) for part in rows.excerpts)
-    before = _cost(robot, thin, spread, joints, np.ones(robot.n))
+
+    def moments(sign: Array, most: int) -> Moments:
+        thin = (part.thinned(max(1, len(rows.q) // most)) for part in rows.excerpts)
+        turned = (replace(part, q=part.q * sign, dq=part.dq * sign, ddq=part.ddq * sign) for part in thin)
+        return Rows.of(robot, tuple(turned)).moments(joints, raw=True)
+
+    def cost(moments: Moments, ridges: Sequence[float] = RIDGES) -> float:
+        unexplained = fit_all(moments, spread, ridges).unexplained[joints]
+        return float(np.mean(np.log(np.clip(unexplained, 1e-9, 1.0))))
+
+    straight = np.ones(robot.n)
+    before = cost(moments(straight, ROWS))
     if before < np.log(WELL):
         return []
+    enough = cost(moments(straight, FEW), (RIDGE,)) - BETTER / 2
     best, found = before - BETTER, None
     for joint in range(robot.n):
         sign = np.ones(robot.n)
         sign[joint] = -1.0
-        turned = tuple(replace(part, q=part.q * sign, dq=part.dq * sign, ddq=part.ddq * sign) for part in thin)
-        for torque_sign in (np.ones(robot.n), sign):
-            cost = _cost(robot, turned, spread, joints, torque_sign)
-            if cost < best:
-                best, found = cost, (joint, bool(torque_sign[joint] < 0))
+        some = moments(sign, FEW)
+        if min(cost(some.scaled(torque_sign), (RIDGE,)) for torque_sign in (straight, sign)) > enough:
+            continue
+        turned = moments(sign, ROWS)
+        for torque_sign in (straight, sign):
+            after = cost(turned.scaled(torque_sign))
+            if after < best:
+                best, found = after, (joint, bool(torque_sign[joint] < 0))
     if found is None:
         return []
     joint, with_torque = found
@@ -63,8 +77,3 @@ def check_orientations(robot: Robot, rows: Rows, spread: Array) -> list[Finding]
             joint=joint + 1,
         )
     ]
-
-
-def _cost(robot: Robot, excerpts: tuple[Excerpt, ...], spread: Array, joints: NDArray[np.intp], sign: Array) -> float:
-    moments = Rows.of(robot, excerpts).moments(joints, raw=True).scaled(sign)
-    return float(np.mean(np.log(np.clip(fit_all(moments, spread).unexplained[joints], 1e-9, 1.0))))

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.quick_fit import OWN, JointFit, Rows, regressor
+from estimation.gate.quick_fit import OWN, JointFit, Rows
+from estimation.gate.rigid_body import joint_rows
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -46,14 +47,33 @@ class JointPhysics:
         return float(np.abs(self.ratios).max())
 
 
-def joint_physics(robot: Robot, rows: Rows, fit: JointFit, joint: int) -> JointPhysics:
-    """Derives inertia and friction losses of a joint, counted from 0, from its fit."""
+def mean_inertias(robot: Robot, rows: Rows) -> list[Array]:
+    """What a unit acceleration of each joint costs it, by the parameters that act on it: n arrays (k_j,).
+
+    Args:
+        robot: with n joints.
+        rows: of the log, some of whose poses are averaged over.
+    """
     poses = rows.q[:: max(1, len(rows.q) // POSES)]
-    zero, unit = np.zeros_like(poses), np.zeros_like(poses)
-    unit[:, joint] = 1.0
-    felt = regressor(robot, poses, zero, unit)[:, joint] - regressor(robot, poses, zero, zero)[:, joint]
+    # Every joint in turn, and none: what is left is the mass matrix's diagonal.
+    accelerations = np.vstack([np.eye(robot.n), np.zeros(robot.n)])
+    q, ddq = np.tile(poses, (len(accelerations), 1)), np.repeat(accelerations, len(poses), axis=0)
+    felt = joint_rows(robot, q, np.zeros_like(q), ddq)
+    places = [slice(k * len(poses), (k + 1) * len(poses)) for k in range(len(accelerations))]
+    return [(own[places[joint]] - own[places[-1]]).mean(axis=0) for joint, own in enumerate(felt)]
+
+
+def joint_physics(rows: Rows, fit: JointFit, joint: int, felt: Array) -> JointPhysics:
+    """Derives inertia and friction losses of a joint from its fit.
+
+    Args:
+        rows: of the log.
+        fit: of the joint.
+        joint: counted from 0.
+        felt: of `mean_inertias` (k,).
+    """
     weights = np.zeros(len(fit.scale))
-    weights[: len(fit.used)] = felt.mean(axis=0)[fit.used]
+    weights[: len(fit.used)] = felt
     weights[-OWN] = 1.0
     inertia, inertia_error = fit.combination(weights)
     own = fit.Y[:, -OWN:] * fit.scale[-OWN:]

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from estimation.gate.excerpts import Excerpt
-from robots.regressor import TorqueModel
+from estimation.gate.rigid_body import joint_rows, rigid_body, used_columns
+from estimation.gate.whole_fit import Moments, solve_scaled
 from robots.robot import Robot
-from robots.terms import RigidBody
 
 Array = NDArray[np.float64]
+Places = NDArray[np.intp]
 
-# Added to the diagonal of the Gram matrix once its columns have unit length; the data choose.
-RIDGES = (1e-8, 1e-6, 1e-5, 1e-4, 1e-3)
 # Of a joint by itself: enough to tell directions apart that the joint alone hardly sees.
 OWN_RIDGE = 1e-6
 # Stretches of time that are left out in turn, and blocks whose residuals count as independent.
@@ -28,50 +26,21 @@ FOLDS, BLOCKS = 6, 60
 SHARP = 0.05
 # Columns that each joint has of its own, after those of the rigid body.
 OWN = 4  # rotor inertia, Coulomb, viscous, offset
-# Weights of the joints are set so many times from the residuals.
-ROUNDS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Moments:
-    """Normal equations of each joint and of each fold.
+class JointColumns:
+    """The columns of one joint: of the rigid body, then its own.
 
     Attributes:
-        gram: (F, n, p, p).
-        cross: (F, n, p).
-        square: (F, n), of the torque.
-        count: (F,) rows.
-        scale: (p,) by which the columns were divided.
+        Y: (M, k), scaled to unit mean square.
+        scale: (k,) by which they were divided.
+        used: indices of the rigid body's columns among its parameters.
     """
 
-    gram: Array
-    cross: Array
-    square: Array
-    count: Array
+    Y: Array
     scale: Array
-
-    def scaled(self, factor: Array) -> Moments:
-        """As if the torques (n,) were so many times what was logged."""
-        return Moments(self.gram, self.cross * factor[:, None], self.square * factor**2, self.count, self.scale)
-
-
-@dataclass(frozen=True, eq=False)
-class WholeFit:
-    """The fit of all joints at once.
-
-    Attributes:
-        values: (p,), of the scaled columns.
-        inverse: of the weighted Gram matrix with its ridge (p, p).
-        weights: of the joints (n,).
-        unexplained: error on left-out stretches over the standard deviation of the torque (n,).
-        cost: mean over the joints of the log of the residual's variance.
-    """
-
-    values: Array
-    inverse: Array
-    weights: Array
-    unexplained: Array
-    cost: float
+    used: NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,18 +78,6 @@ class JointFit:
         return value, float(np.sqrt(influence @ influence * blocks / max(blocks - 1, 1)))
 
 
-@lru_cache(maxsize=8)
-def rigid_body(robot: Robot) -> TorqueModel:
-    """The rigid body of a robot, kept: its expression takes longer than the check of a short log."""
-    return TorqueModel(robot, (RigidBody(),))
-
-
-def regressor(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
-    """Y (M, n, p) of the rigid body."""
-    # numpy rather than compiled code: the rows are few, and a compiler would take seconds.
-    return rigid_body(robot).regressor(q, dq, ddq, backend="vectorised")
-
-
 @dataclass(frozen=True, eq=False)
 class Rows:
     """All excerpts, one after the other.
@@ -130,7 +87,8 @@ class Rows:
         q: (M, n).
         dq: (M, n).
         ddq: (M, n).
-        Y: (M, n, p) of the rigid body.
+        joints: the columns of each joint (n).
+        bodies: number of the rigid body's parameters.
         block: (M,) which of the blocks a row belongs to.
         speed: RMS speed of each joint (n,).
     """
@@ -139,7 +97,8 @@ class Rows:
     q: Array
     dq: Array
     ddq: Array
-    Y: Array
+    joints: tuple[JointColumns, ...]
+    bodies: int
     block: NDArray[np.intp]
     speed: Array
 
@@ -152,8 +111,13 @@ class Rows:
         q, dq, ddq = (np.concatenate([getattr(part, name) for part in excerpts]) for name in ("q", "dq", "ddq"))
         rows = len(q)
         block = np.minimum((np.arange(rows) * BLOCKS) // rows, BLOCKS - 1)
-        Y = regressor(robot, q, dq, ddq)
-        return Rows(tuple(excerpts), q, dq, ddq, Y, block, np.sqrt(np.mean(dq**2, axis=0)))
+        speed = np.sqrt(np.mean(dq**2, axis=0))
+        bodies, used = joint_rows(robot, q, dq, ddq), used_columns(robot)
+        joints = tuple(
+            _joined(body, columns, dq[:, j], ddq[:, j], float(speed[j]))
+            for j, (body, columns) in enumerate(zip(bodies, used, strict=True))
+        )
+        return Rows(tuple(excerpts), q, dq, ddq, joints, rigid_body(robot).size, block, speed)
 
     def raw(self, joint: int) -> Array:
         """Torque of a joint (M,), counted from 0, as it was logged."""
@@ -161,7 +125,11 @@ class Rows:
 
     def torques(self, shift: float = 0.0, order: int = 0) -> Array:
         """Torques (M, n) as they are logged so much later [s], or their derivatives of some order."""
-        return np.concatenate([_evaluate(part, part.t + shift, order) for part in self.excerpts])
+        return np.concatenate([part.torque_at(part.t + shift, order) for part in self.excerpts])
+
+    def near_torques(self, shifts: Array, joint: int, stride: int) -> Array:
+        """Torque of a joint, counted from 0, so much later (S,) [s], on every so many rows of each stretch (S, M')."""
+        return np.concatenate([part.torque_near(shifts, joint, stride) for part in self.excerpts], axis=1)
 
     @cached_property
     def _torques(self) -> Array:
@@ -171,119 +139,102 @@ class Rows:
         """Torque of a joint (M,), counted from 0."""
         return np.ascontiguousarray(self._torques[:, joint])
 
-    def columns(self, joint: int) -> tuple[Array, NDArray[np.intp]]:
-        """Regressor of a joint (M, k) with its own columns, to be read only, and which of the rigid body's they are."""
-        if joint not in self._columns:
-            self._columns[joint] = self._joined(joint)
-        return self._columns[joint]
-
-    @cached_property
-    def _columns(self) -> dict[int, tuple[Array, NDArray[np.intp]]]:
-        return {}
-
-    def _joined(self, joint: int) -> tuple[Array, NDArray[np.intp]]:
-        # Rotor inertia, Coulomb, viscous, offset.
-        body = self.Y[:, joint]
-        used = np.flatnonzero(np.any(body != 0.0, axis=0))
-        dq = self.dq[:, joint]
-        sign = np.tanh(dq / max(SHARP * self.speed[joint], 1e-12))
-        own = np.column_stack([self.ddq[:, joint], sign, dq, np.ones(len(dq))])
-        return np.column_stack([body[:, used], own]), used
+    def thinned(self, stride: int) -> NDArray[np.intp]:
+        """The rows that remain of every so many of each stretch."""
+        ends = np.cumsum([len(part.t) for part in self.excerpts])
+        starts = np.concatenate([[0], ends[:-1]])
+        return np.concatenate([np.arange(start, end, stride) for start, end in zip(starts, ends, strict=True)])
 
     def fit(self, joint: int) -> JointFit:
         """Fits one joint, counted from 0, by itself: what is wrong with another joint does not touch it."""
-        Y, used = self.columns(joint)
-        tau = self.torque(joint)
-        scale = _scale(Y)
-        Y = Y / scale
+        own = self.joints[joint]
+        Y, tau = own.Y, self.torque(joint)
         gram = Y.T @ Y
-        values = _solve(gram, Y.T @ tau, OWN_RIDGE)
+        values = solve_scaled(gram, Y.T @ tau, OWN_RIDGE)
         residual = tau - Y @ values
-        scores = np.add.reduceat(Y * residual[:, None], self.starts, axis=0)
-        return JointFit(Y, scale, used, values, _solve(gram, np.eye(len(gram)), OWN_RIDGE), residual, scores)
+        scores = np.array([Y[rows].T @ residual[rows] for rows in self._blocks])
+        inverse = solve_scaled(gram, np.eye(len(gram)), OWN_RIDGE)
+        return JointFit(Y, own.scale, own.used, values, inverse, residual, scores)
 
     @property
     def starts(self) -> NDArray[np.intp]:
         """The first row of each block."""
         return np.flatnonzero(np.diff(self.block, prepend=-1))
 
+    @property
+    def _blocks(self) -> list[slice]:
+        return [slice(first, stop) for first, stop in pairwise([*self.starts.tolist(), len(self.block)])]
+
     def moments(self, joints: NDArray[np.intp], *, raw: bool = False) -> Moments:
         """Sums the normal equations of some joints, fold by fold, with smoothed torques or raw ones."""
-        n, p = len(self.speed), self.Y.shape[2] + OWN * len(self.speed)
-        bounds = np.linspace(0, len(self.q), FOLDS + 1).astype(int)
-        gram, cross, square = np.zeros((FOLDS, n, p, p)), np.zeros((FOLDS, n, p)), np.zeros((FOLDS, n))
-        for joint in map(int, joints):
-            Y, used = self.columns(joint)
-            where = np.concatenate([used, self.Y.shape[2] + OWN * joint + np.arange(OWN)])
+        chosen = tuple(map(int, joints))
+        gram, scale, places = self._gram(chosen)
+        n, folds, p = gram.shape[:3]
+        cross, square = np.zeros((n, folds, p)), np.zeros((n, folds))
+        for joint in chosen:
+            own = self.joints[joint]
             tau = self.raw(joint) if raw else self.torque(joint)
-            for k, (first, stop) in enumerate(pairwise(bounds)):
-                part = Y[first:stop]
-                gram[k, joint][np.ix_(where, where)] = part.T @ part
-                cross[k, joint, where] = part.T @ tau[first:stop]
-                square[k, joint] = float(tau[first:stop] @ tau[first:stop])
-        scale = np.sqrt(np.einsum("kjpp->p", gram) / len(self.q))
-        scale = np.where(scale > 0, scale, 1.0)
-        return Moments(gram / scale[:, None] / scale, cross / scale, square, np.diff(bounds).astype(float), scale)
+            acts, place = places[joint]
+            factor = own.scale[acts] / scale[place]
+            for k, rows in enumerate(self._folds):
+                cross[joint, k, place] = factor * (own.Y[rows].T @ tau[rows])[acts]
+                square[joint, k] = float(tau[rows] @ tau[rows])
+        return Moments(gram, cross, square, np.array([rows.stop - rows.start for rows in self._folds], dtype=float))
+
+    def _gram(self, joints: tuple[int, ...]) -> tuple[Array, Array, dict[int, tuple[Places, Places]]]:
+        """Gram matrices (n, F, p, p) of the columns that act at all, of unit mean square over these joints.
+
+        They are the same for smoothed torques and raw ones, and kept for the latest joints asked for.
+
+        Returns:
+            The matrices, what the columns were divided by (p,), and of each joint which of its columns act and where
+            they stand.
+        """
+        if joints not in self._grams:
+            energy = np.zeros(self.bodies + OWN * len(self.speed))
+            parts = {}
+            for joint in joints:
+                own = self.joints[joint]
+                parts[joint] = [own.Y[rows].T @ own.Y[rows] for rows in self._folds]
+                energy[self._place(joint)] += own.scale**2 * sum(np.diag(part) for part in parts[joint])
+            kept = np.flatnonzero(energy > 0)
+            scale = np.sqrt(energy[kept] / len(self.q))
+            gram = np.zeros((len(self.speed), FOLDS, len(kept), len(kept)))
+            places = {}
+            for joint in joints:
+                at = self._place(joint)
+                acts = np.flatnonzero(energy[at] > 0)
+                places[joint] = acts, np.searchsorted(kept, at[acts])
+                place = places[joint][1]
+                factor = self.joints[joint].scale[acts] / scale[place]
+                for k, part in enumerate(parts[joint]):
+                    gram[joint, k][np.ix_(place, place)] = part[np.ix_(acts, acts)] * factor[:, None] * factor
+            self._grams.clear()
+            self._grams[joints] = gram, scale, places
+        return self._grams[joints]
+
+    @cached_property
+    def _grams(self) -> dict[tuple[int, ...], tuple[Array, Array, dict[int, tuple[Places, Places]]]]:
+        return {}
+
+    @property
+    def _folds(self) -> list[slice]:
+        bounds = np.linspace(0, len(self.q), FOLDS + 1).astype(int).tolist()
+        return [slice(first, stop) for first, stop in pairwise(bounds)]
+
+    def _place(self, joint: int) -> NDArray[np.intp]:
+        """Where a joint's columns stand among those of all joints."""
+        return np.concatenate([self.joints[joint].used, self.bodies + OWN * joint + np.arange(OWN)])
 
 
-def fit_all(moments: Moments, spread: Array) -> WholeFit:
-    """Fits all joints at once, each weighted by its residual, with the ridge that predicts left-out stretches best.
-
-    Args:
-        moments: of the joints.
-        spread: standard deviation of the torques (n,).
-    """
-    gram, cross, square = (array.sum(axis=0) for array in (moments.gram, moments.cross, moments.square))
-    rows = moments.count.sum()
-    floor = 1e-12 * square / rows + np.finfo(float).tiny
-    used = spread > 0
-    weights = np.where(used, 1.0 / np.where(used, spread, 1.0) ** 2, 0.0)
-    for _ in range(ROUNDS):
-        values = _solve(np.tensordot(weights, gram, 1), weights @ cross, RIDGES[1])
-        variance = np.maximum(_squares(gram, cross, square, values) / rows, floor)
-        weights = np.where(used, 1.0 / variance, 0.0)
-    best = np.full(len(spread), np.inf)
-    ridge, lowest = RIDGES[0], np.inf
-    for candidate in RIDGES:
-        error = np.zeros(len(spread))
-        for k in range(FOLDS):
-            others = _solve(
-                np.tensordot(weights, gram - moments.gram[k], 1), weights @ (cross - moments.cross[k]), candidate
-            )
-            error += _squares(moments.gram[k], moments.cross[k], moments.square[k], others)
-        relative = np.sqrt(error / rows) / np.where(used, spread, np.inf)
-        cost = float(np.mean(np.log(np.clip(relative[used], 1e-9, 1.0)))) if used.any() else 0.0
-        if cost < lowest - 1e-3:
-            lowest, ridge, best = cost, candidate, relative
-    total = np.tensordot(weights, gram, 1)
-    values = _solve(total, weights @ cross, ridge)
-    variance = np.maximum(_squares(gram, cross, square, values) / rows, floor)
-    cost = float(np.mean(np.log(variance[used]))) if used.any() else 0.0
-    return WholeFit(values, _solve(total, np.eye(len(total)), ridge), weights, np.where(used, best, np.nan), cost)
-
-
-def _squares(gram: Array, cross: Array, square: Array, values: Array) -> Array:
-    """Sum of squared residuals of each joint (n,)."""
-    return np.asarray(np.maximum(square - 2 * cross @ values + (gram @ values) @ values, 0.0))
-
-
-def _scale(Y: Array) -> Array:
-    scale = np.sqrt(np.mean(Y**2, axis=0))
-    return np.where(scale > 0, scale, 1.0)
-
-
-def _evaluate(part: Excerpt, t: Array, order: int = 0) -> Array:
-    assert part.torque is not None
-    return np.asarray(part.torque(np.clip(t, part.torque.x[0], part.torque.x[-1]), order))
-
-
-def _solve(gram: Array, cross: Array, ridge: float) -> Array:
-    scale = np.sqrt(np.diag(gram))
+def _joined(body: Array, used: NDArray[np.intp], dq: Array, ddq: Array, speed: float) -> JointColumns:
+    """Sets rotor inertia, Coulomb and viscous friction and offset beside the rigid body's columns (M, k)."""
+    Y = np.empty((len(body), body.shape[1] + OWN))
+    Y[:, :-OWN] = body
+    sign = np.tanh(dq / max(SHARP * speed, 1e-12))
+    for column, values in enumerate((ddq, sign, dq, 1.0), start=body.shape[1]):
+        Y[:, column] = values
+    scale = np.sqrt(np.einsum("ik,ik->k", Y, Y) / len(Y))
     scale = np.where(scale > 0, scale, 1.0)
-    scaled, right = gram / scale[:, None] / scale, cross / scale.reshape((-1,) + (1,) * (cross.ndim - 1))
-    try:
-        solved = cho_solve(cho_factor(scaled + ridge * np.eye(len(gram))), right)
-    except LinAlgError:
-        # Values that differ by twelve orders of magnitude: rounding has made the matrix indefinite.
-        solved = np.linalg.lstsq(scaled + ridge * np.eye(len(gram)), right, rcond=1e-9)[0]
-    return np.asarray(solved / scale.reshape((-1,) + (1,) * (cross.ndim - 1)))
+    Y /= scale
+    return JointColumns(Y, scale, used)

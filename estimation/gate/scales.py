@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.finding import Finding
-from estimation.gate.quick_fit import OWN, JointFit, Moments, Rows, fit_all, rigid_body
+from estimation.gate.quick_fit import OWN, JointFit, Rows
+from estimation.gate.rigid_body import rigid_body
+from estimation.gate.whole_fit import Moments, fit_all
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -65,7 +67,7 @@ def check_size(
     nominal = np.asarray(robot.inertia, dtype=float).ravel()
     if not np.isfinite(nominal).all() or not np.any(nominal):
         return []
-    expected = rows.Y @ rigid_body(robot).nominal
+    described = rigid_body(robot).nominal
     findings = []
     for joint, fit in enumerate(fits, start=1):
         if fit is None or joint in known:
@@ -73,10 +75,11 @@ def check_size(
         tau = fit.Y @ fit.values + fit.residual
         # Friction and offset are no matter of the description.
         own = fit.Y[:, -OWN + 1 :]
-        both = np.column_stack([expected[:, joint - 1], tau])
+        expected = fit.Y[:, :-OWN] @ (fit.scale[:-OWN] * described[fit.used])
+        both = np.column_stack([expected, tau])
         both = both - own @ np.linalg.lstsq(own, both, rcond=None)[0]
         model, rest = both.T
-        if model @ model < 1e-4 * (expected[:, joint - 1] @ expected[:, joint - 1]) or not rest @ rest > 0:
+        if model @ model < 1e-4 * (expected @ expected) or not rest @ rest > 0:
             continue
         slope = float(model @ rest / (model @ model))
         likeness = float(model @ rest / np.sqrt((model @ model) * (rest @ rest)))

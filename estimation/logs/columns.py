@@ -51,7 +51,7 @@ QUANTITIES = (
     Quantity(prefix="i", field="current", unit="A", units={"A": 1.0, "mA": 1e-3}),
     Quantity(prefix="temp", field="temperature", unit="degC", units={"degC": 1.0, "deg_C": 1.0}, complete=False),
     Quantity(prefix="temp_env", field="ambient", unit="degC", units={"degC": 1.0, "deg_C": 1.0}, per_joint=False),
-    Quantity(prefix="qlink", field="qlink", unit="rad", units=_POSITION),
+    Quantity(prefix="qlink", field="qlink", unit="rad", units=_POSITION, complete=False),
     Quantity(prefix="segment", field="segment", unit="", units={"": 1.0}, per_joint=False),
     Quantity(prefix="cycle", field="cycle", unit="", units={"": 1.0}, per_joint=False),
 )

@@ -192,7 +192,11 @@ def map_table(table: Table, mapping: LogMapping, joints: int) -> Table:
             raise InputError(
                 f"the mapping has {len(names)} columns of {quantity.prefix}", file=table.path, allowed=f"{joints}"
             )
+        present = set(table.names)
         for joint, name in enumerate(names, start=1):
+            # Not every joint has a thermometer, or an encoder behind its gear.
+            if not quantity.complete and name not in present and present.intersection(names):
+                continue
             columns[column_name(quantity, joint)] = _converted(table, mapping, entry, quantity, joint, name, joints)
         taken.update(names)
     if mapping.torque_constant is not None:

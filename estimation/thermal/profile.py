@@ -46,7 +46,7 @@ def slow_bound(
     current = solution.coordinates
 
     def kept(constant: float) -> Solution:
-        return solve(problem, current, free, weights, prior, slow=(power, float(np.exp(constant))), max_iterations=100)
+        return solve(problem, current, free, weights, prior, slow=(power, float(np.exp(constant))), max_iterations=1500)
 
     for _ in range(STEPS):
         middle = (low + high) / 2.0

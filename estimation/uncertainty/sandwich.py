@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from estimation.uncertainty.autoregressive import HIGHEST_ORDER, Noise, autocovariance, fit_noise
+from estimation.uncertainty.averages import Averages
 
 Array = NDArray[np.float64]
 
@@ -18,6 +19,8 @@ CHUNK = 4096
 # Above so many rows the fit eats too little of the noise to matter.
 MOST_CORRECTED = 30_000
 DRAWS, ROUNDS = 8, 2
+# So many times Akaike's order: standard errors hang on the noise's density at rest, where that order stops short.
+ORDERS = 2
 # Fewer batches than this say too little of a standard error.
 LEAST_BATCHES = 100
 
@@ -56,7 +59,9 @@ class Part:
             yield slice(start, min(start + CHUNK, self.rows))
 
 
-def covariance(parts: Sequence[Part], weights: Array, inverse: Array, seed: int = 0, share: float = 1.0) -> Array:
+def covariance(
+    parts: Sequence[Part], weights: Array, inverse: Array, seed: int = 0, share: float = 1.0, averaged: int = 1
+) -> Array:
     """Estimates the covariance of weighted least squares.
 
     The meat of the sandwich is Y'W Gamma W Y, Gamma the autocovariance of an autoregressive model of the residual, with
@@ -71,20 +76,49 @@ def covariance(parts: Sequence[Part], weights: Array, inverse: Array, seed: int 
         inverse: of the weighted Gram matrix (p, p).
         seed: of the drawn noise.
         share: of the fitted rows that the parts hold, where they stand for a longer log.
+        averaged: of more than `MOST_CORRECTED` rows so many are averaged at a time, see `Averages`.
 
     Returns:
         The covariance (p, p).
     """
-    plain = _noise(parts, np.zeros((len(weights), HIGHEST_ORDER + 1)))
     # Of a long log the fit eats too little of the noise to matter.
-    noise = _corrected(parts, weights, inverse, plain, np.random.default_rng(seed)) if share == 1 else plain
-    model, robust = (meat / share for meat in _meats(parts, weights, noise, len(inverse)))
+    long = sum(part.rows for part in parts) > MOST_CORRECTED
+    seen: Sequence[Part | Averages] = parts
+    lost = np.zeros_like(inverse)
+    if long and averaged > 1:
+        whole = [part for part in parts if part.rows >= averaged]
+        averages = [Averages.of(part.columns, part.mask, part.residual, averaged, CHUNK) for part in whole]
+        lost = sum((part.lost(weights, len(inverse)) for part in averages), start=lost)
+        seen = averages
+    plain = noise = _noise(seen, np.zeros((len(weights), HIGHEST_ORDER + 1)))
+    if share == 1 and not long:
+        noise = _corrected(parts, weights, inverse, plain, np.random.default_rng(seed))
+    model, robust = ((meat + lost) / share for meat in _meats(seen, weights, noise, len(inverse)))
     scale = float(np.mean(np.diag(noise.covariance) / np.diag(plain.covariance)))
-    first, second = inverse @ model @ inverse, scale * (inverse @ robust @ inverse)
-    errors = np.sqrt(np.maximum(np.diag(first), 0))
-    safe = np.where(errors > 0, errors, 1.0)
-    factor = np.maximum(1.0, np.sqrt(np.maximum(np.diag(second), 0)) / safe)
+    first, second = spread_of(model, inverse), scale * spread_of(robust, inverse)
+    own, other = np.diag(first), np.diag(second)
+    factor = np.sqrt(np.maximum(1.0, np.divide(other, own, out=np.ones_like(own), where=own > 0)))
     return first * factor[:, None] * factor
+
+
+def spread_of(meat: Array, inverse: Array) -> Array:
+    """Multiplies inverse meat inverse (p, p), positive definite whatever rounding leaves of it.
+
+    Along directions that the data hardly determine the inverse is of the order of 1e13, and its products with a meat of
+    sixteen digits are rounding of either sign. As R'R, R = root(meat) inverse, they are a variance all the same; and an
+    eigenvalue of the meat is not known below its last digit, so that a direction without data comes out as one of which
+    nothing is known, not as one without error.
+
+    Args:
+        meat: symmetric, positive semidefinite up to rounding (p, p).
+        inverse: symmetric (p, p).
+    """
+    scale = np.sqrt(np.maximum(np.diag(meat), 0.0))
+    scale = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(meat / scale[:, None] / scale)
+    known = max(float(values[-1]), np.finfo(float).tiny) * len(values) * np.finfo(float).eps
+    root = (np.sqrt(np.maximum(values, known)) * vectors).T @ (scale[:, None] * inverse)
+    return np.asarray(root.T @ root)
 
 
 def white_noise_covariance(parts: Sequence[Part], weights: Array, inverse: Array) -> Array:
@@ -97,7 +131,7 @@ def white_noise_covariance(parts: Sequence[Part], weights: Array, inverse: Array
             Y = part.regressor(rows.start, rows.stop) * (weights * np.sqrt(variance) * part.mask[rows])[:, :, None]
             flat = Y.reshape(-1, Y.shape[2])
             meat += flat.T @ flat
-    return inverse @ meat @ inverse
+    return spread_of(meat, inverse)
 
 
 def batch_factors(scores: Array, inverse: Array, model: Array) -> Array:
@@ -125,16 +159,14 @@ def batch_factors(scores: Array, inverse: Array, model: Array) -> Array:
     return np.where(ratio > 1 + 2 / np.sqrt(2 * batches), ratio, ones)
 
 
-def _noise(parts: Sequence[Part], correction: Array) -> Noise:
+def _noise(parts: Sequence[Part | Averages], correction: Array) -> Noise:
     counts = sum(part.mask.sum(axis=0) for part in parts)
     residual = np.concatenate([part.residual for part in parts])
     own = np.stack([autocovariance(residual[:, j], counts[j]) for j in range(residual.shape[1])])
-    return fit_noise(residual, counts, own + correction)
+    return fit_noise(residual, counts, own + correction, ORDERS)
 
 
 def _corrected(parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, rng: np.random.Generator) -> Noise:
-    if sum(part.rows for part in parts) > MOST_CORRECTED:
-        return noise
     for _ in range(ROUNDS):
         noise = _noise(parts, _lost(parts, weights, inverse, noise, rng))
     return noise
@@ -166,7 +198,7 @@ def _lost(parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, r
     return lost / DRAWS
 
 
-def _meats(parts: Sequence[Part], weights: Array, noise: Noise, size: int) -> tuple[Array, Array]:
+def _meats(parts: Sequence[Part | Averages], weights: Array, noise: Noise, size: int) -> tuple[Array, Array]:
     """The sandwich's meat from the model, and from the products of innovations (p, p)."""
     products = robust = np.zeros((0, 0))
     owner, gather = np.zeros(0, dtype=np.intp), np.zeros((0, size))

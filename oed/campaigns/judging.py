@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from estimation.diagnosis.baseline import FAINT
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.next_experiment import Grams
+from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.power import chance_to_resolve
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.whitening import orthonormal
 from oed.campaigns.discrimination import Judged
 from oed.campaigns.separating import Run
 from robots.common.errors import NotIdentifiableError

@@ -64,7 +64,10 @@ def design(
         str | None, typer.Option(help="Torque noise of each joint [N m], separated by commas.", show_default=False)
     ] = None,
     after: Annotated[
-        Path | None, typer.Option(help="A model.json: add what it does not know yet.", show_default=False)
+        Path | None,
+        typer.Option(
+            help="A model.json: add what it does not know yet; extensions count in torque limits.", show_default=False
+        ),
     ] = None,
     task: Annotated[
         Path | None, typer.Option(help="A trajectory.csv whose torques are to be predicted.", show_default=False)
@@ -121,6 +124,7 @@ def design(
 
         with ResultFolder(out, force, names=["trajectory.csv", "design.json", "report.html"]) as folder:
             described = robot_from(robot, tip, joints, lock)
+            prior, effects = prior_from(after, described.n) if after else (None, ())
             result = run(
                 described,
                 criterion=criterion,
@@ -140,7 +144,8 @@ def design(
                 essential=essential,
                 scaling=scaling,
                 noise=numbers("--noise", noise),
-                after=prior_from(after) if after else None,
+                after=prior,
+                effects=effects,
                 task=read_trajectory(task, n=described.n)[0] if task else None,
                 effort=effort,
                 time_limit=float("inf") if time_limit is None else time_limit,

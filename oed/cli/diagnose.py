@@ -24,6 +24,7 @@ from robots.common.progress import Progress
 
 if TYPE_CHECKING:
     from robots.robot import Robot
+    from robots.signals import Log
 
 
 def diagnose(
@@ -37,6 +38,14 @@ def diagnose(
         list[Path] | None,
         typer.Option(
             "--held-out", help="A log to measure the gain on; by default whole runs are kept.", show_default=False
+        ),
+    ] = None,
+    payload: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--payload",
+            help="A log that carries a known payload, as NUMBER=KG,X,Y,Z: its centre [m] in the flange's frame.",
+            show_default=False,
         ),
     ] = None,
     friction: Annotated[str, typer.Option(help="Of the base model: polynomial or coulomb-viscous.")] = "polynomial",
@@ -73,13 +82,14 @@ def diagnose(
     with console.working() as progress:
         described = robot_from(robot, tip, joints, lock)
         if limits:
-            if log or held_out or not trajectory:
+            if log or held_out or payload or not trajectory:
                 raise typer.BadParameter("--limits takes --trajectory, and no logs", ctx=context)
             summary, data = _limits(described, trajectory, model, noise, out, force, progress)
         else:
             if not log or trajectory or model:
                 raise typer.BadParameter("give --log, or --limits with --trajectory", ctx=context)
-            summary, data = _diagnosis(described, log, held_out or [], friction, seed, out, png, force, progress)
+            loads = dict(map(_payload, payload or []))
+            summary, data = _diagnosis(described, log, held_out or [], loads, friction, seed, out, png, force, progress)
     console.result(f"{summary}\nwritten to {out.resolve()}", data)
 
 
@@ -110,6 +120,7 @@ def _limits(
     with ResultFolder(out, force, names=["limits.json", "report.html"]) as folder:
         torque_model = default_model(robot, velocity_scale=1e-3)
         parameters = np.asarray(torque_model.nominal)
+        beyond: list[str] = []
         if model is not None:
             known = load_model(model)
             if known.robot.n != robot.n:
@@ -117,6 +128,7 @@ def _limits(
             torque_model = known.torque_model
             parameters = np.zeros(torque_model.size)
             parameters[list(known.columns)] = known.values
+            beyond = [e.effect if e.joint is None else f"{e.effect} of joint {e.joint}" for e in known.extensions]
         motions: list[Motion] = []
         for path in trajectories:
             motion = read_trajectory(path)[0]
@@ -126,7 +138,11 @@ def _limits(
             motions.append(Motion(motion.t - motion.t[0] + start, motion.q, motion.dq, motion.ddq))
         progress.start("all effects, all joints", None)
         found = planned_limits(torque_model, parameters, motions, noise=Sensors(torque_noise=max(noise, 1e-4)))
-        data = {"robot": robot.name, "limits": [limit.to_dict() for limit in found]}
+        data = {
+            "robot": robot.name,
+            "limits": [limit.to_dict() for limit in found],
+            "extensions_not_counted": beyond,
+        }
         write_atomic(folder.path("limits.json"), codec.dumps(data, indent=2, allow_nan=False) + "\n")
         save_limits_report(found, robot.title or robot.name, folder)
     hidden = sum(not np.isfinite(limit.detectable) for limit in found)
@@ -141,6 +157,8 @@ def _limits(
         f"{_percent(limit.attributable):>11}   {limit.toughest or ''}".rstrip()
         for limit in found
     ]
+    if beyond:
+        summary.append(f"  limits beside the base model; the model's extensions are not counted: {', '.join(beyond)}")
     return "\n".join(summary), data
 
 
@@ -148,10 +166,46 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2g}" if share < float("inf") else "-"
 
 
+def _payload(text: str) -> tuple[int, list[float]]:
+    """Reads NUMBER=KG,X,Y,Z: the ten inertial parameters of a point mass."""
+    from robots.common.errors import InputError
+
+    number, _, values = text.partition("=")
+    try:
+        mass, x, y, z = map(float, values.split(","))
+        body = [mass, mass * x, mass * y, mass * z]
+        body += [mass * (y * y + z * z), -mass * x * y, -mass * x * z, mass * (x * x + z * z), -mass * y * z]
+        return int(number), [*body, mass * (x * x + y * y)]
+    except ValueError:
+        raise InputError(
+            f"--payload {text}",
+            allowed="NUMBER=KG,X,Y,Z, as 2=5,0,0,0.1 for 5 kg a tenth of a metre ahead of the flange in the second log",
+        ) from None
+
+
+def _laden(logs: list[Log], payloads: dict[int, list[float]]) -> list[Log]:
+    """Tells logs, counted from 1 in the order of reading, what they carry."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from robots.common.errors import InputError
+
+    for number in payloads:
+        if not 1 <= number <= len(logs):
+            raise InputError(
+                f"--payload of log {number}", allowed=f"1 to {len(logs)}: the logs in the order they are read"
+            )
+    return [
+        replace(log, payload=np.array(payloads[i])) if i in payloads else log for i, log in enumerate(logs, start=1)
+    ]
+
+
 def _diagnosis(
     robot: Robot,
     logs: list[Path],
     held_out: list[Path],
+    payloads: dict[int, list[float]],
     friction: str,
     seed: int,
     out: Path,
@@ -168,7 +222,7 @@ def _diagnosis(
     from robots.common.files import ResultFolder
 
     with ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]) as folder:
-        read = read_logs(logs, n=robot.n)
+        read = _laden(read_logs(logs, n=robot.n), payloads)
         other = read_logs(held_out, n=robot.n) if held_out else None
         result = run(robot, read, held_out=other, friction=friction, seed=seed, progress=progress)
         result.save(folder.path("diagnosis.json").parent)

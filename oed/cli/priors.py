@@ -6,17 +6,37 @@ from pathlib import Path
 
 import numpy as np
 
-from estimation import load_model
+from estimation import Model, load_model
 from oed.criteria import Prior
+from robots.common.errors import InputError
+from robots.plants import PlantEffect
 
 
-def prior_from(path: Path) -> Prior:
-    """Reads the information that a model file carries.
+def prior_from(path: Path, n: int) -> tuple[Prior, tuple[PlantEffect, ...]]:
+    """Reads the information that a model file carries, and what the robot has beyond its description.
+
+    Args:
+        path: of a model.json.
+        n: the number of joints of the robot.
 
     Raises:
-        InputError: no model file.
+        InputError: no model file, or one of another number of joints.
     """
     model = load_model(path)
+    if model.robot.n != n:
+        raise InputError(f"a model of {model.robot.n} joints", file=path, allowed=f"{n}")
+    return _prior(model), tuple(
+        PlantEffect(
+            effect=extension.effect,
+            joint=extension.joint,
+            coefficients=tuple(float(c) for c in extension.coefficients),
+            shape=tuple(extension.shape),
+        )
+        for extension in model.extensions
+    )
+
+
+def _prior(model: Model) -> Prior:
     covariance = model.covariance.copy()
     lost = ~model.determined
     covariance[np.diag_indices(len(covariance))] = np.where(lost, np.inf, np.diag(covariance))

@@ -40,6 +40,14 @@ def simulate(
         Path | None,
         typer.Option("--plant", help="A plant YAML; by default the robot's nominal dynamics.", show_default=False),
     ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            "--model",
+            help="Instead of a plant: a model.json that the robot obeys, extensions included.",
+            show_default=False,
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -68,6 +76,8 @@ def simulate(
 
         if (trajectory is None) == (campaign is None):
             raise typer.BadParameter("give either --trajectory or --campaign", ctx=context)
+        if model is not None and (plant or campaign):
+            raise typer.BadParameter("--model takes the place of --plant, and plays a --trajectory", ctx=context)
         given = robot_from(robot, tip, joints, lock) if robot else None
         if campaign is not None:
             planned = Campaign.load(campaign, given)
@@ -91,7 +101,13 @@ def simulate(
             described = given or robot_from(str(metadata["robot"]), tip, joints, lock)
             target = out or Path("log.csv")
             progress.start("simulating", None)
-            virtual = load_plant(plant, described) if plant else nominal_plant(described)
+            if model is not None:
+                from estimation import load_model
+                from estimation.virtual_robot import virtual_robot
+
+                virtual = virtual_robot(load_model(model), described)
+            else:
+                virtual = load_plant(plant, described) if plant else nominal_plant(described)
             log = run(virtual, motion, seed=seed)
             write_log(target, log, force=force)
             data = {"file": str(target), "samples": len(log), "duration": log.duration, "robot": described.name}

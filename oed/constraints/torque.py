@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import casadi
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from oed.constraints.pointwise import PointwiseLimit
 from robots.batch import batch_function
 from robots.common.errors import InfeasibleError, InputError
+from robots.plants import PlantEffect
 from robots.regressor import TorqueModel
 
 Array = NDArray[np.float64]
@@ -24,6 +26,7 @@ class TorqueLimit(PointwiseLimit):
         parameters: (p,), all finite.
         limit: (n,) [N m or N], infinite where there is none.
         margin: share of the limit kept for what the parameters are wrong by, 0 to below 1.
+        effects: what the robot has beyond the model: effects of position, velocity and acceleration.
 
     Raises:
         InputError: parameters that are not finite, no joint with a limit, or a margin out of range.
@@ -32,7 +35,15 @@ class TorqueLimit(PointwiseLimit):
 
     name = "torque"
 
-    def __init__(self, model: TorqueModel, parameters: ArrayLike, limit: ArrayLike, *, margin: float = 0.1) -> None:
+    def __init__(
+        self,
+        model: TorqueModel,
+        parameters: ArrayLike,
+        limit: ArrayLike,
+        *,
+        margin: float = 0.1,
+        effects: Sequence[PlantEffect] = (),
+    ) -> None:
         pi, bound = np.asarray(parameters, dtype=float), np.asarray(limit, dtype=float)
         if not 0 <= margin < 1:
             raise InputError(f"a torque margin of {margin}", allowed="0 to below 1")
@@ -45,12 +56,16 @@ class TorqueLimit(PointwiseLimit):
         if not limited.size:
             raise InputError("no joint has a torque limit")
         self.model, self.parameters, self.margin, self._bound = model, pi, margin, bound
+        self.effects = tuple(effects)
         self.joints = tuple(int(j) + 1 for j in limited)
         self.labels = tuple(f"torque of joint {joint}" for joint in self.joints)
         self.lower, self.upper = -np.ones(len(limited)), np.ones(len(limited))
         symbolic = model.symbolic()
         symbols = [casadi.SX.sym(name, model.robot.n) for name in ("q", "dq", "ddq")]
-        torque = (symbolic(*symbols) @ casadi.SX(pi))[limited.tolist()] / casadi.SX((1 - margin) * bound[limited])
+        total = symbolic(*symbols) @ casadi.SX(pi)
+        for effect in self.effects:
+            total += effect.expression(model, pi, *symbols)
+        torque = total[limited.tolist()] / casadi.SX((1 - margin) * bound[limited])
         torque = casadi.densify(torque)
         slope = casadi.densify(casadi.jacobian(torque, casadi.vertcat(*symbols)))
         self._values = batch_function(casadi.Function("torque", symbols, [torque]))
@@ -58,7 +73,7 @@ class TorqueLimit(PointwiseLimit):
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Compiled code does not cross process borders; it is found again in the cache.
-        return _rebuild, (self.model, self.parameters, self._bound, self.margin)
+        return _rebuild, (self.model, self.parameters, self._bound, self.margin, self.effects)
 
     def values(self, q: Array, dq: Array, ddq: Array) -> Array:
         """Gives torque over the usable limit (M, R)."""
@@ -89,5 +104,7 @@ class TorqueLimit(PointwiseLimit):
             )
 
 
-def _rebuild(model: TorqueModel, parameters: Array, limit: Array, margin: float) -> TorqueLimit:
-    return TorqueLimit(model, parameters, limit, margin=margin)
+def _rebuild(
+    model: TorqueModel, parameters: Array, limit: Array, margin: float, effects: tuple[PlantEffect, ...]
+) -> TorqueLimit:
+    return TorqueLimit(model, parameters, limit, margin=margin, effects=effects)

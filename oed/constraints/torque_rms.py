@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from oed.constraints.torque import TorqueLimit
 from robots.common.errors import InfeasibleError
+from robots.plants import PlantEffect
 from robots.regressor import TorqueModel
 
 Array = NDArray[np.float64]
@@ -22,6 +24,7 @@ class TorqueRms:
         parameters: (p,), all finite.
         limit: (n,) [N m or N], infinite where there is none.
         margin: share of the limit kept for what the parameters are wrong by, 0 to below 1.
+        effects: see `TorqueLimit`.
 
     Raises:
         InputError: as `TorqueLimit` does.
@@ -30,15 +33,24 @@ class TorqueRms:
 
     name = "torque RMS"
 
-    def __init__(self, model: TorqueModel, parameters: ArrayLike, limit: ArrayLike, *, margin: float = 0.1) -> None:
-        self._torque = TorqueLimit(model, parameters, limit, margin=margin)
+    def __init__(
+        self,
+        model: TorqueModel,
+        parameters: ArrayLike,
+        limit: ArrayLike,
+        *,
+        margin: float = 0.1,
+        effects: Sequence[PlantEffect] = (),
+    ) -> None:
+        self._torque = TorqueLimit(model, parameters, limit, margin=margin, effects=effects)
+        self.effects = self._torque.effects
         self.model, self.parameters = self._torque.model, self._torque.parameters
         self.limit = np.asarray(limit, dtype=float)
         self.margin, self.joints = margin, self._torque.joints
         self.labels = tuple(f"torque RMS of joint {joint}" for joint in self.joints)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (self.model, self.parameters, self.limit, self.margin)
+        return _rebuild, (self.model, self.parameters, self.limit, self.margin, self.effects)
 
     def values(self, q: Array, dq: Array, ddq: Array) -> Array:
         """Gives the root mean square over samples (M, n) as shares of the usable limits (R,)."""
@@ -71,5 +83,7 @@ class TorqueRms:
             )
 
 
-def _rebuild(model: TorqueModel, parameters: Array, limit: Array, margin: float) -> TorqueRms:
-    return TorqueRms(model, parameters, limit, margin=margin)
+def _rebuild(
+    model: TorqueModel, parameters: Array, limit: Array, margin: float, effects: tuple[PlantEffect, ...]
+) -> TorqueRms:
+    return TorqueRms(model, parameters, limit, margin=margin, effects=effects)

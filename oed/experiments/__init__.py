@@ -1,6 +1,7 @@
 """Experiments: the design problem, its solver, and the verb that puts them together."""
 
-from oed.experiments.designing import design, usable_limits
+from oed.experiments.checks import usable_limits
+from oed.experiments.designing import design
 from oed.experiments.pareto import ParetoFront, pareto
 from oed.experiments.quality import Quality
 from oed.experiments.result import Design, Outcome

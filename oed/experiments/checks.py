@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from oed.retiming import finite_limits
 from robots.common.errors import InfeasibleError, InputError
 from robots.limits import Limits
 
+# The controller interpolates between the file's samples; a hair of every limit is left to it.
+RESERVE = 0.9995
 # The share of its range that a joint must be able to travel in one period for an experiment to be worth its name.
 TRAVEL = 0.01
 
@@ -58,3 +63,18 @@ def check_period(limits: Limits, base_frequency: float) -> None:
             joint=joint + 1,
             allowed=f"{shortest[joint]:.3g} s or longer, that is a base frequency up to {1 / shortest[joint]:.3g} Hz",
         )
+
+
+def usable_limits(limits: Limits, velocity_fraction: float = 1.0) -> Limits:
+    """Completes infinite acceleration and jerk limits, and keeps a reserve for what happens between the samples.
+
+    Raises:
+        InfeasibleError: a limit of zero.
+        InputError: a joint without a velocity limit.
+    """
+    scaled = finite_limits(limits).scaled(
+        velocity=RESERVE * velocity_fraction, acceleration=RESERVE, jerk=RESERVE, torque=1.0
+    )
+    ranges = limits.upper - limits.lower
+    narrower = np.where(np.isfinite(ranges), ranges, 0.0) * (1 - RESERVE) / 2
+    return replace(scaled, lower=scaled.lower + narrower, upper=scaled.upper - narrower)

@@ -16,7 +16,7 @@ from oed.criteria import Criterion, Prior
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.assembly import assemble, rest_pose
 from oed.experiments.board import Board, outlive_interrupts, stopped_by_interrupt
-from oed.experiments.checks import check_options, check_period
+from oed.experiments.checks import check_options, check_period, usable_limits
 from oed.experiments.essential import essential_part
 from oed.experiments.judging import choose_weighting
 from oed.experiments.margins import measured_margins
@@ -26,20 +26,16 @@ from oed.experiments.result import Design, Outcome
 from oed.experiments.safety import choose_safety, collision_data
 from oed.experiments.search import EFFORTS, Effort, Found, Island
 from oed.experiments.solvers import InteriorPoint, Solver
-from oed.retiming import finite_limits
 from oed.trajectories import FourierSeries, count_periods
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InfeasibleError, InputError, OedError
 from robots.common.parallel import one_blas_thread, parallel_map
 from robots.common.progress import SILENT, Progress
-from robots.limits import Limits
+from robots.plants import PlantEffect
 from robots.robot import Robot
 from robots.signals import Motion
 
 Array = NDArray[np.float64]
-
-# The controller interpolates between the file's samples; a hair of every limit is left to it.
-RESERVE = 0.9995
 
 
 @one_blas_thread()
@@ -66,6 +62,7 @@ def design(
     scaling: str = "none",
     noise: ArrayLike | None = None,
     after: Prior | None = None,
+    effects: Sequence[PlantEffect] = (),
     task: Motion | None = None,
     effort: str | Effort = "standard",
     time_limit: float = np.inf,
@@ -108,6 +105,8 @@ def design(
             the robot's description) or ``unit`` (each to unit length).
         noise: torque noise of each joint (n,) [N m or N]: rows count by one over it; all alike by default.
         after: what an earlier identification knows: the design adds what that lacks.
+        effects: what the robot has beyond its description, as a diagnosis found it: the torque of those that follow
+            from position, velocity and acceleration counts within the torque limits.
         task: with criterion ``i``, the motion whose torques are to be predicted.
         effort: ``quick``, ``standard``, ``thorough``, or counts of one's own.
         time_limit: for the search [s]; past it the best design so far is kept. Without it the same seed gives the same
@@ -149,6 +148,7 @@ def design(
         "scaling": scaling,
         "noise": None if noise is None else np.asarray(noise, dtype=float).tolist(),
         "after": after is not None,
+        "effects": [asdict(effect) for effect in effects],
         "seed": seed,
         "effort": asdict(work),
         "time_limit": time_limit if np.isfinite(time_limit) else None,
@@ -174,6 +174,7 @@ def design(
         collision=collision,
         clearance=clearance,
         space=space,
+        effects=[effect for effect in effects if effect.static],
     )
     problem = FourierProblem(
         base=base,
@@ -234,7 +235,7 @@ def design(
         motion=motion,
         segments=tuple(sequence.table()),
         qualities=(),
-        margins=measured_margins(robot, motion, base),
+        margins=measured_margins(robot, motion, base, [effect for effect in effects if effect.static]),
         islands=tuple(_outcome(found) for found in results),
         settings=settings,
         coefficients=series.coefficients,
@@ -249,21 +250,6 @@ def design(
     if not weighting.plain:
         qualities.insert(1, measure(f"fourier ({weighting.name})", base, design.part("fourier"), weighting))
     return replace(design, qualities=tuple(qualities))
-
-
-def usable_limits(limits: Limits, velocity_fraction: float = 1.0) -> Limits:
-    """Completes infinite acceleration and jerk limits, and keeps a reserve for what happens between the samples.
-
-    Raises:
-        InfeasibleError: a limit of zero.
-        InputError: a joint without a velocity limit.
-    """
-    scaled = finite_limits(limits).scaled(
-        velocity=RESERVE * velocity_fraction, acceleration=RESERVE, jerk=RESERVE, torque=1.0
-    )
-    ranges = limits.upper - limits.lower
-    narrower = np.where(np.isfinite(ranges), ranges, 0.0) * (1 - RESERVE) / 2
-    return replace(scaled, lower=scaled.lower + narrower, upper=scaled.upper - narrower)
 
 
 def _effort(choice: str | Effort) -> Effort:

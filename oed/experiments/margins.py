@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from robots.base_parameters import BaseParameters
 from robots.limits import Limits, Margin, symmetric_margins
+from robots.plants import PlantEffect
 from robots.robot import Robot
 from robots.signals import Motion
+from robots.terms.effects import situation
 
 Array = NDArray[np.float64]
 
@@ -22,19 +24,36 @@ def missing_limits(limits: Limits) -> dict[str, tuple[int, ...]]:
     return {name: tuple(map(int, joints)) for name, joints in lacking.items() if joints.size}
 
 
-def measured_margins(robot: Robot, motion: Motion, base: BaseParameters) -> tuple[Margin, ...]:
-    """Measures the margins to all limits, the torque by the robot's nominal model where it is described."""
+def measured_margins(
+    robot: Robot, motion: Motion, base: BaseParameters, effects: Sequence[PlantEffect] = ()
+) -> tuple[Margin, ...]:
+    """Measures the margins to all limits, the torque by the robot's nominal model where it is described.
+
+    Args:
+        robot: the robot.
+        motion: what it does.
+        base: whose model gives the torque.
+        effects: what the robot has beyond its description.
+    """
     limits: Limits = robot.limits
     margins = list(limits.margins(motion))
     nominal = base.model.nominal
     if np.isfinite(nominal).all() and np.isfinite(limits.torque).any():
-        tau = base.model.torque(motion.q, motion.dq, motion.ddq, nominal)
+        tau = _torque(base, motion, effects)
         margins += symmetric_margins("torque", motion.t, tau, limits.torque)
     if np.isfinite(nominal).all() and np.isfinite(limits.torque_rms).any():
-        margins += _rms_margins(motion, base.model.torque(motion.q, motion.dq, motion.ddq, nominal), limits)
+        margins += _rms_margins(motion, _torque(base, motion, effects), limits)
     if np.isfinite(robot.motor_speed).any():
         margins += symmetric_margins("motor speed", motion.t, robot.gear_ratio * motion.dq, robot.motor_speed)
     return tuple(margins)
+
+
+def _torque(base: BaseParameters, motion: Motion, effects: Sequence[PlantEffect]) -> Array:
+    model = base.model
+    if not effects:
+        return model.torque(motion.q, motion.dq, motion.ddq, model.nominal)
+    now = situation(model, model.nominal, motion.t, motion.q, motion.dq, motion.ddq)
+    return np.sum([now.torque, *(effect.torque(now) for effect in effects)], axis=0)
 
 
 def _rms_margins(motion: Motion, tau: Array, limits: Limits) -> list[Margin]:

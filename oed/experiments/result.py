@@ -22,6 +22,7 @@ from oed.exports import write_trajectory
 from robots.base_parameters import BaseParameters
 from robots.common.files import write_atomic
 from robots.limits import Margin
+from robots.plants import PlantEffect
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.version import VERSION
@@ -119,6 +120,16 @@ class Design:
         return self.qualities[-1]
 
     @property
+    def effects(self) -> tuple[PlantEffect, ...]:
+        """What the robot was said to have beyond its description."""
+        return tuple(
+            PlantEffect(
+                effect=e["effect"], joint=e["joint"], coefficients=tuple(e["coefficients"]), shape=tuple(e["shape"])
+            )
+            for e in self.settings.get("effects", ())
+        )
+
+    @property
     def violated(self) -> tuple[Margin, ...]:
         """Limits that the motion passes; none of position, velocity, acceleration and jerk ever is."""
         return tuple(margin for margin in self.margins if margin.violated)
@@ -150,7 +161,7 @@ class Design:
 
     def check(self) -> tuple[Margin, ...]:
         """Measures all margins anew from the samples of the motion, whatever the solver said."""
-        return measured_margins(self.robot, self.motion, self.base)
+        return measured_margins(self.robot, self.motion, self.base, [e for e in self.effects if e.static])
 
     def summary(self) -> str:
         """Says in a few lines what the experiment is and what it is good for."""
@@ -176,6 +187,7 @@ class Design:
                 f"  tightest limit: {tightest.quantity} of joint {tightest.joint}, "
                 f"{100 * tightest.slack_fraction:.2f} % left at {tightest.time:.3f} s"
             )
+        lines += self._told_effects()
         if self.freedom is not None:
             lines.append(
                 f"  closest bodies: {self.freedom['pair']}, {1e3 * self.freedom['clearance']:.0f} mm at "
@@ -196,6 +208,17 @@ class Design:
                 f"at {margin.time:.3f} s"
             )
         return "\n".join(lines)
+
+    def _told_effects(self) -> list[str]:
+        """Says of which effects beyond the description the torque counted, and of which it could not."""
+        limited = any(margin.quantity.startswith("torque") for margin in self.margins)
+        counted = [effect.label for effect in self.effects if effect.static and limited]
+        lines = [f"  counted within the torque limits: {', '.join(counted)}"] if counted else []
+        lost = [effect.label for effect in self.effects if not (effect.static and limited)]
+        if lost:
+            why = "it depends on time or on the past" if limited else "torque limits or dynamics are not described"
+            lines.append(f"  NOT counted within the torque limits, for {why}: {', '.join(lost)}")
+        return lines
 
     def to_frame(self) -> pd.DataFrame:
         """Gives the experiment as a table: t, q1.., dq1.., ddq1.."""

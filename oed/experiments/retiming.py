@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.criteria import criterion as choose_criterion
-from oed.experiments.designing import usable_limits
+from oed.experiments.checks import usable_limits
 from oed.experiments.margins import measured_margins
 from oed.experiments.quality import design_model, measure
 from oed.experiments.retimed import RetimedExperiment, torque_use

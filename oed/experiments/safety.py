@@ -19,6 +19,7 @@ from robots.base_parameters import BaseParameters
 from robots.collision import CollisionModel, CollisionReport, check_motion, collision_model
 from robots.common.errors import InfeasibleError
 from robots.limits import Limits
+from robots.plants import PlantEffect
 from robots.robot import Robot
 from robots.signals import Motion
 
@@ -65,7 +66,7 @@ class Safety:
         rms = self.torque_rms
         if rms is None:
             return ()
-        return (TorqueRms(rms.model, rms.parameters, MOVES * rms.limit, margin=rms.margin),)
+        return (TorqueRms(rms.model, rms.parameters, MOVES * rms.limit, margin=rms.margin, effects=rms.effects),)
 
     def report(self, motion: Motion) -> CollisionReport | None:
         """Proves a whole motion free of collisions, or finds where it is not."""
@@ -155,6 +156,7 @@ def choose_safety(
     collision: bool,
     clearance: float,
     space: Sequence[GeometricLimit] = (),
+    effects: Sequence[PlantEffect] = (),
 ) -> Safety:
     """Collects the limits that are to be kept, and checks the home pose against them.
 
@@ -168,6 +170,7 @@ def choose_safety(
         collision: watch the arm's own bodies, and the obstacles of the robot's file.
         clearance: between them [m].
         space: further limits in space.
+        effects: what the robot has beyond its description: its torque counts within the torque limits.
 
     Raises:
         InfeasibleError: a home pose that cannot be held, is in collision or breaks another limit in space; a tool box
@@ -189,11 +192,11 @@ def choose_safety(
     limit = rms = None
     bound = np.asarray(robot.limits.torque)
     if torque and np.isfinite(base.model.nominal).all() and np.isfinite(bound).any():
-        limit = TorqueLimit(base.model, base.model.nominal, bound, margin=torque_margin)
+        limit = TorqueLimit(base.model, base.model.nominal, bound, margin=torque_margin, effects=effects)
         limit.check_holding(home)
     continuous = np.asarray(robot.limits.torque_rms)
     if torque and np.isfinite(base.model.nominal).all() and np.isfinite(continuous).any():
-        rms = TorqueRms(base.model, base.model.nominal, continuous, margin=torque_margin)
+        rms = TorqueRms(base.model, base.model.nominal, continuous, margin=torque_margin, effects=effects)
         rms.check_holding(home)
     check = SpatialCheck(GeometricLimits(robot=robot, limits=tuple(space))) if space else None
     return Safety(home=home, torque=limit, torque_rms=rms, collision=model, spatial=spatial, check=check, moved=moved)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.diagnosis import Diagnosis
 from oed.reports.diagnosis_limits import limits_section
 from oed.reports.diagnosis_pictures import cause_picture, gain_picture
+from oed.reports.diagnosis_simulation import simulation_section
 from oed.reports.diagnosis_view import DiagnosisView, view_of
 from oed.reports.joint_units import joint_titles, joint_units
 from oed.reports.page import Cell, Fact, Page, Section, Status, Table
@@ -31,6 +32,8 @@ def diagnosis_page(view: DiagnosisView) -> Page:
     """Builds the page: what is wrong, how it shows, what mending it brings, what could not be seen, what to do next."""
     sections = [_torque(view)]
     sections += [_finding(view, index) for index in range(len(view.findings))]
+    if view.simulation is not None:
+        sections.append(simulation_section(view.simulation, view.joint_names, view.kinds))
     if view.unexplained:
         sections.append(Section(title="What is left", paragraphs=view.unexplained))
     sections.append(_next(view))
@@ -129,7 +132,7 @@ def _torque(view: DiagnosisView) -> Section:
 def _finding(view: DiagnosisView, index: int) -> Section:
     finding = view.findings[index]
     place = "the whole robot" if finding.joint is None else f"joint {finding.joint}"
-    unit = joint_units(view.kinds, len(view.kinds))[finding.shown_on - 1].torque
+    unit = finding.unit or joint_units(view.kinds, len(view.kinds))[finding.shown_on - 1].torque
     values: list[tuple[Cell, ...]] = []
     for name, value, unit_of, lower, upper in finding.parameters:
         known = np.isfinite(lower) and np.isfinite(upper)
@@ -152,7 +155,10 @@ def _finding(view: DiagnosisView, index: int) -> Section:
     ]
     if np.isfinite(finding.before):
         evidence.append(
-            ("error on unseen data", f"{100 * finding.before:.3g} → {100 * finding.after:.3g} % of the torque RMS")
+            (
+                "error on unseen data",
+                f"{100 * finding.before:.3g} → {100 * finding.after:.3g} % of the {finding.of} RMS",
+            )
         )
     if np.isfinite(finding.interval).all():
         low, high = finding.interval
@@ -171,7 +177,7 @@ def _finding(view: DiagnosisView, index: int) -> Section:
         finding.coordinate,
         finding.residual_before,
         finding.residual_after,
-        title=f"What the model leaves of the torque of joint {finding.shown_on}",
+        title=f"What the model leaves of the {finding.of} of joint {finding.shown_on}",
         unit=unit,
         name=f"cause-{index + 1}",
     )

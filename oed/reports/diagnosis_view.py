@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.diagnosis import Diagnosis, Finding, Trace
 from estimation.diagnosis.limits import Limit
+from estimation.diagnosis.simulation import Simulation
+from robots.terms.base import length_unit
 from robots.terms.effects import EFFECTS, EXPERIMENTS
 
 Array = NDArray[np.float64]
@@ -34,6 +36,8 @@ class FindingView:
         coordinate: its values (N,).
         residual_before: of that joint without the finding (N,).
         residual_after: with all findings (N,).
+        of: what before and after are the error of.
+        unit: of the residuals where they are no torques.
     """
 
     title: str
@@ -51,6 +55,8 @@ class FindingView:
     coordinate: Array
     residual_before: Array
     residual_after: Array
+    of: str = "torque"
+    unit: str = ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,6 +83,7 @@ class DiagnosisView:
         next_ranking: kind in words, chance and duration [s], the best first.
         unexplained: what is left, in words.
         warnings: what a reader must know.
+        simulation: the motion simulated without and with what was found; None where nothing was.
     """
 
     robot: str
@@ -98,6 +105,7 @@ class DiagnosisView:
     next_ranking: tuple[tuple[str, float, float], ...] = ()
     unexplained: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    simulation: Simulation | None = None
 
 
 def view_of(diagnosis: Diagnosis) -> DiagnosisView:
@@ -113,7 +121,7 @@ def view_of(diagnosis: Diagnosis) -> DiagnosisView:
     return DiagnosisView(
         robot=robot.title or robot.name,
         verdict=diagnosis.verdict,
-        findings=tuple(_finding(f, trace, x) for f, x in zip(diagnosis.findings, trace.coordinate, strict=True)),
+        findings=_findings(diagnosis, trace),
         joint_names=robot.joint_names,
         kinds=robot.chain.kinds,
         t=trace.t,
@@ -132,7 +140,30 @@ def view_of(diagnosis: Diagnosis) -> DiagnosisView:
         else tuple((EXPERIMENTS.get(p.kind, p.kind), p.resolves, p.duration) for p in following.ranking),
         unexplained=tuple(f"{f.sentence}" for f in left),
         warnings=diagnosis.notes,
+        simulation=diagnosis.simulation,
     )
+
+
+def _findings(diagnosis: Diagnosis, trace: Trace) -> tuple[FindingView, ...]:
+    """Tells findings in the torque, then those by encoders behind the gears, with curves of their own."""
+    count = len(trace.coordinate)
+    told = [_finding(f, trace, x) for f, x in zip(diagnosis.findings[:count], trace.coordinate, strict=True)]
+    for finding, (load, before, after) in zip(diagnosis.findings[count:], trace.windups, strict=True):
+        assert finding.joint is not None
+        view = _finding(finding, trace, trace.t)
+        length = length_unit(diagnosis.model.robot, finding.joint - 1)
+        told.append(
+            replace(
+                view,
+                label=finding.coordinate,
+                coordinate=load,
+                residual_before=1e3 * before,
+                residual_after=1e3 * after,
+                of="wind-up",
+                unit=f"m{length}",
+            )
+        )
+    return tuple(told)
 
 
 def _finding(finding: Finding, trace: Trace, coordinate: Array) -> FindingView:

@@ -5,15 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
+from typing import TYPE_CHECKING
 
+import casadi
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
 from robots.robot import Robot
-from robots.terms.effects import EFFECTS, Effect, Situation
+from robots.terms.effects import EFFECTS, Effect, Situation, StaticEffect
+
+if TYPE_CHECKING:
+    from robots.regressor import TorqueModel
 
 Array = NDArray[np.float64]
+
+SHARP = 1e-3
+"""Width [rad/s or m/s] of a sign that is stated as sharp: a limit that is watched by its derivatives needs one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +44,45 @@ class PlantEffect:
     def term(self) -> Effect:
         """The effect's physics."""
         return EFFECTS[self.effect]
+
+    @property
+    def label(self) -> str:
+        """Effect and joint, for messages."""
+        return self.effect if self.joint is None else f"{self.effect} of joint {self.joint}"
+
+    @property
+    def static(self) -> bool:
+        """Whether its torque follows from position, velocity and acceleration of the instant alone."""
+        return isinstance(EFFECTS.get(self.effect), StaticEffect)
+
+    def expression(
+        self, model: TorqueModel, parameters: Array, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX
+    ) -> casadi.SX:
+        """Builds the torque (n,) of a static effect beside a model, symbolic.
+
+        Args:
+            model: the base model.
+            parameters: its values (p,).
+            q: positions (n,).
+            dq: velocities (n,).
+            ddq: accelerations (n,).
+
+        Raises:
+            InputError: an effect that depends on the past.
+        """
+        term = self.term
+        if not isinstance(term, StaticEffect):
+            raise InputError(
+                f"{self.label} depends on the past", allowed="an effect of position, velocity, acceleration"
+            )
+        Y = model.symbolic()(q, dq, ddq)
+        pi = np.asarray(parameters, dtype=float)
+        inert = np.array([column.term in ("rigid_body", "rotor_inertia") for column in model.columns])
+        widths = [term.velocity_scale for term in model.terms if hasattr(term, "velocity_scale")]
+        width = np.broadcast_to(np.asarray(widths[0] if widths else 0.0, dtype=float), (model.robot.n,))
+        at = [q, dq, ddq, Y @ casadi.SX(np.where(inert, pi, 0.0)), Y @ casadi.SX(pi)]
+        at += [casadi.tanh(dq / casadi.SX(np.where(width > 0, width, SHARP))), casadi.SX(list(self.shape))]
+        return term.function(model.robot, self.joint)(*at) @ casadi.SX(list(self.coefficients))
 
     def torque(self, situation: Situation) -> Array:
         """Evaluates what the effect adds to the torque (N, n) [N m or N]."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +17,16 @@ from robots.plants.sensors import Sensors
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Log, Motion
-from robots.terms.effects import situation
+from robots.terms.effects import Situation, situation
 
 Array = NDArray[np.float64]
+
+
+class Beyond(Protocol):
+    """What a plant has beyond its model: a `PlantEffect`, or an effect as a diagnosis found it."""
+
+    def torque(self, situation: Situation, /) -> Array:
+        """Evaluates what it adds to the torque (N, n) [N m or N]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +44,7 @@ class Plant:
     model: TorqueModel
     parameters: Array
     sensors: Sensors = field(default_factory=Sensors)
-    effects: tuple[PlantEffect, ...] = ()
+    effects: tuple[Beyond, ...] = ()
     heat: PlantHeat | None = None
 
     def __post_init__(self) -> None:

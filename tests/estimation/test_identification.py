@@ -5,7 +5,8 @@ import pytest
 
 import oed
 from estimation import identify
-from estimation.estimators import OrdinaryLeastSquares
+from estimation.choices import Candidates
+from estimation.estimators import ConstrainedLeastSquares, OrdinaryLeastSquares
 from oed.experiments.search import Effort
 from robots import load_robot, nominal_plant, simulate
 from robots.base_parameters import find_base_parameters
@@ -188,3 +189,28 @@ class TestRefusals:
             identify(arm, replace(log, tau=tau), check=False)
         with pytest.raises(OedError, match="check units, signs"):  # the gate sees it before the fit
             identify(arm, replace(log, tau=tau))
+
+
+def test_a_pull_moves_no_value_without_widening_its_interval(arm, arm_log):
+    """Of a short log that a pull helps: variances are those of the fit without one, and the square of each move."""
+    log = arm_log(1, 1, torque_noise=0.05).rows(slice(0, 1000))
+    pulled = identify(arm, log)
+    assert pulled.choice.pull is not None
+    unheld = Candidates(cutoffs=(pulled.choice.cutoff,), ridges=(1e-8,), smoothers=(), pull=False)
+    free = identify(arm, log, candidates=unheld)
+    assert free.choice.velocity_scales == pulled.choice.velocity_scales
+    moved = pulled.model.values - free.model.values
+    rest = pulled.model.covariance - np.outer(moved, moved)
+    # The residual, and with it the noise, is that of the pulled fit.
+    np.testing.assert_allclose(np.sqrt(np.diag(rest)), np.sqrt(np.diag(free.model.covariance)), rtol=0.5)
+    assert (np.abs(moved) <= np.sqrt(np.diag(pulled.model.covariance))).all()
+    assert any("what it moves each value by" in text for text in pulled.warnings)
+
+
+def test_parameters_at_their_bounds_are_named(arm, arm_log):
+    """A bound that the data press against is said, with what it does to intervals."""
+    log = arm_log(torque_noise=0.02)
+    bounded = identify(arm, log, method=ConstrainedLeastSquares(bounds={"f1_1": (0.0, 1.0)}))
+    assert bounded.model.provenance["at_bounds"] == ["f1_1"]
+    assert any(text.startswith("At their bounds: f1_1.") for text in bounded.warnings)
+    assert "at_bounds" not in identify(arm, log).model.provenance

@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 from estimation import identify, predict, read_log
+from estimation.choices import Candidates
+from estimation.prediction import Prediction
+from estimation.preprocessing import LowPass, SmoothingSpline, resample, smooth
 from robots.common.errors import InputError
-from robots.signals import Log
+from robots.signals import Log, Motion
 
 
 @pytest.fixture(scope="module")
@@ -21,6 +24,19 @@ def test_unseen_motion_is_predicted_to_the_noise(model, arm_log):
     assert (prediction.nrmse > 0.015).all()
 
 
+def test_a_prediction_smooths_as_the_fit_did(arm, arm_log):
+    """Where a spline has smoothed the fitted positions, it smooths others; where nothing is said, a low-pass does."""
+    log = arm_log(encoder_counts=3.0)
+    estimate = identify(arm, log, candidates=Candidates(cutoffs=(5.0,)))
+    spline = {"kind": "smoothing spline", "cutoff_hz": 5.0}
+    stated = {**estimate.model.provenance, "cutoff_hz": 5.0, "smoothing": spline}
+    plain = {key: value for key, value in stated.items() if key != "smoothing"}
+    positions = resample(log.t, log.q)
+    for provenance, smoother in ((stated, SmoothingSpline(5.0)), (plain, LowPass(5.0))):
+        motion = predict(replace(estimate.model, provenance=provenance), log).motion
+        np.testing.assert_array_equal(motion.ddq, smooth(positions, smoother).ddq)
+
+
 def test_the_errors_are_those_of_the_arrays(model, arm_log):
     """Error RMS, NRMSE and relative spread follow from measured and predicted torque."""
     log = arm_log(seed=1, motion_seed=1)
@@ -31,6 +47,24 @@ def test_the_errors_are_those_of_the_arrays(model, arm_log):
     np.testing.assert_allclose(prediction.relative_spread, error.std(axis=0) / log.tau.std(axis=0))
     assert prediction.to_dict()["nrmse"] == prediction.nrmse.tolist()
     assert "over RMS" in prediction.summary()
+
+
+def test_below_the_cut_off_only_what_the_model_lacks_is_left():
+    """Torque a tenth larger than predicted and noisy, in uneven time: below the cut-off the tenth remains."""
+    rng = np.random.default_rng(2)
+    t = np.cumsum(rng.uniform(0.001, 0.009, 6000))
+    slow = np.sin(2 * np.pi * 0.4 * t)[:, None]
+    still = np.zeros((len(t), 1))
+    measured = 1.1 * slow + rng.normal(0, 0.1, slow.shape)
+    motion = Motion(t=t, q=still, dq=still, ddq=still)
+    prediction = Prediction(motion=motion, predicted=slow, measured=measured, joint_names=("J1",), cutoff=3.0)
+    # Of the white noise 3 Hz let through a fifteenth of its power here.
+    whole = np.sqrt((0.1**2 / 2 + 0.1**2) / (1.1**2 / 2 + 0.1**2))
+    assert prediction.relative_spread[0] == pytest.approx(whole, rel=0.05)
+    assert prediction.band_limited_spread[0] == pytest.approx(0.1 / 1.1, rel=0.12)
+    written = prediction.to_dict()
+    assert written["cutoff_hz"] == 3.0
+    assert written["error_std_over_torque_std_below_cutoff"] == prediction.band_limited_spread.tolist()
 
 
 def test_a_log_of_positions_is_enough(model, arm_log):

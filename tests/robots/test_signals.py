@@ -112,9 +112,16 @@ def test_value_that_is_not_finite_is_refused_with_place(make, name, value):
 
 @pytest.mark.parametrize("name", ["tau", "current", "qlink"])
 def test_optional_signal_of_a_log_is_finite_if_it_is_there(name):
-    """NaN in torque, current or link position is refused."""
+    """NaN in torque or current is refused, and so is a link encoder that is silent at times."""
     error = refused(log, **{name: spoil(getattr(log(), name), 0, 2, np.nan)})
     assert (error.column, error.joint, error.row) == (name, 3, 1)
+
+
+def test_a_joint_may_have_no_link_encoder():
+    """NaN throughout stands for a joint without one."""
+    qlink = log().qlink.copy()
+    qlink[:, 1] = np.nan
+    assert np.isnan(log(qlink=qlink).qlink[:, 1]).all()
 
 
 @pytest.mark.parametrize("name", ["temperature", "ambient"])

@@ -22,6 +22,8 @@ CLOSE = 0.02
 AGREED = 0.1
 ROUNDS = 5
 TOO_FAINT = 1.4
+EVERY = 2
+BESIDE = 5
 
 
 class Hidden(Exception):
@@ -54,10 +56,9 @@ class Case:
     def visible(self) -> list[float]:
         """The share of its torque's RMS that each effect shows beyond the base model, in the logs as they became."""
         level = self.level()
-        every = 2
-        stack = [np.concatenate([getattr(r, key)[::every] for r in self.logs]) for key in _MOTION]
+        stack = [np.concatenate([getattr(r, key)[::EVERY] for r in self.logs]) for key in _MOTION]
         projection = Projection(base_regressor(self.machine.known, *stack), level)
-        parts = [np.concatenate([r.parts[k][::every] for r in self.logs]) for k in range(len(self.effects))]
+        parts = [np.concatenate([r.parts[k][::EVERY] for r in self.logs]) for k in range(len(self.effects))]
         return [float(projection.visible(part).max()) for part in parts]
 
     def level(self) -> np.ndarray:
@@ -67,9 +68,11 @@ class Case:
     def oracle_gain(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean squared errors (n,) on the unseen logs of the base model, and of it with the effects' own torques.
 
-        Both are least squares on the logs, with the motion as it was and each effect's own torque as one column.
+        Both are least squares on the logs, with the motion as it was and each effect's own torque as one column. Rows
+        beside a joint's reversal do not count: from a log nobody knows which sign its friction has there.
         """
         level = self.level()
+        counted = np.concatenate([_away_from_reversals(r.v_true)[::EVERY] for r in self.unseen])
         errors = []
         for columns in (False, True):
             Y, y, parts = self._stack(self.logs, columns)
@@ -79,21 +82,29 @@ class Case:
             Y, y, parts = self._stack(self.unseen, columns)
             if columns:
                 Y = np.concatenate([Y, parts], axis=2)
-            errors.append(((y - Y @ fit) ** 2).mean(axis=0))
+            errors.append(((y - Y @ fit) ** 2 * counted).sum(axis=0) / counted.sum(axis=0))
         return errors[0], errors[1]
 
     def _stack(self, records: Sequence[Record], parts: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-        every = 2
-        stack = [np.concatenate([getattr(r, key)[::every] for r in records]) for key in _MOTION]
+        stack = [np.concatenate([getattr(r, key)[::EVERY] for r in records]) for key in _MOTION]
         Y = base_regressor(self.machine.known, *stack)
-        y = np.concatenate([r.tau[::every] for r in records])
+        y = np.concatenate([r.tau[::EVERY] for r in records])
         if not parts:
             return Y, y, None
-        own = [np.concatenate([r.parts[k][::every] for r in records]) for k in range(len(self.effects))]
+        own = [np.concatenate([r.parts[k][::EVERY] for r in records]) for k in range(len(self.effects))]
         return Y, y, np.stack(own, axis=2)
 
 
 _MOTION = ("q_true", "v_true", "a_true", "sign")
+
+
+def _away_from_reversals(v: np.ndarray) -> np.ndarray:
+    """Marks rows (N, n) more than `BESIDE` samples from a change of direction."""
+    turned = np.zeros(v.shape, dtype=bool)
+    turned[1:] = np.sign(v[1:]) != np.sign(v[:-1])
+    counted = np.cumsum(np.vstack([np.zeros((1, v.shape[1])), turned]), axis=0)
+    rows = np.arange(len(v))
+    return counted[np.minimum(rows + BESIDE + 1, len(v))] == counted[np.maximum(rows - BESIDE, 0)]
 
 
 def draw_case(

@@ -27,6 +27,7 @@ class ExternalContact(Effect):
     title: ClassVar[str] = "an external contact"
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
+    passing: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("start", "s", -np.inf, np.inf, "linear"),
         Shape("duration", "s", 0.03, 60.0, "log", (0.2, 0.5, 1.25, 3.2)),

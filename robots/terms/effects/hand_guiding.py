@@ -17,16 +17,19 @@ Array = NDArray[np.float64]
 
 
 class HandGuiding(Effect):
-    """tau_j = w(t) (a_j sign(dq_j) + b_j dq_j - s_j tau_M,j), w one during a log and tau_M the torque without gravity.
+    """tau_j = w(t) (a_j sign(dq_j) + b_j dq_j - s_j tau_M,j - g_j tau_G,j), w one during a log.
 
-    A hand that moves the robot takes over what friction and inertia need; what gravity needs stays with the drives.
-    The friction's columns are free of the base model's values, which such a log has spoilt.
+    tau_G is the torque of gravity and tau_M the rest of the rigid body's. A hand that moves the robot takes over what
+    friction and inertia need. What gravity needs stays with the drives, but for the error g of the weight that they
+    compensate: that the hand feels too. The friction's columns are free of the base model's values, which such a log
+    has spoilt.
     """
 
     name: ClassVar[str] = "hand_guiding"
     title: ClassVar[str] = "an external force that moved the robot (by hand)"
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
+    passing: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("start", "s", -np.inf, np.inf, "linear"),
         Shape("end", "s", -np.inf, np.inf, "linear"),
@@ -35,7 +38,7 @@ class HandGuiding(Effect):
     experiments: ClassVar[tuple[str, ...]] = ("repeat",)
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes, joint after joint, Coulomb and viscous friction taken over, and the share of inertia."""
+        """Describes, joint after joint, Coulomb and viscous friction taken over, and shares of inertia and weight."""
         result: list[Coefficient] = []
         for j in range(robot.n):
             force, length = force_unit(robot, j), length_unit(robot, j)
@@ -43,6 +46,7 @@ class HandGuiding(Effect):
                 Coefficient(f"coulomb_by_hand_{j + 1}", force),
                 Coefficient(f"viscous_by_hand_{j + 1}", f"{force} s/{length}"),
                 Coefficient(f"inertia_by_hand_{j + 1}", "1", lower=0.0),
+                Coefficient(f"weight_by_hand_{j + 1}", "1"),
             ]
         return tuple(result)
 
@@ -58,17 +62,19 @@ class HandGuiding(Effect):
         return span, span
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates three columns per joint, each on that joint alone."""
+        """Evaluates four columns per joint, each on that joint alone."""
         n = situation.robot.n
         during = (situation.t >= shape[0]) & (situation.t <= shape[1])
         gravity = np.asarray(situation.robot.chain.gravity, dtype=float)
-        moving = situation.rigid[during] - situation.sensitivity("gravity")[during] @ gravity
-        X = np.zeros((len(situation), n, n, 3))
+        weight = situation.sensitivity("gravity")[during] @ gravity
+        moving = situation.rigid[during] - weight
+        X = np.zeros((len(situation), n, n, 4))
         for j in range(n):
             X[during, j, j, 0] = situation.sign[during, j]
             X[during, j, j, 1] = situation.dq[during, j]
             X[during, j, j, 2] = -moving[:, j]
-        return X.reshape(len(situation), n, 3 * n)
+            X[during, j, j, 3] = -weight[:, j]
+        return X.reshape(len(situation), n, 4 * n)
 
     def describe(
         self,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,6 +37,7 @@ class Situation:
         friction: torque of the base model's friction (N, n) [N m or N].
         torque: torque of the whole base model (N, n) [N m or N].
         velocity_scale: (n,) v0 [rad/s or m/s] of the sign, tanh(dq / v0); 0 for the sharp sign.
+        parts: where logs carry different payloads, the situations that this one joins; `parameters` are the first's.
     """
 
     model: TorqueModel
@@ -49,6 +51,7 @@ class Situation:
     friction: Array
     torque: Array
     velocity_scale: Array
+    parts: tuple[Situation, ...] = ()
     _cache: dict[object, Array] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
@@ -116,7 +119,8 @@ class Situation:
         from robots.terms.effects.sensitivities import evaluate
 
         if kind not in self._cache:
-            self._cache[kind] = evaluate(kind, self)
+            parts = [part.sensitivity(kind) for part in self.parts]
+            self._cache[kind] = np.concatenate(parts) if parts else evaluate(kind, self)
         return self._cache[kind]
 
     def cached(self, key: object, compute: object) -> Array:
@@ -182,6 +186,22 @@ def situation(
         friction=parts["friction"],
         torque=rigid + parts["friction"] + parts["other"],
         velocity_scale=_velocity_scale(model),
+    )
+
+
+def joined(parts: Sequence[Situation]) -> Situation:
+    """Joins situations of one robot on one clock, whose bodies may differ; the parameters are those of the first."""
+    if len(parts) == 1:
+        return parts[0]
+    edges = np.cumsum([0, *(len(part) for part in parts[:-1])])
+    names = ("t", "q", "dq", "ddq", "rigid", "friction", "torque")
+    merged: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return replace(
+        parts[0],
+        **merged,
+        starts=tuple(int(edge) + start for edge, part in zip(edges, parts, strict=True) for start in part.starts),
+        parts=tuple(parts),
+        _cache={},
     )
 
 

@@ -13,6 +13,7 @@ from estimation.diagnosis.power import (
     detectable_energy,
     resolving_energy,
     size_per_energy,
+    unit_mixtures,
 )
 
 DRAWS = 20_000
@@ -64,10 +65,10 @@ def test_what_a_rival_leaves_is_a_projection():
 
 def test_the_size_of_one_column_is_its_root_mean_square():
     """A column of energy E and mean square s has the size sqrt(s / E) per unit of energy, whatever its scale."""
-    assert size_per_energy(np.array([[4.0]]), np.array([[25.0]])) == pytest.approx(0.4)
-    assert size_per_energy(1e6 * np.array([[4.0]]), 1e6 * np.array([[25.0]])) == pytest.approx(0.4)
-    assert size_per_energy(np.array([[4.0]]), np.array([[0.0]])) == np.inf
-    assert size_per_energy(np.array([[0.0]]), np.array([[0.0]])) == np.inf
+    assert size_per_energy(unit_mixtures(np.array([[4.0]])), np.array([[25.0]])) == pytest.approx(0.4)
+    assert size_per_energy(unit_mixtures(1e6 * np.array([[4.0]])), 1e6 * np.array([[25.0]])) == pytest.approx(0.4)
+    assert size_per_energy(unit_mixtures(np.array([[4.0]])), np.array([[0.0]])) == np.inf
+    assert size_per_energy(unit_mixtures(np.array([[0.0]])), np.array([[0.0]])) == np.inf
 
 
 def test_the_size_does_not_depend_on_the_units():
@@ -76,5 +77,5 @@ def test_the_size_does_not_depend_on_the_units():
     X = random.normal(size=(40, 3))
     gram, left = X.T @ X, X.T @ np.diag(random.uniform(0.1, 1, 40)) @ X
     units = np.diag([1e-3, 5.0, 1e4])
-    scaled = size_per_energy(units @ gram @ units, units @ left @ units)
-    assert scaled == pytest.approx(size_per_energy(gram, left), rel=0.25)  # other mixtures are drawn
+    scaled = size_per_energy(unit_mixtures(units @ gram @ units), units @ left @ units)
+    assert scaled == pytest.approx(size_per_energy(unit_mixtures(gram), left), rel=0.25)  # other mixtures are drawn

@@ -10,11 +10,11 @@ from scipy.stats import chi2
 
 from estimation.diagnosis.baseline import base_parameters, build_baseline, inertia_of
 from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.noise import estimate_whitening
 from estimation.diagnosis.problem import Problem, accept, fit_values, pose, score
 from estimation.diagnosis.regularisation import pull_of
 from estimation.diagnosis.scan import measure, scan, surprise
 from estimation.diagnosis.states import record
-from estimation.diagnosis.whitening import estimate_whitening
 from robots.plants import Plant
 from robots.robot import Robot
 from robots.signals import Log

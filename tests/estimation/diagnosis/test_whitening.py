@@ -9,15 +9,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from estimation.diagnosis.band import Band
+from estimation.diagnosis.excess import period_differences, period_mean
+from estimation.diagnosis.gaps import find_gaps
+from estimation.diagnosis.noise import estimate_whitening
+from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.states import Recording
-from estimation.diagnosis.whitening import (
-    Band,
-    estimate_whitening,
-    find_gaps,
-    orthonormal,
-    period_differences,
-    period_mean,
-)
+from estimation.diagnosis.whitening import Whitening
 
 STEP = 0.004
 
@@ -76,6 +74,69 @@ def test_the_band_passes_slow_signals_and_stops_fast_ones() -> None:
         passed = band.passed(wave)[50:-50]
         # The Kaiser window of shape 6 leaves ripples of 63 dB.
         assert np.abs(passed - factor * wave[:: band.stride][50:-50]).max() < 2e-3
+
+
+def _level(whitening: Whitening, residual: np.ndarray, rows: slice = slice(None)) -> np.ndarray:
+    """Mean power of some white rows of the noise from 1.5 to 8 Hz (2,)."""
+    white = replace(whitening, weights=None).all(residual)[rows]
+    power = np.abs(np.fft.rfft(white, axis=0)) ** 2 / len(white)
+    f = np.fft.rfftfreq(len(white), STEP * whitening.band.stride)
+    return np.asarray(power[(f > 1.5) & (f < 8.0)].mean(axis=0))
+
+
+def test_a_slow_effect_is_not_taken_for_noise() -> None:
+    """With an effect four times as large as the noise below 1 Hz, the noise model stays what it is without.
+
+    The mean over some 500 frequencies has a standard error of 4.5 %; at rest a process fitted above 1 Hz says a fifth.
+    """
+    noise = _noise(20_000)
+    t = STEP * np.arange(20_000)[:, None]
+    slow = 4 * noise.std(axis=0) * np.sin(2 * np.pi * np.array([0.05, 0.6]) * t)
+    recording = _recording(20_000)
+    alone = estimate_whitening(recording, noise, 0, np.ones(2))
+    beside = estimate_whitening(recording, noise + slow, 0, np.ones(2))
+    assert _level(beside, noise) == pytest.approx(_level(alone, noise), rel=0.05)
+    at_rest = [
+        [scale / abs(1 - a.sum()) for a, scale in zip(w.coefficients, w.scale, strict=True)] for w in (alone, beside)
+    ]
+    assert at_rest[1] == pytest.approx(at_rest[0], rel=0.2)
+
+
+def test_kicks_at_reversals_and_times_at_rest_do_not_change_the_level() -> None:
+    """Rows of unknown direction, short or long, whatever is in them, leave the level of the noise as it is."""
+    noise = _noise(20_000)
+    unsure = np.zeros((20_000, 2), dtype=bool)
+    residual = noise.copy()
+    for start in range(100, 10_000, 200):
+        unsure[start : start + 6, 0] = True
+        residual[start : start + 6, 0] += 50 * noise[:, 0].std()
+    unsure[10_000:18_000] = True  # both joints stand for two fifths of the time, held by brakes
+    residual[10_000:18_000] = 0.0
+    whitening = estimate_whitening(_recording(20_000, unsure=unsure), residual, 0, np.ones(2))
+    stride = whitening.band.stride
+    assert _level(whitening, noise, slice(9_900 // stride)) == pytest.approx([1.0, 1.0], abs=0.2)
+    assert whitening.weights is not None
+    assert not whitening.weights[10_000 // stride + 1 : 18_000 // stride].any()
+    assert np.median(whitening.weights[: 9_000 // stride], axis=0) == pytest.approx([1.0, 1.0])
+
+
+def test_filtering_columns_together_is_filtering_each() -> None:
+    """Columns of very different size, and of zeros, come out as convolution written out has them."""
+    rng = np.random.default_rng(0)
+    band = estimate_whitening(_recording(), _noise(10_000), 0, np.ones(2)).band
+    columns = rng.standard_normal((1000, 5)) * [1.0, 1e9, 0.0, 1e-9, 1.0]
+    after = np.array([1.0, -0.5, 0.2])
+    together = band.passed(columns, after)
+    half = len(band.taps) // 2
+    for column, result in zip(columns.T, together.T, strict=True):
+        full = np.convolve(column, band.taps)
+        # The first rows feel what the filter puts before the log.
+        lead = full[half % band.stride :: band.stride]
+        first = half // band.stride
+        expected = np.convolve(lead, after)[first : first + len(result)]
+        assert result == pytest.approx(expected, abs=1e-12 * max(np.abs(column).max(), 1e-300))
+        assert result == pytest.approx(band.passed(column, after), abs=1e-12 * np.abs(column).max())
+    assert not together[:, 2].any()
 
 
 def test_rows_of_unknown_direction_do_not_count() -> None:

@@ -102,3 +102,17 @@ def test_folder_brings_its_mapping(tmp_path):
     (tmp_path / "mapping.yaml").write_text("position: {columns: x, unit: deg}\n")
     (log,) = read_logs(tmp_path, 1)
     np.testing.assert_allclose(log.q[:, 0], [np.pi / 2, np.pi])
+
+
+def test_link_encoders_of_some_joints(tmp_path):
+    """A pattern may find columns for some joints only; one that finds none is refused."""
+    table = "t,a1,a2,m1,m2,s2\n0,1,2,3,4,2.1\n0.004,1.1,2.2,3,4,2.3\n"
+    text = 'time: {column: t}\nposition: {columns: ["a{joint}"]}\ntorque: {columns: ["m{joint}"]}\n'
+    path, mapping = files(tmp_path, table, text + 'link_position: {columns: ["s{joint}"]}\n')
+    log = read_log(path, 2, mapping=mapping)
+    assert np.isnan(log.qlink[:, 0]).all()
+    assert log.qlink[:, 1].tolist() == [2.1, 2.3]
+    path, mapping = files(tmp_path, table, text + 'link_position: {columns: ["z{joint}"]}\n')
+    with pytest.raises(InputError) as caught:
+        read_log(path, 2, mapping=mapping)
+    assert caught.value.column == "z1"

@@ -133,11 +133,19 @@ def test_fewer_torques_than_positions_name_the_first_missing(save):
     assert "q1..q6" in error.allowed
 
 
-@pytest.mark.parametrize("prefix", ["dq", "ddq", "i", "qlink"])
+@pytest.mark.parametrize("prefix", ["dq", "ddq", "i"])
 def test_incomplete_optional_quantity_names_the_missing_column(save, prefix):
     """An optional quantity has a column for each joint or none."""
     path, _ = save(columns(joints=3, **{f"{prefix}1": [0.0] * 4, f"{prefix}3": [0.0] * 4}))
     assert refused(path).column == f"{prefix}2"
+
+
+def test_link_encoders_of_some_joints_are_read(save):
+    """A joint without an encoder behind its gear has no column, and is NaN in the log."""
+    path, _ = save(columns(joints=3, qlink2=[1.0, 2.0, 3.0, 4.0]))
+    log = read_log(path)
+    assert log.qlink[:, 1].tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert np.isnan(log.qlink[:, [0, 2]]).all()
 
 
 @pytest.mark.parametrize("extra", ["tau3", "dq3", "temp3"])

@@ -53,7 +53,7 @@ def dense(Y, mask, residual, inverse):
     """(Y'WY)^-1 Y'W Gamma W Y (Y'WY)^-1 and the robust estimate, by matrices of all rows at once."""
     counts = mask.sum(axis=0)
     own = np.stack([autocovariance(residual[:, j], counts[j]) for j in range(JOINTS)])
-    noise = fit_noise(residual, counts, own)
+    noise = fit_noise(residual, counts, own, sandwich.ORDERS)
     rows = len(Y)
     filters = []
     for a in noise.coefficients:
@@ -170,3 +170,27 @@ def test_louder_noise_where_it_counts_is_noticed():
     expected = np.mean(y2 * s2) / (np.mean(y2) * np.mean(s2))
     assert stated[0, 0] / white[0, 0] == pytest.approx(expected, rel=0.25)
     assert expected > 1.25
+
+
+def test_a_direction_without_data_has_a_large_variance_and_no_negative_one():
+    """Columns that are the same but for rounding leave their difference open: its errors are huge, all others hold."""
+    rng = np.random.default_rng(3)
+    Y = regressor(700)
+    # A third and a fourth column that differ by what sixteen digits see, and one that no row has.
+    twin = Y[:, :, :1] * (1 + 1e-15 * rng.standard_normal((700, JOINTS, 1)))
+    wide = np.concatenate([Y, twin, np.zeros((700, JOINTS, 1))], axis=2)
+    noise = coloured(700, rng)
+    _, residual, inverse = fit(Y, noise, np.ones((700, JOINTS)))
+    known = covariance([part(Y, np.ones((700, JOINTS)), residual)], WEIGHTS, inverse)
+    weighted = (wide * WEIGHTS[None, :, None]).reshape(-1, wide.shape[2])
+    gram = weighted.T @ wide.reshape(-1, wide.shape[2])
+    scale = np.sqrt(np.where(np.diag(gram) > 0, np.diag(gram), 1.0))
+    faint = np.linalg.inv(gram / scale[:, None] / scale + 1e-13 * np.eye(len(gram))) / scale[:, None] / scale
+    full = covariance([part(wide, np.ones((700, JOINTS)), residual)], WEIGHTS, (faint + faint.T) / 2)
+    errors = np.sqrt(np.diag(full))
+    assert (np.linalg.eigvalsh(full / errors[:, None] / errors) > -1e-12).all()
+    size = Y.shape[2]
+    lost = [0, size, size + 1]
+    assert (errors[lost] > 1e3 * np.sqrt(np.diag(known)).max()).all()
+    kept = [k for k in range(size) if k != 0]
+    np.testing.assert_allclose(errors[kept], np.sqrt(np.diag(known))[kept], rtol=1e-3)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.logs import write_log
+from estimation.logs import read_log, write_log
 from estimation.model import load_model
 from oed.exports import read_trajectory
 from robots.loading import load_robot
@@ -75,6 +75,7 @@ def test_its_files_are_of_use(done: Path) -> None:
     assert [extension.effect for extension in model.extensions] == ["friction_step"]
     page = (done / "report.html").read_text()
     assert "friction that changed at one moment" in page
+    assert "Simulated motion" in page
     assert "Smallest size that would be found" in page
 
 
@@ -101,6 +102,39 @@ def test_limits_by_an_identified_model(run, robot: Path, experiment: Path, tmp_p
     result = run(*line, "--model", experiment / "model.json", "--out", tmp_path, "--json")
     assert result.code == 0, result.err
     assert any(np.isfinite(limit["detectable"] or np.inf) for limit in result.data["limits"])
+
+
+def test_an_extended_model_is_a_model_like_any_other(
+    run, done: Path, logs: Path, robot: Path, experiment: Path, tmp_path: Path
+) -> None:
+    """`oed predict`, `simulate`, `design` and the limits take it, and say where the extension cannot count."""
+    model, motion = done / "model.json", experiment / "trajectory.csv"
+    predicted = run("predict", "--model", model, "--log", logs / "second.csv", "--out", tmp_path / "p.csv", "--json")
+    assert predicted.code == 0, predicted.err
+    played = run("simulate", "--robot", robot, "--trajectory", motion, "--model", model, "--out", tmp_path / "log.csv")
+    assert played.code == 0, played.err
+    log, known = read_log(tmp_path / "log.csv"), load_model(model)
+    states = read_trajectory(motion)[0]
+    expected = known.torque(states.q, states.dq, states.ddq, states.t)
+    assert np.abs(expected - known.torque(states.q, states.dq, states.ddq)).max() > 1.0
+    # The log has 2 % of noise.
+    assert np.sqrt(np.mean((log.tau - expected) ** 2)) < 0.03 * np.sqrt(np.mean(expected**2))
+    planned = run("design", "--robot", robot, "--after", model, "--effort", "quick", "--out", tmp_path / "next")
+    assert planned.code == 0, planned.err
+    assert "NOT counted within the torque limits" in planned.out
+    assert "friction_step of joint 2" in planned.out
+    line = ("diagnose", "--limits", "--robot", robot, "--trajectory", motion, "--model", model)
+    limits = run(*line, "--out", tmp_path / "limits", "--json")
+    assert limits.data["extensions_not_counted"] == ["friction_step of joint 2"]
+
+
+def test_a_model_takes_the_place_of_a_plant(run, done: Path, logs: Path, experiment: Path, tmp_path: Path) -> None:
+    """Both together, or a model of another robot, end with code 2 and the reason."""
+    line = ("simulate", "--trajectory", experiment / "trajectory.csv", "--model", done / "model.json")
+    both = run(*line, "--plant", logs / "plant.yaml", "--out", tmp_path / "log.csv")
+    assert both.code == 2
+    assert "--model takes the place of --plant" in " ".join(both.err.split())
+    assert not (tmp_path / "log.csv").exists()
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from oed.criteria import criterion
-from oed.experiments.designing import usable_limits
+from oed.experiments.checks import usable_limits
 from oed.experiments.problem import FourierProblem
 from robots.base_parameters import find_base_parameters
 from robots.limits import Limits

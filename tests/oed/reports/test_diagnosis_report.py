@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.limits import Limit
+from estimation.diagnosis.simulation import Curves, Simulation
 from oed.reports.diagnosis_limits import limits_page
 from oed.reports.diagnosis_pictures import binned, cause_picture, gain_picture
 from oed.reports.diagnosis_report import diagnosis_page
 from oed.reports.diagnosis_view import DiagnosisView, FindingView
 from oed.reports.page import render
 from robots.common.errors import InputError
+from robots.plants.closed_loop import Loop
 
 N = 400
 LIMITS = tuple(
@@ -94,6 +96,32 @@ def test_a_page_without_findings(verdict, expected, view):
     page = diagnosis_page(replace(view, verdict=verdict, findings=(), next_kind=""))
     assert expected in page.verdict
     assert "Nothing is left to tell apart." in render(page)
+
+
+def test_the_simulated_motion_is_told(view):
+    """The page says what was simulated under which loop, per joint in its unit, and draws the joint that gains most."""
+    t = 0.01 * np.arange(N)
+    two = np.column_stack([np.sin(t), np.cos(t)])
+    curves = Curves(t=t, measured=two, torque=(0.9 * two, two), deviation=(1e-3 * two, 1e-4 * two))
+    simulation = Simulation(
+        start=2.0,
+        end=7.0,
+        loop=Loop(bandwidth=5.0),
+        torque=(np.array([0.05, 0.1]), np.array([0.05, 0.02])),
+        motion=(np.array([1e-3, 2e-3]), np.array([1e-3, 4e-4])),
+        note="As it is.",
+        curves=curves,
+    )
+    page = diagnosis_page(replace(view, simulation=simulation))
+    (picture,) = (picture for picture in page.pictures if picture.name == "simulation")
+    assert "swing" in picture.title
+    assert picture.panels[1].y_label == "[mrad]"
+    assert picture.panels[1].series[0].y == pytest.approx(two[:, 1])
+    text = render(page)
+    for part in ("Simulated motion", "From 2.0 to 7.0 s", "The loop is assumed", "5 Hz", "As it is.", "mm"):
+        assert part in text, part
+    again = diagnosis_page(replace(view, simulation=replace(simulation, curves=None)))
+    assert "simulation" not in [picture.name for picture in again.pictures]
 
 
 def test_an_ambiguous_verdict_is_no_good_news(view):

@@ -138,7 +138,7 @@ def test_a_search_for_pushes_finds_the_moment(now):
 
 
 def test_a_hand_takes_what_motion_needs(seen, twin):
-    """A hand that guides the robot through a log leaves the drives what gravity needs, by pinocchio, and offsets."""
+    """A hand that guides the robot leaves the drives gravity, by pinocchio, but for a share, and offsets."""
     t = np.concatenate([0.004 * np.arange(700), 60 + 0.004 * np.arange(800)])
     now = seen(times=t, starts=(0, 700))
     guiding = EFFECTS["hand_guiding"]
@@ -146,12 +146,14 @@ def test_a_hand_takes_what_motion_needs(seen, twin):
     X = guiding.columns(now, None, window)
     assert not X[:700].any()
     f1, f2 = np.array(now.robot.friction)[:, :2].T
-    taken = X @ np.column_stack([-f1, -f2, np.ones(now.robot.n)]).reshape(-1)
+    share = 0.1 * np.arange(1, now.robot.n + 1)
+    taken = X @ np.column_stack([-f1, -f2, np.ones(now.robot.n), share]).reshape(-1)
     state, rest = (now.q[700:], now.dq[700:]), np.zeros_like(now.q[700:])
     moving = twin(now.robot).torque(*state, now.ddq[700:], now.robot.inertia)
-    moving -= twin(now.robot).torque(now.q[700:], rest, rest, now.robot.inertia)
+    weight = twin(now.robot).torque(now.q[700:], rest, rest, now.robot.inertia)
+    moving -= weight
     moving += np.array(now.robot.rotor_inertia) * now.ddq[700:]
-    expected = -moving - f1 * np.sign(now.dq[700:]) - f2 * now.dq[700:]
+    expected = -moving - share * weight - f1 * np.sign(now.dq[700:]) - f2 * now.dq[700:]
     np.testing.assert_allclose(taken[700:], expected, atol=1e-9 * np.abs(now.rigid).max())
 
 

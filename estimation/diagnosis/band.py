@@ -1,0 +1,99 @@
+"""The band of frequencies in which motion is known: torque and columns are low-passed alike, and thinned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+from scipy.signal import firwin
+
+from estimation.diagnosis.states import Recording
+
+Array = NDArray[np.float64]
+
+# The error of the acceleration may make this share of the torque noise's power; above, both are filtered away.
+SHARE = 0.2
+# Slowest low-pass [Hz], fastest as a share of the sampling rate: above, a sampled kick is no longer what it was.
+SLOWEST, FASTEST = 4.0, 0.2
+TRANSITION = 0.25  # of the low-pass, as a share of its cut-off
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """The frequencies in which motion is known: torque and all columns are low-passed alike, and thinned.
+
+    Friction that turns round kicks a joint faster than its encoder can tell. Where both sides of the equation are
+    filtered alike, what is lost on one side is lost on the other.
+
+    Attributes:
+        taps: of the filter, an odd number; empty for none.
+        stride: rows that become one.
+        cutoff: [Hz].
+    """
+
+    taps: Array
+    stride: int
+    cutoff: float
+
+    def passed(self, series: Array, after: Array | None = None) -> Array:
+        """Filters and thins rows (N,) or (N, k) of one log; `after` (p,) filters what is left.
+
+        Columns that lie one after the other in memory (Fortran's order) are filtered several times as fast.
+        """
+        if not len(self.taps) and after is None:
+            return series[:: self.stride]
+        rows = -(-len(series) // self.stride)
+        columns = np.ascontiguousarray(series.T if series.ndim > 1 else series[None])
+        # Two real columns are one complex one, the filters being real; as large as each other, so that the rounding of
+        # neither shows in the other, and zeros stay zeros.
+        sizes = np.maximum(columns.max(axis=1, initial=0.0), -columns.min(axis=1, initial=0.0))[:, None]
+        units = 1.0 / np.where(sizes > 0, sizes, 1.0)
+        packed = np.zeros((-(-len(columns) // 2), len(series)), dtype=complex)
+        np.multiply(columns[::2], units[::2], out=packed.real)
+        np.multiply(columns[1::2], units[1::2], out=packed.imag[: len(columns) // 2])
+        size, response = _response(self, len(series), 0 if after is None else len(after))
+        spectrum = scipy.fft.fft(packed, size, axis=1)
+        if response is not None:
+            spectrum *= response
+        # Thinned rows have the mean of the spectra that fall onto each other.
+        folded = spectrum.reshape(len(packed), self.stride, -1).sum(axis=1) / self.stride
+        if after is not None:
+            folded *= scipy.fft.fft(after, folded.shape[1])
+        thin = scipy.fft.ifft(folded, axis=1, overwrite_x=True)[:, :rows]
+        result = np.empty((len(columns), rows))
+        np.multiply(thin.real, sizes[::2], out=result[::2])
+        np.multiply(thin.imag[: len(columns) // 2], sizes[1::2], out=result[1::2])
+        return result[0] if series.ndim == 1 else result.T
+
+
+@lru_cache(maxsize=64)
+def _response(band: Band, rows: int, after: int) -> tuple[int, NDArray[np.complex128] | None]:
+    """The length of transforms in which nothing wraps round, and the filter's response with no delay."""
+    half = len(band.taps) // 2
+    size = band.stride * scipy.fft.next_fast_len(-(-(rows + 2 * half) // band.stride) + after)
+    if not half:
+        return size, None
+    centred = np.zeros(size)
+    centred[: half + 1] = band.taps[half:]
+    centred[-half:] = band.taps[:half]
+    return size, scipy.fft.fft(centred)
+
+
+def find_band(recording: Recording, inertia: Array, torque_density: Array) -> Band:
+    """Finds the band: up to where the error of the acceleration, as a torque, comes near the torque noise.
+
+    Args:
+        recording: the data.
+        inertia: of each joint (n,) [kg m2].
+        torque_density: power density of the torque noise at high frequency (n,) [(N m)^2/Hz].
+    """
+    rate = 1 / recording.step
+    error = np.maximum(recording.floor * inertia**2, 1e-300)
+    limits = (SHARE * torque_density / error) ** 0.25 / (2 * np.pi)
+    cutoff = float(np.clip(limits.min(), min(SLOWEST, FASTEST * rate), FASTEST * rate))
+    stride = max(1, int(rate / (2.5 * cutoff)))
+    length = int(np.ceil(3.6 * rate / (TRANSITION * cutoff))) | 1
+    return Band(firwin(length, cutoff * (1 - TRANSITION / 2), fs=rate, window=("kaiser", 6.0)), stride, cutoff)

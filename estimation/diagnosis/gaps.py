@@ -1,0 +1,189 @@
+"""Rows in which a joint's direction of motion is not known: bridged where they are long, fitted freely elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+from scipy.sparse import csc_matrix
+
+from estimation.diagnosis.states import spans
+
+if TYPE_CHECKING:
+    from estimation.diagnosis.whitening import Whitening
+
+Array = NDArray[np.float64]
+
+# Functions of one gap that the band cannot tell apart count once.
+DISTINCT = 1e-4
+# A joint that has not moved on for so long [s] is at rest.
+LONG_GAP = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Gaps:
+    """Rows in which a joint's direction of motion is not known, nor then the sign of its friction.
+
+    Short ones are given a torque of their own each, as many numbers as the band lets through: white columns that are
+    projected out of torque and hypotheses alike. Long ones, a joint at rest, are bridged by straight lines in both, so
+    that filters pass over them, and do not count.
+
+    Attributes:
+        bridges: per joint the rows, those before and after that count, and the weight of the latter.
+        free: per joint orthonormal white columns (N, f) of the short gaps.
+    """
+
+    bridges: tuple[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], Array], ...]
+    free: tuple[csc_matrix, ...]
+
+    def bridged(self, series: Array, joint: int) -> Array:
+        """Replaces the rows of long gaps in columns (N,) or (N, k) of a joint, counted from 0."""
+        rows, before, after, weight = self.bridges[joint]
+        if not len(rows):
+            return series
+        result = series.copy(order="K")
+        w = weight[:, *(None,) * (series.ndim - 1)]
+        result[rows] = (1 - w) * series[before] + w * series[after]
+        return result
+
+    def freed(self, white: Array, joint: int) -> Array:
+        """Projects the short gaps' torques out of white columns of a joint."""
+        if joint >= len(self.free) or not self.free[joint].shape[1]:
+            return white
+        own = self.free[joint]
+        return np.asarray(white - own @ (own.T @ white))
+
+    def resting(self, starts: tuple[int, ...], rows: int, stride: int, margin: int) -> NDArray[np.bool_]:
+        """Marks the thinned rows (M, n) of long gaps and `margin` rows beside: what bridges them is not measured."""
+        columns = []
+        for at, *_ in self.bridges:
+            flags = np.zeros(rows, dtype=bool)
+            flags[at] = True
+            parts = [flags[start:stop] for start, stop in pairwise((*starts, rows))]
+            columns.append(np.concatenate([binary_dilation(part, iterations=margin)[::stride] for part in parts]))
+        return np.column_stack(columns)
+
+
+def find_gaps(unsure: NDArray[np.bool_], starts: tuple[int, ...], longest: int = 0) -> Gaps:
+    """Makes bridges over stretches of rows (N, n) longer than `longest`, none from one log to another."""
+    bridges = []
+    for column in unsure.T:
+        flags = np.zeros_like(column)
+        for start, stop in spans(column):
+            if stop - start > longest:
+                flags[start:stop] = True
+        pieces = []
+        for start, stop in pairwise((*starts, len(column))):
+            rows, good = np.flatnonzero(flags[start:stop]), np.flatnonzero(~flags[start:stop])
+            if not len(rows) or not len(good):
+                continue  # a joint that stands all the time: nothing to bridge from
+            at = np.searchsorted(good, rows)
+            before, after = good[np.maximum(at - 1, 0)], good[np.minimum(at, len(good) - 1)]
+            before = np.where(at == 0, after, before)
+            weight = np.where(after > before, (rows - before) / np.maximum(after - before, 1), 0.0)
+            pieces.append((rows + start, before + start, after + start, np.clip(weight, 0.0, 1.0)))
+        empty = np.zeros(0, dtype=np.intp)
+        if pieces:
+            rows, before, after, weight = (np.concatenate(part) for part in zip(*pieces, strict=True))
+        else:
+            rows, before, after, weight = empty, empty, empty, np.zeros(0)
+        bridges.append((rows, before, after, weight))
+    return Gaps(tuple(bridges), ())
+
+
+def long_gap(step: float) -> int:
+    """Number of rows of `step` [s] beyond which a joint whose direction is not known is at rest."""
+    return max(8, round(LONG_GAP / step))
+
+
+def free_columns(unsure: NDArray[np.bool_], longest: int, whitening: Whitening, width: float) -> tuple[csc_matrix, ...]:
+    """Builds the white columns of the short gaps: polynomials over each, one for every `width` rows and one more.
+
+    Each is whitened where it is not zero only, so that a long log costs no more a gap than a short one; they are made
+    orthonormal gap by gap where gaps do not touch each other's rows.
+    """
+    result = []
+    beside = int(np.ceil(1.5 * width)) + 2
+    for j, column in enumerate(unsure.T):
+        pieces: list[tuple[int, Array]] = []
+        first_row = 0
+        for run_start, run_stop in pairwise((*whitening.starts, len(column))):
+            for gap in spans(column[run_start:run_stop]):
+                for start, stop in _short(*gap, longest, beside, run_stop - run_start):
+                    x = np.linspace(-1, 1, stop - start) if stop - start > 1 else np.zeros(1)
+                    number = min(stop - start, int(np.ceil((stop - start) / width)) + 1)
+                    shapes = np.asarray(np.polynomial.legendre.legvander(x, number - 1), dtype=np.float64)
+                    row, white = _white_gap(whitening, j, start, shapes, run_stop - run_start)
+                    pieces.append((first_row + row, white))
+            first_row += -(-(run_stop - run_start) // whitening.band.stride)
+        result.append(_sparse([_orthonormal_block(block) for block in _touching(pieces)], first_row))
+    return tuple(result)
+
+
+def _white_gap(whitening: Whitening, joint: int, start: int, shapes: Array, rows: int) -> tuple[int, Array]:
+    """Whitens functions of a gap (m, k) that begins at a row of a log: the first white row, and the white rows."""
+    band = whitening.band
+    half, stride = len(band.taps) // 2, band.stride
+    taps = np.concatenate([[1.0], -whitening.coefficients[joint]]) / whitening.scale[joint]
+    low = max(0, start - half - stride) // stride * stride
+    high = min(rows, start + len(shapes) + half + (len(taps) + 1) * stride)
+    segment = np.zeros((high - low, shapes.shape[1]))
+    segment[start - low : start - low + len(shapes)] = shapes
+    white = band.passed(segment, taps)
+    first = low // stride
+    lead = max(0, min(len(taps) - 1 - first, len(white)))
+    white[:lead] *= np.linspace(0, 1, len(taps))[1 + first : 1 + first + lead, None]
+    return first, white
+
+
+def _touching(pieces: Sequence[tuple[int, Array]]) -> Iterator[list[tuple[int, Array]]]:
+    """Groups pieces (first row, values), in the order of their first rows, that share rows."""
+    block: list[tuple[int, Array]] = []
+    end = 0
+    for row, values in pieces:
+        if block and row >= end:
+            yield block
+            block = []
+        block.append((row, values))
+        end = max(end, row + len(values))
+    if block:
+        yield block
+
+
+def _orthonormal_block(pieces: Sequence[tuple[int, Array]]) -> tuple[int, Array]:
+    """Makes the columns of pieces that share rows orthonormal: first row, and values."""
+    first = min(row for row, _ in pieces)
+    rows = max(row + len(values) for row, values in pieces) - first
+    block = np.zeros((rows, sum(values.shape[1] for _, values in pieces)))
+    at = 0
+    for row, values in pieces:
+        block[row - first : row - first + len(values), at : at + values.shape[1]] = values
+        at += values.shape[1]
+    norms = np.linalg.norm(block, axis=0)
+    block /= np.where(norms > 0, norms, 1.0)
+    values, vectors = np.linalg.eigh(block.T @ block)
+    kept = values > DISTINCT * values[-1]
+    return first, block @ (vectors[:, kept] / np.sqrt(values[kept]))
+
+
+def _sparse(blocks: Sequence[tuple[int, Array]], rows: int) -> csc_matrix:
+    """Puts blocks (first row, values) side by side."""
+    if not blocks:
+        return csc_matrix((rows, 0))
+    data = np.concatenate([values.T.ravel() for _, values in blocks])
+    indices = np.concatenate([np.tile(np.arange(row, row + len(values)), values.shape[1]) for row, values in blocks])
+    lengths = np.concatenate([np.full(values.shape[1], len(values)) for _, values in blocks])
+    return csc_matrix((data, indices, np.concatenate([[0], np.cumsum(lengths)])), shape=(rows, len(lengths)))
+
+
+def _short(start: int, stop: int, longest: int, beside: int, rows: int) -> list[tuple[int, int]]:
+    """A short gap as it is; of a long one both ends, where the joint came to rest or broke loose with a kick."""
+    if stop - start <= longest:
+        return [(start, stop)]
+    ends = [(max(edge - beside, 0), min(edge + beside, rows)) for edge in (start, stop) if 0 < edge < rows]
+    return ends

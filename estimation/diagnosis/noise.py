@@ -1,0 +1,144 @@
+"""The colour of the torque noise, from the residual of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len
+
+from estimation.diagnosis.band import find_band
+from estimation.diagnosis.gaps import find_gaps, free_columns, long_gap
+from estimation.diagnosis.states import Recording
+from estimation.diagnosis.whitening import Whitening
+from estimation.uncertainty.autoregressive import HIGHEST_ORDER, Noise, fit_noise, levinson
+
+Array = NDArray[np.float64]
+
+# Share of the variance added to the diagonal: without it the whitening would amplify an empty band.
+LOADING = 0.01
+# Innovations beyond so many standard deviations count as this many: a level that tails of five degrees pass rarely.
+WINSOR = 5.0
+# The flat part of the band, as a share of its cut-off.
+INSIDE = 0.75
+# Longest memory of the noise model [s]: with more, it would take slow effects for noise.
+MEMORY = 0.2
+# Noise of that memory is flat below this frequency [Hz]; what stands out there is an effect's, and not counted.
+FLAT = 1.0
+FEWEST = 4.0  # periods of that frequency without which nothing is said of it
+ROUNDS = 20
+# Of the noise's process: fewer coefficients would not tell a colour from white, however seldom rows are.
+LOWEST_ORDER = 4
+# White rows beyond so many standard deviations weigh as if they were there (Huber): kicks that no filter undoes.
+HUBER = 3.5
+
+
+def estimate_whitening(recording: Recording, residual: Array, parameters: int, inertia: Array) -> Whitening:
+    """Estimates the noise.
+
+    It is the residual of the model: what is found in it later is taken out, and the noise estimated anew. Differences
+    between repetitions would leave all that repeats out of the noise, also the errors of a model that is right but for
+    a few rows: they are for telling what repeats from what does not (`residual_shares`), not for alarms.
+
+    Args:
+        recording: the data.
+        residual: torque less model (N, n) [N m or N].
+        parameters: how many were fitted to it: they have taken some of the noise.
+        inertia: of each joint (n,) [kg m2], for the error that the acceleration's makes.
+    """
+    longest = long_gap(recording.step)
+    gaps = find_gaps(recording.unsure, recording.starts, longest)
+    # Where the direction of motion is not known the residual is no noise.
+    all_gaps = find_gaps(recording.unsure, recording.starts)
+    bridged = np.column_stack([all_gaps.bridged(column, j) for j, column in enumerate(residual.T)])
+    pieces = [bridged[run] for run in recording.runs]
+    band = find_band(recording, inertia, _density(pieces, recording.step))
+    pieces = [band.passed(piece) for piece in pieces]
+    step = recording.step * band.stride
+    width = 1 / (2 * band.cutoff * recording.step)
+    resting = gaps.resting(recording.starts, len(residual), band.stride, int(np.ceil(1.5 * width)) + 2)
+    counts = np.maximum((~resting).sum(axis=0), 1).astype(float)
+    tells = sum(map(len, pieces)) * step * FLAT >= FEWEST
+    window = (FLAT if tells else 0.0, INSIDE * band.cutoff if len(band.taps) else np.inf)
+    noise = _colour(pieces, step, counts, parameters, window)
+    trimmed = max(len(a) for a in noise.coefficients)
+    innovations = np.concatenate([noise.whitened(piece)[min(trimmed, len(piece) // 2) :] for piece in pieces])
+    # White noise has as much power at each frequency: what effects add to the slow ones is left out, and above the band
+    # there is nothing.
+    spectrum = np.fft.rfft(innovations, axis=0)
+    f = np.fft.rfftfreq(len(innovations), step)
+    spectrum[(f < window[0]) | (f >= window[1])] = 0.0
+    inside = max(int(((f >= window[0]) & (f < window[1])).sum()), 1)
+    scale = np.maximum(np.sqrt((np.abs(spectrum) ** 2).sum(axis=0) / inside / counts), 1e-12)
+    white = np.fft.irfft(spectrum, len(innovations), axis=0)
+    white = np.clip(white / np.maximum(white.std(axis=0), 1e-12), -WINSOR, WINSOR)
+    white -= white.mean(axis=0)
+    white /= np.maximum(white.std(axis=0), 1e-12)
+    correlation = np.atleast_2d(white.T @ white / len(white))
+    # Too few rows make correlations of nothing; a tenth towards none keeps the inverse tame.
+    correlation = 0.95 * correlation + 0.05 * np.eye(residual.shape[1])
+    plain = Whitening(
+        coefficients=noise.coefficients,
+        scale=scale,
+        precision=np.asarray(np.linalg.inv(correlation), dtype=np.float64),
+        starts=recording.starts,
+        innovations=white,
+        gaps=gaps,
+        band=band,
+    )
+    free = free_columns(recording.unsure, longest, plain, width)
+    plain = replace(plain, gaps=replace(gaps, free=free))
+    left = np.where(resting, np.nan, np.abs(plain.all(residual)))
+    level = np.array([np.nanmedian(column) if np.isfinite(column).any() else 1.0 for column in left.T]) / 0.6745
+    weights = np.minimum(1.0, HUBER * np.maximum(level, 0.1) / np.maximum(left, 1e-12))
+    return replace(plain, weights=np.where(resting, 0.0, weights))
+
+
+def _colour(pieces: Sequence[Array], step: float, counts: Array, parameters: int, window: tuple[float, float]) -> Noise:
+    """Fits the noise by its spectrum within a window, and lets the model say what is outside.
+
+    What an effect leaves in the residual is slow, as motion is; taken for noise it would hide itself. Above the window
+    is the edge of the band. Outside, the spectrum is what the fitted process has there, again and again until it stays
+    (a Yule-Walker fit of data that are missing).
+
+    Args:
+        pieces: residual of each log (N, n), `step` [s] a row.
+        step: the sample period [s].
+        counts: rows of each joint that are no bridge over a time at rest (n,).
+        parameters: how many were fitted to the residual: they have taken some of the noise.
+        window: lowest and highest frequency [Hz].
+    """
+    rows, joints = sum(map(len, pieces)), pieces[0].shape[1]
+    highest = int(np.clip(round(MEMORY / step), LOWEST_ORDER, HIGHEST_ORDER))
+    size = next_fast_len(max(map(len, pieces)) + highest + 1, real=True)
+    power = sum(np.abs(np.fft.rfft(piece, size, axis=0)) ** 2 for piece in pieces) / counts
+    power = power * rows * joints / max(rows * joints - parameters, 0.5 * rows * joints)
+    f = np.fft.rfftfreq(size, step)
+    known = (f >= window[0]) & (f < window[1])
+
+    def covariances() -> Array:
+        result = np.fft.irfft(power, size, axis=0)[: highest + 1].T
+        result[:, 0] = np.maximum(result[:, 0] * (1 + LOADING), np.finfo(float).tiny)
+        return np.asarray(result)
+
+    if known.any() and not known.all():
+        places = np.flatnonzero(known)
+        slowest, fastest = places[: max(1, len(places) // 4)], places[-max(1, len(places) // 4) :]
+        power[f < window[0]] = power[slowest].mean(axis=0)
+        power[f >= window[1]] = power[fastest].mean(axis=0)
+        lags = np.exp(-2j * np.pi * step * f[~known, None] * np.arange(1, highest + 1))
+        for _ in range(ROUNDS):
+            for j, covariance in enumerate(covariances()):
+                a, variance = levinson(covariance, counts[j])
+                power[~known, j] = variance / np.abs(1.0 - lags[:, : len(a)] @ a) ** 2
+    return fit_noise(np.concatenate(pieces), counts, covariances())
+
+
+def _density(pieces: Sequence[Array], step: float) -> Array:
+    """Power density of the noise (n,) in the upper half of the band, from its fast changes."""
+    # A second difference passes white noise of variance s^2 as 6 s^2 and slow noise not at all; the median square
+    # stands above the rare kicks at reversals.
+    squares = np.concatenate([np.diff(piece, 2, axis=0) ** 2 for piece in pieces])
+    return np.asarray(np.median(squares, axis=0) / 0.455 / 6 * 2 * step)

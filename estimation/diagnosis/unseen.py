@@ -1,0 +1,257 @@
+"""What members of the extended model bring on data that no fit has seen: logs kept apart, or parts left out in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.carried import lightened, situation_on, with_body
+from estimation.diagnosis.extending import dense
+from estimation.diagnosis.findings import Gain
+from estimation.diagnosis.gain import PARTS, Unseen, cross_validated, models, on_held_out
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.refinement import Member
+from estimation.diagnosis.regularisation import held
+from estimation.diagnosis.simulating import Plant, compare
+from estimation.diagnosis.simulation import Simulation
+from estimation.diagnosis.states import Recording, record
+from robots.robot import Robot
+from robots.signals import Log
+from robots.terms.effects import Situation
+
+Array = NDArray[np.float64]
+
+SHORTEST_UNSEEN = 1.0  # [s] of held-out logs
+# Of this many seconds of unseen data the motion is simulated, by a fit to at most so many rows.
+STRETCH = 5.0
+ENOUGH_ROWS = 12_000
+# An effect lives in one log that holds more than this share of its energy.
+ALONE = 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Errors on unseen data.
+
+    Attributes:
+        unseen: of all models.
+        gains: what each member brings there.
+        coordinates: on which each member shows there (M,).
+        whole: the unseen data, after the logs of the fit where heat may last from them.
+        first: row of `whole` at which the unseen data begin.
+        effects: columns (N, n, k) of each member on the data of the fit.
+        torque: of all members together on the unseen data (M, n).
+    """
+
+    unseen: Unseen
+    gains: tuple[Gain, ...]
+    coordinates: tuple[Array, ...]
+    whole: Recording
+    first: int
+    effects: tuple[Array, ...]
+    torque: Array
+
+
+def measure_unseen(
+    robot: Robot, problem: Problem, members: Sequence[Member], held_out: Sequence[Log], seed: int
+) -> Measured:
+    """Measures on held-out logs, or on each part of the logs by a fit to the others.
+
+    Args:
+        robot: the robot.
+        problem: the data of the fit.
+        members: what was found.
+        held_out: logs that the fit has not seen; none to leave parts out in turn.
+        seed: of the intervals.
+    """
+    effects = tuple(dense(problem, member.hypothesis, member.shape) for member in members)
+    rng = np.random.default_rng(seed)
+    if held_out:
+        unseen, now, whole, first, columns = _on_logs(robot, problem, members, effects, held_out)
+    else:
+        unseen, now = _left_out(problem, effects), problem.situation
+        whole, first, columns = problem.recording, 0, list(effects)
+    there = slice(first, None)
+    torque = np.zeros_like(whole.tau[there])
+    for X, member in zip(columns, members, strict=True):
+        torque += X @ member.coefficients
+    return Measured(
+        unseen=unseen,
+        gains=tuple(_gain(unseen, i, member, rng) for i, member in enumerate(members)),
+        coordinates=tuple(m.hypothesis.effect.coordinate(now, m.hypothesis.joint, m.shape)[1][there] for m in members),
+        whole=whole,
+        first=first,
+        effects=effects,
+        torque=torque,
+    )
+
+
+def _left_out(problem: Problem, effects: Sequence[Array]) -> Unseen:
+    """Leaves out logs in turn; parts of logs where an effect lives in one log alone, which no other log could tell."""
+    recording = problem.recording
+    if len(recording.runs) == 1 or not any(_in_one_log(recording, X) for X in effects):
+        return cross_validated(problem, effects)
+    apart = replace(recording, starts=tuple(part.start for part in _parts(recording)))
+    unseen = cross_validated(replace(problem, recording=apart), effects)
+    return replace(unseen, how=_WITHIN.format(PARTS, len(recording.runs)))
+
+
+_WITHIN = (
+    "each of {} stretches of each of {} logs, predicted from all other stretches: something that was found acts in one "
+    "log only, and no other log could tell it"
+)
+
+
+def _in_one_log(recording: Recording, X: Array) -> bool:
+    energies = np.array([float(np.sum(X[run] ** 2)) for run in recording.runs])
+    return bool(energies.max() > ALONE * energies.sum())
+
+
+def _parts(recording: Recording) -> list[slice]:
+    """Cuts every log into stretches of about as many rows."""
+    parts = []
+    for run in recording.runs:
+        edges = np.linspace(run.start, run.stop, PARTS + 1).astype(int)
+        parts += [slice(int(a), int(b)) for a, b in pairwise(edges) if b > a]
+    return parts
+
+
+def simulate_unseen(
+    problem: Problem, members: Sequence[Member], measured: Measured, held_out: bool
+) -> Simulation | None:
+    """Simulates the stretch of unseen data in which the extension acts most, without and with it.
+
+    Args:
+        problem: the data of the fit.
+        members: what was found, at least one.
+        measured: of these members.
+        held_out: whether logs were kept apart; else the fit leaves out the part in which the stretch lies.
+
+    Returns:
+        The simulation; None where the fitted robot runs away from the loop.
+    """
+    whole, first = measured.whole, measured.first
+    parts = [slice(max(run.start, first), run.stop) for run in whole.runs if run.stop > first]
+    if not held_out and (len(parts) == 1 or any(_in_one_log(whole, X) for X in measured.effects)):
+        parts = _parts(whole)
+    strength = np.sum((measured.torque / problem.whitening.scale) ** 2, axis=1)
+    part, rows = _strongest(parts, np.concatenate([np.zeros(first), strength]), round(STRETCH / whole.step))
+    base, extended = _fits(problem, measured.effects, None if held_out else part)
+    known = problem.baseline.base
+    b = known.size
+    before = Plant(model=known.model, columns=known.independent, values=base[:b])
+    edges = np.cumsum([b + problem.baseline.nuisance.shape[2], *(X.shape[2] for X in measured.effects)])
+    after = replace(
+        before,
+        values=extended[:b],
+        members=tuple(members),
+        coefficients=tuple(extended[start:stop] for start, stop in pairwise(edges)),
+    )
+    return compare(before, after, whole, rows)
+
+
+def _strongest(parts: Sequence[slice], strength: Array, length: int) -> tuple[slice, slice]:
+    """Finds the window of some rows in which a signal (N,) is strongest, and the part in which it lies."""
+    sums = np.concatenate([[0.0], np.cumsum(strength)])
+    best, chosen = -1.0, (parts[0], parts[0])
+    for part in parts:
+        size = min(length, part.stop - part.start)
+        for start in range(part.start, part.stop - size + 1, max(1, size // 4)):
+            mean = float(sums[start + size] - sums[start]) / size
+            # A longer window goes before a short one that is hardly stronger by chance.
+            value = mean * min(1.0, size / length)
+            if value > best:
+                best, chosen = value, (part, slice(start, start + size))
+    return chosen
+
+
+def _fits(problem: Problem, effects: Sequence[Array], left_out: slice | None) -> tuple[Array, Array]:
+    """Fits base model and nuisance alone, and with the effects, to all rows but those left out."""
+    recording = problem.recording
+    kept = np.ones(len(recording), dtype=bool)
+    if left_out is not None:
+        kept[left_out] = False
+    rows = np.flatnonzero(kept)
+    rows = rows[:: max(1, -(-len(rows) // ENOUGH_ROWS))]
+    full = np.concatenate(
+        [problem.baseline.regressor[rows], problem.baseline.nuisance[rows], *(X[rows] for X in effects)], axis=2
+    )
+    weights = ~recording.unsure[rows] / problem.whitening.scale
+    flat = (full * weights[:, :, None]).reshape(-1, full.shape[2])
+    gram, cross = flat.T @ flat, flat.T @ (recording.tau[rows] * weights).reshape(-1)
+    # Thinned rows count for all.
+    factor = kept.sum() / max(len(rows), 1)
+    alone, *_, everything = models(full.shape[2] - sum(X.shape[2] for X in effects), effects)
+    first, last = (
+        held(factor * gram[np.ix_(chosen, chosen)], factor * cross[chosen], problem.pull)
+        for chosen in (alone, everything)
+    )
+    return first, last
+
+
+def _gain(unseen: Unseen, i: int, member: Member, rng: np.random.Generator) -> Gain:
+    """The fall of the error by one member, on its joint, or over all it acts on."""
+    own = member.hypothesis.joint
+    joints = [own - 1] if own is not None else list(member.group.joints)
+    last = len(unseen.errors) - 1
+    low, high = unseen.interval(i + 1, last, joints, rng)
+    return Gain(
+        nrmse_before=float(unseen.nrmse(i + 1)[joints].mean()),
+        nrmse_after=float(unseen.nrmse(last)[joints].mean()),
+        ci95=(low, high),
+    )
+
+
+def _on_logs(
+    robot: Robot, problem: Problem, members: Sequence[Member], effects: Sequence[Array], held_out: Sequence[Log]
+) -> tuple[Unseen, Situation, Recording, int, list[Array]]:
+    recording = problem.recording
+    other = lightened(robot, record(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN))
+    # One clock: where the unseen logs come later, the heat of the ones before is still there.
+    later = bool(other.t[0] > recording.t[-1])
+    whole = _joined(recording, other) if later else other
+    now = situation_on(whole, problem.situation.model, unloaded(problem))
+    first = len(recording) if later else 0
+    columns = []
+    for member in members:
+        X = np.zeros((len(whole), robot.n, len(member.coefficients)))
+        joints, parts = member.hypothesis.columns(now, member.shape)
+        for j, part in zip(joints, parts, strict=True):
+            X[:, j] = part
+        columns.append(X[first:])
+    baseline = problem.baseline
+    base = baseline.base.regressor(other.q, other.dq, other.ddq)
+    nuisance = np.zeros((len(other), robot.n, baseline.nuisance.shape[2]))
+    unseen = on_held_out(problem, effects, other, np.concatenate([base, nuisance], axis=2), columns)
+    return unseen, now, whole, first, columns
+
+
+def unloaded(problem: Problem) -> Array:
+    """Parameters (p,) without the payload that the first log may carry."""
+    now, recording = problem.situation, problem.recording
+    return with_body(now.model, now.parameters, -recording.bodies[0])
+
+
+def _joined(first: Recording, second: Recording) -> Recording:
+    starts = (*first.starts, *(len(first) + start for start in second.starts))
+
+    def both(name: str) -> Array:
+        return np.concatenate([getattr(first, name), getattr(second, name)])
+
+    return replace(
+        first,
+        t=both("t"),
+        q=both("q"),
+        dq=both("dq"),
+        ddq=both("ddq"),
+        tau=both("tau"),
+        unsure=both("unsure").astype(bool),
+        starts=starts,
+        cycles=(*first.cycles, *second.cycles),
+        names=(*first.names, *second.names),
+        payloads=(*first.bodies, *second.bodies) if first.payloads or second.payloads else (),
+    )

@@ -1,0 +1,36 @@
+"""A virtual robot that obeys an identified model, extensions included."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.model import Model
+from robots.common.errors import InputError
+from robots.plants import Plant, Sensors
+from robots.robot import Robot
+
+
+def virtual_robot(model: Model, robot: Robot | None = None, sensors: Sensors | None = None) -> Plant:
+    """Builds the plant that `oed simulate` plays motions on.
+
+    Args:
+        model: identified, or extended by a diagnosis.
+        robot: with gear ratios and limits, which a model file does not hold; by default the model's own geometry alone.
+        sensors: what the log sees.
+
+    Raises:
+        InputError: a robot of another number of joints.
+    """
+    torque_model = model.torque_model
+    if robot is not None:
+        if robot.n != model.robot.n:
+            raise InputError(f"a model of {model.robot.n} joints", allowed=f"{robot.n}, as {robot.name} has")
+        torque_model = replace(torque_model, robot=robot)
+    parameters = np.zeros(torque_model.size)
+    # Base parameters stand for sums: with the others zero they give the same torques.
+    parameters[list(model.columns)] = model.values
+    return Plant(
+        model=torque_model, parameters=parameters, sensors=sensors or Sensors(), effects=tuple(model.extensions)
+    )
