@@ -98,11 +98,11 @@ def cross_validated(problem: Problem, effects: Sequence[Array]) -> Unseen:
             "so that the gain on another motion may differ"
         )
     base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
+    weights = ~recording.unsure / problem.whitening.scale
     full = np.concatenate([base, *effects], axis=2)
-    rows, target = _white(problem, full)
-    places = _white_rows(problem)
-    parts = [slice(places[fold.start], places[fold.stop]) for fold in folds]
-    grams = [_moments(rows[part], target[part]) for part in parts]
+    weighted = full * weights[:, :, None]
+    target = recording.tau * weights
+    grams = [_moments(weighted[fold], target[fold]) for fold in folds]
     total = (sum(g for g, _ in grams), sum(c for _, c in grams))
     errors = [np.empty_like(recording.tau) for _ in models(base.shape[2], effects)]
     for fold, (gram, cross) in zip(folds, grams, strict=True):
@@ -129,8 +129,11 @@ def on_held_out(
         unseen_base: columns of base model and nuisance on them (M, n, b + m).
         unseen_effects: columns of each effect on them (M, n, k).
     """
+    recording = problem.recording
     base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
-    gram, cross = _moments(*_white(problem, np.concatenate([base, *effects], axis=2)))
+    weights = ~recording.unsure / problem.whitening.scale
+    full = np.concatenate([base, *effects], axis=2)
+    gram, cross = _moments(full * weights[:, :, None], recording.tau * weights)
     other = np.concatenate([unseen_base, *unseen_effects], axis=2)
     errors = []
     for chosen in models(base.shape[2], effects):
@@ -146,25 +149,6 @@ def models(base: int, effects: Sequence[Array]) -> list[NDArray[np.intp]]:
     own = [np.arange(a, b) for a, b in pairwise(edges)]
     everything = np.arange(edges[-1])
     return [np.arange(base), *(np.setdiff1d(everything, part) for part in own), everything]
-
-
-def _white(problem: Problem, columns: Array) -> tuple[Array, Array]:
-    """Whitens columns (N, n, p) and the torque as the extended model is fitted: generalised least squares."""
-    white = problem.whitening
-    root = np.linalg.cholesky(white.precision)
-    rows = np.einsum("jk,njb->nkb", root, white.all(columns), optimize=True)
-    return rows, white.all(problem.recording.tau) @ root
-
-
-def _white_rows(problem: Problem) -> NDArray[np.intp]:
-    """The white row at which each row of the recording, and its end (N + 1,), begins: white rows are thinned."""
-    stride, starts = problem.whitening.band.stride, problem.whitening.starts
-    places: list[NDArray[np.intp]] = []
-    first = 0
-    for start, stop in pairwise((*starts, len(problem.recording))):
-        places.append(first + -(-np.arange(stop - start) // stride))
-        first += -(-(stop - start) // stride)
-    return np.concatenate([*places, [first]])
 
 
 def _moments(Y: Array, target: Array) -> tuple[Array, Array]:
