@@ -57,16 +57,20 @@ def test_stopped_within_the_limits(solver: Solver, problem: FourierProblem, star
 
 
 def test_same_optimum(problem: FourierProblem, start: np.ndarray) -> None:
-    """From a point near an optimum both methods end at the same value: IPOPT is the oracle."""
+    """IPOPT, the oracle, ends at nothing better: neither from a point near the optimum nor from where ours ended.
+
+    By its rounding it may end at another optimum that is worse.
+    """
     smooth = replace(problem, criterion=criterion("d"))
     stage = Stage(sharpness=1, max_iter=300, barrier=1e-5)
-    near = smooth.shrunk(InteriorPoint(tolerance=1e-6).minimise(smooth, start, [stage]).z, 0.999)
-    ends = [
-        smooth.surrogate(solver.minimise(smooth, near, [stage]).z, 1)[0]
-        for solver in (InteriorPoint(tolerance=1e-6), Ipopt(tolerance=1e-6))
-    ]
+    own, oracle = InteriorPoint(tolerance=1e-6), Ipopt(tolerance=1e-6)
+    near = smooth.shrunk(own.minimise(smooth, start, [stage]).z, 0.999)
+    end = own.minimise(smooth, near, [stage]).z
+    others = [oracle.minimise(smooth, begin, [stage]).z for begin in (near, smooth.shrunk(end, 0.999))]
+    value, *best = (smooth.surrogate(z, 1)[0] for z in (end, *others))
     # The value is log det(Y'Y) / 2 m with its sign turned: 0.02 of it is 2 % of a standard error.
-    assert ends[0] == pytest.approx(ends[1], abs=2e-2)
+    assert value <= min(best) + 2e-2
+    assert min(best) <= value + 0.1
 
 
 def test_rows_that_bernstein_implies(problem: FourierProblem) -> None:
