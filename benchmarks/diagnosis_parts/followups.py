@@ -13,6 +13,7 @@ from tests.truth.experiments import Stage, follow_up
 def follow(case: Case, robot: Robot, diagnosis: Any) -> dict[str, Any]:
     """Does the recommended experiment and diagnoses again, with the new logs beside the old."""
     from estimation import diagnose
+    from estimation.diagnosis.carried import point_mass
 
     plan = diagnosis.next_experiment
     if plan is None:
@@ -23,13 +24,13 @@ def follow(case: Case, robot: Robot, diagnosis: Any) -> dict[str, Any]:
     logs = [Log(t=record.t, q=record.q, tau=record.tau) for record in case.logs]
     for stage, record in zip(stages, follow_up(case, stages), strict=True):
         logs.append(
-            Log(t=record.t, q=record.q, tau=record.tau, payload=_hung(stage.payload) if stage.payload else None)
+            Log(
+                t=record.t,
+                q=record.q,
+                tau=record.tau,
+                payload=point_mass(stage.payload, (0.0, 0.0, 0.1)) if stage.payload else None,
+            )
         )
     said = diagnose(robot, logs).to_dict()
     found = [{"effect": f["effect"], "joint": f["joint"]} for f in said["findings"]]
     return {"kind": plan.kind, "promised": plan.resolves, "verdict": said["verdict"], "findings": found}
-
-
-def _hung(mass: float) -> list[float]:
-    """The ten parameters of the point mass that the true robot carries, a tenth of a metre ahead of its flange."""
-    return [mass, 0.0, 0.0, 0.1 * mass, 0.01 * mass, 0.0, 0.0, 0.01 * mass, 0.0, 0.0]

@@ -64,4 +64,11 @@ def with_body(model: TorqueModel, parameters: Array, body: Array) -> Array:
     return result
 
 
-__all__ = ["lightened", "situation_on", "with_body"]
+def point_mass(mass: float, centre: tuple[float, float, float]) -> Array:
+    """Gives the ten inertial parameters of a point mass [kg] at a place [m] in the flange's frame."""
+    x, y, z = centre
+    inertia = (y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y)
+    return mass * np.array([1.0, x, y, z, *inertia])
+
+
+__all__ = ["lightened", "point_mass", "situation_on", "with_body"]

@@ -25,7 +25,7 @@ def hidden_springs(problem: Problem, false_alarm: float) -> tuple[tuple[int, str
         Joint, counted from 1, and sentence.
     """
     robot, recording = problem.situation.robot, problem.recording
-    torque = np.sqrt(np.mean(recording.tau**2, axis=0))
+    torque = problem.rms
     needed = detectable_energy(1, robot.n, false_alarm=false_alarm)
     told = []
     for j in range(robot.n):

@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.carried import point_mass, with_body
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.limits import no_gaps
 from estimation.diagnosis.next_experiment_motions import MAKERS, VARIED, Stage, room_of
@@ -26,7 +27,6 @@ from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms.effects import EXPERIMENTS, situation
-from robots.terms.effects.sensitivities import moved_body
 
 Array = NDArray[np.float64]
 
@@ -209,12 +209,7 @@ class Grams:
         return gram[own, own]
 
     def _parameters(self, payload: float) -> Array:
-        parameters = np.array(self.problem.situation.parameters)
-        if payload:
-            body = np.array([payload, 0.0, 0.0, ARM * payload, *(ARM**2 * payload * np.array([1, 0, 0, 1, 0, 0]))])
-            rigid = [i for i, column in enumerate(self.model.columns) if column.term == "rigid_body"]
-            parameters[rigid[-10:]] += moved_body(self.model.robot.chain.tip) @ body
-        return parameters
+        return with_body(self.model, self.problem.situation.parameters, point_mass(payload, (0.0, 0.0, ARM)))
 
     def _gram(self, base: Array, effects: Sequence[Array], whitening: Whitening) -> Array:
         joined = np.concatenate([base, *effects], axis=2)

@@ -23,6 +23,9 @@ from oed.cli.options import (
 from robots.common.progress import Progress
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from robots.robot import Robot
     from robots.signals import Log
 
@@ -166,16 +169,15 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2g}" if share < float("inf") else "-"
 
 
-def _payload(text: str) -> tuple[int, list[float]]:
+def _payload(text: str) -> tuple[int, NDArray[np.float64]]:
     """Reads NUMBER=KG,X,Y,Z: the ten inertial parameters of a point mass."""
+    from estimation.diagnosis.carried import point_mass
     from robots.common.errors import InputError
 
     number, _, values = text.partition("=")
     try:
         mass, x, y, z = map(float, values.split(","))
-        body = [mass, mass * x, mass * y, mass * z]
-        body += [mass * (y * y + z * z), -mass * x * y, -mass * x * z, mass * (x * x + z * z), -mass * y * z]
-        return int(number), [*body, mass * (x * x + y * y)]
+        return int(number), point_mass(mass, (x, y, z))
     except ValueError:
         raise InputError(
             f"--payload {text}",
@@ -183,11 +185,9 @@ def _payload(text: str) -> tuple[int, list[float]]:
         ) from None
 
 
-def _laden(logs: list[Log], payloads: dict[int, list[float]]) -> list[Log]:
+def _laden(logs: list[Log], payloads: dict[int, NDArray[np.float64]]) -> list[Log]:
     """Tells logs, counted from 1 in the order of reading, what they carry."""
     from dataclasses import replace
-
-    import numpy as np
 
     from robots.common.errors import InputError
 
@@ -196,16 +196,14 @@ def _laden(logs: list[Log], payloads: dict[int, list[float]]) -> list[Log]:
             raise InputError(
                 f"--payload of log {number}", allowed=f"1 to {len(logs)}: the logs in the order they are read"
             )
-    return [
-        replace(log, payload=np.array(payloads[i])) if i in payloads else log for i, log in enumerate(logs, start=1)
-    ]
+    return [replace(log, payload=payloads[i]) if i in payloads else log for i, log in enumerate(logs, start=1)]
 
 
 def _diagnosis(
     robot: Robot,
     logs: list[Path],
     held_out: list[Path],
-    payloads: dict[int, list[float]],
+    payloads: dict[int, NDArray[np.float64]],
     friction: str,
     seed: int,
     out: Path,
