@@ -12,9 +12,11 @@ from estimation.diagnosis.extension import Extension
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem, accept, score
 from estimation.diagnosis.refinement import Member
-from estimation.diagnosis.regularisation import held
+from estimation.diagnosis.regularisation import held, row_weight
+from estimation.diagnosis.shrinkage import pull_on
 from estimation.identification import NEGLIGIBLE, RELATIVE
 from estimation.model import Model
+from estimation.pulls import Pull
 
 Array = NDArray[np.float64]
 
@@ -68,7 +70,10 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         linear[start + size : start + size + shapes] = False
     values = np.zeros(columns.shape[2])
     free = flat[:, linear]
-    values[linear] = held(free.T @ free, free.T @ tau, problem.pull)
+    pull = pull_on(problem, members)
+    # White rows tell what they are, not what coloured ones of their number would.
+    pull = Pull(pull.precision / row_weight(white), pull.target)
+    values[linear] = held(free.T @ free, free.T @ tau, pull)
     covariance = _covariance(flat)
     lower_upper = [m.hypothesis.coefficient_bounds(problem.situation.robot) for m in members]
     extensions, known = [], []
@@ -83,6 +88,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         scale[open_] = 1.0
         own = own * scale[:, None] * scale
         own[open_, open_] = np.inf
+        own[range(size, size + shapes), range(size, size + shapes)] += _inexact(member) ** 2
         coefficients = np.clip(values[start : start + size], lower, upper)
         errors = np.sqrt(np.maximum(np.diag(own), 0.0))
         determined = np.concatenate(
@@ -158,6 +164,12 @@ def _steps(problem: Problem, member: Member, others: object) -> list[float]:
                 step *= 2.0
         steps.append(found if found <= (abs(value) if shape.scale == "log" else 0.3 * room) else np.inf)
     return steps
+
+
+def _inexact(member: Member) -> Array:
+    """Standard errors (s,) that the formula adds to those of the data."""
+    described = zip(member.hypothesis.effect.shapes, member.shape, strict=True)
+    return np.array([s.inexact * (abs(value) if s.scale == "log" else 1.0) for s, value in described])
 
 
 def _gain(problem: Problem, member: Member, shape: tuple[float, ...], others: object) -> float:

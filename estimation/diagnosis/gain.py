@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.regularisation import held
 from estimation.diagnosis.states import Recording
+from estimation.pulls import Pull
 
 Array = NDArray[np.float64]
 
@@ -78,12 +79,13 @@ class Unseen:
         return max(BLOCK, 5 * max(times))
 
 
-def cross_validated(problem: Problem, effects: Sequence[Array]) -> Unseen:
+def cross_validated(problem: Problem, effects: Sequence[Array], pull: Pull) -> Unseen:
     """Fits on all runs but one, or all parts but one of a single run, and measures on the one left out.
 
     Args:
         problem: the data.
         effects: columns (N, n, k) of each effect found.
+        pull: on base model, nuisance and effects.
     """
     recording = problem.recording
     runs = recording.runs
@@ -108,7 +110,7 @@ def cross_validated(problem: Problem, effects: Sequence[Array]) -> Unseen:
     for fold, (gram, cross) in zip(folds, grams, strict=True):
         rest = (total[0] - gram, total[1] - cross)
         for error, chosen in zip(errors, models(base.shape[2], effects), strict=True):
-            values = held(rest[0][np.ix_(chosen, chosen)], rest[1][chosen], problem.pull)
+            values = held(rest[0][np.ix_(chosen, chosen)], rest[1][chosen], pull.columns(chosen))
             error[fold] = recording.tau[fold] - full[fold][:, :, chosen] @ values
     return Unseen(how, recording.t, recording.step, recording.tau, tuple(errors), ~recording.unsure)
 
@@ -119,6 +121,7 @@ def on_held_out(
     unseen: Recording,
     unseen_base: Array,
     unseen_effects: Sequence[Array],
+    pull: Pull,
 ) -> Unseen:
     """Fits on all logs and measures on others.
 
@@ -128,6 +131,7 @@ def on_held_out(
         unseen: other logs.
         unseen_base: columns of base model and nuisance on them (M, n, b + m).
         unseen_effects: columns of each effect on them (M, n, k).
+        pull: on base model, nuisance and effects.
     """
     recording = problem.recording
     base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
@@ -137,7 +141,7 @@ def on_held_out(
     other = np.concatenate([unseen_base, *unseen_effects], axis=2)
     errors = []
     for chosen in models(base.shape[2], effects):
-        values = held(gram[np.ix_(chosen, chosen)], cross[chosen], problem.pull)
+        values = held(gram[np.ix_(chosen, chosen)], cross[chosen], pull.columns(chosen))
         errors.append(unseen.tau - other[:, :, chosen] @ values)
     how = f"{len(unseen.runs)} log{'s' if len(unseen.runs) > 1 else ''} that the fit has not seen"
     return Unseen(how, unseen.t, unseen.step, unseen.tau, tuple(errors), ~unseen.unsure)

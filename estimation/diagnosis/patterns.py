@@ -173,7 +173,7 @@ def _speed(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Ar
 
 
 def _load(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
-    load = s.rigid[:, joint - 1]
+    load = s.load[:, joint - 1]
     x = load / max(float(np.abs(load).max()), 1e-9)
     return np.column_stack([x, np.abs(x), x * np.abs(x), x**2, np.abs(x) ** 3])
 

@@ -50,7 +50,7 @@ def pull_of(baseline: Baseline, recording: Recording, whitening: Whitening | Non
         levels[own, np.arange(len(own))] = raised
         share = (levels / torque[:, None]).max(axis=0) / OWN
         pull = Pull(np.diag(np.maximum(share, SILENT) ** 2), np.zeros(len(own)))
-    strength = 1.0 if whitening is None else _colour(whitening)
+    strength = 1.0 if whitening is None else row_weight(whitening)
     b, m = len(pull.target), baseline.nuisance.shape[2]
     precision = np.zeros((b + m, b + m))
     precision[:b, :b] = pull.precision
@@ -59,14 +59,17 @@ def pull_of(baseline: Baseline, recording: Recording, whitening: Whitening | Non
     return Pull(strength * precision, np.concatenate([pull.target, np.zeros(m)]))
 
 
-def _colour(whitening: Whitening) -> float:
-    """Power density of the noise at rest, over that of white noise of its innovations, a row of the log each."""
+def row_weight(whitening: Whitening) -> float:
+    """Gives the power density of the noise at rest, over that of white noise of its innovations, a row of the log each.
+
+    So many plain rows, weighed by the innovations' scale, tell as much of a slow torque as one that is white.
+    """
     gains = [1.0 / max(abs(1.0 - float(np.sum(a))), 0.01) for a in whitening.coefficients]
     return whitening.band.stride * float(np.mean(np.square(gains)))
 
 
 def held(gram: Array, cross: Array, pull: Pull) -> Array:
-    """Solves normal equations (p, p), (p,) whose first columns are base model and nuisance, with the pull on those.
+    """Solves normal equations (p, p), (p,) with a pull on the first columns, or all.
 
     Directions that neither determines stay at zero: the fit is that of least norm.
     """

@@ -59,17 +59,20 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     members = [*(found.member for found in founds), *judgement.patterns]
     p_values = [*(found.p_value for found in founds), *judgement.p_values]
     seen = _seen(robot, told, members)
-    dropped = []
+    dropped, spoiling = [], []
     while harmful := [i for i, gain in enumerate(seen.gains) if _harms(gain) and not _elsewhere(told, members[i])]:
         # What makes unseen errors larger is no cause, however well it fits: a few rows at the end of a log.
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
-        dropped.append(members.pop(worst).hypothesis.label)
-        p_values.pop(worst)
+        member, p_value = members.pop(worst), p_values.pop(worst)
         if worst < len(founds):
             founds.pop(worst)
+            dropped.append(member.hypothesis.label)
+        else:
+            # A free function that errs elsewhere is no model; that something is unexplained is as true as before.
+            spoiling.append((member, p_value, seen.gains[worst]))
         seen = _seen(robot, told, members)
     verdict = judgement.verdict
-    if dropped and len(members) == len(founds):
+    if dropped and len(members) == len(founds) and not spoiling:
         verdict = "none" if not members else "ambiguous" if any(map(is_open, founds)) else "named"
     fitted = fit_extended(problem, members, _provenance(told))
     findings = tuple(
@@ -85,6 +88,12 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         )
         for i, member in enumerate(members)
     )
+    if spoiling:
+        fit = fit_extended(problem, [*members, *(member for member, _, _ in spoiling)], {})
+        findings += tuple(
+            _finding(robot, problem, member, fit, i, p_value, None, gain)
+            for i, (member, p_value, gain) in enumerate(spoiling, start=len(members))
+        )
     unseen = seen.unseen
     twisted = _windups(told, seen)
     if twisted and verdict == "none":
@@ -107,14 +116,23 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         next_experiment=_next(problem, founds) if verdict == "ambiguous" else None,
         model=replace(fitted.model, extensions=(*fitted.model.extensions, *added)),
         how_unseen=unseen.how,
-        notes=(*_notes(told, findings, before, after), *(_DROPPED.format(name) for name in dropped), *lost),
+        notes=(*_notes(told, findings, before, after), *_left_out(dropped, [m for m, _, _ in spoiling]), *lost),
         trace=_trace(unseen, seen.coordinates, twisted),
         simulation=simulation,
     )
 
 
 _LOST = "Simulated forward, the fitted robot ran away from the position loop: its fit suits no simulation."
+_SPOILING = (
+    "On joint {} something is unexplained, but the free function that shows it errs on unseen data: it is no part of the "
+    "extended model."
+)
 _DROPPED = "A fit of {} stood out of the noise, but makes the error on unseen data larger: left out."
+
+
+def _left_out(dropped: Sequence[str], spoiling: Sequence[Member]) -> list[str]:
+    joints = sorted({member.hypothesis.joint or 0 for member in spoiling})
+    return [*(_DROPPED.format(name) for name in dropped), *(_SPOILING.format(joint) for joint in joints)]
 
 
 def _harms(gain: Gain) -> bool:

@@ -16,9 +16,11 @@ from estimation.diagnosis.gain import PARTS, Unseen, cross_validated, models, on
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.regularisation import held
+from estimation.diagnosis.shrinkage import pull_on
 from estimation.diagnosis.simulating import Plant, compare
 from estimation.diagnosis.simulation import Simulation
 from estimation.diagnosis.states import Recording, record
+from estimation.pulls import Pull
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import Situation
@@ -45,6 +47,7 @@ class Measured:
         first: row of `whole` at which the unseen data begin.
         effects: columns (N, n, k) of each member on the data of the fit.
         torque: of all members together on the unseen data (M, n).
+        pull: on base model, nuisance and members, of all fits.
     """
 
     unseen: Unseen
@@ -54,6 +57,7 @@ class Measured:
     first: int
     effects: tuple[Array, ...]
     torque: Array
+    pull: Pull
 
 
 def measure_unseen(
@@ -70,10 +74,11 @@ def measure_unseen(
     """
     effects = tuple(dense(problem, member.hypothesis, member.shape) for member in members)
     rng = np.random.default_rng(seed)
+    pull = pull_on(problem, members)
     if held_out:
-        unseen, now, whole, first, columns = _on_logs(robot, problem, members, effects, held_out)
+        unseen, now, whole, first, columns = _on_logs(robot, problem, members, effects, held_out, pull)
     else:
-        unseen, now = _left_out(problem, effects), problem.situation
+        unseen, now = _left_out(problem, effects, pull), problem.situation
         whole, first, columns = problem.recording, 0, list(effects)
     there = slice(first, None)
     torque = np.zeros_like(whole.tau[there])
@@ -87,16 +92,17 @@ def measure_unseen(
         first=first,
         effects=effects,
         torque=torque,
+        pull=pull,
     )
 
 
-def _left_out(problem: Problem, effects: Sequence[Array]) -> Unseen:
+def _left_out(problem: Problem, effects: Sequence[Array], pull: Pull) -> Unseen:
     """Leaves out logs in turn; parts of logs where an effect lives in one log alone, which no other log could tell."""
     recording = problem.recording
     if len(recording.runs) == 1 or not any(_in_one_log(recording, X) for X in effects):
-        return cross_validated(problem, effects)
+        return cross_validated(problem, effects, pull)
     apart = replace(recording, starts=tuple(part.start for part in _parts(recording)))
-    unseen = cross_validated(replace(problem, recording=apart), effects)
+    unseen = cross_validated(replace(problem, recording=apart), effects, pull)
     return replace(unseen, how=_WITHIN.format(PARTS, len(recording.runs)))
 
 
@@ -140,7 +146,7 @@ def simulate_unseen(
         parts = _parts(whole)
     strength = np.sum((measured.torque / problem.whitening.scale) ** 2, axis=1)
     part, rows = _strongest(parts, np.concatenate([np.zeros(first), strength]), round(STRETCH / whole.step))
-    base, extended = _fits(problem, measured.effects, None if held_out else part)
+    base, extended = _fits(problem, measured, None if held_out else part)
     known = problem.baseline.base
     b = known.size
     before = Plant(model=known.model, columns=known.independent, values=base[:b])
@@ -169,9 +175,9 @@ def _strongest(parts: Sequence[slice], strength: Array, length: int) -> tuple[sl
     return chosen
 
 
-def _fits(problem: Problem, effects: Sequence[Array], left_out: slice | None) -> tuple[Array, Array]:
+def _fits(problem: Problem, measured: Measured, left_out: slice | None) -> tuple[Array, Array]:
     """Fits base model and nuisance alone, and with the effects, to all rows but those left out."""
-    recording = problem.recording
+    recording, effects = problem.recording, measured.effects
     kept = np.ones(len(recording), dtype=bool)
     if left_out is not None:
         kept[left_out] = False
@@ -187,7 +193,7 @@ def _fits(problem: Problem, effects: Sequence[Array], left_out: slice | None) ->
     factor = kept.sum() / max(len(rows), 1)
     alone, *_, everything = models(full.shape[2] - sum(X.shape[2] for X in effects), effects)
     first, last = (
-        held(factor * gram[np.ix_(chosen, chosen)], factor * cross[chosen], problem.pull)
+        held(factor * gram[np.ix_(chosen, chosen)], factor * cross[chosen], measured.pull.columns(chosen))
         for chosen in (alone, everything)
     )
     return first, last
@@ -207,7 +213,12 @@ def _gain(unseen: Unseen, i: int, member: Member, rng: np.random.Generator) -> G
 
 
 def _on_logs(
-    robot: Robot, problem: Problem, members: Sequence[Member], effects: Sequence[Array], held_out: Sequence[Log]
+    robot: Robot,
+    problem: Problem,
+    members: Sequence[Member],
+    effects: Sequence[Array],
+    held_out: Sequence[Log],
+    pull: Pull,
 ) -> tuple[Unseen, Situation, Recording, int, list[Array]]:
     recording = problem.recording
     other = lightened(robot, record(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN))
@@ -226,7 +237,7 @@ def _on_logs(
     baseline = problem.baseline
     base = baseline.base.regressor(other.q, other.dq, other.ddq)
     nuisance = np.zeros((len(other), robot.n, baseline.nuisance.shape[2]))
-    unseen = on_held_out(problem, effects, other, np.concatenate([base, nuisance], axis=2), columns)
+    unseen = on_held_out(problem, effects, other, np.concatenate([base, nuisance], axis=2), columns, pull)
     return unseen, now, whole, first, columns
 
 

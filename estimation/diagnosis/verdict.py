@@ -19,8 +19,10 @@ CLOSE = 10.0
 MOST_PATTERNS = 3
 # A pattern beside named effects counts when it explains this share of what they do: formulas are true to some per cent.
 BEYOND = 0.05
-# A pattern is a flexible thing: it must be worth its parameters by this much (Schwarz), strong evidence.
+# A pattern is a flexible thing: beside what is named it must be worth its parameters by this much (Schwarz), strong
+# evidence, for formulas are not exact. Where nothing is named it must be no more than sure.
 LEAST = 10.0
+SURE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,7 @@ def judge(
     explain much more; several names on one joint must fit better than free functions do, all parameters counted.
     """
     named = [found.member for found in selection.found]
-    left, p_values = _patterns(problem, patterns, named, false_alarm, rng)
+    left, p_values = _patterns(problem, patterns, named, false_alarm, rng, alone=True)
     explained, rest = selection.accepted.gain, sum(map(_worth, left))
     share = explained / (explained + rest) if explained + rest > 0 else 1.0
     kept = selection.found
@@ -67,7 +69,8 @@ def judge(
     members = left if share < ENOUGH else []
     while len(kept) < len(named):
         # Names that do not fit would only distort the patterns: those start anew, beside the names that hold.
-        members, p_values = _patterns(problem, patterns, [found.member for found in kept], false_alarm, rng)
+        beside = [found.member for found in kept]
+        members, p_values = _patterns(problem, patterns, beside, false_alarm, rng, alone=True)
         # What is unexplained reaches other joints: names that explain less than it does are not to be trusted.
         strong = tuple(found for found in kept if found.member.gain > max(map(_worth, members), default=0.0))
         if len(strong) == len(kept):
@@ -121,8 +124,13 @@ def _patterns(
     named: Sequence[Member],
     false_alarm: float,
     rng: np.random.Generator,
+    *,
+    alone: bool = False,
 ) -> tuple[list[Member], list[float]]:
-    """Adds patterns beside named effects, while the strongest is significant and worth it."""
+    """Adds patterns beside named effects, while the strongest is significant and worth it.
+
+    Where the first is `alone`, no formula beside it that could be inexact, it must be no more than sure.
+    """
     members: list[Member] = []
     p_values: list[float] = []
     while len(members) < MOST_PATTERNS:
@@ -135,8 +143,10 @@ def _patterns(
         if not p <= false_alarm:
             break
         member = refine(problem, best.hypothesis, best.shape, accepted)
-        enough = BEYOND * sum(m.gain for m in (*named, *members))
-        if member.bic(problem.rows) < LEAST or _worth(member) < enough:
+        before = (*named, *members)
+        if _worth(member) < BEYOND * sum(m.gain for m in before):
+            break
+        if member.bic(problem.rows) < LEAST and (before or not alone or p > SURE):
             break
         members.append(member)
         p_values.append(p)

@@ -16,7 +16,7 @@ from estimation.diagnosis.states import Recording
 from robots.signals import Log
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effects import EFFECTS
-from robots.terms.effects.joint_elasticity import link_inertia, link_torque
+from robots.terms.effects.joint_elasticity import link_inertia
 from robots.terms.effects.situation import Situation
 
 Array = NDArray[np.float64]
@@ -145,7 +145,7 @@ def _signals(now: Situation, measured: Array, joint: int, delay: float) -> _Sign
         t=now.t[rows],
         windup=measured[rows],
         rest=np.column_stack([np.ones_like(q), dq, sign, *once]),
-        load=link_torque(now, joint)[rows],
+        load=now.load[:, joint - 1][rows],
         rival=np.column_stack(twice),
         delay=delay,
     )

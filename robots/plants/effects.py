@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS, Effect, Situation, StaticEffect
+from robots.terms.effects.situation import rotor_inertias
 
 if TYPE_CHECKING:
     from robots.regressor import TorqueModel
@@ -80,7 +81,9 @@ class PlantEffect:
         inert = np.array([column.term in ("rigid_body", "rotor_inertia") for column in model.columns])
         widths = [term.velocity_scale for term in model.terms if hasattr(term, "velocity_scale")]
         width = np.broadcast_to(np.asarray(widths[0] if widths else 0.0, dtype=float), (model.robot.n,))
-        at = [q, dq, ddq, Y @ casadi.SX(np.where(inert, pi, 0.0)), Y @ casadi.SX(pi)]
+        rigid = Y @ casadi.SX(np.where(inert, pi, 0.0))
+        load = rigid - ddq * casadi.SX(rotor_inertias(model, pi).sum(axis=0))
+        at = [q, dq, ddq, rigid, load, Y @ casadi.SX(pi)]
         at += [casadi.tanh(dq / casadi.SX(np.where(width > 0, width, SHARP))), casadi.SX(list(self.shape))]
         return term.function(model.robot, self.joint)(*at) @ casadi.SX(list(self.coefficients))
 

@@ -65,14 +65,23 @@ class Case:
         """RMS of each joint's torque (n,) without noise."""
         return np.sqrt(np.concatenate([r.clean for r in self.logs]).__pow__(2).mean(axis=0))
 
-    def oracle_gain(self) -> tuple[np.ndarray, np.ndarray]:
+    def oracle_gain(self, within: Sequence[tuple[float, float]] | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Mean squared errors (n,) on the unseen logs of the base model, and of it with the effects' own torques.
 
         Both are least squares on the logs, with the motion as it was and each effect's own torque as one column. Rows
         beside a joint's reversal do not count: from a log nobody knows which sign its friction has there.
+
+        Args:
+            within: first and last time [s] of what counts of each unseen log; all of it by default.
         """
         level = self.level()
-        counted = np.concatenate([_away_from_reversals(r.v_true)[::EVERY] for r in self.unseen])
+        ends = within or [(r.t[0], r.t[-1]) for r in self.unseen]
+        counted = np.concatenate(
+            [
+                (_away_from_reversals(r.v_true) & ((r.t >= first) & (r.t <= last))[:, None])[::EVERY]
+                for r, (first, last) in zip(self.unseen, ends, strict=True)
+            ]
+        )
         errors = []
         for columns in (False, True):
             Y, y, parts = self._stack(self.logs, columns)

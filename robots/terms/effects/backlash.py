@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from robots.terms.base import length_unit
 from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
-from robots.terms.effects.joint_elasticity import link_inertia, link_torque, windup
+from robots.terms.effects.joint_elasticity import link_inertia, windup
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -55,7 +55,7 @@ class Backlash(Effect):
         times, ways, quickness = _crossings(situation, joint)
         durations = np.clip((6.0 * shape[0] / quickness) ** (1 / 3), max(QUICKEST, situation.period), SLOWEST)
         side, rate, curve = (np.zeros(len(situation)) for _ in range(3))
-        load = link_torque(situation, joint)
+        load = situation.load[:, joint - 1]
         for run in situation.runs:
             t = situation.t[run]
             side[run] = np.sign(load[run.start])
@@ -88,12 +88,12 @@ class Backlash(Effect):
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the gear's load."""
         assert joint is not None
-        return f"load of joint {joint} [N m]", link_torque(situation, joint)
+        return f"load of joint {joint} [N m]", situation.load[:, joint - 1]
 
 
 def _crossings(situation: Situation, joint: int) -> tuple[Array, Array, Array]:
     """Finds where the load changes sign: times [s], the new sign, and its rate over the link's inertia [rad/s3]."""
-    load = link_torque(situation, joint)
+    load = situation.load[:, joint - 1]
     inertia = np.maximum(link_inertia(situation, joint)[:, joint - 1], 1e-12)
     small = 1e-4 * float(np.abs(load).max(initial=0.0))
     at = []

@@ -38,6 +38,8 @@ class Shape:
         upper: the largest.
         scale: ``log`` where values differ by factors, ``linear`` where by steps.
         grid: the values that a scan tries where the data give none (see `Effect.grid`).
+        inexact: standard error that the formula itself has, beside that of the data: no change is quite sudden, no push
+            has quite that form. In the parameter's unit; a share of the value on a logarithmic scale.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Shape:
     upper: float
     scale: Literal["log", "linear"] = "log"
     grid: tuple[float, ...] = ()
+    inexact: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -200,6 +203,7 @@ class Instant(NamedTuple):
         dq: velocities (n,) [rad/s or m/s].
         ddq: accelerations (n,) [rad/s2 or m/s2].
         rigid: torque of the rigid body and the rotors (n,) [N m or N].
+        load: torque that passes the gears (n,) [N m or N]: `rigid` without the rotors'.
         torque: torque of the whole base model (n,) [N m or N].
         sign: sign of the velocities as the base model takes it (n,): smooth where that is.
         shape: one value per entry of the effect's `shapes`.
@@ -209,6 +213,7 @@ class Instant(NamedTuple):
     dq: casadi.SX
     ddq: casadi.SX
     rigid: casadi.SX
+    load: casadi.SX
     torque: casadi.SX
     sign: casadi.SX
     shape: casadi.SX
@@ -241,7 +246,7 @@ class StaticEffect(Effect):
         """
 
     def function(self, robot: Robot, joint: Place) -> casadi.Function:
-        """Builds (q, dq, ddq, rigid, torque, sign, shape) -> X (n, k) as a CasADi function."""
+        """Builds (q, dq, ddq, rigid, load, torque, sign, shape) -> X (n, k) as a CasADi function."""
         at = Instant.symbols(robot.n, len(self.shapes))
         X = self.expression(robot, joint, at)
         return casadi.Function(self.name, list(at), [casadi.densify(X)], list(Instant._fields), ["X"])
@@ -250,7 +255,7 @@ class StaticEffect(Effect):
         """Evaluates `expression` on all samples."""
         s = situation
         shapes = np.broadcast_to(np.asarray(shape, dtype=float), (len(s), len(self.shapes)))
-        return _evaluator(self, s.robot, joint)(s.q, s.dq, s.ddq, s.rigid, s.torque, s.sign, shapes)[0]
+        return _evaluator(self, s.robot, joint)(s.q, s.dq, s.ddq, s.rigid, s.load, s.torque, s.sign, shapes)[0]
 
 
 class StaticJointEffect(StaticEffect, JointEffect):
@@ -273,7 +278,7 @@ class StaticJointEffect(StaticEffect, JointEffect):
         """Evaluates `row` on all samples."""
         s, j = situation, joint - 1
         shapes = np.broadcast_to(np.asarray(shape, dtype=float), (len(s), len(self.shapes)))
-        signals = (np.ascontiguousarray(a[:, j]) for a in (s.q, s.dq, s.ddq, s.rigid, s.torque, s.sign))
+        signals = (np.ascontiguousarray(a[:, j]) for a in (s.q, s.dq, s.ddq, s.rigid, s.load, s.torque, s.sign))
         return _row_evaluator(self, s.robot, joint)(*signals, shapes)[0][:, 0]
 
     columns = JointEffect.columns

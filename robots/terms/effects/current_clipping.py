@@ -18,12 +18,14 @@ Array = NDArray[np.float64]
 class CurrentClipping(JointEffect):
     """tau = c (clip(tau, -L, L) - tau), c = 1 where all of the torque beyond L is lost.
 
+    The log is cut with its noise, which at the limit is then lost to one side: L comes out low by some share of it.
+
     Flat tops in the log are also flagged by `gate`: such samples say that the torque was L or more, not how much.
     """
 
     name: ClassVar[str] = "current_clipping"
     title: ClassVar[str] = "torque cut off at the current limit"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("level", "N m", 1e-3, 1e6, "log"),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("level", "N m", 1e-3, 1e6, "log", inexact=0.01),)
     rivals: ClassVar[tuple[str, ...]] = ("torque_constant_saturation", "load_dependent_friction")
     experiments: ClassVar[tuple[str, ...]] = ("payload", "static_hold")
 

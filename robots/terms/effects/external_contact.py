@@ -29,8 +29,8 @@ class ExternalContact(Effect):
     depends_on: ClassVar[Literal["state", "time"]] = "time"
     passing: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
-        Shape("start", "s", -np.inf, np.inf, "linear"),
-        Shape("duration", "s", 0.03, 60.0, "log", (0.2, 0.5, 1.25, 3.2)),
+        Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.02),
+        Shape("duration", "s", 0.03, 60.0, "log", (0.2, 0.5, 1.25, 3.2), 0.05),
     )
     rivals: ClassVar[tuple[str, ...]] = ("payload_change", "hand_guiding", "friction_step", "torque_sensor_drift")
     experiments: ClassVar[tuple[str, ...]] = ("repeat",)

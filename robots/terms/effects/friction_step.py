@@ -23,7 +23,7 @@ class FrictionStep(JointEffect):
     name: ClassVar[str] = "friction_step"
     title: ClassVar[str] = "friction that changed at one moment"
     depends_on: ClassVar[Literal["state", "time"]] = "time"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("change_time", "s", -np.inf, np.inf, "linear"),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("change_time", "s", -np.inf, np.inf, "linear", inexact=0.02),)
     rivals: ClassVar[tuple[str, ...]] = ("thermal_friction", "load_heat", "payload_change", "external_contact")
     experiments: ClassVar[tuple[str, ...]] = ("pause", "repeat")
 

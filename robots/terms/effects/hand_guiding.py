@@ -31,8 +31,8 @@ class HandGuiding(Effect):
     depends_on: ClassVar[Literal["state", "time"]] = "time"
     passing: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
-        Shape("start", "s", -np.inf, np.inf, "linear"),
-        Shape("end", "s", -np.inf, np.inf, "linear"),
+        Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.02),
+        Shape("end", "s", -np.inf, np.inf, "linear", inexact=0.02),
     )
     rivals: ClassVar[tuple[str, ...]] = ("external_contact", "payload_change", "friction_step")
     experiments: ClassVar[tuple[str, ...]] = ("repeat",)

@@ -44,7 +44,7 @@ class JointElasticity(Effect):
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per compliance of one."""
         assert joint is not None
-        load = followed(situation, link_torque(situation, joint), shape[0])
+        load = followed(situation, situation.load[:, joint - 1], shape[0])
         return windup(situation, joint, load, *situation.derivatives(load))[:, :, None]
 
     def describe(
@@ -65,7 +65,7 @@ class JointElasticity(Effect):
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the second derivative of the load."""
         assert joint is not None
-        curve = situation.derivatives(link_torque(situation, joint))[1]
+        curve = situation.derivatives(situation.load[:, joint - 1])[1]
         return f"second derivative of the load of joint {joint} [N m/s2]", curve
 
 
@@ -87,27 +87,11 @@ def followed(situation: Situation, load: Array, resonance: float) -> Array:
     return result
 
 
-def link_torque(situation: Situation, joint: int) -> Array:
-    """Gives the torque (N,) that passes a joint's gear: the rigid-body torque without the rotor's."""
-    fitted, hidden = rotor_inertia(situation, joint)
-    return np.asarray(situation.rigid[:, joint - 1] - (fitted + hidden) * situation.ddq[:, joint - 1])
-
-
 def link_inertia(situation: Situation, joint: int) -> Array:
     """Gives a joint's column of the links' inertia matrix (N, n), without its rotor."""
     column = situation.sensitivity("inertia")[:, :, joint - 1].copy()
-    column[:, joint - 1] -= rotor_inertia(situation, joint)[1]
+    column[:, joint - 1] -= situation.rotors[1, joint - 1]
     return column
-
-
-def rotor_inertia(situation: Situation, joint: int) -> tuple[float, float]:
-    """Gives a rotor's inertia, as fitted, and as described where the fit holds it within the link's.
-
-    Next to the base a rotor moves as its link does: no log tells the two apart, and one base parameter holds both.
-    """
-    rotor = [i for i, c in enumerate(situation.model.columns) if c.term == "rotor_inertia" and c.joint == joint]
-    fitted = float(situation.parameters[rotor].sum())
-    return (fitted, 0.0) if fitted or not rotor else (0.0, float(situation.robot.rotor_inertia[joint - 1]))
 
 
 def windup(situation: Situation, joint: int, lag: Array, rate: Array, curve: Array) -> Array:

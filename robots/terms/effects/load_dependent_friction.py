@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class LoadDependentFriction(StaticJointEffect):
-    """tau = |tau_L| (a sign(dq) + b dq), tau_L the rigid-body torque (Hamon et al. 2010).
+    """tau = |tau_L| (a sign(dq) + b dq), tau_L the torque that passes the gear (Hamon et al. 2010).
 
     The first column is also a gear's efficiency, better when driving than when driven.
     """
@@ -42,7 +42,7 @@ class LoadDependentFriction(StaticJointEffect):
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds |tau_L| sign(dq) and |tau_L| dq."""
-        load = casadi.fabs(at.rigid)
+        load = casadi.fabs(at.load)
         return casadi.horzcat(load * at.sign, load * at.dq)
 
     def describe(
@@ -64,5 +64,5 @@ class LoadDependentFriction(StaticJointEffect):
         """Gives the load times the direction of motion."""
         assert joint is not None
         j = joint - 1
-        signed = np.abs(situation.rigid[:, j]) * situation.sign[:, j]
+        signed = np.abs(situation.load[:, j]) * situation.sign[:, j]
         return f"load of joint {joint}, signed by its direction [N m]", signed

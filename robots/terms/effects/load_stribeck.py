@@ -43,7 +43,7 @@ class LoadStribeck(StaticJointEffect):
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds |tau_L| exp(-|dq| / v_s) sign(dq)."""
-        return casadi.fabs(at.rigid) * casadi.exp(-at.dq * at.sign / at.shape[0]) * at.sign
+        return casadi.fabs(at.load) * casadi.exp(-at.dq * at.sign / at.shape[0]) * at.sign
 
     def describe(
         self,

@@ -79,6 +79,16 @@ class Situation:
         v0 = np.broadcast_to(self.velocity_scale, self.dq.shape)
         return np.where(v0 > 0, np.tanh(self.dq / np.where(v0 > 0, v0, 1.0)), np.sign(self.dq))
 
+    @cached_property
+    def rotors(self) -> Array:
+        """The rotors' inertias (2, n) [kg m2 or kg], see `rotor_inertias`."""
+        return rotor_inertias(self.model, self.parameters)
+
+    @cached_property
+    def load(self) -> Array:
+        """The torque that passes the gears (N, n) [N m or N]: that of the rigid body without the rotors'."""
+        return self.rigid - self.ddq * self.rotors.sum(axis=0)
+
     def friction_at(self, dq: Array) -> Array:
         """Evaluates the base model's friction (N, n) [N m or N] at other velocities (N, n)."""
         columns = [i for i, c in enumerate(self.model.columns) if c.term == "friction" and self.parameters[i]]
@@ -203,6 +213,23 @@ def joined(parts: Sequence[Situation]) -> Situation:
         parts=tuple(parts),
         _cache={},
     )
+
+
+def rotor_inertias(model: TorqueModel, parameters: Array) -> Array:
+    """Gives the rotors' inertias (2, n): as fitted, and as described where the fit holds them within the links'.
+
+    Next to the base a rotor moves as its link does: no log tells the two apart, and one base parameter holds both.
+
+    Args:
+        model: the base model.
+        parameters: its standard parameters (p,).
+    """
+    result = np.zeros((2, model.robot.n))
+    for column, value in zip(model.columns, parameters, strict=True):
+        if column.term == "rotor_inertia":
+            at = column.joint - 1
+            result[:, at] = (value, 0.0) if value else (0.0, model.robot.rotor_inertia[at])
+    return result
 
 
 def _velocity_scale(model: TorqueModel) -> Array:

@@ -156,7 +156,7 @@ def test_static_effects_share_one_expression(effect, seen):
         function = effect.function(now.robot, joint)
         X = effect.columns(now, joint, point)
         for i in (0, 333, 1400):
-            signals = (now.q, now.dq, now.ddq, now.rigid, now.torque, now.sign)
+            signals = (now.q, now.dq, now.ddq, now.rigid, now.load, now.torque, now.sign)
             expected = function(*(signal[i] for signal in signals), list(point)).full()
             np.testing.assert_allclose(X[i], expected, rtol=1e-12, atol=1e-12)
 

@@ -14,7 +14,7 @@ from robots.geometry.chain import Chain
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS, situation
 from robots.terms.effects.base_tilt import level_axes
-from robots.terms.effects.joint_elasticity import followed, link_torque, rotor_inertia
+from robots.terms.effects.joint_elasticity import followed
 
 STEP = 1e-5
 SOME = slice(100, 1400, 65)
@@ -50,7 +50,7 @@ def test_an_encoder_offset_moves_the_joint(now, torque):
 def test_an_elastic_gear_lets_its_link_lag(now, torque):
     """A stiff gear changes all torques as a link does that lags by its load, with its velocity and acceleration."""
     for joint in (1, 3, 5):
-        spline = CubicSpline(now.t, link_torque(now, joint))
+        spline = CubicSpline(now.t, now.load[:, joint - 1])
         step = -np.eye(5)[joint - 1]
         change = [spline(now.t[SOME], order)[:, None] * step for order in range(3)]
         # Large lags (c = 1) would leave the difference's range: it is scaled to the largest.
@@ -165,7 +165,7 @@ def test_a_hand_on_the_only_log_shows_nowhere(seen):
 def test_a_loose_gear_lets_its_link_cross(seen):
     """Where the load changes sign the link crosses the play, over the time that the growing load needs for it."""
     now = seen(5, seed=1)
-    loads = [link_torque(now, joint) for joint in range(1, 6)]
+    loads = [now.load[:, joint - 1] for joint in range(1, 6)]
     joint = 1 + int(np.argmax([np.count_nonzero(np.diff(np.sign(load))) for load in loads]))
     load = loads[joint - 1]
     inertia = now.sensitivity("inertia")[:, joint - 1, joint - 1]
@@ -191,9 +191,9 @@ def test_a_rotor_within_its_link_is_told_from_it(seen):
     merged = situation(now.model, parameters, now.t, now.q, now.dq, now.ddq)
     # As a fit does, the link's own torque takes the rotor's on.
     merged = replace(merged, rigid=merged.rigid + np.outer(now.ddq[:, 0], np.eye(4)[0] * rotor))
-    np.testing.assert_allclose(link_torque(merged, 1), link_torque(now, 1), atol=1e-9)
-    assert rotor_inertia(now, 1) == (rotor, 0.0)
-    assert rotor_inertia(merged, 1) == (0.0, rotor)
+    np.testing.assert_allclose(merged.load[:, 0], now.load[:, 0], atol=1e-9)
+    np.testing.assert_array_equal(now.rotors[:, 0], [rotor, 0.0])
+    np.testing.assert_array_equal(merged.rotors[:, 0], [0.0, rotor])
 
 
 def test_a_soft_gear_keeps_its_link_behind(seen):
