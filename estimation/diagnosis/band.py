@@ -1,4 +1,4 @@
-"""The band of frequencies in which motion is known: torque and columns are low-passed alike, and thinned."""
+"""The bands of frequencies in which motion is known: torque and columns are low-passed alike, and thinned."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TRANSITION = 0.25  # of the low-pass, as a share of its cut-off
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """The frequencies in which motion is known: torque and all columns are low-passed alike, and thinned.
+    """The frequencies in which a joint's torque is known: it and all its columns are low-passed alike, and thinned.
 
     Friction that turns round kicks a joint faster than its encoder can tell. Where both sides of the equation are
     filtered alike, what is lost on one side is lost on the other.
@@ -82,18 +82,24 @@ def _response(band: Band, rows: int, after: int) -> tuple[int, NDArray[np.comple
     return size, scipy.fft.fft(centred)
 
 
-def find_band(recording: Recording, inertia: Array, torque_density: Array) -> Band:
-    """Finds the band: up to where the error of the acceleration, as a torque, comes near the torque noise.
+def find_bands(recording: Recording, inertia: Array, torque_density: Array) -> tuple[Band, ...]:
+    """Finds each joint's band: up to where the error of all accelerations, as a torque, comes near the torque noise.
+
+    Rows are thinned alike for all joints, by what the fastest band needs.
 
     Args:
         recording: the data.
-        inertia: of each joint (n,) [kg m2].
+        inertia: torque on each joint per acceleration of each (n, n) [kg m2].
         torque_density: power density of the torque noise at high frequency (n,) [(N m)^2/Hz].
     """
     rate = 1 / recording.step
-    error = np.maximum(recording.floor * inertia**2, 1e-300)
+    error = np.maximum(inertia**2 @ recording.floor, 1e-300)
     limits = (SHARE * torque_density / error) ** 0.25 / (2 * np.pi)
-    cutoff = float(np.clip(limits.min(), min(SLOWEST, FASTEST * rate), FASTEST * rate))
-    stride = max(1, int(rate / (2.5 * cutoff)))
+    cutoffs = np.clip(limits, min(SLOWEST, FASTEST * rate), FASTEST * rate)
+    stride = max(1, int(rate / (2.5 * cutoffs.max())))
+    return tuple(_band(float(cutoff), rate, stride) for cutoff in cutoffs)
+
+
+def _band(cutoff: float, rate: float, stride: int) -> Band:
     length = int(np.ceil(3.6 * rate / (TRANSITION * cutoff))) | 1
     return Band(firwin(length, cutoff * (1 - TRANSITION / 2), fs=rate, window=("kaiser", 6.0)), stride, cutoff)

@@ -123,13 +123,16 @@ def _sharpness(
 
 
 def inertia_of(baseline: Baseline, recording: Recording, values: Array) -> Array:
-    """Gives each joint's own inertia (n,), rotor and all, as base parameters (b,) say it: mean over some states."""
+    """Gives the torque on each joint per acceleration of each (n, n) [kg m2], as base parameters (b,) say it.
+
+    Rotors included, root mean square over some states.
+    """
     rows = np.linspace(0, len(recording) - 1, 50).astype(int)
     q, zero = recording.q[rows], np.zeros((len(rows), recording.n))
     still = baseline.base.torque(q, zero, zero, values)
-    result = np.empty(recording.n)
-    for j in range(recording.n):
+    result = np.empty((recording.n, recording.n))
+    for k in range(recording.n):
         unit = zero.copy()
-        unit[:, j] = 1.0
-        result[j] = np.mean((baseline.base.torque(q, zero, unit, values) - still)[:, j])
-    return np.maximum(np.abs(result), 1e-9)
+        unit[:, k] = 1.0
+        result[:, k] = np.sqrt(np.mean((baseline.base.torque(q, zero, unit, values) - still) ** 2, axis=0))
+    return result

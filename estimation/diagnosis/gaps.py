@@ -101,15 +101,17 @@ def long_gap(step: float) -> int:
     return max(8, round(LONG_GAP / step))
 
 
-def free_columns(unsure: NDArray[np.bool_], longest: int, whitening: Whitening, width: float) -> tuple[csc_matrix, ...]:
-    """Builds the white columns of the short gaps: polynomials over each, one for every `width` rows and one more.
+def free_columns(
+    unsure: NDArray[np.bool_], longest: int, whitening: Whitening, widths: Sequence[float]
+) -> tuple[csc_matrix, ...]:
+    """Builds the white columns of the short gaps: polynomials over each, one for every `widths[j]` rows and one more.
 
     Each is whitened where it is not zero only, so that a long log costs no more a gap than a short one; they are made
     orthonormal gap by gap where gaps do not touch each other's rows.
     """
     result = []
-    beside = int(np.ceil(1.5 * width)) + 2
-    for j, column in enumerate(unsure.T):
+    for j, (column, width) in enumerate(zip(unsure.T, widths, strict=True)):
+        beside = int(np.ceil(1.5 * width)) + 2
         pieces: list[tuple[int, Array]] = []
         first_row = 0
         for run_start, run_stop in pairwise((*whitening.starts, len(column))):
@@ -120,14 +122,14 @@ def free_columns(unsure: NDArray[np.bool_], longest: int, whitening: Whitening, 
                     shapes = np.asarray(np.polynomial.legendre.legvander(x, number - 1), dtype=np.float64)
                     row, white = _white_gap(whitening, j, start, shapes, run_stop - run_start)
                     pieces.append((first_row + row, white))
-            first_row += -(-(run_stop - run_start) // whitening.band.stride)
+            first_row += -(-(run_stop - run_start) // whitening.stride)
         result.append(_sparse([_orthonormal_block(block) for block in _touching(pieces)], first_row))
     return tuple(result)
 
 
 def _white_gap(whitening: Whitening, joint: int, start: int, shapes: Array, rows: int) -> tuple[int, Array]:
     """Whitens functions of a gap (m, k) that begins at a row of a log: the first white row, and the white rows."""
-    band = whitening.band
+    band = whitening.bands[joint]
     half, stride = len(band.taps) // 2, band.stride
     taps = np.concatenate([[1.0], -whitening.coefficients[joint]]) / whitening.scale[joint]
     low = max(0, start - half - stride) // stride * stride

@@ -179,7 +179,7 @@ def expected_whitening(recording: Recording, noise: Sensors, level: Array | None
         precision=np.eye(n),
         starts=recording.starts,
         gaps=no_gaps(n),
-        band=Band(np.zeros(0), 1, 0.5 / recording.step),
+        bands=(Band(np.zeros(0), 1, 0.5 / recording.step),) * recording.n,
         innovations=np.random.default_rng(0).standard_normal((1024, n)),
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
-from estimation.diagnosis.band import find_band
+from estimation.diagnosis.band import find_bands
 from estimation.diagnosis.gaps import find_gaps, free_columns, long_gap
 from estimation.diagnosis.states import Recording
 from estimation.diagnosis.whitening import Whitening
@@ -46,7 +46,7 @@ def estimate_whitening(recording: Recording, residual: Array, parameters: int, i
         recording: the data.
         residual: torque less model (N, n) [N m or N].
         parameters: how many were fitted to it: they have taken some of the noise.
-        inertia: of each joint (n,) [kg m2], for the error that the acceleration's makes.
+        inertia: torque on each joint per acceleration of each (n, n) [kg m2], for what their errors make.
     """
     longest = long_gap(recording.step)
     gaps = find_gaps(recording.unsure, recording.starts, longest)
@@ -54,29 +54,33 @@ def estimate_whitening(recording: Recording, residual: Array, parameters: int, i
     all_gaps = find_gaps(recording.unsure, recording.starts)
     bridged = np.column_stack([all_gaps.bridged(column, j) for j, column in enumerate(residual.T)])
     pieces = [bridged[run] for run in recording.runs]
-    band = find_band(recording, inertia, _density(pieces, recording.step))
-    pieces = [band.passed(piece) for piece in pieces]
-    step = recording.step * band.stride
-    width = 1 / (2 * band.cutoff * recording.step)
-    resting = gaps.resting(recording.starts, len(residual), band.stride, int(np.ceil(1.5 * width)) + 2)
+    bands = find_bands(recording, inertia, _density(pieces, recording.step))
+    pieces = [
+        np.column_stack([band.passed(column) for band, column in zip(bands, piece.T, strict=True)]) for piece in pieces
+    ]
+    stride = bands[0].stride
+    step = recording.step * stride
+    cutoffs = np.array([band.cutoff for band in bands])
+    widths = 1 / (2 * cutoffs * recording.step)
+    resting = gaps.resting(recording.starts, len(residual), stride, int(np.ceil(1.5 * widths.max())) + 2)
     counts = np.maximum((~resting).sum(axis=0), 1).astype(float)
     tells = sum(map(len, pieces)) * step * FLAT >= FEWEST
-    window = (FLAT if tells else 0.0, INSIDE * band.cutoff if len(band.taps) else np.inf)
-    noise = _colour(pieces, step, counts, parameters, window)
+    slowest, fastest = FLAT if tells else 0.0, INSIDE * cutoffs
+    noise = _colour(pieces, step, counts, parameters, slowest, fastest)
     trimmed = max(len(a) for a in noise.coefficients)
     innovations = np.concatenate([noise.whitened(piece)[min(trimmed, len(piece) // 2) :] for piece in pieces])
     # White noise has as much power at each frequency: what effects add to the slow ones is left out, and above the band
     # there is nothing.
     spectrum = np.fft.rfft(innovations, axis=0)
     f = np.fft.rfftfreq(len(innovations), step)
-    spectrum[(f < window[0]) | (f >= window[1])] = 0.0
-    inside = max(int(((f >= window[0]) & (f < window[1])).sum()), 1)
-    scale = np.maximum(np.sqrt((np.abs(spectrum) ** 2).sum(axis=0) / inside / counts), 1e-12)
-    white = np.fft.irfft(spectrum, len(innovations), axis=0)
-    white = np.clip(white / np.maximum(white.std(axis=0), 1e-12), -WINSOR, WINSOR)
-    white -= white.mean(axis=0)
-    white /= np.maximum(white.std(axis=0), 1e-12)
-    correlation = np.atleast_2d(white.T @ white / len(white))
+    inside = (f[:, None] >= slowest) & (f[:, None] < fastest)
+    spectrum[~inside] = 0.0
+    scale = np.maximum(np.sqrt((np.abs(spectrum) ** 2).sum(axis=0) / np.maximum(inside.sum(axis=0), 1) / counts), 1e-12)
+    white = _unit(spectrum, len(innovations))
+    # Joints correlate in the frequencies that all of them know.
+    spectrum[~inside.all(axis=1)] = 0.0
+    shared = _unit(spectrum, len(innovations))
+    correlation = np.atleast_2d(shared.T @ shared / len(shared))
     # Too few rows make correlations of nothing; a tenth towards none keeps the inverse tame.
     correlation = 0.95 * correlation + 0.05 * np.eye(residual.shape[1])
     plain = Whitening(
@@ -86,9 +90,9 @@ def estimate_whitening(recording: Recording, residual: Array, parameters: int, i
         starts=recording.starts,
         innovations=white,
         gaps=gaps,
-        band=band,
+        bands=bands,
     )
-    free = free_columns(recording.unsure, longest, plain, width)
+    free = free_columns(recording.unsure, longest, plain, widths.tolist())
     plain = replace(plain, gaps=replace(gaps, free=free))
     left = np.where(resting, np.nan, np.abs(plain.all(residual)))
     level = np.array([np.nanmedian(column) if np.isfinite(column).any() else 1.0 for column in left.T]) / 0.6745
@@ -96,7 +100,17 @@ def estimate_whitening(recording: Recording, residual: Array, parameters: int, i
     return replace(plain, weights=np.where(resting, 0.0, weights))
 
 
-def _colour(pieces: Sequence[Array], step: float, counts: Array, parameters: int, window: tuple[float, float]) -> Noise:
+def _unit(spectrum: NDArray[np.complex128], rows: int) -> Array:
+    """Gives the signals (N, n) of spectra, outliers cut, of no mean and unit variance."""
+    white = np.fft.irfft(spectrum, rows, axis=0)
+    white = np.clip(white / np.maximum(white.std(axis=0), 1e-12), -WINSOR, WINSOR)
+    white -= white.mean(axis=0)
+    return np.asarray(white / np.maximum(white.std(axis=0), 1e-12))
+
+
+def _colour(
+    pieces: Sequence[Array], step: float, counts: Array, parameters: int, slowest: float, fastest: Array
+) -> Noise:
     """Fits the noise by its spectrum within a window, and lets the model say what is outside.
 
     What an effect leaves in the residual is slow, as motion is; taken for noise it would hide itself. Above the window
@@ -108,32 +122,41 @@ def _colour(pieces: Sequence[Array], step: float, counts: Array, parameters: int
         step: the sample period [s].
         counts: rows of each joint that are no bridge over a time at rest (n,).
         parameters: how many were fitted to the residual: they have taken some of the noise.
-        window: lowest and highest frequency [Hz].
+        slowest: lowest frequency of the windows [Hz].
+        fastest: highest of each joint's (n,) [Hz].
     """
     rows, joints = sum(map(len, pieces)), pieces[0].shape[1]
     highest = int(np.clip(round(MEMORY / step), LOWEST_ORDER, HIGHEST_ORDER))
     size = next_fast_len(max(map(len, pieces)) + highest + 1, real=True)
     power = sum(np.abs(np.fft.rfft(piece, size, axis=0)) ** 2 for piece in pieces) / counts
     power = power * rows * joints / max(rows * joints - parameters, 0.5 * rows * joints)
-    f = np.fft.rfftfreq(size, step)
-    known = (f >= window[0]) & (f < window[1])
+    covariances = np.empty((joints, highest + 1))
+    for j in range(joints):
+        covariances[j] = _covariance(power[:, j], size, step, counts[j], (slowest, float(fastest[j])), highest)
+    return fit_noise(np.concatenate(pieces), counts, covariances)
 
-    def covariances() -> Array:
-        result = np.fft.irfft(power, size, axis=0)[: highest + 1].T
-        result[:, 0] = np.maximum(result[:, 0] * (1 + LOADING), np.finfo(float).tiny)
+
+def _covariance(power: Array, size: int, step: float, count: float, window: tuple[float, float], highest: int) -> Array:
+    """Gives one joint's covariances (highest + 1,) from its power (F,), known in a window alone, of `size` rows."""
+    f = np.fft.rfftfreq(size, step)
+    power = power.copy()
+
+    def covariance() -> Array:
+        result = np.fft.irfft(power, size)[: highest + 1]
+        result[0] = max(result[0] * (1 + LOADING), np.finfo(float).tiny)
         return np.asarray(result)
 
+    known = (f >= window[0]) & (f < window[1])
     if known.any() and not known.all():
         places = np.flatnonzero(known)
-        slowest, fastest = places[: max(1, len(places) // 4)], places[-max(1, len(places) // 4) :]
-        power[f < window[0]] = power[slowest].mean(axis=0)
-        power[f >= window[1]] = power[fastest].mean(axis=0)
+        quarter = max(1, len(places) // 4)
+        power[f < window[0]] = power[places[:quarter]].mean()
+        power[f >= window[1]] = power[places[-quarter:]].mean()
         lags = np.exp(-2j * np.pi * step * f[~known, None] * np.arange(1, highest + 1))
         for _ in range(ROUNDS):
-            for j, covariance in enumerate(covariances()):
-                a, variance = levinson(covariance, counts[j])
-                power[~known, j] = variance / np.abs(1.0 - lags[:, : len(a)] @ a) ** 2
-    return fit_noise(np.concatenate(pieces), counts, covariances())
+            a, variance = levinson(covariance(), count)
+            power[~known] = variance / np.abs(1.0 - lags[:, : len(a)] @ a) ** 2
+    return covariance()
 
 
 def _density(pieces: Sequence[Array], step: float) -> Array:

@@ -65,7 +65,7 @@ def row_weight(whitening: Whitening) -> float:
     So many plain rows, weighed by the innovations' scale, tell as much of a slow torque as one that is white.
     """
     gains = [1.0 / max(abs(1.0 - float(np.sum(a))), 0.01) for a in whitening.coefficients]
-    return whitening.band.stride * float(np.mean(np.square(gains)))
+    return whitening.stride * float(np.mean(np.square(gains)))
 
 
 def held(gram: Array, cross: Array, pull: Pull) -> Array:

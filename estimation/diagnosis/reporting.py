@@ -124,8 +124,8 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
 
 _LOST = "Simulated forward, the fitted robot ran away from the position loop: its fit suits no simulation."
 _SPOILING = (
-    "On joint {} something is unexplained, but the free function that shows it errs on unseen data: it is no part of the "
-    "extended model."
+    "On joint {} something is unexplained, but the free function that shows it errs on unseen data: it is no part of "
+    "the extended model."
 )
 _DROPPED = "A fit of {} stood out of the noise, but makes the error on unseen data larger: left out."
 
@@ -296,7 +296,7 @@ def _provenance(told: Told) -> dict[str, object]:
         "logs": described,
         "method": "diagnosis",
         "tool_version": VERSION,
-        "cutoff_hz": float(max(problem.recording.cutoff, problem.whitening.band.cutoff)),
+        "cutoff_hz": float(max(problem.recording.cutoff, *(band.cutoff for band in problem.whitening.bands))),
         "velocity_scales": [float(v) for v in problem.situation.velocity_scale],
         "seed": told.seed,
         "false_alarm": told.false_alarm,

@@ -25,7 +25,7 @@ class Whitening:
         starts: rows at which a log begins: the filters start anew.
         innovations: what the noise looks like when white (M, n), for drawing more of it.
         gaps: rows of each joint that do not count.
-        band: where motion is known.
+        bands: each joint's: where motion is known. Rows are thinned alike.
         weights: of the white rows (N, n): those that no noise explains count less; None for ones.
     """
 
@@ -35,8 +35,13 @@ class Whitening:
     starts: tuple[int, ...]
     innovations: Array
     gaps: Gaps
-    band: Band
+    bands: tuple[Band, ...]
     weights: Array | None = None
+
+    @property
+    def stride(self) -> int:
+        """Rows of a log that become one."""
+        return self.bands[0].stride
 
     def apply(self, series: Array, joint: int) -> Array:
         """Whitens columns (N,) or (N, k) of one joint, counted from 0."""
@@ -48,7 +53,7 @@ class Whitening:
         taps = np.concatenate([[1.0], -self.coefficients[joint]]) / self.scale[joint]
         parts = []
         for start, stop in pairwise((*self.starts, len(series))):
-            white = self.band.passed(series[start:stop], taps)
+            white = self.bands[joint].passed(series[start:stop], taps)
             # Before the log there is nothing to predict from: its first rows would weigh as if they were shocks.
             lead = min(len(taps) - 1, len(white))
             white[:lead] *= np.linspace(0, 1, len(taps))[1 : lead + 1, *(None,) * (series.ndim - 1)]

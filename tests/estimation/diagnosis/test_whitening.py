@@ -53,11 +53,11 @@ def test_coloured_noise_becomes_white_and_of_unit_density_in_the_band() -> None:
     Each of five stretches of the band holds some 700 frequencies: the standard error of its mean power is 4 %.
     """
     residual = _noise(10_000)
-    whitening = estimate_whitening(_recording(), residual, 0, np.ones(2))
+    whitening = estimate_whitening(_recording(), residual, 0, np.eye(2))
     white = whitening.all(residual)[50:]
     power = np.abs(np.fft.rfft(white, axis=0)) ** 2 / len(white)
-    f = np.fft.rfftfreq(len(white), STEP * whitening.band.stride)
-    edges = np.linspace(0.5, 0.75 * whitening.band.cutoff, 6)
+    f = np.fft.rfftfreq(len(white), STEP * whitening.stride)
+    edges = np.linspace(0.5, 0.75 * whitening.bands[0].cutoff, 6)
     for low, high in pairwise(edges):
         assert power[(f >= low) & (f < high)].mean(axis=0) == pytest.approx([1.0, 1.0], abs=0.2)
     correlation = np.linalg.inv(whitening.precision)
@@ -66,8 +66,8 @@ def test_coloured_noise_becomes_white_and_of_unit_density_in_the_band() -> None:
 
 def test_the_band_passes_slow_signals_and_stops_fast_ones() -> None:
     """Below three quarters of the cut-off a signal comes through unchanged, above 1.1 times it is gone."""
-    whitening = estimate_whitening(_recording(), _noise(10_000), 0, np.ones(2))
-    band = whitening.band
+    whitening = estimate_whitening(_recording(), _noise(10_000), 0, np.eye(2))
+    band = whitening.bands[0]
     t = STEP * np.arange(10_000)
     for frequency, factor in ((0.7 * band.cutoff, 1.0), (1.15 * band.cutoff, 0.0)):
         wave = np.sin(2 * np.pi * frequency * t)
@@ -80,7 +80,7 @@ def _level(whitening: Whitening, residual: np.ndarray, rows: slice = slice(None)
     """Mean power of some white rows of the noise from 1.5 to 8 Hz (2,)."""
     white = replace(whitening, weights=None).all(residual)[rows]
     power = np.abs(np.fft.rfft(white, axis=0)) ** 2 / len(white)
-    f = np.fft.rfftfreq(len(white), STEP * whitening.band.stride)
+    f = np.fft.rfftfreq(len(white), STEP * whitening.stride)
     return np.asarray(power[(f > 1.5) & (f < 8.0)].mean(axis=0))
 
 
@@ -93,8 +93,8 @@ def test_a_slow_effect_is_not_taken_for_noise() -> None:
     t = STEP * np.arange(20_000)[:, None]
     slow = 4 * noise.std(axis=0) * np.sin(2 * np.pi * np.array([0.05, 0.6]) * t)
     recording = _recording(20_000)
-    alone = estimate_whitening(recording, noise, 0, np.ones(2))
-    beside = estimate_whitening(recording, noise + slow, 0, np.ones(2))
+    alone = estimate_whitening(recording, noise, 0, np.eye(2))
+    beside = estimate_whitening(recording, noise + slow, 0, np.eye(2))
     assert _level(beside, noise) == pytest.approx(_level(alone, noise), rel=0.05)
     at_rest = [
         [scale / abs(1 - a.sum()) for a, scale in zip(w.coefficients, w.scale, strict=True)] for w in (alone, beside)
@@ -112,8 +112,8 @@ def test_kicks_at_reversals_and_times_at_rest_do_not_change_the_level() -> None:
         residual[start : start + 6, 0] += 50 * noise[:, 0].std()
     unsure[10_000:18_000] = True  # both joints stand for two fifths of the time, held by brakes
     residual[10_000:18_000] = 0.0
-    whitening = estimate_whitening(_recording(20_000, unsure=unsure), residual, 0, np.ones(2))
-    stride = whitening.band.stride
+    whitening = estimate_whitening(_recording(20_000, unsure=unsure), residual, 0, np.eye(2))
+    stride = whitening.stride
     assert _level(whitening, noise, slice(9_900 // stride)) == pytest.approx([1.0, 1.0], abs=0.2)
     assert whitening.weights is not None
     assert not whitening.weights[10_000 // stride + 1 : 18_000 // stride].any()
@@ -123,7 +123,7 @@ def test_kicks_at_reversals_and_times_at_rest_do_not_change_the_level() -> None:
 def test_filtering_columns_together_is_filtering_each() -> None:
     """Columns of very different size, and of zeros, come out as convolution written out has them."""
     rng = np.random.default_rng(0)
-    band = estimate_whitening(_recording(), _noise(10_000), 0, np.ones(2)).band
+    band = estimate_whitening(_recording(), _noise(10_000), 0, np.eye(2)).bands[0]
     columns = rng.standard_normal((1000, 5)) * [1.0, 1e9, 0.0, 1e-9, 1.0]
     after = np.array([1.0, -0.5, 0.2])
     together = band.passed(columns, after)
@@ -144,7 +144,7 @@ def test_rows_of_unknown_direction_do_not_count() -> None:
     unsure = np.zeros((10_000, 2), dtype=bool)
     unsure[3000:3006, 0] = True
     recording = _recording(unsure=unsure)
-    whitening = replace(estimate_whitening(recording, _noise(10_000), 0, np.ones(2)), weights=None)
+    whitening = replace(estimate_whitening(recording, _noise(10_000), 0, np.eye(2)), weights=None)
     kick = np.zeros(10_000)
     kick[3001:3005] = 1000.0
     plain = replace(whitening, gaps=find_gaps(np.zeros_like(unsure), (0,)))
