@@ -14,7 +14,7 @@ from estimation.diagnosis.carried import lightened
 from estimation.diagnosis.diagnosis import Diagnosis
 from estimation.diagnosis.excess import residual_shares
 from estimation.diagnosis.extending import dense
-from estimation.diagnosis.hypotheses import all_hypotheses
+from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.limits import find_limits
 from estimation.diagnosis.noise import estimate_whitening
 from estimation.diagnosis.patterns import all_patterns
@@ -162,25 +162,34 @@ def _search(
         share = 0.1 + 0.3 * attempt
         inertia = inertia_of(baseline, recording, values)
         whitening = estimate_whitening(recording, residual, baseline.base.size + known, inertia)
-        if search is not None and not (_calmer(search.problem, whitening.scale) or _moved(search.problem, values)):
-            break
+        if search is not None:
+            if not (_calmer(search.problem, whitening.scale) or _moved(search.problem, values)):
+                break
+            # Its columns are most of what a diagnosis keeps in memory: they go before others come.
+            search = None
         rng = np.random.default_rng(seed)
         problem = pose(recording, baseline, whitening, draws=DRAWS, rng=rng, extra=extra)
-        entries = measure(problem, hypotheses, _teller(bar, share, 0.2))
-        selection = select(
-            problem,
-            entries,
-            false_alarm=false_alarm,
-            rng=rng,
-            advance=_noter(bar, share + 0.25),
-        )
-        search = Search(problem, entries, selection)
-        if not selection.found:
+        search = _searched(problem, hypotheses, false_alarm, rng, bar, share)
+        del problem
+        if not search.selection.found:
             break
-        residual, values, extra = _cleaned(problem, baseline, selection)
-        known = sum(found.member.degrees for found in selection.found)
+        residual, values, extra = _cleaned(search.problem, baseline, search.selection)
+        known = sum(found.member.degrees for found in search.selection.found)
     assert search is not None
     return search
+
+
+def _searched(
+    problem: Problem,
+    hypotheses: Sequence[Hypothesis],
+    false_alarm: float,
+    rng: np.random.Generator,
+    bar: Progress,
+    share: float,
+) -> Search:
+    entries = measure(problem, hypotheses, _teller(bar, share, 0.2))
+    advance = _noter(bar, share + 0.25)
+    return Search(problem, entries, select(problem, entries, false_alarm=false_alarm, rng=rng, advance=advance))
 
 
 def _teller(bar: Progress, start: float, share: float) -> Callable[[float], None]:
