@@ -53,7 +53,7 @@ class Member:
 def refine(
     problem: Problem, hypothesis: Hypothesis, start: tuple[float, ...], accepted: Accepted, *, effort: int = EFFORT
 ) -> Member:
-    """Searches the shape that explains most, from a point of the grid.
+    """Searches the shape that explains most for its number of parameters, from a point of the grid.
 
     The linear coefficients and the base model are projected out at every step (variable projection, Golub and Pereyra
     1973), so that the search has as many dimensions as the effect has shape parameters.
@@ -70,10 +70,11 @@ def refine(
         group = problem.group(joints, columns)
         result = score(problem, group, accepted)
         gain, coefficients = result.bounded(lower, upper)
-        if not best or gain > best[0].gain:
-            member = Member(hypothesis, shape, group, gain, coefficients, result.degrees + len(free), result.visible)
+        member = Member(hypothesis, shape, group, gain, coefficients, result.degrees + len(free), result.visible)
+        worth = member.bic(problem.rows)
+        if not best or worth > best[0].bic(problem.rows):
             best[:] = [member]
-        return gain
+        return worth
 
     evaluate(start)
     if free and effort:

@@ -41,7 +41,7 @@ class TorqueSensorDrift(JointEffect):
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists a line, and zeros that wander in more and more stretches."""
         (origin, _), (_, longest) = self.bounds(situation, joint)
-        return tuple((origin, longest / pieces) for pieces in (1, 2, 4, STRETCHES))
+        return tuple((origin, longest / pieces) for pieces in (1, 2, 4, 8, STRETCHES))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Fixes the origin, which only dates the drift; the stretches cover the data."""
@@ -68,5 +68,5 @@ class TorqueSensorDrift(JointEffect):
         return f"The torque zero of joint {joint} wanders over {np.ptp(places):.3g} {force}."
 
 
-STRETCHES = 8
+STRETCHES = 16
 """Stretches of a zero that wanders."""
