@@ -8,15 +8,17 @@ FIGAROH (PyPI ``figaroh``) pins other libraries and lives in an environment of i
 Both get the first half of the log and predict the second; then both get 100,000 samples of a virtual arm of that URDF.
 FIGAROH is used as its own ``BaseIdentification.solve(wls=True)`` does, step by step: its filters, its differentiation,
 its regressor with friction, actuator inertia and offsets, its QR base parameters, its weighted least squares. Of the
-cut-offs of its low-pass the one that predicts the unseen half best is taken for it. Each runs in a process of its own.
+cut-offs of its low-pass the one that predicts the unseen half best is taken for it. Each runs in a process of its own,
+with one BLAS thread; the 100,000 samples by turns, and the fastest of each counts. What either imports is collected
+before its clock starts.
 """
 
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -25,12 +27,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from memory import peak_memory
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
 SAMPLES, PERIOD = 100_000, 0.004
 CUTOFFS = (2.0, 5.0, 10.0)
+REPEATS = 3
 GOALS = {"accuracy": 0.9, "time": 1 / 20, "memory": 1 / 10}
 
 
@@ -72,6 +76,7 @@ def figaroh(urdf: str, known: Path, unseen: Path | None, cutoff: float) -> dict[
         return build_regressor_basic(robot, smooth, dq, steps._differentiate_signal(t, dq), config)
 
     data = np.load(known)
+    gc.collect()
     start = time.perf_counter(), time.process_time()
     standard = get_standard_parameters(robot.model, config)
     standard.update(add_standard_additional_parameters(robot.model, config))
@@ -90,7 +95,7 @@ def figaroh(urdf: str, known: Path, unseen: Path | None, cutoff: float) -> dict[
         W = build_regressor_reduced(regressor(data["t"], data["q"]), dead)[:, list(decomposer.get_base_indices())]
         error = data["tau"] - (W @ phi).reshape(n, -1).T
         result["error"] = np.sqrt(np.mean(error**2, axis=0)).tolist()
-    return result | {"memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6}
+    return result | {"memory": peak_memory()}
 
 
 def ours(urdf: str, known: Path, unseen: Path | None) -> dict[str, Any]:
@@ -101,6 +106,7 @@ def ours(urdf: str, known: Path, unseen: Path | None) -> dict[str, Any]:
 
     robot = load_robot(urdf)
     logs = [Log(**np.load(path)) for path in (known, *([unseen] if unseen else []))]
+    gc.collect()
     start = time.perf_counter(), time.process_time()
     estimate = identify(robot, logs[0])
     result: dict[str, Any] = {"wall": time.perf_counter() - start[0], "cpu": time.process_time() - start[1]}
@@ -108,7 +114,7 @@ def ours(urdf: str, known: Path, unseen: Path | None) -> dict[str, Any]:
         from estimation import predict
 
         result["error"] = predict(estimate.model, logs[1]).error_rms.tolist()
-    return result | {"memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6}
+    return result | {"memory": peak_memory()}
 
 
 def simulated(urdf: str, path: Path) -> None:
@@ -167,8 +173,16 @@ def main() -> int:
             for cutoff in CUTOFFS
         ]
         own = in_process(sys.executable, "ours", options.urdf, str(known), str(unseen), "0")
-        theirs_long = in_process(options.python, "figaroh", options.urdf, str(long), "", str(CUTOFFS[1]))
-        own_long = in_process(sys.executable, "ours", options.urdf, str(long), "", "0")
+        turns = [
+            (
+                in_process(options.python, "figaroh", options.urdf, str(long), "", str(CUTOFFS[1])),
+                in_process(sys.executable, "ours", options.urdf, str(long), "", "0"),
+            )
+            for _ in range(REPEATS)
+        ]
+    theirs_long, own_long = (
+        {key: min(run[key] for run in runs) for key in runs[0]} for runs in zip(*turns, strict=True)
+    )
     best = min(range(len(tries)), key=lambda k: float(np.sum(tries[k]["error"])))
     theirs = np.array(tries[best]["error"])
     mine = np.array(own["error"])
@@ -179,12 +193,15 @@ def main() -> int:
     print("  torque ", " ".join(f"{v:7.3f}" for v in torque))
     ratio = float(np.mean(mine / theirs))
     print(f"  ours over FIGAROH's, mean of the joints: {ratio:.2f} (goal {GOALS['accuracy']:g})")
-    print(f"{SAMPLES} samples, seconds of processors and peak memory")
-    print(f"  FIGAROH {theirs_long['cpu']:7.2f} s {theirs_long['memory']:6.2f} GB")
-    print(f"  ours    {own_long['cpu']:7.2f} s {own_long['memory']:6.2f} GB")
-    times, memories = own_long["cpu"] / theirs_long["cpu"], own_long["memory"] / theirs_long["memory"]
-    print(f"  ratios  1/{1 / times:.1f} of the time (goal 1/20), 1/{1 / memories:.1f} of the memory (goal 1/10)")
-    met = ratio <= GOALS["accuracy"] and times <= GOALS["time"] and memories <= GOALS["memory"]
+    print(f"{SAMPLES} samples, seconds of processors and by the clock, and peak memory")
+    for name, found in (("FIGAROH", theirs_long), ("ours   ", own_long)):
+        print(f"  {name} {found['cpu']:7.2f} s {found['wall']:7.2f} s {found['memory']:6.2f} GB")
+    times, clock, memories = (own_long[key] / theirs_long[key] for key in ("cpu", "wall", "memory"))
+    print(
+        f"  ratios  1/{1 / times:.1f} of the processors' time, 1/{1 / clock:.1f} by the clock (goal 1/20), "
+        f"1/{1 / memories:.1f} of the memory (goal 1/10)"
+    )
+    met = ratio <= GOALS["accuracy"] and clock <= GOALS["time"] and memories <= GOALS["memory"]
     return 0 if met else 1
 
 

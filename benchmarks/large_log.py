@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -20,6 +19,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+from memory import peak_memory
 from scipy.linalg.blas import dsyrk
 
 from estimation import identify, read_log, write_log
@@ -66,7 +66,7 @@ def run(path: Path) -> dict[str, float]:
     return {
         "wall": time.perf_counter() - clock,
         "cpu": time.process_time() - cpu,
-        "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,
+        "memory": peak_memory(),
         "samples": float(len(estimate.t)),
         "identified": float(sum(joint.identified for joint in estimate.joints)),
     }

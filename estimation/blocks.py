@@ -137,35 +137,23 @@ class Sides:
         return Sides(Blocks.empty(joints, blocks, columns), Blocks.empty(joints, blocks, columns))
 
 
-def side_products(own: Array, wide: Array, tau: Array, weight: Array, size: int) -> tuple[Array, Array]:
-    """Averages so many rows of one joint at a time, and multiplies their columns with each other.
+def side_products(sums: Array, lost: Array, places: NDArray[np.intp], size: int) -> tuple[Array, Array]:
+    """Multiplies the columns of rows that are averaged so many at a time with each other.
 
     Args:
-        own: the joint's columns (N, k).
-        wide: more of them, one after the other (w, N).
-        tau: its torque (N,), as the last column.
-        weight: of the rows in a fit (N,), 0 to 1; where a row does not count, both sides are zero, and what is left of
-            its average is still an equation.
-        size: N is a multiple of it.
+        sums: of each group of `size` rows of one joint (G, k), all rows counting alike.
+        lost: of some groups what of their sums does not count in a fit (P, k); what is left of such an average is
+            still an equation.
+        places: which groups those are (P,).
+        size: rows of a group.
 
     Returns:
-        (k + w + 1, k + w + 1), of the rows as they count in a fit, and of all rows alike.
+        (k, k), of the rows as they count in a fit, and of all rows alike.
     """
-    groups, count = len(tau) // size, own.shape[1]
-    rows = np.empty((groups, count + len(wide) + 1))
-    ones = np.ones(size)
-    # Products of small matrices: numpy's own sum along so short an axis takes four times as long.
-    rows[:, :count] = own if size == 1 else (np.ones((groups, 1, size)) @ own.reshape(groups, size, count))[:, 0]
-    rows[:, count:-1] = (wide.reshape(-1, size) @ ones).reshape(len(wide), groups).T
-    rows[:, -1] = np.ascontiguousarray(tau).reshape(groups, size) @ ones
-    weights = weight.reshape(groups, size)
-    partial = np.flatnonzero((weights != 1).any(axis=1))
-    rest = rows[partial]
-    rows[partial] = 0.0
-    common = rows.T @ rows
-    if not len(partial):
-        return common / size**2, common / size**2
-    places = (partial[:, None] * size + np.arange(size)).ravel()
-    some = np.column_stack([own[places], wide[:, places].T, tau[places]])
-    counted = np.einsum("gs,gsk->gk", weights[partial], some.reshape(len(partial), size, -1))
+    if not len(places):
+        common = sums.T @ sums / size**2
+        return common, common
+    rest = sums[places]
+    sums[places] = 0.0
+    common, counted = sums.T @ sums, rest - lost
     return (common + counted.T @ counted) / size**2, (common + rest.T @ rest) / size**2

@@ -133,7 +133,7 @@ def bootstrap(
     gates = estimate.gates
     if gates and len(gates) != len(data):
         raise InputError(f"{len(data)} logs", allowed=f"{len(gates)}, as the estimate was made of")
-    base = find_base_parameters(model.torque_model)
+    base = find_base_parameters(model.torque_model, gravities=model.gravities)
     if base.independent != tuple(model.columns) or robot.n != model.robot.n:
         raise InputError("the estimate is of another robot", remedy="identify it again")
     usable = [part for log, gate in zip(data, gates, strict=True) for part in gate.usable(log)] if gates else data
@@ -193,7 +193,8 @@ def _moments(regressor: JointRegressor, part: Rows, piece: slice) -> Moments:
     sums = []
     for rows in chunks(piece.stop - piece.start):
         at = slice(piece.start + rows.start, piece.start + rows.stop)
-        sums.append(regressor.moments(motion.q[at], motion.dq[at], motion.ddq[at], part.tau[at], part.mask[at]))
+        states = (motion.q[at], motion.dq[at], motion.ddq[at])
+        sums.append(regressor.moments(*states, part.tau[at], part.mask[at], part.gravity))
     return reduce(add, sums)
 
 

@@ -14,7 +14,7 @@ from estimation.estimators import Estimator
 from estimation.preparation import Prepared, Rows, rows_of
 from estimation.preprocessing import Harmonics, LowPass, Smoother, SmoothingSpline
 from estimation.pulls import Pull, description_pull, friction_levels
-from estimation.regression import JointRegressor, threaded
+from estimation.regression import JointRegressor, summed
 from robots.base_parameters import BaseParameters
 
 Array = NDArray[np.float64]
@@ -162,8 +162,9 @@ class Comparison:
         size = averaged or self.averaged
         pieces = [(part, piece) for part in self._rows(smoother) for piece in self._pieces(part)]
         sides = Sides.empty(len(self.spread), len(pieces), self.base.size + len(self.spread) * len(WIDER))
-        for _ in threaded(lambda item: self._fill(sides, item[0], *item[1], size), enumerate(pieces)):
-            pass
+        # One after the other: what is done with a piece is so short that threads wait for each other.
+        for block, (part, piece) in enumerate(pieces):
+            self._fill(sides, block, part, piece, size)
         return sides
 
     def _rows(self, smoother: Smoother) -> list[Rows]:
@@ -181,17 +182,33 @@ class Comparison:
         whole = rows // size * size
         place = slice(piece.start, piece.start + (whole or rows))
         size = size if whole else rows
-        motion, mask, tau = part.motion, part.mask[place], part.tau[place]
-        dq = motion.dq[place]
-        joints = zip(self.regressor(motion.q[place], dq, motion.ddq[place]), self.regressor.used, strict=True)
-        for joint, (own, used) in enumerate(joints):
-            wide = np.tanh(dq[:, joint] / WIDER[:, None])
-            products = side_products(own, wide, tau[:, joint], mask[:, joint], size)
+        motion, mask, tau = part.motion, part.mask[place], np.ascontiguousarray(part.tau[place].T)
+        signals = motion.q[place], motion.dq[place], motion.ddq[place]
+        all_sums = self.regressor.sums(*signals, size, part.gravity)
+        # Few rows do not count in full: their columns are asked for once more.
+        slow = np.flatnonzero((mask != 1).any(axis=1))
+        q, dq, ddq = (signal[slow] for signal in signals)
+        slow_rows = self.regressor(q, dq, ddq, part.gravity)
+        missing, speeds = 1 - mask[slow].T, np.ascontiguousarray(signals[1].T)
+        groups, ones = len(mask) // size, np.ones(size)
+        for joint, (sums, some, used) in enumerate(zip(all_sums, slow_rows, self.regressor.used, strict=True)):
+            wide = np.tanh(speeds[joint] / WIDER[:, None])
+            count = len(used)
+            rows = np.empty((groups, count + len(WIDER) + 1))
+            rows[:, :count] = sums
+            # A product: numpy's own sum along so short an axis takes four times as long.
+            rows[:, count:-1] = (wide.reshape(-1, size) @ ones).reshape(len(WIDER), groups).T
+            rows[:, -1] = tau[joint].reshape(groups, size) @ ones
+            own = np.flatnonzero(missing[joint])
+            at = slow[own]
+            lost = np.column_stack([some[own], wide[:, at].T, tau[joint, at]]) * missing[joint, own, None]
+            places, lost = summed(lost, at // size)
+            products = side_products(rows, lost, places, size)
             chosen = np.concatenate([used, self.base.size + joint * len(WIDER) + np.arange(len(WIDER))])
-            for side, sums in zip((sides.fitted, sides.judged), products, strict=True):
-                side.gram[joint, block][np.ix_(chosen, chosen)] = sums[:-1, :-1]
-                side.cross[joint, block, chosen] = sums[:-1, -1]
-                side.square[joint, block] = sums[-1, -1]
+            for side, product in zip((sides.fitted, sides.judged), products, strict=True):
+                side.gram[joint, block][np.ix_(chosen, chosen)] = product[:-1, :-1]
+                side.cross[joint, block, chosen] = product[:-1, -1]
+                side.square[joint, block] = product[-1, -1]
         sides.fitted.count[:, block] = mask.sum(axis=0) / size
         sides.judged.count[:, block] = len(mask) / size
 
@@ -224,11 +241,10 @@ class Comparison:
 
     def left_out(self, blocks: Sides, trial: Trial) -> Array:
         """RMS error of all rows of each block, predicted from the others (n,) [N m or N]."""
-        columns, judged = self._columns(trial.scales), blocks.judged
-        values = np.zeros(judged.cross.shape[1:])
-        # Columns that are not chosen have no part in the torque.
-        values[:, columns] = self._without(blocks.fitted.columns(columns.tolist()), trial)
-        return np.asarray(np.sqrt(judged.squares(values) / np.maximum(judged.count.sum(axis=1), 1)))
+        columns = self._columns(trial.scales).tolist()
+        judged = blocks.judged.columns(columns)
+        squares = judged.squares(self._without(blocks.fitted.columns(columns), trial))
+        return np.asarray(np.sqrt(squares / np.maximum(judged.count.sum(axis=1), 1)))
 
     def _without(self, chosen: Blocks, trial: Trial) -> Array:
         """Parameters (B, b) of the fit without each block."""
@@ -259,7 +275,7 @@ class Comparison:
         """Errors (N, n) of each block of a log by the next of the values."""
         motion = part.motion
         for piece in self._pieces(part):
-            rows = self.regressor(motion.q[piece], motion.dq[piece], motion.ddq[piece])
+            rows = self.regressor(motion.q[piece], motion.dq[piece], motion.ddq[piece], part.gravity)
             parameters = next(values)
             error = part.tau[piece].copy()
             for joint, (Y, used) in enumerate(zip(rows, self.regressor.used, strict=True)):

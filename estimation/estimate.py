@@ -72,7 +72,7 @@ class Estimate:
         white_noise_errors: standard errors (b,) that white noise would have: too small where noise is coloured.
         t: times (N,) of the fitted rows [s].
         dq: joint velocities (N, n) of the fitted rows.
-        measured: torque (N, n) of the fitted rows [N m or N].
+        measured: torque (N, n) of the fitted rows, less that of known payloads [N m or N].
         predicted: by the model (N, n).
         dropped_rows: rows of the logs that repeated an old position.
         gates: what the gate found in each log; empty where it was not asked.

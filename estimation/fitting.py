@@ -87,7 +87,8 @@ def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, ch
     # One array for all parts, which the estimate keeps: of millions of rows a copy counts.
     torque = np.empty((sum(len(part.motion) for part in rows), rows[0].tau.shape[1]))
     predicted = np.split(torque, np.cumsum([len(part.motion) for part in rows])[:-1])
-    passes = [_pass(regressor, part, solution, into) for part, into in zip(rows, predicted, strict=True)]
+    long = len(torque) > MOST_ROWS
+    passes = [_pass(regressor, part, solution, into, long) for part, into in zip(rows, predicted, strict=True)]
     scores = np.concatenate([found.scores for found in passes])
     fitted = [_Fitted(part, torque, None) for part, torque in zip(rows, predicted, strict=True)]
     if solution.row_weights is not None:
@@ -96,7 +97,7 @@ def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, ch
         moments = sum_moments(regressor, weighted).pulled(choice.pull)
         # An M-estimator's scores are its weights times its errors (Huber 1967).
         fitted = [_Fitted(*some) for some in zip(rows, predicted, factors, strict=True)]
-        scores = _scores(regressor, fitted, solution.weights)
+        scores = _scores(regressor, fitted, solution.weights) if long else scores
     averaged = round(AVERAGED / float(np.median([log.positions.period for log in logs])))
     full, white = _covariances(regressor, fitted, scores, moments, solution, averaged, seed)
     return Fit(
@@ -119,7 +120,7 @@ def sum_moments(regressor: JointRegressor, rows: Sequence[Rows]) -> Moments:
     def of(item: tuple[Rows, slice]) -> Moments:
         part, at = item
         motion = part.motion
-        return regressor.moments(motion.q[at], motion.dq[at], motion.ddq[at], part.tau[at], part.mask[at])
+        return regressor.moments(motion.q[at], motion.dq[at], motion.ddq[at], part.tau[at], part.mask[at], part.gravity)
 
     return reduce(add, threaded(of, ((part, at) for part in rows for at in chunks(len(part.motion)))))
 
@@ -142,14 +143,14 @@ class _Pass(NamedTuple):
 
     Attributes:
         nominal: sum of each joint's squared errors (n,) by the robot's description.
-        scores: Y' W e of the fit over each chunk (chunks, b), of the rows that count.
+        scores: Y' W e of the fit over each chunk (chunks, b), of the rows that count; zero where nobody asks.
     """
 
     nominal: Array
     scores: Array
 
 
-def _pass(regressor: JointRegressor, part: Rows, solution: Solution, torque: Array) -> _Pass:
+def _pass(regressor: JointRegressor, part: Rows, solution: Solution, torque: Array, scored: bool) -> _Pass:
     """Looks at all rows once more, now that the parameters are known, and writes the predicted torque (N, n)."""
     motion, base = part.motion, regressor.base
     described = base.from_standard(base.model.nominal)
@@ -157,14 +158,15 @@ def _pass(regressor: JointRegressor, part: Rows, solution: Solution, torque: Arr
 
     def of(at: slice) -> tuple[Array, Array]:
         nominal, score = np.empty(part.tau.shape[1]), np.zeros(base.size)
-        for joint, Y in enumerate(regressor(motion.q[at], motion.dq[at], motion.ddq[at])):
+        for joint, Y in enumerate(regressor(motion.q[at], motion.dq[at], motion.ddq[at], part.gravity)):
             used = regressor.used[joint]
             fitted, expected = (Y @ both[used]).T
             torque[at, joint] = fitted
             measured = part.tau[at, joint]
             expected = measured - expected
             nominal[joint] = expected @ expected
-            score[used] += ((measured - fitted) * part.mask[at, joint] * solution.weights[joint]) @ Y
+            if scored:
+                score[used] += ((measured - fitted) * part.mask[at, joint] * solution.weights[joint]) @ Y
         return nominal, score
 
     nominal, scores = zip(*threaded(of, chunks(len(motion))), strict=True)
@@ -214,17 +216,21 @@ def _parts(regressor: JointRegressor, fitted: Sequence[_Fitted]) -> list[Part]:
 
 
 def _part(joints: JointRegressor, fitted: _Fitted, begin: int, end: int) -> Part:
-    motion, mask = fitted.rows.motion, fitted.rows.mask[begin:end]
+    motion, mask, gravity = fitted.rows.motion, fitted.rows.mask[begin:end], fitted.rows.gravity
 
     def regressor(start: int, stop: int) -> Array:
         at = slice(begin + start, begin + stop)
-        return joints.base.regressor(motion.q[at], motion.dq[at], motion.ddq[at])
+        return joints.base.regressor(motion.q[at], motion.dq[at], motion.ddq[at], gravity=gravity)
 
     def split(start: int, stop: int) -> tuple[Array, ...]:
         at = slice(begin + start, begin + stop)
-        return joints(motion.q[at], motion.dq[at], motion.ddq[at])
+        return joints(motion.q[at], motion.dq[at], motion.ddq[at], gravity)
 
-    return Part(end - begin, regressor, mask, fitted.errors(slice(begin, end)), joints.used, split)
+    def sums(start: int, stop: int, size: int) -> list[Array]:
+        at = slice(begin + start, begin + stop)
+        return joints.counted(motion.q[at], motion.dq[at], motion.ddq[at], mask[start:stop], size, gravity)
+
+    return Part(end - begin, regressor, mask, fitted.errors(slice(begin, end)), joints.used, split, sums)
 
 
 def _scores(regressor: JointRegressor, fitted: Sequence[_Fitted], weights: Array) -> Array:
@@ -235,7 +241,7 @@ def _scores(regressor: JointRegressor, fitted: Sequence[_Fitted], weights: Array
         motion = some.rows.motion
         error = some.errors(at) * weights
         score = np.zeros(regressor.base.size)
-        for joint, Y in enumerate(regressor(motion.q[at], motion.dq[at], motion.ddq[at])):
+        for joint, Y in enumerate(regressor(motion.q[at], motion.dq[at], motion.ddq[at], some.rows.gravity)):
             score[regressor.used[joint]] += error[:, joint] @ Y
         return score
 

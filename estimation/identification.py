@@ -14,6 +14,7 @@ from estimation.estimators import Estimator
 from estimation.estimators import estimator as choose_estimator
 from estimation.fitting import Fit, fit
 from estimation.gate import GateReport, check_log
+from estimation.known_setup import gravities_of, require_plain
 from estimation.model import Model
 from estimation.preparation import Prepared, prepare
 from estimation.preprocessing import Harmonics
@@ -66,7 +67,8 @@ def identify(
 
     Args:
         robot: the robot.
-        logs: one log or several, of t, q and tau or current.
+        logs: one log or several, of t, q and tau or current. One that states a payload or a gravity counts as such: the
+            parameters are the arm's own, and all that bases which stand unlike show together.
         method: ``wls``, ``ols``, or an estimator of one's own.
         friction: ``polynomial`` or ``coulomb-viscous``.
         rotor: with rotor inertias.
@@ -80,13 +82,16 @@ def identify(
         The estimate.
 
     Raises:
-        InputError: logs of another robot, without torque, too short, or refused by the gate; unknown options.
+        InputError: logs of another robot, without torque, too short, or refused by the gate; unknown options; a payload
+            or gravity that the method does not know.
         NotIdentifiableError: logs in which no joint moves, or no joint's torque can be predicted.
     """
     chosen = choose_estimator(method)
     data = [logs] if isinstance(logs, Log) else list(logs)
     if not data:
         raise InputError("no logs", allowed="one or more")
+    if chosen.simulates:
+        require_plain(data, f"the method {chosen.name}")
     bar = progress or SILENT
     bar.start("identifying", 4.0)
     _require_motion(data)
@@ -98,7 +103,7 @@ def identify(
     usable = [part for log, gate in zip(data, gates, strict=True) for part in gate.usable(log)] if gates else data
     prepared = [prepare(robot, log) for log in usable]
     sharp = default_model(robot, friction=friction, velocity_scale=VELOCITY_SCALES[0], rotor=rotor, offset=offset)
-    base = find_base_parameters(sharp)
+    base = find_base_parameters(sharp, gravities=gravities_of(data))
     bar.update(1.0, "choosing smoothing and regularisation")
     choice = choose(base, prepared, chosen, candidates or Candidates())
     predictable = _predictable(prepared, choice)
@@ -125,6 +130,7 @@ def identify(
     colour = colour_of(np.sqrt(np.maximum(np.diag(found.covariance), 0.0)), found.white, determined)
     base, rows = found.base, found.rows
     provenance = {**_provenance(data, chosen, found.choice, joints, seed), "colour": colour}
+    provenance["gravities"] = [list(gravity) for gravity in base.gravities]
     if "standard" in found.solution.extras:
         provenance["standard_parameters"] = np.asarray(found.solution.extras["standard"], dtype=float).tolist()
     if found.solution.extras.get("active"):

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimation.diagnosis.carried import with_body
 from estimation.diagnosis.extension import Extension, extension_torque, read_extension
+from estimation.known_setup import require_known
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.geometry.chain import Chain, Joint
@@ -20,6 +22,7 @@ from robots.limits import Limits
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.terms import Column, build_term, describe_term
+from robots.terms.effects.situation import joined, situation
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,6 +59,11 @@ class Model:
     extensions: tuple[Extension, ...] = ()
 
     @property
+    def gravities(self) -> tuple[tuple[float, ...], ...]:
+        """Gravities (3,) in the base frame [m/s2] besides the description's, under which the parameters hold too."""
+        return tuple(tuple(map(float, gravity)) for gravity in self.provenance.get("gravities", ()))
+
+    @property
     def robot(self) -> Robot:
         """The robot."""
         return self.torque_model.robot
@@ -75,7 +83,16 @@ class Model:
         """Standard errors (b,), infinite where the data do not determine the parameter."""
         return np.where(self.determined, np.sqrt(np.diag(self.covariance)), np.inf)
 
-    def torque(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike, t: ArrayLike | None = None) -> Array:
+    def torque(
+        self,
+        q: ArrayLike,
+        dq: ArrayLike,
+        ddq: ArrayLike,
+        t: ArrayLike | None = None,
+        *,
+        gravity: ArrayLike | None = None,
+        payload: ArrayLike | None = None,
+    ) -> Array:
         """Predicts the torque (N, n) [N m or N] of a motion given by arrays (N, n).
 
         Args:
@@ -84,13 +101,27 @@ class Model:
             ddq: accelerations.
             t: times (N,) [s]. With them the extensions count, some of which depend on time or on what came before;
                 without, the terms alone.
+            gravity: (3,) in the base frame [m/s2], where the base stands otherwise than the robot's description says.
+            payload: ten inertial parameters of a body on the flange, in its frame, as `Log` has them.
+
+        Raises:
+            InputError: a gravity that shows parameters which the model lacks.
         """
-        own = self.torque_model.torque(q, dq, ddq, self.values, columns=self.columns)
+        model = self.torque_model.under(gravity)
+        if model is not self.torque_model:
+            require_known(self.torque_model, self.columns, self.gravities, np.asarray(gravity, dtype=float))
+        parameters = np.zeros(model.size)
+        parameters[list(self.columns)] = self.values
+        asked: tuple[int, ...] = self.columns
+        if payload is not None:
+            parameters = with_body(model, parameters, np.asarray(payload, dtype=float))
+            asked = tuple(np.union1d(asked, np.flatnonzero(parameters)).tolist())
+        own = model.torque(q, dq, ddq, parameters[list(asked)], columns=asked)
         if t is None or not self.extensions:
             return own
         arrays = [np.atleast_2d(np.asarray(array, dtype=float)) for array in (q, dq, ddq)]
-        times = np.asarray(t, dtype=float)
-        return own + extension_torque(self.extensions, self.torque_model, self.values, self.columns, times, *arrays)
+        state = situation(model, parameters, np.asarray(t, dtype=float), *arrays)
+        return own + extension_torque(self.extensions, joined([state], self.torque_model))
 
     def to_frame(self) -> pd.DataFrame:
         """Gives a row per parameter: joint, value, standard error, percent, unit, determined, formula."""

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from estimation.estimators.drive_gains import CurrentRun, DriveGains, fit_drive_gains
 from estimation.estimators.payload import Payload, fit_payload
+from estimation.known_setup import require_plain
 from estimation.model import Model
 from estimation.preparation import prepare
 from robots.base_parameters import find_base_parameters
@@ -35,10 +36,11 @@ def identify_payload(model: Model, logs: Log | Sequence[Log], *, consistent: boo
         The payload, about the last link's frame.
 
     Raises:
-        InputError: logs of another robot, or without torque.
+        InputError: logs of another robot, without torque, or that state a payload or gravity of their own.
         NotIdentifiableError: runs that move no payload.
     """
     runs = [logs] if isinstance(logs, Log) else list(logs)
+    require_plain(runs, "the fit of a payload")
     cutoff = float(model.provenance.get("cutoff_hz", CUTOFF))
     return fit_payload(
         model.torque_model,
@@ -71,9 +73,10 @@ def identify_drive_gains(
         The gains, in the units of `Robot.torque_constant`.
 
     Raises:
-        InputError: a log without currents, or no payload at all.
+        InputError: a log without currents, or that states a payload or gravity of its own, or no payload at all.
         NotIdentifiableError: runs that leave a gain open.
     """
+    require_plain([log for log, _ in runs], "the fit of drive gains")
     base = find_base_parameters(default_model(robot, friction=friction, velocity_scale=SHARP))
     found = []
     for log, payload in runs:

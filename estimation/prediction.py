@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.known_setup import HEAT, require_plain
 from estimation.model import Model
 from estimation.preparation import torque_of
 from estimation.preprocessing import LowPass, Smoother, SmoothingSpline, resample, smooth
@@ -163,7 +164,8 @@ def predict(
 
     Args:
         model: an identified model.
-        log: positions over time; its torque, if any, is compared with the prediction and not used otherwise.
+        log: positions over time; its torque, if any, is compared with the prediction and not used otherwise. A payload
+            or a gravity that it states counts.
         thermal: this model with its thermal models: friction falls as the motion heats the joints.
         start: temperatures of each joint's zones at first [degC]; those of the surroundings by default.
         ambient: temperature of the surroundings where the log does not state it [degC]; each model's by default.
@@ -172,7 +174,8 @@ def predict(
         The torques at the log's own times.
 
     Raises:
-        InputError: another number of joints, or too few rows.
+        InputError: another number of joints, or too few rows; a gravity that shows parameters which the model lacks; a
+            payload or a gravity beside heat.
     """
     robot = model.robot
     if log.n != robot.n:
@@ -183,17 +186,19 @@ def predict(
     motion = smooth(resample(log.t, log.q), _smoother(model, cutoff))
     has_torque = log.tau is not None or log.current is not None
     if thermal is None:
-        predicted = model.torque(motion.q, motion.dq, motion.ddq, motion.t)
+        states = (motion.q, motion.dq, motion.ddq)
+        predicted = model.torque(*states, motion.t, gravity=log.gravity, payload=log.payload)
     else:
         from estimation.thermal.history import surroundings
 
+        require_plain([log], HEAT)
         predicted, _ = thermal.simulate(motion, ambient=surroundings(log, motion.t, ambient), start=start)
     return Prediction(
         motion=motion,
         predicted=predicted,
         measured=torque_of(robot, log) if has_torque else None,
         joint_names=robot.joint_names,
-        band=_band(model, motion),
+        band=_band(model, motion, log.gravity),
         cutoff=cutoff,
     )
 
@@ -205,7 +210,7 @@ def _smoother(model: Model, cutoff: float) -> Smoother:
     return SmoothingSpline(cutoff) if kind == SmoothingSpline.name else LowPass(cutoff)
 
 
-def _band(model: Model, motion: Motion) -> Array | None:
+def _band(model: Model, motion: Motion, gravity: Array | None) -> Array | None:
     level = model.provenance.get("band95")
     if level is None:
         return None
@@ -213,8 +218,9 @@ def _band(model: Model, motion: Motion) -> Array | None:
     if model.provenance.get("regularised", True):
         # The covariance is that of the fit without regularisation: it knows nothing of what fills open directions.
         return width
+    torque_model = model.torque_model.under(gravity)
     for rows in chunks(len(motion)):
-        Y = model.torque_model.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows], columns=model.columns)
+        Y = torque_model.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows], columns=model.columns)
         variance = np.einsum("tjp,tjp->tj", Y @ model.covariance, Y)
         width[rows] = np.hypot(width[rows], NORMAL_95 * np.sqrt(np.maximum(variance, 0.0)))
     return width

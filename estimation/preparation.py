@@ -10,10 +10,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.known_setup import Load, load_of
 from estimation.preprocessing import LowPass, Resampled, Smoother, period_of, resample, smooth
 from estimation.regression import threaded
 from robots.common.errors import InputError
-from robots.common.parallel import available_cores
 from robots.robot import Robot
 from robots.signals import Log, Motion
 
@@ -35,13 +35,15 @@ class Rows:
 
     Attributes:
         motion: smoothed, at the log's own times.
-        tau: measured torque (N, n), as it was logged.
+        tau: measured torque (N, n), as it was logged, less that of a known payload.
         mask: (N, n), zero where a row of a joint does not count.
+        gravity: (3,) in the base frame [m/s2]; None as the robot's description says.
     """
 
     motion: Motion
     tau: Array
     mask: Array
+    gravity: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -52,11 +54,13 @@ class Prepared:
         log: as it was recorded.
         tau: joint torque (N, n) [N m or N].
         positions: on the grid.
+        load: the log's known payload; None without.
     """
 
     log: Log
     tau: Array
     positions: Resampled
+    load: Load | None = None
 
     @cached_property
     def period(self) -> float | None:
@@ -86,7 +90,7 @@ class Prepared:
         (rows,) = self._masked([(motion, self.tau)])
         edge = smoother.edge(motion.duration)
         inside = (motion.t >= motion.t[0] + edge) & (motion.t <= motion.t[-1] - edge)
-        return Rows(rows.motion, rows.tau, rows.mask * inside[:, None])
+        return replace(rows, mask=rows.mask * inside[:, None])
 
     def pieces(self, by: float | Smoother) -> list[Rows]:
         """Smooths the log as `rows` does, a long one in pieces that follow each other."""
@@ -111,7 +115,8 @@ class Prepared:
 
     def cut(self, part: slice) -> Prepared:
         """Takes some rows."""
-        return Prepared(_window(self.log, part), self.tau[part], resample(self.log.t[part], self.log.q[part]))
+        positions = resample(self.log.t[part], self.log.q[part])
+        return Prepared(_window(self.log, part), self.tau[part], positions, self.load)
 
     def stretches(self, count: int, rows: int) -> Iterator[Prepared]:
         """Gives `count` evenly spread stretches of so many rows each, or the log where that is all of it."""
@@ -127,9 +132,11 @@ class Prepared:
         end = int(np.searchsorted(t, t[-1] - edge, side="right"))
         return (motion.slice(begin, end) if (begin, end) != (0, len(t)) else motion), self.tau[begin:end]
 
-    @staticmethod
-    def _masked(parts: list[tuple[Motion, Array]]) -> list[Rows]:
-        """Leaves out the rows (N, n) in which a joint is almost at rest, by its speed in all parts together."""
+    def _masked(self, parts: list[tuple[Motion, Array]]) -> list[Rows]:
+        """Leaves out the rows (N, n) in which a joint is almost at rest, by its speed in all parts together.
+
+        The torque of a known payload is taken off, by the smoothed motion.
+        """
         total = sum(len(motion) for motion, _ in parts)
         speed = np.sqrt(sum(np.einsum("tj,tj->j", motion.dq, motion.dq) for motion, _ in parts) / total)
         moves = speed >= STANDING
@@ -138,7 +145,9 @@ class Prepared:
             if not moves.all():
                 motion = Motion(motion.t, motion.q, motion.dq * moves, motion.ddq * moves)
             fast = np.abs(motion.dq) >= SLOW * speed
-            rows.append(Rows(motion, tau, (fast | ~moves).astype(float)))
+            if self.load is not None:
+                tau = tau - self.load.torque(motion)
+            rows.append(Rows(motion, tau, (fast | ~moves).astype(float), self.log.gravity))
         return rows
 
 
@@ -152,7 +161,7 @@ def prepare(robot: Robot, log: Log) -> Prepared:
     if log.n != robot.n:
         raise InputError(f"{log.n} joints", file=file, allowed=f"{robot.n}, as {robot.name} has")
     try:
-        return Prepared(log, torque_of(robot, log), resample(log.t, log.q))
+        return Prepared(log, torque_of(robot, log), resample(log.t, log.q), load_of(robot, log))
     except InputError as error:
         raise InputError(
             error.problem, file=file, joint=error.joint, allowed=error.allowed, remedy=error.remedy
@@ -176,7 +185,7 @@ def rows_of(logs: Sequence[Prepared], by: float | Smoother, *, ends: bool = Fals
         log.even and len(log.tau) == len(first.tau) and np.isclose(log.positions.period, first.positions.period, 1e-9)
         for log in logs
     )
-    groups = max(1, min(len(logs), available_cores())) if alike else len(logs)
+    groups = 1 if alike else len(logs)
     bounds = np.linspace(0, len(logs), groups + 1).astype(int).tolist()
 
     def group(place: tuple[int, int]) -> list[Rows]:
@@ -189,7 +198,7 @@ def rows_of(logs: Sequence[Prepared], by: float | Smoother, *, ends: bool = Fals
         pairs = zip(some, parts, strict=True)
         return [log._seen(Motion(log.positions.original, *signals), smoother, ends) for log, signals in pairs]
 
-    return [rows for found in threaded(group, pairwise(bounds)) for rows in found]
+    return [rows for found in (threaded if groups > 1 else map)(group, pairwise(bounds)) for rows in found]
 
 
 def torque_of(robot: Robot, log: Log) -> Array:
@@ -218,4 +227,4 @@ def _smoother(by: float | Smoother) -> Smoother:
 
 def _window(log: Log, part: slice) -> Log:
     # Only what the fit needs: other signals of a long log need not be copied.
-    return Log(t=log.t[part], q=log.q[part], name=log.name)
+    return Log(t=log.t[part], q=log.q[part], name=log.name, gravity=log.gravity)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -33,6 +33,8 @@ class BaseParameters:
         singular_values: (p,) of the column-scaled sample regressor, descending: the gap after b confirms the rank.
         neglected: the largest part of a column that the kept ones do not span, of the largest norm of its kind: some
             1e-15 by rounding; more where the geometry is close to a special case.
+        gravities: (3,) each [m/s2], in the base frame: besides that of the robot's description, those under which the
+            grouping holds too.
     """
 
     model: TorqueModel
@@ -40,6 +42,7 @@ class BaseParameters:
     grouping: Array
     singular_values: Array
     neglected: float
+    gravities: tuple[tuple[float, ...], ...] = ()
 
     @property
     def size(self) -> int:
@@ -79,13 +82,21 @@ class BaseParameters:
         """Regroups standard parameters (p,) into base parameters (b,)."""
         return self.grouping @ np.asarray(parameters, dtype=float)
 
-    def regressor(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
-        """Evaluates Y_b (N, n, b)."""
-        return self.model.regressor(q, dq, ddq, columns=self.independent)
+    def regressor(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike, *, gravity: ArrayLike | None = None) -> Array:
+        """Evaluates Y_b (N, n, b), under another gravity (3,) of `gravities` where given."""
+        return self.model.under(gravity).regressor(q, dq, ddq, columns=self.independent)
 
-    def torque(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike, parameters: ArrayLike) -> Array:
-        """Evaluates tau = Y_b pi_b (N, n) for base parameters (b,)."""
-        return self.model.torque(q, dq, ddq, parameters, columns=self.independent)
+    def torque(
+        self,
+        q: ArrayLike,
+        dq: ArrayLike,
+        ddq: ArrayLike,
+        parameters: ArrayLike,
+        *,
+        gravity: ArrayLike | None = None,
+    ) -> Array:
+        """Evaluates tau = Y_b pi_b (N, n) for base parameters (b,), under another gravity (3,) where given."""
+        return self.model.under(gravity).torque(q, dq, ddq, parameters, columns=self.independent)
 
     def essential(
         self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike, parameters: ArrayLike, threshold: float = 0.01
@@ -114,7 +125,12 @@ class BaseParameters:
 
 
 def find_base_parameters(
-    model: TorqueModel, *, samples: int = 400, seed: int = 0, tolerance: float = 1e-4
+    model: TorqueModel,
+    *,
+    gravities: Iterable[ArrayLike] = (),
+    samples: int = 400,
+    seed: int = 0,
+    tolerance: float = 1e-4,
 ) -> BaseParameters:
     """Finds the base parameters by a QR factorisation that walks the columns from left to right.
 
@@ -125,6 +141,8 @@ def find_base_parameters(
 
     Args:
         model: the torque model.
+        gravities: (3,) each [m/s2], in the base frame: bases that stand otherwise than the description says. A joint on
+            a vertical axis gets parameters by a base that is tilted.
         samples: how many random states.
         seed: of the random states.
         tolerance: the part of a column, of the largest norm of its kind, below which it counts as spanned (the thesis
@@ -136,7 +154,9 @@ def find_base_parameters(
     Raises:
         NotIdentifiableError: the singular values show a lower rank than the columns kept.
     """
-    Y = _random_regressor(model, samples, seed)
+    others = tuple(dict.fromkeys(tuple(np.asarray(gravity, dtype=float).tolist()) for gravity in gravities))
+    others = tuple(gravity for gravity in others if not np.array_equal(gravity, model.robot.chain.gravity))
+    Y = np.concatenate([_random_regressor(model.under(gravity), samples, seed) for gravity in (None, *others)])
     scale = _scales(model, np.linalg.norm(Y, axis=0))
     scaled = Y / scale
     independent = _walk(scaled, tolerance)
@@ -152,7 +172,7 @@ def find_base_parameters(
     # What is as small as the neglected part is noise of it.
     grouping = np.where(np.abs(combination) < max(_ROUNDING, 10 * neglected), 0.0, _snap(grouping))
     grouping[:, independent] = np.eye(len(independent))
-    return BaseParameters(model, tuple(independent), grouping, singular_values, neglected)
+    return BaseParameters(model, tuple(independent), grouping, singular_values, neglected, others)
 
 
 def _random_regressor(model: TorqueModel, samples: int, seed: int) -> Array:
@@ -162,7 +182,9 @@ def _random_regressor(model: TorqueModel, samples: int, seed: int) -> Array:
     # Whole turns rather than the limits: which parameters act is the geometry's, not a narrow range's.
     half = np.where(revolute, np.pi, 1.0)
     q, dq, ddq = (rng.uniform(-1, 1, (samples, robot.n)) * factor for factor in (half, 3.0, 10.0))
-    return model.regressor(q, dq, ddq, backend="vectorised").reshape(samples * robot.n, model.size)
+    # By CasADi's own machine: to compile or translate the expression takes longer than so few samples.
+    Y = model.symbolic().map(samples)(q.T, dq.T, ddq.T).full().reshape(robot.n, samples, model.size)
+    return np.asarray(Y.transpose(1, 0, 2).reshape(samples * robot.n, model.size))
 
 
 def _scales(model: TorqueModel, norms: Array) -> Array:

@@ -60,6 +60,18 @@ class TorqueModel:
         """The robot description's parameters (p,), NaN where it states none."""
         return np.concatenate([term.nominal(self.robot) for term in self.terms])
 
+    def under(self, gravity: ArrayLike | None) -> TorqueModel:
+        """Gives the model on a base that stands otherwise, the same object for the same gravity.
+
+        Args:
+            gravity: (3,) in the base frame [m/s2]; None as the robot's description has it.
+        """
+        robot = self.robot.under(gravity)
+        if robot is self.robot:
+            return self
+        models: dict[Robot, TorqueModel] = self.__dict__.setdefault("_models", {})
+        return models.setdefault(robot, TorqueModel(robot, self.terms))
+
     @cached_property
     def _expression(self) -> tuple[list[casadi.SX], casadi.SX]:
         n = self.robot.n

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from robots.common.errors import InputError
 from robots.geometry.chain import Chain
@@ -117,7 +118,23 @@ class Robot:
         """Joint names from the base to the flange."""
         return self.chain.names
 
+    def under(self, gravity: ArrayLike | None) -> Robot:
+        """Gives the robot on a base that stands otherwise, the same object for the same gravity.
+
+        Args:
+            gravity: (3,) in the base frame [m/s2]; None for this robot.
+        """
+        if gravity is None or np.array_equal(gravity, self.chain.gravity):
+            return self
+        return _standing(self, tuple(float(component) for component in np.asarray(gravity, dtype=float)))
+
     @property
     def has_inertia(self) -> bool:
         """Whether the inertial parameters of every link are known."""
         return bool(np.isfinite(self.inertia).all())
+
+
+# What was compiled for a robot is kept by the robot: a new one for every log would compile it anew.
+@lru_cache(maxsize=64)
+def _standing(robot: Robot, gravity: tuple[float, ...]) -> Robot:
+    return replace(robot, chain=Chain(robot.chain.joints, gravity=np.array(gravity), tip=robot.chain.tip))

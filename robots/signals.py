@@ -8,9 +8,17 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from robots.common.errors import InputError
+from robots.signal_checks import (
+    checked_body,
+    checked_common,
+    checked_gravity,
+    checked_joints,
+    checked_time,
+    require_finite,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -38,11 +46,11 @@ class Motion:
     ddq: FloatArray
 
     def __post_init__(self) -> None:
-        t = _time(self.t)
-        q = _joint_signal("q", self.q, len(t), None)
+        t = checked_time(self.t)
+        q = checked_joints("q", self.q, len(t), None)
         _freeze(self, t=t, q=q)
         for name in ("dq", "ddq"):
-            _freeze(self, **{name: _joint_signal(name, getattr(self, name), len(t), q.shape[1])})
+            _freeze(self, **{name: checked_joints(name, getattr(self, name), len(t), q.shape[1])})
 
     def __len__(self) -> int:
         return len(self.t)
@@ -126,6 +134,8 @@ class Log:
         cycle: whole number of the repetition of an experiment, (N,).
         payload: a known payload, (10,) in the flange's frame: mass [kg], mass times centre [kg m], inertia about the
             frame's origin xx xy xz yy yz zz [kg m2]; None for none.
+        gravity: gravity's acceleration (3,) in the base frame [m/s2], where the base stood otherwise than the robot's
+            description says, as tilted or on a wall; None as described.
         name: a short name for reports.
         metadata: anything else that is known of the recording.
 
@@ -146,26 +156,29 @@ class Log:
     segment: FloatArray | None = None
     cycle: FloatArray | None = None
     payload: FloatArray | None = None
+    gravity: FloatArray | None = None
     name: str = ""
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        t = _time(self.t)
-        q = _joint_signal("q", self.q, len(t), None)
+        t = checked_time(self.t)
+        q = checked_joints("q", self.q, len(t), None)
         _freeze(self, t=t, q=q)
         for name in _PER_JOINT:
             value = getattr(self, name)
             if value is not None:
                 nan_allowed = name in ("temperature", "qlink")
-                _freeze(self, **{name: _joint_signal(name, value, len(t), q.shape[1], nan_allowed=nan_allowed)})
+                _freeze(self, **{name: checked_joints(name, value, len(t), q.shape[1], nan_allowed=nan_allowed)})
         if self.qlink is not None:
-            _require_finite("qlink", np.where(np.isnan(self.qlink).all(axis=0), 0.0, self.qlink), joints=True)
+            require_finite("qlink", np.where(np.isnan(self.qlink).all(axis=0), 0.0, self.qlink), joints=True)
         for name in _COMMON:
             value = getattr(self, name)
             if value is not None:
-                _freeze(self, **{name: _common_signal(name, value, len(t))})
+                _freeze(self, **{name: checked_common(name, value, len(t))})
         if self.payload is not None:
-            _freeze(self, payload=_body(self.payload))
+            _freeze(self, payload=checked_body(self.payload))
+        if self.gravity is not None:
+            _freeze(self, gravity=checked_gravity(self.gravity))
         object.__setattr__(self, "metadata", dict(self.metadata))
 
     def __len__(self) -> int:
@@ -194,11 +207,11 @@ class Log:
         """The sample period [s], or None if the steps differ by more than a part in 10^6."""
         return uniform_period(self.t)
 
-    def rows(self, part: slice) -> Log:
+    def rows(self, part: slice | NDArray[np.intp]) -> Log:
         """Returns the log of some of the samples.
 
         Args:
-            part: which samples, as in ``array[part]``.
+            part: which samples, as in ``array[part]``: a slice, or increasing indices.
 
         Raises:
             InputError: no sample is left, or the slice runs backward.
@@ -206,17 +219,6 @@ class Log:
         cut = {"t", "q", *_PER_JOINT, *_COMMON}
         values = {item.name: getattr(self, item.name) for item in fields(self)}
         return Log(**{key: value[part] if key in cut and value is not None else value for key, value in values.items()})
-
-
-def _body(value: ArrayLike) -> FloatArray:
-    body = np.array(value, dtype=float)
-    if body.shape != (10,) or not np.isfinite(body).all() or body[0] < 0:
-        raise InputError(
-            f"a payload of {np.array2string(body, threshold=12)}",
-            column="payload",
-            allowed="ten numbers: a mass of 0 or more, mass times centre, inertia xx xy xz yy yz zz",
-        )
-    return body
 
 
 _PER_JOINT = ("tau", "current", "dq", "ddq", "temperature", "qlink")
@@ -236,78 +238,6 @@ def uniform_period(t: FloatArray) -> float | None:
     rounding = 2.0 * float(np.spacing(np.abs(t[[0, -1]]).max()))
     even = bool(np.abs(np.diff(t) - period).max() <= JITTER * period + rounding)
     return period if even else None
-
-
-def _time(value: ArrayLike) -> FloatArray:
-    t = _array("t", value, 1)
-    if len(t) == 0:
-        raise InputError("no samples", column="t", allowed="one or more")
-    _require_finite("t", t[:, None], joints=False)
-    backward = np.flatnonzero(np.diff(t) <= 0.0)
-    if len(backward):
-        first = int(backward[0])
-        times = f"{float(t[first + 1])!r} after {float(t[first])!r}"
-        verb = "repeats" if t[first + 1] == t[first] else "runs backward"
-        raise InputError(
-            f"time {verb}: {times}{_more(len(backward))}", column="t", row=first + 2, allowed="increasing times"
-        )
-    return t
-
-
-def _joint_signal(
-    name: str, value: ArrayLike, rows: int, joints: int | None, *, nan_allowed: bool = False
-) -> FloatArray:
-    array = _array(name, value, 2)
-    if array.shape[0] != rows:
-        raise InputError(f"{array.shape[0]} rows, but t has {rows}", column=name)
-    if array.shape[1] == 0 or joints not in (None, array.shape[1]):
-        raise InputError(f"{array.shape[1]} joints", column=name, allowed=f"{joints or '1 or more'}")
-    _require_finite(name, array, joints=True, nan_allowed=nan_allowed)
-    return array
-
-
-def _common_signal(name: str, value: ArrayLike, rows: int) -> FloatArray:
-    array = _array(name, value, 1)
-    if len(array) != rows:
-        raise InputError(f"{len(array)} rows, but t has {rows}", column=name)
-    _require_finite(name, array[:, None], joints=False, nan_allowed=name == "ambient")
-    broken = np.flatnonzero(array != np.round(array)) if name != "ambient" else np.empty(0, int)
-    if len(broken):
-        first = int(broken[0])
-        raise InputError(f"found {float(array[first])!r}", column=name, row=first + 1, allowed="whole numbers")
-    return array
-
-
-def _array(name: str, value: ArrayLike, dimensions: int) -> FloatArray:
-    shape = "(N,)" if dimensions == 1 else "(N, n)"
-    try:
-        given = np.asarray(value)
-        if given.dtype.kind not in "biuf":
-            raise TypeError(f"dtype {given.dtype}")
-        array = np.array(given, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
-        raise InputError(f"not an array of numbers ({error})", column=name, allowed=f"numbers, {shape}") from error
-    if array.ndim != dimensions:
-        raise InputError(f"shape {array.shape}", column=name, allowed=f"shape {shape}")
-    return array
-
-
-def _require_finite(name: str, array: FloatArray, *, joints: bool, nan_allowed: bool = False) -> None:
-    bad = np.isinf(array) if nan_allowed else ~np.isfinite(array)
-    if not bad.any():
-        return
-    row, column = (int(index) for index in np.argwhere(bad)[0])
-    raise InputError(
-        f"found {float(array[row, column])}{_more(int(bad[:, column].sum()))}",
-        column=name,
-        row=row + 1,
-        joint=column + 1 if joints else None,
-        allowed="finite numbers, or nan where a sensor was silent" if nan_allowed else "finite numbers",
-    )
-
-
-def _more(count: int) -> str:
-    return f" (the first of {count})" if count > 1 else ""
 
 
 def _freeze(owner: object, **arrays: FloatArray) -> None:

@@ -29,6 +29,7 @@ def follow(case: Case, robot: Robot, diagnosis: Any) -> dict[str, Any]:
                 q=record.q,
                 tau=record.tau,
                 payload=point_mass(stage.payload, (0.0, 0.0, 0.1)) if stage.payload else None,
+                gravity=stage.gravity,
             )
         )
     said = diagnose(robot, logs).to_dict()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.carried import situation_on
+from estimation.diagnosis.carried import regressor_on, situation_on
 from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.states import Recording
 from robots.base_parameters import BaseParameters, find_base_parameters
@@ -44,9 +45,14 @@ class Baseline:
         return situation_on(recording, self.base.model, values, self.base.independent)
 
 
-def base_parameters(robot: Robot, friction: str, scales: tuple[float, ...]) -> BaseParameters:
-    """Finds the base parameters of rigid body, friction, rotors and offsets, the sign as sharp as `scales` say."""
-    return find_base_parameters(default_model(robot, friction=friction, velocity_scale=scales))
+def base_parameters(
+    robot: Robot, friction: str, scales: tuple[float, ...], gravities: Iterable[Array] = ()
+) -> BaseParameters:
+    """Finds the base parameters of rigid body, friction, rotors and offsets, the sign as sharp as `scales` say.
+
+    They are those under the gravity of the robot's description and under `gravities` (3,) together.
+    """
+    return find_base_parameters(default_model(robot, friction=friction, velocity_scale=scales), gravities=gravities)
 
 
 def build_baseline(base: BaseParameters, recording: Recording, residual_scale: Array | None = None) -> Baseline:
@@ -59,7 +65,7 @@ def build_baseline(base: BaseParameters, recording: Recording, residual_scale: A
     """
     scale = recording.tau.std(axis=0) if residual_scale is None else residual_scale
     weights = 1.0 / np.maximum(scale, 1e-9 * max(1.0, float(np.abs(recording.tau).max())))
-    Y = base.regressor(recording.q, recording.dq, recording.ddq)
+    Y = regressor_on(base, recording)
     signs = [i for i, column in enumerate(base.columns) if column.symbol == "f1"]
     chosen = _sharpness(Y, signs, base, recording, weights) if signs else None
     if chosen is not None:

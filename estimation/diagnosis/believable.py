@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.carried import with_body
 from estimation.diagnosis.smoothed_motion import smoothed
 from estimation.preparation import Prepared
 from robots.regressor import default_model
@@ -71,7 +72,12 @@ def _residual(robot: Robot, logs: Sequence[Prepared], cutoffs: Array) -> float:
         speed = np.sqrt(np.mean(dq**2, axis=0))
         known = (np.abs(dq[rows]) > SLOW * speed) | (speed < 1e-9)
         tau = np.column_stack([np.interp(t[rows], log.log.t, column) for column in log.tau.T])
-        blocks.append(model.regressor(q[rows], dq[rows], ddq[rows]) * known[:, :, None])
+        # Each log as it was recorded: a payload or another gravity that is known must not pass for noise.
+        motion = (q[rows], dq[rows], ddq[rows])
+        own = model.under(log.log.gravity)
+        if log.log.payload is not None:
+            tau -= own.torque(*motion, with_body(model, np.zeros(model.size), log.log.payload))
+        blocks.append(own.regressor(*motion) * known[:, :, None])
         targets.append(tau * known)
     Y, tau = np.concatenate(blocks), np.concatenate(targets)
     scale = np.maximum(tau.std(axis=0), 1e-9 * max(float(np.abs(tau).max()), 1e-12))

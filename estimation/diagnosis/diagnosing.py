@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.baseline import Baseline, base_parameters, build_baseline, inertia_of
-from estimation.diagnosis.carried import lightened
+from estimation.diagnosis.carried import lightened, unloaded
 from estimation.diagnosis.diagnosis import Diagnosis
 from estimation.diagnosis.excess import residual_shares
 from estimation.diagnosis.extending import dense
@@ -25,6 +25,7 @@ from estimation.diagnosis.scan import Entry, measure
 from estimation.diagnosis.selection import Selection, select
 from estimation.diagnosis.states import Recording, record
 from estimation.diagnosis.verdict import Judgement, judge
+from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
@@ -72,7 +73,8 @@ def diagnose(
 
     Args:
         robot: the robot.
-        logs: one or several, of t, q and tau or current; t is one clock. A log that says so carries a known payload.
+        logs: one or several, of t, q and tau or current; t is one clock. A log that says so carries a known payload,
+            or was recorded under another gravity.
         held_out: logs of other motions to measure the gain on; without, runs or stretches are kept apart.
         candidates: effects to look for, by name; all by default.
         friction: of the base model: ``polynomial`` or ``coulomb-viscous``.
@@ -101,7 +103,10 @@ def diagnose(
         recording = lightened(robot, record(robot, data))
         if not (np.ptp(recording.q, axis=0) > 0).any():
             raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
-        search = _search(robot, recording, effects, friction, false_alarm, seed, bar)
+        # Unseen logs count too: what only they show is told by the description at least.
+        gravities = [log.gravity for log in (*data, *other) if log.gravity is not None]
+        base = base_parameters(robot, friction, (0.001,) * robot.n, gravities)
+        search = _search(base, recording, effects, false_alarm, seed, bar)
         bar.update(0.75, "what is left")
         patterns = measure(search.problem, all_hypotheses(robot, list(all_patterns(robot))))
         judgement = judge(search.problem, search.selection, patterns, false_alarm, np.random.default_rng(seed + 2))
@@ -140,17 +145,15 @@ def _effects(candidates: Sequence[str | Effect] | None) -> list[Effect]:
 
 
 def _search(
-    robot: Robot,
+    base: BaseParameters,
     recording: Recording,
     effects: Sequence[Effect],
-    friction: str,
     false_alarm: float,
     seed: int,
     bar: Progress,
 ) -> Search:
     """Searches the catalogue; once more where what was found had been taken for noise."""
-    hypotheses = all_hypotheses(robot, effects)
-    base = base_parameters(robot, friction, (0.001,) * robot.n)
+    hypotheses = all_hypotheses(base.model.robot, effects)
     baseline = build_baseline(base, recording)
     tau = recording.tau
     values = fit_values(baseline, tau.std(axis=0) + 1e-12, recording.unsure, tau, pull_of(baseline, recording))
@@ -213,7 +216,7 @@ def _moved(problem: Problem, values: Array) -> bool:
     base = problem.baseline.base
     full = np.zeros(base.model.size)
     full[list(base.independent)] = values
-    change = problem.baseline.regressor @ (full - problem.situation.parameters)[list(base.independent)]
+    change = problem.baseline.regressor @ (full - unloaded(problem))[list(base.independent)]
     torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
     return bool(np.max(np.sqrt(np.mean(change**2, axis=0)) / np.maximum(torque, 1e-12)) > MOVED)
 

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.patterns import build_pattern
 from robots.common.errors import InputError
-from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS, Effect
-from robots.terms.effects.situation import Situation, situation
+from robots.terms.effects.situation import Situation
 
 Array = NDArray[np.float64]
 
@@ -116,22 +115,11 @@ def find_effect(name: str) -> Effect:
     return pattern
 
 
-def extension_torque(
-    extensions: Sequence[Extension],
-    model: TorqueModel,
-    values: Array,
-    columns: tuple[int, ...],
-    t: Array,
-    q: Array,
-    dq: Array,
-    ddq: Array,
-) -> Array:
-    """Evaluates the extensions of a model with base parameters `values` on a motion (N, n) [N m or N]."""
-    total = np.zeros_like(q)
-    if extensions:
-        state = situation(model, values, t, q, dq, ddq, columns=columns)
-        for extension in extensions:
-            total += extension.torque(state)
+def extension_torque(extensions: Sequence[Extension], state: Situation) -> Array:
+    """Evaluates the extensions of a model in what its base model says of a motion (N, n) [N m or N]."""
+    total = np.zeros_like(state.q)
+    for extension in extensions:
+        total += extension.torque(state)
     return total
 
 

@@ -15,18 +15,19 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.carried import point_mass, with_body
+from estimation.diagnosis.carried import point_mass, regressor_on, unloaded, with_body
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.limits import no_gaps
 from estimation.diagnosis.next_experiment_motions import MAKERS, VARIED, Stage, room_of
 from estimation.diagnosis.power import chance_to_resolve
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.whitening import Whitening
-from robots.geometry.chain import Chain
+from robots.base_parameters import find_base_parameters
 from robots.regressor import TorqueModel
-from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms.effects import EXPERIMENTS, situation
+from robots.terms.effects.base_tilt import level_axes
+from robots.terms.effects.situation import joined
 
 Array = NDArray[np.float64]
 
@@ -80,7 +81,8 @@ class NextExperiment:
         joint: the joint that it is about, from 1; None for all.
         why: one sentence for people.
         resolves: chance that it leaves one cause.
-        stages: motions with their pauses, payloads and base poses.
+        stages: motions with their pauses, payloads and base poses; without a pose of its own, the base stands as in the
+            last log.
         ranking: all kinds, the best first.
     """
 
@@ -115,7 +117,7 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
     possible = list(causes)[:4]
     if len(possible) < 2:
         return None
-    robot = problem.situation.robot
+    robot = problem.situation.robot.under(problem.recording.gravities[-1])
     joint = next((c.hypothesis.joint for c in possible if c.hypothesis.joint is not None), None)
     index = joint - 1 if joint is not None else int(np.argmax(np.ptp(problem.recording.q, axis=0)))
     room = room_of(robot, problem.recording)
@@ -152,9 +154,13 @@ class Grams:
     def __init__(self, problem: Problem, causes: Sequence[Cause]) -> None:
         self.problem = problem
         self.causes = causes
-        now = problem.situation
-        self.model: TorqueModel = now.model
-        self.columns = tuple(int(i) for i in problem.baseline.base.independent)
+        self.model: TorqueModel = problem.situation.model
+        # A base that is tilted shows parameters that the logs do not: they take a part of what it shows of a cause.
+        gravity = np.asarray(self.model.robot.chain.gravity, dtype=float)
+        fields = [field for field in problem.recording.fields if field is not None]
+        tilted = [gravity + np.linalg.norm(gravity) * axis for axis in level_axes(gravity)] if gravity.any() else []
+        self.base = find_base_parameters(self.model, gravities=[*fields, *tilted])
+        self.columns = self.base.independent
         self.sizes = [len(c.coefficients) for c in causes]
 
     @cached_property
@@ -162,7 +168,7 @@ class Grams:
         """Of the logs that there are."""
         now = self.problem.situation
         effects = [c.hypothesis.effect.columns(now, c.hypothesis.joint, c.shape) for c in self.causes]
-        return self._gram(self.problem.baseline.regressor, effects, self.problem.whitening)
+        return self._gram(regressor_on(self.base, self.problem.recording), effects, self.problem.whitening)
 
     def chance(self, stages: Sequence[Stage]) -> float:
         """Gives the chance that each cause, were it true, would be told from every other."""
@@ -181,20 +187,14 @@ class Grams:
         starts: list[int] = []
         t0, rows = begin, 0
         for part in _joined(stages):
-            robot = _changed(self.model.robot, part.gravity)
-            model = replace(self.model, robot=robot)
-            now = situation(
-                model,
-                self._parameters(part.payload),
-                t0 + part.motion.t,
-                part.motion.q,
-                part.motion.dq,
-                part.motion.ddq,
-                starts=part.starts,
-            )
+            model = self.model.under(self.problem.recording.gravities[-1] if part.gravity is None else part.gravity)
+            motion = (part.motion.q, part.motion.dq, part.motion.ddq)
+            carried = self._parameters(part.payload)
+            own = situation(model, carried, t0 + part.motion.t, *motion, starts=part.starts)
+            now = joined([own], self.model)
             bases.append(model.regressor(now.q, now.dq, now.ddq, columns=self.columns))
-            for own, cause in zip(effects, self.causes, strict=True):
-                own.append(cause.hypothesis.effect.columns(now, cause.hypothesis.joint, cause.shape))
+            for columns, cause in zip(effects, self.causes, strict=True):
+                columns.append(cause.hypothesis.effect.columns(now, cause.hypothesis.joint, cause.shape))
             starts += [rows + s for s in part.starts]
             rows += len(part.motion)
             t0 = float(now.t[-1]) + 60.0
@@ -209,7 +209,7 @@ class Grams:
         return gram[own, own]
 
     def _parameters(self, payload: float) -> Array:
-        return with_body(self.model, self.problem.situation.parameters, point_mass(payload, (0.0, 0.0, ARM)))
+        return with_body(self.model, unloaded(self.problem), point_mass(payload, (0.0, 0.0, ARM)))
 
     def _gram(self, base: Array, effects: Sequence[Array], whitening: Whitening) -> Array:
         joined = np.concatenate([base, *effects], axis=2)
@@ -271,9 +271,3 @@ def _joined(stages: Sequence[Stage]) -> list[_Part]:
         starts = tuple(int(s) for s in np.cumsum([0, *(len(m) for m in motions[:-1])]))
         result.append(_Part(Motion.concatenate(motions), starts, carried, gravity))
     return result
-
-
-def _changed(robot: Robot, gravity: Array | None) -> Robot:
-    if gravity is None:
-        return robot
-    return replace(robot, chain=Chain(robot.chain.joints, gravity=gravity, tip=robot.chain.tip))

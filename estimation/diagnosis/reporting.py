@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.carried import situation_on
+from estimation.diagnosis.carried import situation_on, unloaded
 from estimation.diagnosis.diagnosis import Diagnosis, Trace
 from estimation.diagnosis.extending import Fitted, fit_extended
 from estimation.diagnosis.findings import Finding, Gain, Parameter
@@ -18,10 +18,10 @@ from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.patterns import Pattern
 from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.recording import cut
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found, Selection
-from estimation.diagnosis.simulating import cut
-from estimation.diagnosis.unseen import Measured, measure_unseen, simulate_unseen, unloaded
+from estimation.diagnosis.unseen import Measured, measure_unseen, simulate_unseen
 from estimation.diagnosis.verdict import CLOSE, Judgement, is_open
 from estimation.diagnosis.windup import EFFECT as ELASTICITY
 from estimation.diagnosis.windup import Windup, measure_windups
@@ -302,4 +302,5 @@ def _provenance(told: Told) -> dict[str, object]:
         "false_alarm": told.false_alarm,
         "residual_rms": np.sqrt(np.mean(problem.remainder**2, axis=0)).tolist(),
         "torque_rms": torque.tolist(),
+        "gravities": [list(gravity) for gravity in problem.baseline.base.gravities],
     }

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from estimation.diagnosis.carried import situation_on, with_body
+from estimation.diagnosis.recording import Recording, cut
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.simulation import Curves, Simulation
-from estimation.diagnosis.states import Recording
 from robots.plants.closed_loop import Driven, Loop, Reference, Tangent, drive
 from robots.regressor import TorqueModel
-from robots.terms.effects.situation import Situation, situation
+from robots.terms.effects.situation import Situation
 
 Array = NDArray[np.float64]
 
@@ -46,7 +47,21 @@ class Plant:
 
     def at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
         """Gives what effects may depend on along a motion at the times of a recording."""
-        return situation(self.model, self.values, part.t, *motion, starts=part.starts, columns=self.columns)
+        q, dq, ddq = motion
+        return situation_on(replace(part, q=q, dq=dq, ddq=ddq), self.model, self.values, self.columns)
+
+    def base(self, part: Recording, motion: tuple[Array, Array, Array]) -> Array:
+        """Evaluates the base model's torque (N, n) along a motion of one log, with its gravity and payload."""
+        own = self.model.under(part.gravities[0]).torque(*motion, self.values, columns=self.columns)
+        return own + self.carried(part, motion)
+
+    def carried(self, part: Recording, motion: tuple[Array, Array, Array]) -> Array:
+        """Evaluates the torque (N, n) of the payload that one log carries."""
+        body = with_body(self.model, np.zeros(self.model.size), part.bodies[0])
+        columns = np.flatnonzero(body).tolist()
+        if not columns:
+            return np.zeros_like(motion[0])
+        return self.model.under(part.gravities[0]).torque(*motion, body[columns], columns=columns)
 
     def beyond(self, now: Situation, members: Sequence[int]) -> Array:
         """Evaluates the torque of some of the effects (N, n) [N m or N]."""
@@ -75,7 +90,9 @@ def compare(before: Plant, after: Plant, whole: Recording, rows: slice, loop: Lo
     loop = loop or Loop()
     part = cut(whole, rows)
     inertia = _loop_inertia(before, part)
-    reference = Reference(step=part.step, q=part.q, dq=part.dq, ddq=part.ddq, torque=part.tau)
+    # The recording's torque is the arm's own; what drives it carries the log's payload besides.
+    driving = part.tau + before.carried(part, (part.q, part.dq, part.ddq))
+    reference = Reference(step=part.step, q=part.q, dq=part.dq, ddq=part.ddq, torque=driving)
     driven = [_driven(plant, whole, rows, reference, inertia, loop) for plant in (before, after)]
     if not all(np.isfinite(run.change) for run, _ in driven):
         return None
@@ -119,7 +136,7 @@ def _driven(
 
     def follow(moving: bool) -> Driven:
         def resistance(q: Array, dq: Array, ddq: Array) -> tuple[Array, Array]:
-            base = plant.model.torque(q, dq, ddq, plant.values, columns=plant.columns)
+            base = plant.base(part, (q, dq, ddq))
             smooth, turning = effects.along((q, dq, ddq)) if moving else effects.measured
             return base - coulomb * _sign(dq, width) + smooth, coulomb + turning
 
@@ -214,23 +231,3 @@ def _loop_inertia(plant: Plant, part: Recording) -> Array:
     own = np.mean(np.diagonal(_tangent(now).inertia, axis1=1, axis2=2), axis=0)
     torque, curve = (np.sqrt(np.mean(values**2, axis=0)) for values in (part.tau, part.ddq))
     return np.maximum(own, SLUGGISH * torque / np.maximum(curve, 1e-3 * max(float(curve.max()), 1e-9)))
-
-
-def cut(whole: Recording, rows: slice) -> Recording:
-    """Takes rows of a recording, and the logs that begin in them."""
-    begins = (0, *(start - rows.start for start in whole.starts if rows.start < start < rows.stop))
-    first = sum(start <= rows.start for start in whole.starts) - 1
-    logs = slice(first, first + len(begins))
-    return replace(
-        whole,
-        t=whole.t[rows],
-        starts=begins,
-        q=whole.q[rows],
-        dq=whole.dq[rows],
-        ddq=whole.ddq[rows],
-        tau=whole.tau[rows],
-        unsure=whole.unsure[rows],
-        cycles=(None,) * len(begins),
-        names=whole.names[logs],
-        payloads=whole.payloads[logs],
-    )

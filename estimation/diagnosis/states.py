@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +13,7 @@ from scipy.signal import butter, sosfiltfilt, welch
 
 from estimation.diagnosis.believable import believable_cutoff
 from estimation.diagnosis.periods import Cycle, find_cycle, project
+from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.smoothed_motion import smoothed
 from estimation.preparation import SLOW, Prepared, prepare
 from robots.common.errors import InputError
@@ -44,69 +44,6 @@ SHARPER = 1.2
 CREEP, CREEPING = 0.03, 0.15
 # At the ends of a log, rows in which all joints are slower than this share are left out, up to so long [s].
 SETTLED, ENDS = 0.15, 2.0
-
-
-@dataclass(frozen=True, eq=False)
-class Recording:
-    """All logs, one after the other.
-
-    Attributes:
-        t: time [s], (N,), one clock.
-        starts: row at which each log begins.
-        q: positions (N, n), free of noise [rad or m].
-        dq: velocities (N, n).
-        ddq: accelerations (N, n).
-        tau: torque as measured (N, n) [N m or N].
-        step: sample period [s].
-        cycles: per log the repeated part, in rows of the log; None where nothing repeats.
-        cutoff: lowest frequency [Hz] above which positions are taken for noise.
-        floor: power density of each joint's position noise (n,) [rad^2/Hz].
-        unsure: rows (N, n) in which the direction of motion is not known: friction may have either sign there.
-        names: of the logs.
-        payloads: per log a known body at the flange (10,), in its frame; empty where no log has one.
-    """
-
-    t: Array
-    starts: tuple[int, ...]
-    q: Array
-    dq: Array
-    ddq: Array
-    tau: Array
-    step: float
-    cycles: tuple[Cycle | None, ...]
-    cutoff: float
-    floor: Array
-    unsure: NDArray[np.bool_]
-    names: tuple[str, ...]
-    payloads: tuple[Array, ...] = ()
-
-    def __len__(self) -> int:
-        return len(self.t)
-
-    @property
-    def n(self) -> int:
-        """Number of joints."""
-        return int(self.q.shape[1])
-
-    @property
-    def runs(self) -> tuple[slice, ...]:
-        """Each log's rows."""
-        return tuple(slice(a, b) for a, b in pairwise((*self.starts, len(self.t))))
-
-    @property
-    def bodies(self) -> tuple[Array, ...]:
-        """Each log's known payload (10,), zeros for none."""
-        return self.payloads or (np.zeros(10),) * len(self.starts)
-
-    @property
-    def duration(self) -> float:
-        """Time recorded, without the pauses between logs [s]."""
-        return len(self.t) * self.step
-
-    @property
-    def periodic(self) -> bool:
-        """Whether every log repeats its motion."""
-        return all(cycle is not None for cycle in self.cycles)
 
 
 def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shortest: float = SHORTEST) -> Recording:
@@ -159,6 +96,7 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
         unsure=np.concatenate([part[7] for part in parts]),
         names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
         payloads=_payloads(prepared),
+        fields=_fields(prepared),
     )
 
 
@@ -166,6 +104,11 @@ def _payloads(prepared: Sequence[Prepared]) -> tuple[Array, ...]:
     if all(log.log.payload is None for log in prepared):
         return ()
     return tuple(np.zeros(10) if log.log.payload is None else np.array(log.log.payload) for log in prepared)
+
+
+def _fields(prepared: Sequence[Prepared]) -> tuple[Array | None, ...]:
+    gravities = tuple(log.log.gravity for log in prepared)
+    return () if all(gravity is None for gravity in gravities) else gravities
 
 
 def _step(prepared: Sequence[Prepared]) -> float:
@@ -325,3 +268,6 @@ def spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Lists the stretches [start, stop) of rows (N,) that are flagged."""
     edges = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+__all__ = ["Recording", "record", "spans"]

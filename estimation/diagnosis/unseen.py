@@ -9,17 +9,18 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.carried import lightened, situation_on, with_body
+from estimation.diagnosis.carried import lightened, regressor_on, situation_on, unloaded
 from estimation.diagnosis.extending import dense
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.gain import PARTS, Unseen, cross_validated, models, on_held_out
 from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.recording import Recording, following
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.regularisation import held
 from estimation.diagnosis.shrinkage import pull_on
 from estimation.diagnosis.simulating import Plant, compare
 from estimation.diagnosis.simulation import Simulation
-from estimation.diagnosis.states import Recording, record
+from estimation.diagnosis.states import record
 from estimation.pulls import Pull
 from robots.robot import Robot
 from robots.signals import Log
@@ -224,7 +225,7 @@ def _on_logs(
     other = lightened(robot, record(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN))
     # One clock: where the unseen logs come later, the heat of the ones before is still there.
     later = bool(other.t[0] > recording.t[-1])
-    whole = _joined(recording, other) if later else other
+    whole = following(recording, other) if later else other
     now = situation_on(whole, problem.situation.model, unloaded(problem))
     first = len(recording) if later else 0
     columns = []
@@ -235,34 +236,7 @@ def _on_logs(
             X[:, j] = part
         columns.append(X[first:])
     baseline = problem.baseline
-    base = baseline.base.regressor(other.q, other.dq, other.ddq)
+    base = regressor_on(baseline.base, other)
     nuisance = np.zeros((len(other), robot.n, baseline.nuisance.shape[2]))
     unseen = on_held_out(problem, effects, other, np.concatenate([base, nuisance], axis=2), columns, pull)
     return unseen, now, whole, first, columns
-
-
-def unloaded(problem: Problem) -> Array:
-    """Parameters (p,) without the payload that the first log may carry."""
-    now, recording = problem.situation, problem.recording
-    return with_body(now.model, now.parameters, -recording.bodies[0])
-
-
-def _joined(first: Recording, second: Recording) -> Recording:
-    starts = (*first.starts, *(len(first) + start for start in second.starts))
-
-    def both(name: str) -> Array:
-        return np.concatenate([getattr(first, name), getattr(second, name)])
-
-    return replace(
-        first,
-        t=both("t"),
-        q=both("q"),
-        dq=both("dq"),
-        ddq=both("ddq"),
-        tau=both("tau"),
-        unsure=both("unsure").astype(bool),
-        starts=starts,
-        cycles=(*first.cycles, *second.cycles),
-        names=(*first.names, *second.names),
-        payloads=(*first.bodies, *second.bodies) if first.payloads or second.payloads else (),
-    )

@@ -41,9 +41,11 @@ class Estimator(ABC):
 
     Attributes:
         name: as the command line spells it.
+        simulates: whether it simulates the robot, which it then takes to carry nothing and to stand as described.
     """
 
     name: str
+    simulates: bool = False
 
     @abstractmethod
     def weights(self, moments: Moments, ridge: float) -> Array:

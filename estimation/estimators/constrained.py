@@ -148,9 +148,10 @@ def _covariance(data: RegressionData, values: Array, weights: Array, grouping: A
     equations = [
         Equations(
             rows=len(part.motion),
-            regressor=partial(regressor_rows, data.base, part.motion),
+            regressor=partial(regressor_rows, data.base, part.motion, gravity=part.gravity),
             mask=part.mask,
-            residual=part.tau - data.base.torque(part.motion.q, part.motion.dq, part.motion.ddq, values),
+            residual=part.tau
+            - data.base.torque(part.motion.q, part.motion.dq, part.motion.ddq, values, gravity=part.gravity),
         )
         for part in data.parts
     ]

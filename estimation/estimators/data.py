@@ -37,6 +37,10 @@ class FittedRows(Protocol):
     def mask(self) -> Array:
         """Zero where a row of a joint does not count (N, n)."""
 
+    @property
+    def gravity(self) -> Array | None:
+        """Gravity in the base frame (3,) [m/s2]; None as the robot's description says."""
+
 
 class Chunk(NamedTuple):
     """Some rows of one log: Y (m, n, b), tau (m, n), mask (m, n)."""
@@ -81,7 +85,7 @@ class RegressionData:
         motion = part.motion
         for start in range(0, len(motion), size):
             rows = slice(start, start + size)
-            Y = self.base.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows])
+            Y = self.base.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows], gravity=part.gravity)
             yield Chunk(Y, part.tau[rows], part.mask[rows])
 
     def blocks(self, count: int) -> list[Moments]:
@@ -102,4 +106,4 @@ class _Piece:
 
     def __init__(self, part: FittedRows, rows: slice) -> None:
         self.motion = part.motion.slice(rows.start, rows.stop)
-        self.tau, self.mask = part.tau[rows], part.mask[rows]
+        self.tau, self.mask, self.gravity = part.tau[rows], part.mask[rows], part.gravity

@@ -36,6 +36,7 @@ class DirectAndInverse(WeightedLeastSquares):
     """
 
     name = "didim"
+    simulates = True
 
     def __init__(self, loop: Loop | None = None, temper: float = 0.5) -> None:
         super().__init__(temper)

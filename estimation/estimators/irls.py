@@ -78,10 +78,10 @@ class ReweightedLeastSquares(WeightedLeastSquares):
         slope, equations = np.zeros(len(limit)), []
         for part in data.parts:
             motion = part.motion
-            residual = part.tau - data.base.torque(motion.q, motion.dq, motion.ddq, values)
+            residual = part.tau - data.base.torque(motion.q, motion.dq, motion.ddq, values, gravity=part.gravity)
             share = residual / limit
             slope += (self.slopes(share) * (part.mask > 0)).sum(axis=0)
-            regressor = partial(regressor_rows, data.base, motion)
+            regressor = partial(regressor_rows, data.base, motion, gravity=part.gravity)
             equations.append(Equations(len(motion), regressor, part.mask, residual * self.factors(share)))
         slope = np.maximum(slope / np.maximum(data.moments.count, 1), LEAST_SLOPE)
         return honest_covariance(equations, weights, np.tensordot(weights * slope, data.moments.gram, axes=1))

@@ -36,6 +36,7 @@ class InstrumentalVariables(WeightedLeastSquares):
     """
 
     name = "iv"
+    simulates = True
 
     def __init__(self, loop: Loop | None = None, temper: float = 0.5) -> None:
         super().__init__(temper)

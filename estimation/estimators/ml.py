@@ -9,7 +9,7 @@ import numpy as np
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.data import CHUNK, FittedRows, RegressionData
 from estimation.estimators.regularisation import regularisation, solve_scaled
-from estimation.estimators.spread import Equations, honest_covariance
+from estimation.estimators.spread import Equations, honest_covariance, regressor_rows
 from estimation.estimators.wls import WeightedLeastSquares
 
 ROUNDS = 20
@@ -73,14 +73,14 @@ def _covariance(data: RegressionData, values: Array, precision: Array) -> Array:
     size = data.base.size
 
     def whitened(part: FittedRows, start: int, stop: int) -> Array:
-        motion, rows = part.motion, slice(start, stop)
-        Y = data.base.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows]) * part.mask[rows, :, None]
+        Y = regressor_rows(data.base, part.motion, start, stop, part.gravity) * part.mask[start:stop, :, None]
         return np.asarray(np.einsum("jk,mkb->mjb", root, Y, optimize=True))
 
     gram, equations = np.zeros((size, size)), []
     for part in data.parts:
         motion = part.motion
-        residual = (part.tau - data.base.torque(motion.q, motion.dq, motion.ddq, values)) * part.mask
+        torque = data.base.torque(motion.q, motion.dq, motion.ddq, values, gravity=part.gravity)
+        residual = (part.tau - torque) * part.mask
         rows = partial(whitened, part)
         equations.append(Equations(len(motion), rows, np.ones_like(part.mask), residual @ root.T))
         for start in range(0, len(motion), CHUNK):

@@ -55,7 +55,7 @@ def honest_covariance(
     return covariance(parts, weights, (inverse + inverse.T) / 2)
 
 
-def regressor_rows(base: BaseParameters, motion: Motion, start: int, stop: int) -> Array:
-    """Evaluates some rows of a motion's regressor (stop - start, n, b)."""
+def regressor_rows(base: BaseParameters, motion: Motion, start: int, stop: int, gravity: Array | None = None) -> Array:
+    """Evaluates some rows of a motion's regressor (stop - start, n, b), under another gravity (3,) where given."""
     rows = slice(start, stop)
-    return base.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows])
+    return base.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows], gravity=gravity)

@@ -151,6 +151,7 @@ def _regressor_noise(data: RegressionData, noise: Array) -> Array:
                 for direction in root.T:
                     step = np.zeros((3, 1, n))
                     step[:, 0, joint] = direction
-                    change = (data.base.regressor(*(state + step)) - data.base.regressor(*(state - step))) / 2
+                    up, down = (data.base.regressor(*at, gravity=part.gravity) for at in (state + step, state - step))
+                    change = (up - down) / 2
                     total += Moments.of(change, np.zeros_like(part.tau[at]), part.mask[at]).gram
     return total * (rows / max(sum(len(range(stride // 2, len(p.motion), stride)) for p in data.parts), 1))

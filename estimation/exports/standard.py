@@ -50,7 +50,7 @@ def standard_parameters(model: Model, inertia: Array | None = None) -> Array:
             f"{model.robot.name}: the description states no inertial parameters to complete the identified ones with",
             remedy=REMEDY,
         )
-    base = find_base_parameters(torque_model)
+    base = find_base_parameters(torque_model, gravities=model.gravities)
     if base.independent != model.columns:
         raise InputError("the model's parameters are not the robot's base parameters", remedy="identify it again")
     own = [i for i, column in enumerate(base.columns) if column.term == "rigid_body"]

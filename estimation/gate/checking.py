@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from estimation.gate.columns import Columns
 from estimation.gate.delays import Delay, delay_findings, estimate_delays
-from estimation.gate.excerpts import Excerpt, cutoffs, excerpt, stretch, stretches
+from estimation.gate.excerpts import Excerpt, cutoffs, excerpts_of, stretch, stretches
 from estimation.gate.excitation import HOPELESS, check_excitation
 from estimation.gate.finding import Finding
 from estimation.gate.jumps import check_jumps
@@ -35,6 +35,7 @@ from estimation.gate.values import (
 )
 from estimation.gate.velocities import check_velocities
 from estimation.gate.whole_fit import fit_all
+from estimation.known_setup import set_up
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log
@@ -71,6 +72,7 @@ def check_log(robot: Robot, log: Log) -> GateReport:
     file = str(log.metadata.get("file", log.name))
     if log.n != robot.n:
         raise InputError(f"{log.n} joints", file=file or None, allowed=f"{robot.n}, as {robot.name} has")
+    robot = set_up(robot, log)
     samples, duration = len(log), log.duration
     columns = Columns.of(log)
     timing = check_timing(log, robot.period)
@@ -175,8 +177,7 @@ def _look(robot: Robot, log: Log, torque: Array | None, timing: Timing, spread: 
     pieces = [part for part in found if part is not None]
 
     def at(cutoff: float) -> tuple[Excerpt, ...]:
-        found = (excerpt(part, timing.period, cutoff) for part in pieces)
-        return tuple(part for part in found if part is not None)
+        return excerpts_of(pieces, timing.period, cutoff)
 
     candidates = cutoffs(timing.period)
     if torque is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -43,6 +43,11 @@ class Stretch:
     torque: Array | None
     velocity: Array | None
 
+    @property
+    def signals(self) -> list[Array]:
+        """Those that there are, in order."""
+        return [signal for signal in (self.q, self.torque, self.velocity) if signal is not None]
+
 
 @dataclass(frozen=True, eq=False)
 class Excerpt:
@@ -81,6 +86,8 @@ class Excerpt:
 
     def torque_at(self, t: Array, order: int = 0) -> Array:
         """Smoothed torque or current (K, n) at times (K,), within the stretch, or its derivative of some order."""
+        if t is self.t and not order and self.smoothed is not None:
+            return self.smoothed[self.place]
         return np.asarray(self._spline(np.clip(t, self.grid[0], self.grid[-1]), order))
 
     def torque_near(self, shift: Array, joint: int, stride: int) -> Array:
@@ -166,34 +173,47 @@ def stretch(log: Log, torque: Array | None, piece: slice, period: float) -> Stre
     return Stretch(grid, _at(grid, t[fresh], q[fresh]), tau, velocity)
 
 
-def excerpt(part: Stretch, period: float, cutoff: float) -> Excerpt | None:
-    """Smooths one stretch, position and torque by the same filter, and thins it.
+def excerpts_of(parts: Sequence[Stretch], period: float, cutoff: float) -> tuple[Excerpt, ...]:
+    """Smooths stretches, position and torque by the same filter, and thins them.
 
     Args:
-        part: the stretch.
-        period: of its grid [s].
+        parts: the stretches, of the same signals.
+        period: of their grids [s].
         cutoff: [Hz].
 
     Returns:
-        The stretch without its ends; None where too little is left.
+        The stretches without their ends, but for those of which too little is left.
     """
+    smoothed: dict[int, Iterator[Array]] = {}
+    for length in {len(part.t) for part in parts}:
+        # One filter for all signals of all stretches of a length: its set-up costs as much as a column.
+        signals = [signal for part in parts if len(part.t) == length for signal in part.signals]
+        widths = np.cumsum([signal.shape[1] for signal in signals])
+        smoothed[length] = iter(np.split(_low_pass(np.hstack(signals), period, cutoff), widths[:-1], axis=1))
+    found = (_excerpt(part, [next(smoothed[len(part.t)]) for _ in part.signals], period, cutoff) for part in parts)
+    return tuple(part for part in found if part is not None)
+
+
+def _excerpt(part: Stretch, smoothed: Sequence[Array], period: float, cutoff: float) -> Excerpt | None:
+    """Thins one stretch whose signals are smoothed; None where too little is left."""
     grid, edge = part.t, EDGE / cutoff
     inside = np.flatnonzero((grid >= grid[0] + edge) & (grid <= grid[-1] - edge))
     inside = inside[:: max(1, int(1.0 / (KEPT * cutoff * period)))]
     if len(inside) < 12:
         return None
-    signals = [signal for signal in (part.q, part.torque, part.velocity) if signal is not None]
-    # One filter for all of them: its set-up costs as much as a column.
-    smooth = iter(np.split(_low_pass(np.hstack(signals), period, cutoff), len(signals), axis=1))
+    smooth = iter(smoothed)
     q = next(smooth)
-    dq = np.gradient(q, period, axis=0, edge_order=2)
-    ddq = np.gradient(dq, period, axis=0, edge_order=2)
+
+    def slope(at: NDArray[np.intp]) -> Array:
+        return np.asarray((q[at + 1] - q[at - 1]) / (2 * period))
+
     tau = None if part.torque is None else next(smooth)
     return Excerpt(
         grid[inside],
         q[inside],
-        dq[inside],
-        ddq[inside],
+        slope(inside),
+        # The ends that are left out are longer than a sample by far.
+        (slope(inside + 1) - slope(inside - 1)) / (2 * period),
         None if part.torque is None else part.torque[inside],
         None if part.velocity is None else next(smooth)[inside],
         inside,

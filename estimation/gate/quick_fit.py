@@ -24,6 +24,8 @@ OWN_RIDGE = 1e-6
 FOLDS, BLOCKS = 6, 60
 # sign(dq) is smoothed over this share of a joint's RMS speed.
 SHARP = 0.05
+# Of a joint's largest column: what is smaller is the rounding of a product that is zero.
+SILENT = 1e-12
 # Columns that each joint has of its own, after those of the rigid body.
 OWN = 4  # rotor inertia, Coulomb, viscous, offset
 
@@ -125,7 +127,7 @@ class Rows:
 
     def torques(self, shift: float = 0.0, order: int = 0) -> Array:
         """Torques (M, n) as they are logged so much later [s], or their derivatives of some order."""
-        return np.concatenate([part.torque_at(part.t + shift, order) for part in self.excerpts])
+        return np.concatenate([part.torque_at(part.t + shift if shift else part.t, order) for part in self.excerpts])
 
     def near_torques(self, shifts: Array, joint: int, stride: int) -> Array:
         """Torque of a joint, counted from 0, so much later (S,) [s], on every so many rows of each stretch (S, M')."""
@@ -235,6 +237,8 @@ def _joined(body: Array, used: NDArray[np.intp], dq: Array, ddq: Array, speed: f
     for column, values in enumerate((ddq, sign, dq, 1.0), start=body.shape[1]):
         Y[:, column] = values
     scale = np.sqrt(np.einsum("ik,ik->k", Y, Y) / len(Y))
-    scale = np.where(scale > 0, scale, 1.0)
+    # A column that does not act is rounding: brought to unit size it would be a regressor of chance.
+    silent = scale <= SILENT * scale.max()
+    Y[:, silent], scale[silent] = 0.0, 1.0
     Y /= scale
     return JointColumns(Y, scale, used)

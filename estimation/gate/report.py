@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -154,11 +154,7 @@ class GateReport:
 
 def pick_rows(log: Log, rows: NDArray[np.intp]) -> Log:
     """Keeps some rows of a log, by their indices."""
-    kept: dict[str, Any] = {item.name: getattr(log, item.name) for item in fields(log)}
-    for name, value in kept.items():
-        if isinstance(value, np.ndarray):
-            kept[name] = value[rows]
-    return Log(**kept)
+    return log.rows(rows)
 
 
 def worst_first(findings: list[Finding]) -> tuple[Finding, ...]:

@@ -41,5 +41,4 @@ def _evaluator(robot: Robot) -> tuple[BatchFunction, tuple[NDArray[np.intp], ...
     inputs = [casadi.SX.sym(name, robot.n) for name in ("q", "dq", "ddq")]
     Y = symbolic(*inputs)
     parts = [casadi.densify(Y[joint, columns.tolist()]) for joint, columns in enumerate(used)]
-    # numpy rather than compiled code: the rows are few, and a compiler would take seconds.
-    return batch_function(casadi.Function("joint_rows", inputs, parts), "vectorised"), used
+    return batch_function(casadi.Function("joint_rows", inputs, parts)), used

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from estimation.identification import identify
+from estimation.known_setup import HEAT, require_plain
 from estimation.model import Model
 from estimation.thermal.band import error_band
 from estimation.thermal.campaign_estimate import CampaignEstimate
@@ -74,12 +75,13 @@ def fit_campaign(
         The estimate.
 
     Raises:
-        InputError: no logs, or logs of another robot.
+        InputError: no logs, logs of another robot, or that state a payload or gravity.
         NotIdentifiableError: no joint moves.
     """
     data = [logs] if isinstance(logs, Log) else list(logs)
     if not data:
         raise InputError("no logs", allowed="one or more")
+    require_plain(data, HEAT)
     bar = progress or SILENT
     bar.start("fitting rigid body, friction and heat", float(MOST_ROUNDS + 2))
     try:

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.known_setup import HEAT, require_plain
 from estimation.model import Model
 from estimation.preparation import SLOW, torque_of
 from estimation.preprocessing import resample, smooth
@@ -54,10 +55,11 @@ def friction_signal(model: Model, log: Log) -> FrictionSignal:
         log: positions and torque or current.
 
     Raises:
-        InputError: another number of joints, no torque, or a model without friction.
+        InputError: another number of joints, no torque, a payload or gravity, or a model without friction.
     """
     if log.n != model.robot.n:
         raise InputError(f"{log.n} joints", file=log.metadata.get("file"), allowed=f"{model.robot.n}")
+    require_plain([log], HEAT)
     own = np.array([column.term == "friction" for column in model.parameters])
     if not own.any():
         raise InputError("a model without friction", allowed="one whose terms have friction")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.known_setup import HEAT, require_plain
 from estimation.preprocessing import resample, smooth
 from estimation.thermal.torque import ThermalTorqueModel
 from robots.common.errors import InputError
@@ -32,10 +33,11 @@ def start_temperatures(
         Temperatures of each joint's zones (n,) [degC]; None for a joint whose friction does not change.
 
     Raises:
-        InputError: logs of another robot, or that overlap each other or go on past `until`.
+        InputError: logs of another robot, that state a payload or gravity, overlap each other or go on past `until`.
     """
     state: list[Array | None] = [None] * model.model.robot.n
     cutoff, now = float(model.model.provenance.get("cutoff_hz", 10.0)), None
+    require_plain(before, HEAT)
     for log in sorted(before, key=lambda log: float(log.t[0])):
         motion = smooth(resample(log.t, log.q), cutoff)
         around = surroundings(log, motion.t, ambient)

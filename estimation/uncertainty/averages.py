@@ -49,6 +49,7 @@ class Averages:
         residual: Array,
         size: int,
         chunk: int,
+        sums: Callable[[int, int, int], Sequence[Array]] | None = None,
     ) -> Averages:
         """Goes through the rows once.
 
@@ -58,6 +59,8 @@ class Averages:
             residual: (N, n), zero there.
             size: rows of a group; the last N modulo `size` are left out.
             chunk: rows held at a time.
+            sums: (start, stop, size) -> each joint's columns summed over groups as they count, n arrays; None to sum
+                `columns`.
         """
         groups, joints = len(mask) // size, mask.shape[1]
         counted = mask[: groups * size].reshape(groups, size, joints)
@@ -68,7 +71,7 @@ class Averages:
             np.maximum(rows - 1, 0.0).sum(axis=0), 1.0
         )
         used: list[NDArray[np.intp]] = []
-        sums: list[Array] = []
+        totals: list[Array] = []
         within: list[Array] = []
         step = max(1, chunk // size)
         looked = 0
@@ -76,20 +79,24 @@ class Averages:
             end = min(begin + step, groups)
             inside = piece % EVERY == 0
             looked += (end - begin) * inside
+            if sums is not None and totals and not inside:
+                for total, part in zip(totals, sums(begin * size, end * size, size), strict=True):
+                    total[begin:end] = part
+                continue
             found = columns(begin * size, end * size)
-            if not sums:
+            if not totals:
                 used = [indices for _, indices in found]
-                sums = [np.empty((groups, len(indices))) for indices in used]
+                totals = [np.empty((groups, len(indices))) for indices in used]
                 within = [np.zeros((len(indices), len(indices))) for indices in used]
             for joint, (Y, _) in enumerate(found):
                 weight = np.ascontiguousarray(counted[begin:end, :, joint])
-                total = (weight[:, None] @ Y.reshape(end - begin, size, -1))[:, 0]
-                sums[joint][begin:end] = total
+                part = (weight[:, None] @ Y.reshape(end - begin, size, -1))[:, 0]
+                totals[joint][begin:end] = part
                 if inside:
                     weighted = Y * weight.reshape(-1, 1)
-                    mean = total / np.sqrt(np.maximum(rows[begin:end, joint, None], 1.0))
+                    mean = part / np.sqrt(np.maximum(rows[begin:end, joint, None], 1.0))
                     within[joint] += weighted.T @ weighted - mean.T @ mean
-        return Averages(groups, rows / size, means, used, sums, [gram * groups / looked for gram in within], variance)
+        return Averages(groups, rows / size, means, used, totals, [gram * groups / looked for gram in within], variance)
 
     def columns(self, start: int, stop: int) -> list[tuple[Array, NDArray[np.intp]]]:
         """Gives each joint's columns (stop - start, p_j) that times the mask are the sums, with their indices."""

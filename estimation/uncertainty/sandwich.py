@@ -36,6 +36,7 @@ class Part:
         residual: (N, n), as the fit left it.
         used: per joint the indices of the columns that act on it; None for all.
         split: (start, stop) -> each joint's own columns, n arrays (stop - start, p_j); None to take them out of Y.
+        sums: (start, stop, size) -> the same summed over groups of `size` rows as they count; None to sum them.
     """
 
     rows: int
@@ -44,6 +45,7 @@ class Part:
     residual: Array
     used: Sequence[NDArray[np.intp]] | None = None
     split: Callable[[int, int], Sequence[Array]] | None = None
+    sums: Callable[[int, int, int], Sequence[Array]] | None = None
 
     def columns(self, start: int, stop: int) -> list[tuple[Array, NDArray[np.intp]]]:
         """Evaluates each joint's columns (stop - start, p_j), with their indices."""
@@ -87,7 +89,7 @@ def covariance(
     lost = np.zeros_like(inverse)
     if long and averaged > 1:
         whole = [part for part in parts if part.rows >= averaged]
-        averages = [Averages.of(part.columns, part.mask, part.residual, averaged, CHUNK) for part in whole]
+        averages = [Averages.of(part.columns, part.mask, part.residual, averaged, CHUNK, part.sums) for part in whole]
         lost = sum((part.lost(weights, len(inverse)) for part in averages), start=lost)
         seen = averages
     plain = noise = _noise(seen, np.zeros((len(weights), HIGHEST_ORDER + 1)))
@@ -201,30 +203,31 @@ def _lost(parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, r
 def _meats(parts: Sequence[Part | Averages], weights: Array, noise: Noise, size: int) -> tuple[Array, Array]:
     """The sandwich's meat from the model, and from the products of innovations (p, p)."""
     products = robust = np.zeros((0, 0))
-    owner, gather = np.zeros(0, dtype=np.intp), np.zeros((0, size))
+    owner, used = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
     for part in parts:
-        innovations = noise.whitened(part.residual)
+        innovations = np.ascontiguousarray(noise.whitened(part.residual).T)
         states: list[Array] = []
         # Gamma = A^-1 C A^-T: the transposed inverse filter runs from the last row to the first.
         for rows in reversed(list(part.chunks())):
             found = part.columns(rows.start, rows.stop)
             if not products.size:
                 owner = np.repeat(np.arange(len(found)), [len(columns) for _, columns in found])
-                gather = np.eye(size)[np.concatenate([columns for _, columns in found])]
+                used = np.concatenate([columns for _, columns in found])
                 products, robust = np.zeros((len(owner), len(owner))), np.zeros((size, size))
             if not states:
-                states = [np.zeros((len(a), len(k))) for a, (_, k) in zip(noise.coefficients, found, strict=True)]
-            filtered = np.empty((rows.stop - rows.start, len(owner)))
+                states = [np.zeros((len(k), len(a))) for a, (_, k) in zip(noise.coefficients, found, strict=True)]
+            # Columns lie one after the other in memory: filters and sums run along them.
+            filtered, scores = np.empty((len(owner), rows.stop - rows.start)), np.zeros((size, rows.stop - rows.start))
             end = 0
             for j, (a, (Y, columns)) in enumerate(zip(noise.coefficients, found, strict=True)):
-                backward = (Y * (weights[j] * part.mask[rows, j, None]))[::-1]
+                backward = (Y.T * (weights[j] * part.mask[rows, j]))[:, ::-1]
                 if len(a):
-                    backward, states[j] = lfilter([1.0], np.concatenate([[1.0], -a]), backward, axis=0, zi=states[j])
+                    backward, states[j] = lfilter([1.0], np.concatenate([[1.0], -a]), backward, zi=states[j])
                 begin, end = end, end + len(columns)
-                filtered[:, begin:end] = backward[::-1]
-            products += filtered.T @ filtered
-            filtered *= innovations[rows][:, owner]
-            scores = filtered @ gather
-            robust += scores.T @ scores
+                filtered[begin:end] = backward[:, ::-1]
+                scores[columns] += filtered[begin:end] * innovations[j, rows]
+            products += filtered @ filtered.T
+            robust += scores @ scores.T
     # sum_jk C_jk F_j'F_k, each column put where it belongs.
+    gather = np.eye(size)[used]
     return gather.T @ (noise.covariance[np.ix_(owner, owner)] * products) @ gather, robust

@@ -20,14 +20,11 @@ from oed.cli.options import (
     TipOption,
     robot_from,
 )
+from oed.cli.set_up import GravityOption, PayloadOption, told
 from robots.common.progress import Progress
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from robots.robot import Robot
-    from robots.signals import Log
 
 
 def diagnose(
@@ -43,14 +40,8 @@ def diagnose(
             "--held-out", help="A log to measure the gain on; by default whole runs are kept.", show_default=False
         ),
     ] = None,
-    payload: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--payload",
-            help="A log that carries a known payload, as NUMBER=KG,X,Y,Z: its centre [m] in the flange's frame.",
-            show_default=False,
-        ),
-    ] = None,
+    payload: PayloadOption = None,
+    gravity: GravityOption = None,
     friction: Annotated[str, typer.Option(help="Of the base model: polynomial or coulomb-viscous.")] = "polynomial",
     limits: Annotated[
         bool, typer.Option("--limits", help="Before any experiment: say what --trajectory could show.")
@@ -85,14 +76,14 @@ def diagnose(
     with console.working() as progress:
         described = robot_from(robot, tip, joints, lock)
         if limits:
-            if log or held_out or payload or not trajectory:
+            if log or held_out or payload or gravity or not trajectory:
                 raise typer.BadParameter("--limits takes --trajectory, and no logs", ctx=context)
             summary, data = _limits(described, trajectory, model, noise, out, force, progress)
         else:
             if not log or trajectory or model:
                 raise typer.BadParameter("give --log, or --limits with --trajectory", ctx=context)
-            loads = dict(map(_payload, payload or []))
-            summary, data = _diagnosis(described, log, held_out or [], loads, friction, seed, out, png, force, progress)
+            known = (payload, gravity)
+            summary, data = _diagnosis(described, log, held_out or [], known, friction, seed, out, png, force, progress)
     console.result(f"{summary}\nwritten to {out.resolve()}", data)
 
 
@@ -169,41 +160,11 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2g}" if share < float("inf") else "-"
 
 
-def _payload(text: str) -> tuple[int, NDArray[np.float64]]:
-    """Reads NUMBER=KG,X,Y,Z: the ten inertial parameters of a point mass."""
-    from estimation.diagnosis.carried import point_mass
-    from robots.common.errors import InputError
-
-    number, _, values = text.partition("=")
-    try:
-        mass, x, y, z = map(float, values.split(","))
-        return int(number), point_mass(mass, (x, y, z))
-    except ValueError:
-        raise InputError(
-            f"--payload {text}",
-            allowed="NUMBER=KG,X,Y,Z, as 2=5,0,0,0.1 for 5 kg a tenth of a metre ahead of the flange in the second log",
-        ) from None
-
-
-def _laden(logs: list[Log], payloads: dict[int, NDArray[np.float64]]) -> list[Log]:
-    """Tells logs, counted from 1 in the order of reading, what they carry."""
-    from dataclasses import replace
-
-    from robots.common.errors import InputError
-
-    for number in payloads:
-        if not 1 <= number <= len(logs):
-            raise InputError(
-                f"--payload of log {number}", allowed=f"1 to {len(logs)}: the logs in the order they are read"
-            )
-    return [replace(log, payload=payloads[i]) if i in payloads else log for i, log in enumerate(logs, start=1)]
-
-
 def _diagnosis(
     robot: Robot,
     logs: list[Path],
     held_out: list[Path],
-    payloads: dict[int, NDArray[np.float64]],
+    known: tuple[list[str] | None, list[str] | None],
     friction: str,
     seed: int,
     out: Path,
@@ -220,9 +181,12 @@ def _diagnosis(
     from robots.common.files import ResultFolder
 
     with ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]) as folder:
-        read = _laden(read_logs(logs, n=robot.n), payloads)
-        other = read_logs(held_out, n=robot.n) if held_out else None
-        result = run(robot, read, held_out=other, friction=friction, seed=seed, progress=progress)
+        read = list(read_logs(logs, n=robot.n))
+        other = list(read_logs(held_out, n=robot.n)) if held_out else []
+        # Held-out logs count on after the others.
+        both = told([*read, *other], *known)
+        read, other = both[: len(read)], both[len(read) :]
+        result = run(robot, read, held_out=other or None, friction=friction, seed=seed, progress=progress)
         result.save(folder.path("diagnosis.json").parent)
         following = result.next_experiment
         if following is not None and following.kind in MADE:

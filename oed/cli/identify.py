@@ -23,12 +23,15 @@ from oed.cli.options import (
     TipOption,
     robot_from,
 )
+from oed.cli.set_up import GravityOption, PayloadOption, told
 
 
 def identify(
     robot: RobotOption,
     log: LogOption,
     mapping: MappingOption = None,
+    payload: PayloadOption = None,
+    gravity: GravityOption = None,
     method: Annotated[str, typer.Option(help="An estimator, or all to compare them.")] = "wls",
     friction: Annotated[str, typer.Option(help="polynomial or coulomb-viscous.")] = "polynomial",
     rotor: Annotated[bool, typer.Option(help="With rotor inertias.")] = True,
@@ -65,7 +68,7 @@ def identify(
             # Opened before the work, so that a file in the way ends it early and an error leaves none of them.
             streams = {path: files.enter_context(open_atomic(path, force=force)) for path in (urdf, c_code) if path}
             described = robot_from(robot, tip, joints, lock)
-            logs = read_logs(log, n=described.n, mapping=mapping, joints=described.joint_names)
+            logs = told(read_logs(log, n=described.n, mapping=mapping, joints=described.joint_names), payload, gravity)
             options: dict[str, Any] = {
                 "friction": friction,
                 "rotor": rotor,

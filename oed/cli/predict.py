@@ -10,6 +10,7 @@ import typer
 
 from oed.cli.console import Console
 from oed.cli.options import ForceOption, JsonOption, MappingOption, QuietOption
+from oed.cli.set_up import GravityOption, PayloadOption, told
 
 if TYPE_CHECKING:
     from estimation.model import Model
@@ -20,6 +21,8 @@ def predict(
     model: Annotated[Path, typer.Option("--model", help="A model.json, or its folder.", show_default=False)],
     log: Annotated[Path, typer.Option("--log", help="A log of the motion.", show_default=False)],
     mapping: MappingOption = None,
+    payload: PayloadOption = None,
+    gravity: GravityOption = None,
     before: Annotated[
         list[Path] | None,
         typer.Option(
@@ -49,7 +52,8 @@ def predict(
 
         identified = load_model(model)
         robot = identified.robot
-        recorded = read_log(log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names)
+        read = read_log(log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names)
+        (recorded,) = told([read], payload, gravity)
         progress.start("predicting", None)
         heat = _heat(model, identified, recorded, before or [], ambient, mapping)
         result = run(identified, recorded, **heat.options)

@@ -41,6 +41,33 @@ class BatchFunction(ABC):
         Raises:
             InputError: arrays of the wrong shape.
         """
+        arrays, samples = self._checked(arguments)
+        outputs = self._outputs(samples, out)
+        self._evaluate(samples, arrays, outputs)
+        return outputs
+
+    def sums(self, *arguments: Array, size: int) -> tuple[Array, ...]:
+        """Sums each output over groups of so many samples that follow each other.
+
+        What a fit needs of samples much faster than the motion: none of the outputs is written, only their sums.
+
+        Args:
+            *arguments: one array (N, k) per input; further axes may split k.
+            size: samples of a group, 1 or more; the last N modulo `size` are left out.
+
+        Returns:
+            One C-ordered array (N // size, r, c) per output.
+
+        Raises:
+            InputError: arrays of the wrong shape.
+        """
+        arrays, samples = self._checked(arguments)
+        outputs = self._outputs(samples // size, None)
+        self._sum(samples // size, size, arrays, outputs)
+        return outputs
+
+    def _checked(self, arguments: tuple[Array, ...]) -> tuple[list[Array], int]:
+        """The arguments as C-ordered arrays, and how many samples they hold."""
         arrays = [np.ascontiguousarray(argument, dtype=np.float64) for argument in arguments]
         if len(arrays) != len(self.input_sizes):
             raise InputError(f"{len(arrays)} arguments", allowed=f"{len(self.input_sizes)}")
@@ -48,6 +75,10 @@ class BatchFunction(ABC):
         for position, (array, size) in enumerate(zip(arrays, self.input_sizes, strict=True)):
             if array.shape[:1] != (samples,) or array.size != samples * size:
                 raise InputError(f"argument {position + 1} has shape {array.shape}", allowed=f"({samples}, {size})")
+        return arrays, samples
+
+    def _outputs(self, samples: int, out: tuple[Array, ...] | None) -> tuple[Array, ...]:
+        """Fresh arrays for the outputs, or those given."""
         shapes = tuple((samples, *shape) for shape in self.output_shapes)
         outputs = tuple(np.empty(shape) for shape in shapes) if out is None else out
         if len(outputs) != len(shapes):
@@ -55,12 +86,15 @@ class BatchFunction(ABC):
         for array, shape in zip(outputs, shapes, strict=True):
             if array.shape != shape or array.dtype != np.float64 or not array.flags.c_contiguous:
                 raise InputError(f"out has shape {array.shape}", allowed=f"{shape}, C-ordered float64")
-        self._evaluate(samples, arrays, outputs)
         return outputs
 
     @abstractmethod
     def _evaluate(self, samples: int, arguments: list[Array], outputs: tuple[Array, ...]) -> None:
         """Fills the outputs."""
+
+    @abstractmethod
+    def _sum(self, groups: int, size: int, arguments: list[Array], outputs: tuple[Array, ...]) -> None:
+        """Fills the outputs with sums over groups."""
 
 
 def row_major(function: casadi.Function) -> casadi.Function:

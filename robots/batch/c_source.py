@@ -10,6 +10,8 @@ from robots.batch.operations import operation
 
 # `vec` is GCC's and Clang's portable vector type: its arithmetic needs no intrinsics and no luck with optimisers.
 # Samples are transposed into it at the entrance and back at the exit; the last block repeats its last sample.
+# VECTOR_LIBM is defined where the C library has sines of whole vectors (glibc's libmvec, to some 1e-16): one by one
+# they cost as much as the rest of a regressor.
 _HEAD = """#include <math.h>
 #if defined(__AVX512F__)
 #define W 8
@@ -19,11 +21,28 @@ _HEAD = """#include <math.h>
 #define W 2
 #endif
 typedef double vec __attribute__((vector_size(8 * W)));
+#if defined(__AVX512F__)
+#define VECTOR(name) _ZGVeN8v_##name
+#elif defined(__AVX2__)
+#define VECTOR(name) _ZGVdN4v_##name
+#elif defined(__AVX__)
+#define VECTOR(name) _ZGVcN4v_##name
+#else
+#define VECTOR(name) _ZGVbN2v_##name
+#endif
+#ifdef VECTOR_LIBM
+vec VECTOR(sin)(vec), VECTOR(cos)(vec), VECTOR(tanh)(vec);
+#define OF(name, target, argument) target = VECTOR(name)(argument);
+#else
+#define OF(name, target, argument) EACH(target, name(argument[k]))
+#endif
 #define EACH(target, value) for (int k = 0; k < W; ++k) target[k] = value;
 
 static void evaluate(const vec* restrict x, vec* restrict y) {
 """
 _TAIL = """}
+
+static const long long in_size[] = {%(in_sizes)s}, out_size[] = {%(out_sizes)s};
 
 static void scatter(const vec* restrict y, long long size, double* restrict out) {
   const double* from = (const double*)y;
@@ -31,32 +50,55 @@ static void scatter(const vec* restrict y, long long size, double* restrict out)
     for (int k = 0; k < W; ++k) out[k * size + j] = from[j * W + k];
 }
 
+// Lane k takes row start + k * step of the inputs, the last lanes that of the last one left.
+static void gather(vec* restrict x, const double** in, long long start, long long step, int left) {
+  long long at = 0;
+  for (int i = 0; i < %(n_in)d; ++i)
+    for (long long j = 0; j < in_size[i]; ++j, ++at)
+      for (int k = 0; k < W; ++k) x[at][k] = in[i][(start + (k < left ? k : left - 1) * step) * in_size[i] + j];
+}
+
+static void leave(const vec* restrict y, double** out, long long start, int left) {
+  long long at = 0;
+  for (int i = 0; i < %(n_out)d; at += out_size[i], ++i) {
+    if (left == W) {
+      scatter(y + at, out_size[i], out[i] + start * out_size[i]);
+      continue;
+    }
+    for (int k = 0; k < left; ++k)
+      for (long long j = 0; j < out_size[i]; ++j) out[i][(start + k) * out_size[i] + j] = y[at + j][k];
+  }
+}
+
 void batch_all(long long samples, const double** in, double** out) {
-  static const long long in_size[] = {%(in_sizes)s}, out_size[] = {%(out_sizes)s};
   vec x[%(x_size)d], y[%(y_size)d];
   for (long long start = 0; start < samples; start += W) {
     const int left = samples - start < W ? (int)(samples - start) : W;
-    long long at = 0;
-    for (int i = 0; i < %(n_in)d; ++i)
-      for (long long j = 0; j < in_size[i]; ++j, ++at)
-        for (int k = 0; k < W; ++k) x[at][k] = in[i][(start + (k < left ? k : left - 1)) * in_size[i] + j];
+    gather(x, in, start, 1, left);
     evaluate(x, y);
-    at = 0;
-    for (int i = 0; i < %(n_out)d; at += out_size[i], ++i) {
-      if (left == W) {
-        scatter(y + at, out_size[i], out[i] + start * out_size[i]);
-        continue;
-      }
-      for (int k = 0; k < left; ++k)
-        for (long long j = 0; j < out_size[i]; ++j) out[i][(start + k) * out_size[i] + j] = y[at + j][k];
+    leave(y, out, start, left);
+  }
+}
+
+void batch_sums(long long groups, long long size, const double** in, double** out) {
+  vec x[%(x_size)d], y[%(y_size)d], total[%(y_size)d];
+  const vec zero = {0};
+  for (long long start = 0; start < groups; start += W) {
+    const int left = groups - start < W ? (int)(groups - start) : W;
+    for (int j = 0; j < %(y_size)d; ++j) total[j] = zero;
+    for (long long row = 0; row < size; ++row) {
+      gather(x, in, start * size + row, size, left);
+      evaluate(x, y);
+      for (int j = 0; j < %(y_size)d; ++j) total[j] += y[j];
     }
+    leave(total, out, start, left);
   }
 }
 """
 
 
 def c_source(function: casadi.Function) -> str:
-    """Writes the C of ``batch_all(samples, inputs, outputs)``.
+    """Writes the C of ``batch_all(samples, inputs, outputs)`` and ``batch_sums(groups, size, inputs, outputs)``.
 
     Args:
         function: a function of SX with dense column vectors as inputs and outputs.
@@ -79,7 +121,9 @@ def c_source(function: casadi.Function) -> str:
             lines.append(f"  y[{sum(outputs[: into[0]]) + into[1]}] = w{source[0]};")
         else:
             known = operation(identifier)
-            if known.c is None:
+            if known.vector is not None:
+                lines.append(f"  OF({known.vector}, w{into[0]}, w{source[0]})")
+            elif known.c is None:
                 lines.append(f"  w{into[0]} = " + known.numpy.format(*(f"w{i}" for i in source)) + ";")
             else:
                 lines.append(f"  EACH(w{into[0]}, " + known.c.format(*(f"w{i}[k]" for i in source)) + ")")

@@ -10,6 +10,7 @@ import platform
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
@@ -21,6 +22,8 @@ from robots.batch.c_source import c_source
 log = logging.getLogger(__name__)
 
 FLAGS = ("-march=native", "-fno-math-errno", "-fPIC", "-shared")
+# Sines of whole vectors: tried first, and done without where the compiler, the C library or the processor lacks them.
+VECTOR_LIBM = ("-DVECTOR_LIBM", "-Wl,--no-undefined", "-lmvec")
 # Optimisation pays, up to a length at which it would take minutes: a chain of ten oblique joints, differentiated.
 LONG = 600_000
 
@@ -40,15 +43,22 @@ class CompiledFunction(BatchFunction):
         super().__init__(function)
         library = _build(c_source(row_major(function)))
         try:
-            self._call = ctypes.CDLL(str(library)).batch_all
+            loaded = ctypes.CDLL(str(library))
+            self._all, self._sums = loaded.batch_all, loaded.batch_sums
         except (OSError, AttributeError) as error:
             raise CompilerError(f"{library} cannot be loaded: {error}") from error
-        self._call.restype = None
+        self._all.restype = self._sums.restype = None
 
     def _evaluate(self, samples: int, arguments: list[Array], outputs: tuple[Array, ...]) -> None:
-        pointers_in = (ctypes.c_void_p * len(arguments))(*(a.ctypes.data for a in arguments))
-        pointers_out = (ctypes.c_void_p * len(outputs))(*(a.ctypes.data for a in outputs))
-        self._call(ctypes.c_longlong(samples), pointers_in, pointers_out)
+        self._all(ctypes.c_longlong(samples), _pointers(arguments), _pointers(outputs))
+
+    def _sum(self, groups: int, size: int, arguments: list[Array], outputs: tuple[Array, ...]) -> None:
+        counts = ctypes.c_longlong(groups), ctypes.c_longlong(size)
+        self._sums(*counts, _pointers(arguments), _pointers(outputs))
+
+
+def _pointers(arrays: Sequence[Array]) -> ctypes.Array[ctypes.c_void_p]:
+    return (ctypes.c_void_p * len(arrays))(*(array.ctypes.data for array in arrays))
 
 
 def default_backend() -> str:
@@ -66,7 +76,7 @@ def cache_folder() -> Path:
 
 @cache
 def compiler() -> tuple[str, str]:
-    """Finds the C compiler: its path, and a text that changes with its version and this machine.
+    """Finds the C compiler: its path, and a text that changes with its file and this machine.
 
     Raises:
         CompilerError: none is on the path.
@@ -74,9 +84,19 @@ def compiler() -> tuple[str, str]:
     for name in (os.environ.get("CC"), "cc", "gcc", "clang"):
         path = shutil.which(name) if name else None
         if path:
-            version = subprocess.run([path, "--version"], capture_output=True, text=True, check=False).stdout
-            return path, f"{version}|{platform.machine()}|{_processor()}"
+            # Not its own words: to ask it takes longer than to load what it has built.
+            file = Path(path).resolve()
+            state = file.stat()
+            return path, f"{file}|{state.st_size}|{state.st_mtime_ns}|{_libc()}|{platform.machine()}|{_processor()}"
     raise CompilerError("no C compiler (cc, gcc, clang) on the path")
+
+
+def _libc() -> str:
+    # A library built with a newer one does not load with an older.
+    try:
+        return os.confstr("CS_GNU_LIBC_VERSION") or ""
+    except ValueError:
+        return ""
 
 
 def _processor() -> str:
@@ -90,7 +110,7 @@ def _processor() -> str:
 
 def _build(source: str) -> Path:
     path, identity = compiler()
-    key = hashlib.sha256("\0".join((source, identity, *FLAGS)).encode()).hexdigest()[:32]
+    key = hashlib.sha256("\0".join((source, identity, *FLAGS, *VECTOR_LIBM)).encode()).hexdigest()[:32]
     for folder in (cache_folder(), Path(tempfile.gettempdir()) / f"robot-oed-{os.getuid()}"):
         library = folder / f"{key}.so"
         try:
@@ -110,9 +130,13 @@ def _compile(path: str, source: str, library: Path) -> None:
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         code, built = Path(folder) / "batch.c", Path(folder) / "batch.so"
         code.write_text(source, encoding="utf-8")
-        command = [path, "-O3" if len(source) < LONG else "-O1", *FLAGS, str(code), "-o", str(built), "-lm"]
-        result = subprocess.run(command, capture_output=True, text=True, check=False)
-        if result.returncode:
+        effort = "-O3" if len(source) < LONG else "-O1"
+        for extra in (VECTOR_LIBM, ()):
+            command = [path, effort, *FLAGS, str(code), "-o", str(built), *extra, "-lm"]
+            result = subprocess.run(command, capture_output=True, text=True, check=False)
+            if not result.returncode:
+                break
+        else:
             raise CompilerError(f"{path} failed: {result.stderr.strip()[:500]}")
         # Another process may have built the same file meanwhile: replacing it is atomic and harmless.
         os.replace(built, library)

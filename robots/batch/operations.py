@@ -15,10 +15,12 @@ class Operation(NamedTuple):
     Attributes:
         numpy: on arrays.
         c: on numbers; None where C's arithmetic on whole vectors says it as numpy does.
+        vector: name of the C function of one argument, where libraries have it for whole vectors too.
     """
 
     numpy: str
     c: str | None = None
+    vector: str | None = None
 
 
 OPERATIONS = {
@@ -38,8 +40,8 @@ OPERATIONS = {
     casadi.OP_EXPM1: Operation("np.expm1({0})", "expm1({0})"),
     casadi.OP_LOG: Operation("np.log({0})", "log({0})"),
     casadi.OP_LOG1P: Operation("np.log1p({0})", "log1p({0})"),
-    casadi.OP_SIN: Operation("np.sin({0})", "sin({0})"),
-    casadi.OP_COS: Operation("np.cos({0})", "cos({0})"),
+    casadi.OP_SIN: Operation("np.sin({0})", "sin({0})", "sin"),
+    casadi.OP_COS: Operation("np.cos({0})", "cos({0})", "cos"),
     casadi.OP_TAN: Operation("np.tan({0})", "tan({0})"),
     casadi.OP_ASIN: Operation("np.arcsin({0})", "asin({0})"),
     casadi.OP_ACOS: Operation("np.arccos({0})", "acos({0})"),
@@ -47,7 +49,7 @@ OPERATIONS = {
     casadi.OP_ATAN2: Operation("np.arctan2({0}, {1})", "atan2({0}, {1})"),
     casadi.OP_SINH: Operation("np.sinh({0})", "sinh({0})"),
     casadi.OP_COSH: Operation("np.cosh({0})", "cosh({0})"),
-    casadi.OP_TANH: Operation("np.tanh({0})", "tanh({0})"),
+    casadi.OP_TANH: Operation("np.tanh({0})", "tanh({0})", "tanh"),
     casadi.OP_ASINH: Operation("np.arcsinh({0})", "asinh({0})"),
     casadi.OP_ACOSH: Operation("np.arccosh({0})", "acosh({0})"),
     casadi.OP_ATANH: Operation("np.arctanh({0})", "atanh({0})"),

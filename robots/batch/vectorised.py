@@ -39,6 +39,14 @@ class VectorisedFunction(BatchFunction):
                     for band in range(0, result.shape[0], BAND):
                         target[rows, band : band + BAND] = result[band : band + BAND].T
 
+    def _sum(self, groups: int, size: int, arguments: list[Array], outputs: tuple[Array, ...]) -> None:
+        step = max(1, CHUNK // size)
+        for start in range(0, groups, step):
+            stop = min(start + step, groups)
+            rows = [argument[start * size : stop * size] for argument in arguments]
+            for target, values in zip(outputs, self(*rows), strict=True):
+                target[start:stop] = values.reshape(stop - start, size, *values.shape[1:]).sum(axis=1)
+
 
 def _translate(function: casadi.Function) -> Callable[[list[Array], list[Array]], None]:
     """Writes the instruction list as the body of a Python function and compiles that."""

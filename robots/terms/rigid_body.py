@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import casadi
@@ -39,27 +40,34 @@ class RigidBody(Term):
 
     def regressor(self, robot: Robot, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX) -> casadi.SX:
         """Builds Y (n, 10 n): joint k feels the links from k outwards, so Y is block upper triangular."""
-        chain = robot.chain
-        rotations, translations = zip(
-            *(symbolic_placement(joint, q[i]) for i, joint in enumerate(chain.joints)), strict=True
-        )
-        blocks = _link_wrenches(chain.joints, rotations, translations, chain.gravity, dq, ddq)
-        Y = casadi.SX(chain.n, 10 * chain.n)
-        for link, block in enumerate(blocks):
-            wrench = block  # (6, 10): force, then moment, of the link on its parent, in the frame it stands in
-            for k in range(link, -1, -1):
-                joint = chain.joints[k]
-                part = wrench[3:, :] if joint.kind == "revolute" else wrench[:3, :]
-                Y[k, 10 * link : 10 * link + 10] = casadi.sparsify(casadi.SX(cleaned(joint.axis)).T @ part)
-                if k:
-                    force = rotations[k] @ wrench[:3, :]
-                    moment = rotations[k] @ wrench[3:, :] + casadi.skew(translations[k]) @ force
-                    wrench = casadi.vertcat(force, moment)
-        return Y
+        return _rows(robot)(q, dq, ddq)
 
     def nominal(self, robot: Robot) -> NDArray[np.float64]:
         """Gives the described inertial parameters, link after link (10 n,)."""
         return np.asarray(robot.inertia, dtype=float).reshape(-1)
+
+
+@lru_cache(maxsize=8)
+def _rows(robot: Robot) -> casadi.Function:
+    """Builds the recursion once for all models of a robot, which ask for it with symbols of their own."""
+    q, dq, ddq = (casadi.SX.sym(name, robot.n) for name in ("q", "dq", "ddq"))
+    chain = robot.chain
+    rotations, translations = zip(
+        *(symbolic_placement(joint, q[i]) for i, joint in enumerate(chain.joints)), strict=True
+    )
+    blocks = _link_wrenches(chain.joints, rotations, translations, chain.gravity, dq, ddq)
+    Y = casadi.SX(chain.n, 10 * chain.n)
+    for link, block in enumerate(blocks):
+        wrench = block  # (6, 10): force, then moment, of the link on its parent, in the frame it stands in
+        for k in range(link, -1, -1):
+            joint = chain.joints[k]
+            part = wrench[3:, :] if joint.kind == "revolute" else wrench[:3, :]
+            Y[k, 10 * link : 10 * link + 10] = casadi.sparsify(casadi.SX(cleaned(joint.axis)).T @ part)
+            if k:
+                force = rotations[k] @ wrench[:3, :]
+                moment = rotations[k] @ wrench[3:, :] + casadi.skew(translations[k]) @ force
+                wrench = casadi.vertcat(force, moment)
+    return casadi.Function("rigid_body", [q, dq, ddq], [Y])
 
 
 def _link_wrenches(

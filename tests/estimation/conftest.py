@@ -6,7 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
+from numpy.typing import ArrayLike
 
 from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits
@@ -95,3 +97,64 @@ def data() -> Callable[[str], Path]:
         return folder
 
     return find
+
+
+@pytest.fixture(scope="session")
+def pinocchio_torque() -> Callable[..., np.ndarray]:
+    """Evaluate a robot's rigid body by pinocchio, in any field of gravity, with a point mass on the flange."""
+
+    def torque(
+        robot: Robot,
+        motion: Motion,
+        gravity: ArrayLike | None = None,
+        mass: float = 0.0,
+        centre: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> np.ndarray:
+        model = pin.Model()
+        parent = 0
+        for joint, body in zip(robot.chain.joints, robot.inertia, strict=True):
+            placement = pin.SE3(np.asarray(joint.rotation), np.asarray(joint.translation))
+            parent = model.addJoint(
+                parent, pin.JointModelRevoluteUnaligned(np.asarray(joint.axis)), placement, joint.name
+            )
+            # Pinocchio's order of the tensor: xx xy yy xz yz zz.
+            inertia = pin.Inertia.FromDynamicParameters(body[[0, 1, 2, 3, 4, 5, 7, 6, 8, 9]])
+            model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+        if mass:
+            tip = np.asarray(robot.chain.tip)
+            at = tip[:3, :3] @ np.asarray(centre) + tip[:3, 3]
+            model.appendBodyToJoint(parent, pin.Inertia(mass, at, np.zeros((3, 3))), pin.SE3.Identity())
+        model.gravity.linear = np.asarray(robot.chain.gravity if gravity is None else gravity, dtype=float)
+        data = model.createData()
+        return np.array([pin.rnea(model, data, *state) for state in zip(motion.q, motion.dq, motion.ddq, strict=True)])
+
+    return torque
+
+
+@pytest.fixture(scope="session")
+def upright(arm: Robot) -> Robot:
+    """Three joints, the first about the vertical: gravity never acts on it while the base stands level."""
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    axis = np.array([0.0, 0.0, 1.0])
+    joints = (
+        Joint("waist", "revolute", np.eye(3), np.array([0.0, 0.0, 0.3]), axis),
+        Joint("shoulder", "revolute", turn, np.array([0.1, 0.0, 0.0]), axis),
+        Joint("elbow", "revolute", np.eye(3), np.array([0.4, 0.0, 0.0]), axis),
+    )
+    three = np.ones(3)
+    waist = [6.0, 0.3, 0.2, 0.5, 0.2, 0.0, 0.0, 0.2, 0.0, 0.25]
+    return Robot(
+        name="upright",
+        chain=Chain(joints),
+        limits=Limits(
+            lower=-2 * three,
+            upper=2 * three,
+            velocity=4 * three,
+            acceleration=30 * three,
+            jerk=500 * three,
+            torque=100 * three,
+        ),
+        inertia=np.vstack([waist, arm.inertia]),
+        rotor_inertia=np.array([0.3, 0.2, 0.1]),
+        friction=np.array([[2.0, 1.5, 0.0, 0.0], [2.0, 1.5, 0.0, 0.0], [1.0, 0.8, 0.0, 0.0]]),
+    )

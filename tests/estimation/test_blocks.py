@@ -98,9 +98,11 @@ def test_choices_of_columns_are_fitted_one_by_one(problem):
 def test_products_are_those_of_averaged_rows(size, counted):
     """Of the rows as they count and of all rows, averaged by a loop."""
     rng = np.random.default_rng(3)
-    own, wide, tau = rng.normal(size=(60, 4)), rng.normal(size=(3, 60)), rng.normal(size=60)
+    rows = rng.normal(size=(60, 8))
     weight = (rng.random(60) < counted).astype(float)
-    rows = np.column_stack([own, wide.T, tau])
-    for found, weights in zip(side_products(own, wide, tau, weight, size), (weight, np.ones(60)), strict=True):
+    sums, missing = rows.reshape(-1, size, 8).sum(axis=1), (1 - weight)[:, None] * rows
+    places = np.flatnonzero((weight.reshape(-1, size) != 1).any(axis=1))
+    lost = missing.reshape(-1, size, 8).sum(axis=1)[places]
+    for found, weights in zip(side_products(sums, lost, places, size), (weight, np.ones(60)), strict=True):
         means = [sum(weights[i] * rows[i] for i in range(g, g + size)) / size for g in range(0, 60, size)]
         np.testing.assert_allclose(found, sum(np.outer(mean, mean) for mean in means), rtol=1e-9, atol=1e-12)

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from estimation import preparation
 from estimation.preparation import prepare, rows_of
 from estimation.preprocessing import Harmonics, LowPass, SmoothingSpline
 
@@ -11,12 +10,10 @@ def stretches(arm, arm_log):
     return list(prepare(arm, arm_log()).stretches(4, 900))
 
 
-@pytest.mark.parametrize("cores", [1, 3])
 @pytest.mark.parametrize("ends", [False, True])
 @pytest.mark.parametrize("smoother", [LowPass(5.0), SmoothingSpline(5.0), Harmonics(1.7, 3)], ids=lambda s: s.name)
-def test_stretches_smoothed_together_are_those_smoothed_alone(stretches, smoother, ends, cores, monkeypatch):
-    """Columns of one signal come out as signals of their own, on any number of cores."""
-    monkeypatch.setattr(preparation, "available_cores", lambda: cores)
+def test_stretches_smoothed_together_are_those_smoothed_alone(stretches, smoother, ends):
+    """Columns of one signal come out as signals of their own."""
     found = rows_of(stretches, smoother, ends=ends)
     for together, log in zip(found, stretches, strict=True):
         alone = log.rows(smoother, ends=ends)

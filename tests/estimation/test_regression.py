@@ -3,7 +3,7 @@ import pytest
 
 from estimation import regression
 from estimation.moments import Moments
-from estimation.regression import JointRegressor, chunks, threaded
+from estimation.regression import JointRegressor, chunks, summed, threaded
 from robots.base_parameters import find_base_parameters
 from robots.regressor import default_model
 
@@ -39,6 +39,29 @@ def test_moments_and_torque_are_those_of_dense_rows(base, states):
         a, b = getattr(found, name), getattr(expected, name)
         np.testing.assert_allclose(a, b, rtol=1e-10, atol=1e-10 * np.abs(b).max())
     np.testing.assert_allclose(regressor.torque(*states, values), base.torque(*states, values), rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.9, 0.0])
+@pytest.mark.parametrize("size", [1, 6])
+def test_rows_are_summed_over_groups(base, states, share, size):
+    """Sums over groups of samples, of all and of those that count, are those of each joint's rows."""
+    mask = (np.random.default_rng(2).random((300, 2)) < share).astype(float)
+    regressor = JointRegressor(base)
+    sums, counted = regressor.sums(*states, size), regressor.counted(*states, mask, size)
+    for joint, rows in enumerate(regressor(*states)):
+        for found, weights in ((sums[joint], np.ones(300)), (counted[joint], mask[:, joint])):
+            expected = (weights[:, None] * rows).reshape(300 // size, size, -1).sum(axis=1)
+            np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-11)
+
+
+def test_rows_of_a_group_are_summed():
+    """Groups that are not there are left out, and no rows give no groups."""
+    places, sums = summed(np.arange(8.0).reshape(4, 2), np.array([0, 2, 2, 5]))
+    assert places.tolist() == [0, 2, 5]
+    assert sums.tolist() == [[0, 1], [6, 8], [6, 7]]
+    places, sums = summed(np.empty((0, 2)), np.empty(0, dtype=np.intp))
+    assert places.shape == (0,)
+    assert sums.shape == (0, 2)
 
 
 @pytest.mark.parametrize("cores", [1, 3])

@@ -246,3 +246,24 @@ def test_concatenation_refuses_what_does_not_join():
         Motion.concatenate([whole, whole])
     with pytest.raises(InputError, match="step is unknown"):
         Motion.concatenate([whole.slice(0, 1), whole], shift=True)
+
+
+@pytest.mark.parametrize("part", [slice(1, 4), np.array([0, 2, 3])])
+def test_what_is_known_of_a_recording_goes_with_its_rows(part):
+    """A payload and a gravity are of the whole log: any rows of it, and its pickle, keep them, frozen."""
+    gravity, payload = np.array([0.0, -2.54, -9.48]), np.arange(10.0)
+    whole = log(gravity=gravity, payload=payload)
+    for other in (whole.rows(part), pickle.loads(pickle.dumps(whole))):
+        np.testing.assert_array_equal(other.gravity, gravity)
+        np.testing.assert_array_equal(other.payload, payload)
+        with pytest.raises(ValueError, match="read-only"):
+            other.gravity[0] = 1.0
+    np.testing.assert_array_equal(whole.rows(part).q, whole.q[part])
+    assert log().gravity is None
+
+
+@pytest.mark.parametrize("name", ["gravity", "payload"])
+@pytest.mark.parametrize("value", [[0.0, -9.81], [0.0, np.nan, -9.81], "down", [[0.0, 0.0, -9.81]], -9.81])
+def test_a_gravity_or_payload_that_is_none_is_refused(name, value):
+    """Three finite numbers, or ten; the column says which."""
+    assert refused(log, **{name: value}).column == name

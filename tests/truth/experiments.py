@@ -12,6 +12,7 @@ from scipy.interpolate import make_interp_spline
 from tests.truth.cases import Case
 from tests.truth.dynamics import massless, rigid_torque, with_gravity, with_tool
 from tests.truth.effects.base import Effect
+from tests.truth.effects.surroundings import Tilt
 from tests.truth.plant import PAUSE, Record, play
 from tests.truth.references import Reference, Spline
 from tests.truth.ride import Ride
@@ -38,11 +39,16 @@ class Stage:
 
 @dataclass(frozen=True, kw_only=True)
 class KnownChange(Effect):
-    """A payload and a field of gravity that the user sets between two times."""
+    """A payload and a field of gravity that the user sets between two times.
+
+    A base that is askew on its mount stays so when it is tilted: the true field is `turn` (3, 3) times the one that the
+    user knows, and the payload hangs in it too.
+    """
 
     stage: Stage
     start: float
     end: float
+    turn: np.ndarray
 
     name = "known change"
 
@@ -51,15 +57,14 @@ class KnownChange(Effect):
         motion = ride.link_q[rows], ride.link_v[rows], ride.link_a[rows]
         model = ride.machine.model
         torque = np.zeros_like(ride.q)
+        known = model.gravity.linear if self.stage.gravity is None else self.stage.gravity
         if self.stage.gravity is not None:
             still = np.zeros_like(motion[0])
-            change = with_gravity(model, self.stage.gravity - model.gravity.linear)
+            change = with_gravity(model, self.turn @ (known - model.gravity.linear))
             torque[rows] += rigid_torque(change, motion[0], still, still)
         if self.stage.payload:
             point = pin.Inertia(float(self.stage.payload), np.array([0.0, 0.0, 0.1]), np.zeros((3, 3)))
-            body = with_tool(massless(model), point)
-            if self.stage.gravity is not None:
-                body = with_gravity(body, self.stage.gravity)
+            body = with_gravity(with_tool(massless(model), point), self.turn @ known)
             torque[rows] += rigid_torque(body, *motion)
         return torque
 
@@ -70,13 +75,17 @@ def follow_up(case: Case, stages: Sequence[Stage]) -> tuple[Record, ...]:
     clock = sum(reference.duration for reference in references) + PAUSE * (len(references) - 1)
     pauses = [PAUSE] * (len(references) - 1)
     changes = []
+    turn = np.eye(3)
+    for effect in case.effects:
+        if isinstance(effect, Tilt):
+            turn = effect.turn @ turn
     for stage in stages:
         reference = tabulated(stage.t, stage.q)
         references.append(reference)
         pauses.append(stage.pause)
         start = clock + stage.pause
         clock = start + reference.duration
-        changes.append(KnownChange(stage=stage, start=start - stage.pause / 2, end=clock + 0.1))
+        changes.append(KnownChange(stage=stage, start=start - stage.pause / 2, end=clock + 0.1, turn=turn))
     rng = np.random.default_rng([case.seed, 1])
     records = play(case.machine, references, [*case.effects, *changes], case.noise, rng, pause=pauses)
     return tuple(records[case.training :])

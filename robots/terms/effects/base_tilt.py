@@ -16,7 +16,11 @@ Array = NDArray[np.float64]
 
 
 class BaseTilt(Effect):
-    """tau = (d rigid/dg) (g x e1) a + (d rigid/dg) (g x e2) b: gravity turned by small angles about two level axes."""
+    """tau = (d rigid/dg) (g x e1) a + (d rigid/dg) (g x e2) b: gravity turned by small angles about two level axes.
+
+    The axes are level where the robot stands as described, and turn with the base where a log's base is tilted: the
+    base is set askew on its mount.
+    """
 
     name: ClassVar[str] = "base_tilt"
     title: ClassVar[str] = "a base that is not level"
@@ -34,8 +38,9 @@ class BaseTilt(Effect):
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per angle."""
-        gravity = np.asarray(situation.robot.chain.gravity, dtype=float)
-        return situation.sensitivity("gravity") @ np.cross(gravity, level_axes(gravity)).T
+        axes = level_axes(np.asarray(situation.robot.chain.gravity, dtype=float))
+        turned = np.cross(situation.gravity[:, None], axes)  # (N, 2, 3)
+        return situation.sensitivity("gravity") @ turned.transpose(0, 2, 1)
 
     def describe(
         self,

@@ -65,8 +65,7 @@ class HandGuiding(Effect):
         """Evaluates four columns per joint, each on that joint alone."""
         n = situation.robot.n
         during = (situation.t >= shape[0]) & (situation.t <= shape[1])
-        gravity = np.asarray(situation.robot.chain.gravity, dtype=float)
-        weight = situation.sensitivity("gravity")[during] @ gravity
+        weight = np.einsum("njk,nk->nj", situation.sensitivity("gravity")[during], situation.gravity[during])
         moving = situation.rigid[during] - weight
         X = np.zeros((len(situation), n, n, 4))
         for j in range(n):

@@ -37,7 +37,8 @@ class Situation:
         friction: torque of the base model's friction (N, n) [N m or N].
         torque: torque of the whole base model (N, n) [N m or N].
         velocity_scale: (n,) v0 [rad/s or m/s] of the sign, tanh(dq / v0); 0 for the sharp sign.
-        parts: where logs carry different payloads, the situations that this one joins; `parameters` are the first's.
+        parts: where logs carry different payloads, or the base stands otherwise than the robot's description says, the
+            situations that this one joins; `parameters` are the first's, and each has a model of its own gravity.
     """
 
     model: TorqueModel
@@ -72,6 +73,13 @@ class Situation:
         """The median sample period within the logs [s]; 0 for a single sample."""
         steps = np.concatenate([np.diff(self.t[run]) for run in self.runs])
         return float(np.median(steps)) if len(steps) else 0.0
+
+    @cached_property
+    def gravity(self) -> Array:
+        """Gravity in the base frame at each sample (N, 3) [m/s2]."""
+        if self.parts:
+            return np.concatenate([part.gravity for part in self.parts])
+        return np.broadcast_to(np.asarray(self.robot.chain.gravity, dtype=float), (len(self), 3))
 
     @cached_property
     def sign(self) -> Array:
@@ -199,15 +207,22 @@ def situation(
     )
 
 
-def joined(parts: Sequence[Situation]) -> Situation:
-    """Joins situations of one robot on one clock, whose bodies may differ; the parameters are those of the first."""
-    if len(parts) == 1:
+def joined(parts: Sequence[Situation], model: TorqueModel | None = None) -> Situation:
+    """Joins situations of one robot on one clock; the parameters are those of the first.
+
+    Args:
+        parts: one or more; their bodies and gravities may differ.
+        model: the base model under the gravity of the robot's description; by default that of the first part.
+    """
+    model = model or parts[0].model
+    if len(parts) == 1 and parts[0].model is model:
         return parts[0]
     edges = np.cumsum([0, *(len(part) for part in parts[:-1])])
     names = ("t", "q", "dq", "ddq", "rigid", "friction", "torque")
     merged: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
     return replace(
         parts[0],
+        model=model,
         **merged,
         starts=tuple(int(edge) + start for edge, part in zip(edges, parts, strict=True) for start in part.starts),
         parts=tuple(parts),

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from estimation.diagnosis.carried import point_mass, situation_on
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.limits import planned_problem
-from estimation.diagnosis.next_experiment import plan_next
+from estimation.diagnosis.next_experiment import Grams, plan_next
 from estimation.diagnosis.next_experiment_motions import MADE, MAKERS, room_of
 from robots.loading import load_robot
 from robots.plants import Sensors
@@ -126,3 +127,50 @@ def test_limits_of_zero_are_no_limits(problem):
     for make in MAKERS.values():
         for stage in make(room, 2, 0):
             assert np.isfinite(stage.motion.q).all()
+
+
+def test_the_experiment_starts_from_the_arm_itself(problem):
+    """A payload that the first log carried has no part in what an experiment without it shows."""
+    body = point_mass(6.0, (0.0, 0.1, 0.2))
+    carried = replace(problem.recording, payloads=(body,))
+    now = situation_on(carried, problem.situation.model, problem.situation.parameters)
+    laden = replace(problem, recording=carried, situation=now)
+    assert np.abs(now.rigid - problem.situation.rigid).max() > 10.0
+    causes = [
+        _guess(problem, "load_dependent_friction", 4, (), 0.02),
+        _guess(problem, "stribeck", 4, (0.05, 1.0), 0.02),
+    ]
+    room = room_of(problem.situation.robot, problem.recording)
+    stages = MAKERS["payload"](room, 3, 0)
+    expected, found = (Grams(some, causes).of(stages) for some in (problem, laden))
+    # The parameters were added and taken off again: rounding of sums.
+    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_a_tilted_base_counts_with_the_parameters_that_it_shows(problem):
+    """The first joint's first moments, which level logs leave open, take what they can of a cause."""
+    causes = [_guess(problem, "spring", 1, (), 0.02), _guess(problem, "torque_constant_error", 1, (), 0.02)]
+    grams = Grams(problem, causes)
+    names = {column.name for column in grams.base.columns} - {c.name for c in problem.baseline.base.columns}
+    assert names == {"mPx_1", "mPy_1"}
+    room = room_of(problem.situation.robot, problem.recording)
+    total = grams.old + grams.of(MAKERS["second_base_pose"](room, 0, 0))
+    own = [i for i, column in enumerate(grams.base.columns) if column.name in names]
+    level = np.sqrt(np.diag(grams.old)[own])
+    assert np.all(level < 1e-6 * np.sqrt(np.diag(total)[own]))
+
+
+def test_a_base_that_stands_otherwise_stays_there(problem):
+    """Without a pose of its own an experiment is made where the last log was; a second pose tilts from there."""
+    wall = np.array([-9.81, 0.0, 0.0])
+    stands = replace(problem, recording=replace(problem.recording, fields=(wall,)))
+    causes = [_guess(problem, "stribeck", 4, (0.05, 1.0), 0.02), _guess(problem, "spring", 4, (), 0.02)]
+    room = room_of(problem.situation.robot, problem.recording)
+    (stage,) = MAKERS["repeat"](room, 3, 0)
+    grams = Grams(stands, causes)
+    expected = grams.of([replace(stage, gravity=wall)])
+    np.testing.assert_allclose(grams.of([stage]), expected, atol=1e-12 * np.abs(expected).max())
+    plan = plan_next(stands, causes)
+    (tilted,) = MAKERS["second_base_pose"](room_of(problem.situation.robot.under(wall), stands.recording), 3, 0)
+    assert plan is not None
+    assert tilted.gravity @ wall / 9.81**2 == pytest.approx(np.cos(np.radians(15.0)))

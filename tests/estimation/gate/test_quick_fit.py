@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.gate.delays import _remaining, _Search, estimate_delays
-from estimation.gate.excerpts import excerpt, stretch
+from estimation.gate.excerpts import excerpts_of, stretch
 from estimation.gate.quick_fit import OWN, Rows
 from estimation.gate.rigid_body import joint_rows, rigid_body, used_columns
 from estimation.gate.whole_fit import fit_all
@@ -14,7 +14,7 @@ from estimation.gate.whole_fit import fit_all
 def rows(er3a, good):
     log = good()
     parts = [stretch(log, log.tau, piece, 0.004) for piece in (slice(0, 2500), slice(2500, 5000))]
-    return Rows.of(er3a, [excerpt(part, 0.004, 12.0) for part in parts])
+    return Rows.of(er3a, excerpts_of(parts, 0.004, 12.0))
 
 
 def test_joint_rows_are_those_of_the_rigid_body(er3a):
@@ -24,6 +24,17 @@ def test_joint_rows_are_those_of_the_rigid_body(er3a):
     for joint, (found, used) in enumerate(zip(joint_rows(er3a, *states), used_columns(er3a), strict=True)):
         np.testing.assert_allclose(found, Y[:, joint, used], rtol=1e-12, atol=1e-12)
         assert not np.delete(Y[:, joint], used, axis=1).any()
+
+
+def test_rounding_is_no_column(er3a, rows):
+    """Columns that do not act are zero: a joint on a vertical axis has some that rounding alone fills."""
+    scaled = rows.joints[0].Y
+    size = np.sqrt(np.mean(scaled**2, axis=0))
+    np.testing.assert_allclose(size[size > 0], 1.0, rtol=1e-9)
+    body = rigid_body(er3a).regressor(rows.q, rows.dq, rows.ddq)[:, 0, rows.joints[0].used]
+    silent = np.abs(body).max(axis=0) < 1e-10
+    assert silent.any()
+    assert not scaled[:, : len(silent)][:, silent].any()
 
 
 def test_the_whole_fit_leaves_out_each_fold(er3a, rows):
@@ -75,7 +86,7 @@ def test_the_search_finds_the_best_of_all_shifts(er3a, good, delay):
     """Some rows first and the neighbours on all rows then end where all shifts on all rows do, and at the truth."""
     log = good()
     shifted = np.column_stack([np.interp(log.t - delay, log.t, column) for column in log.tau.T])
-    part = excerpt(stretch(log, shifted, slice(50, 4950), 0.004), 0.004, 12.0)
+    (part,) = excerpts_of([stretch(log, shifted, slice(50, 4950), 0.004)], 0.004, 12.0)
     rows = Rows.of(er3a, [part])
     fits = {joint: rows.fit(joint) for joint in range(er3a.n)}
     shifts = np.linspace(-0.04, 0.04, 25)

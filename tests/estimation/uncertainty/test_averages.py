@@ -1,11 +1,9 @@
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from estimation.uncertainty import Part, covariance, sandwich
 from estimation.uncertainty.averages import Averages
-
-JOINTS, WEIGHTS = 2, np.array([1.0, 0.3])
+from tests.estimation.uncertainty.least_squares import JOINTS, WEIGHTS, coloured, fit
 
 
 def regressor(rows, fastest=0.7):
@@ -20,16 +18,9 @@ def regressor(rows, fastest=0.7):
     return Y
 
 
-def coloured(rows, rng, a=(0.9, 0.6), correlation=0.5):
-    innovations = rng.multivariate_normal([0, 0], [[1.0, correlation], [correlation, 1.0]], rows + 300)
-    return np.column_stack([lfilter([1.0], [1.0, -a[j]], innovations[:, j])[300:] for j in range(JOINTS)])
-
-
-def fit(Y, noise, mask):
-    W = mask * WEIGHTS
-    inverse = np.linalg.inv(np.einsum("njp,nj,njq->pq", Y, W, Y))
-    values = inverse @ np.einsum("njp,nj->p", Y, W * noise)
-    return values, Part(len(Y), lambda i, k: Y[i:k], mask, (noise - Y @ values) * mask), inverse
+def fitted(Y, noise, mask):
+    values, residual, inverse = fit(Y, noise, mask)
+    return values, Part(len(Y), lambda i, k: Y[i:k], mask, residual), inverse
 
 
 def averages(Y, mask, residual, size, chunk):
@@ -94,7 +85,7 @@ def test_averages_state_the_covariance_of_repeated_experiments(monkeypatch):
     Y, mask = regressor(4000), (rng.random((4000, JOINTS)) < 0.97).astype(float)
     estimates, stated = [], np.zeros((4, 4))
     for draw in range(400):
-        values, part, inverse = fit(Y, coloured(4000, rng), mask)
+        values, part, inverse = fitted(Y, coloured(4000, rng), mask)
         estimates.append(values)
         if draw % 10 == 0:
             stated += covariance([part], WEIGHTS, inverse, averaged=5) / 40
@@ -108,7 +99,7 @@ def test_averages_agree_with_all_rows(monkeypatch):
     monkeypatch.setattr(sandwich, "MOST_CORRECTED", 0)
     rng = np.random.default_rng(6)
     mask = (rng.random((40_000, JOINTS)) < 0.98).astype(float)
-    _, part, inverse = fit(regressor(40_000), coloured(40_000, rng), mask)
+    _, part, inverse = fitted(regressor(40_000), coloured(40_000, rng), mask)
     errors = [np.sqrt(np.diag(covariance([part], WEIGHTS, inverse, averaged=size))) for size in (1, 5)]
     # Two autoregressive models of one residual, of other orders and steps: each knows its density to five per cent.
     np.testing.assert_allclose(errors[1], errors[0], rtol=0.15)
@@ -117,7 +108,7 @@ def test_averages_agree_with_all_rows(monkeypatch):
 def test_short_logs_are_not_averaged():
     """Where the fit eats noticeably of the noise, all rows count as before."""
     rng = np.random.default_rng(7)
-    _, part, inverse = fit(regressor(2000), coloured(2000, rng), np.ones((2000, JOINTS)))
+    _, part, inverse = fitted(regressor(2000), coloured(2000, rng), np.ones((2000, JOINTS)))
     found = covariance([part], WEIGHTS, inverse, averaged=5)
     assert np.array_equal(found, covariance([part], WEIGHTS, inverse))
 
@@ -127,7 +118,7 @@ def test_parts_shorter_than_a_group_are_left_out(monkeypatch):
     monkeypatch.setattr(sandwich, "MOST_CORRECTED", 0)
     rng = np.random.default_rng(8)
     Y = regressor(5003)
-    _, part, inverse = fit(Y, coloured(5003, rng), np.ones((5003, JOINTS)))
+    _, part, inverse = fitted(Y, coloured(5003, rng), np.ones((5003, JOINTS)))
     parts = [
         Part(stop - start, lambda i, k, first=start: Y[first + i : first + k], part.mask[start:stop], residual)
         for start, stop in ((0, 5000), (5000, 5003))
@@ -135,3 +126,26 @@ def test_parts_shorter_than_a_group_are_left_out(monkeypatch):
     ]
     found = covariance(parts, WEIGHTS, inverse, averaged=5)
     assert np.array_equal(found, covariance(parts[:1], WEIGHTS, inverse, averaged=5))
+
+
+@pytest.mark.parametrize("share", [1.0, 0.9, 0.0])
+def test_sums_of_groups_may_be_given(share):
+    """Sums that somebody else has made of the rows as they count give what sums of the rows give."""
+    rng, size = np.random.default_rng(6), 5
+    Y, mask = regressor(1203), (rng.random((1203, JOINTS)) < share).astype(float)
+    residual = rng.normal(size=(1203, JOINTS)) * mask
+    asked = []
+
+    def sums(start, stop, size):
+        asked.append(start)
+        counted = Y[start:stop] * mask[start:stop, :, None]
+        return list(counted.reshape(-1, size, JOINTS, 4).sum(axis=1).transpose(1, 0, 2))
+
+    part = Part(len(Y), lambda i, k: Y[i:k], mask, residual)
+    plain = Averages.of(part.columns, mask, residual, size, 100)
+    given = Averages.of(part.columns, mask, residual, size, 100, sums)
+    assert len(asked) > 5
+    for first, second in zip(plain.sums, given.sums, strict=True):
+        np.testing.assert_allclose(second, first, atol=1e-12)
+    for first, second in zip(plain.within, given.within, strict=True):
+        np.testing.assert_array_equal(second, first)

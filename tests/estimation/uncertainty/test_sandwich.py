@@ -5,9 +5,9 @@ from scipy.signal import lfilter
 
 from estimation.uncertainty import Part, covariance, sandwich, white_noise_covariance
 from estimation.uncertainty.autoregressive import autocovariance, fit_noise
+from tests.estimation.uncertainty.least_squares import JOINTS, WEIGHTS, coloured, fit
 
-JOINTS, COLUMNS = 2, 3
-WEIGHTS = np.array([1.0, 0.3])
+COLUMNS = 3
 
 
 def regressor(rows, seed=0):
@@ -20,20 +20,6 @@ def regressor(rows, seed=0):
     Y[:, 0, 1] = 1.0
     Y[:, 1, 2] = np.sign(np.sin(2 * np.pi * 0.7 * t))
     return Y
-
-
-def coloured(rows, rng, a=(0.9, 0.6), correlation=0.5):
-    innovations = rng.multivariate_normal([0, 0], [[1.0, correlation], [correlation, 1.0]], rows + 300)
-    return np.column_stack([lfilter([1.0], [1.0, -a[j]], innovations[:, j])[300:] for j in range(JOINTS)])
-
-
-def fit(Y, noise, mask):
-    """Weighted least squares of noise alone: estimate, residual, inverse Gram matrix."""
-    W = mask * WEIGHTS
-    gram = np.einsum("njp,nj,njq->pq", Y, W, Y)
-    inverse = np.linalg.inv(gram)
-    values = inverse @ np.einsum("njp,nj->p", Y, W * noise)
-    return values, (noise - Y @ values) * mask, inverse
 
 
 def part(Y, mask, residual):

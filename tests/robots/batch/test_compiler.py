@@ -126,6 +126,17 @@ def test_another_compiler_builds_anew(fresh, needs_compiler, square, monkeypatch
     assert len(list(fresh.glob("*.so"))) == 2
 
 
+def test_sines_of_vectors_are_done_without(fresh, needs_compiler, function, expected, monkeypatch, tmp_path):
+    """Where the C library has no sines of whole vectors, they are taken one by one."""
+    path, _ = compiled.compiler()
+    compiled.compiler.cache_clear()
+    script = f'case "$*" in *-lmvec*) echo no such library >&2; exit 1;; esac\nexec {path} "$@"'
+    monkeypatch.setenv("CC", fake_compiler(tmp_path, script))
+    x, y = (np.random.default_rng(0).normal(size=(19, k)) for k in (3, 2))
+    for found, wanted in zip(batch_function(function, "compiled")(x, y), expected(x, y), strict=True):
+        np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-12)
+
+
 def test_two_processes_may_build_the_same(fresh, needs_compiler, monkeypatch, tmp_path):
     """Processes that build the same function at once all get a whole library."""
     path, _ = compiled.compiler()

@@ -105,3 +105,14 @@ def test_constants_and_copies(backend):
     copied, constants = evaluate(np.array([[1.0, 2.0], [3.0, 4.0]]))
     np.testing.assert_array_equal(copied[:, :, 0], [[1.0, 2.0], [3.0, 4.0]])
     np.testing.assert_array_equal(constants[1, :, 0], [np.inf, -np.inf, np.nan, -0.5])
+
+
+@pytest.mark.parametrize(("samples", "size"), [(1, 1), (9, 1), (40, 5), (43, 5), (4100, 3), (2100, 2050), (3, 5)])
+def test_sums_over_groups(samples, size, backend, function):
+    """Sums of each group are those of its samples, and what does not fill a group is left out."""
+    evaluate = batch_function(function, backend)
+    x, y = (np.random.default_rng(samples).normal(size=(samples, k)) for k in (3, 2))
+    groups = samples // size
+    for sums, values in zip(evaluate.sums(x, y, size=size), evaluate(x, y), strict=True):
+        expected = values[: groups * size].reshape(groups, size, *values.shape[1:]).sum(axis=1)
+        np.testing.assert_allclose(sums, expected, rtol=ACCURACY, atol=ACCURACY * size)

@@ -66,9 +66,13 @@ class Tilt(Effect):
     def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Tilt:
         return cls(joint=None, heading=rng.uniform(0, 2 * np.pi))
 
+    @property
+    def turn(self) -> np.ndarray:
+        """(3, 3) what the field of gravity is turned by, in the frame of the base."""
+        return np.asarray(pin.exp3(self.amount * np.array([np.cos(self.heading), np.sin(self.heading), 0.0])))
+
     def torque(self, ride: Ride) -> np.ndarray:
-        axis = np.array([np.cos(self.heading), np.sin(self.heading), 0.0])
-        turned = pin.exp3(self.amount * axis) @ ride.machine.model.gravity.linear
+        turned = self.turn @ ride.machine.model.gravity.linear
         field = with_gravity(ride.machine.model, turned - ride.machine.model.gravity.linear)
         still = np.zeros_like(ride.q)
         return rigid_torque(field, ride.link_q, still, still)

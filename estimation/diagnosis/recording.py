@@ -1,0 +1,127 @@
+"""What a diagnosis knows of logs: one grid, motion free of noise, torque as measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.periods import Cycle
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """All logs, one after the other.
+
+    Attributes:
+        t: time [s], (N,), one clock.
+        starts: row at which each log begins.
+        q: positions (N, n), free of noise [rad or m].
+        dq: velocities (N, n).
+        ddq: accelerations (N, n).
+        tau: torque as measured (N, n) [N m or N].
+        step: sample period [s].
+        cycles: per log the repeated part, in rows of the log; None where nothing repeats.
+        cutoff: lowest frequency [Hz] above which positions are taken for noise.
+        floor: power density of each joint's position noise (n,) [rad^2/Hz].
+        unsure: rows (N, n) in which the direction of motion is not known: friction may have either sign there.
+        names: of the logs.
+        payloads: per log a known body at the flange (10,), in its frame; empty where no log has one.
+        fields: per log gravity (3,) in the base frame [m/s2], None as the robot is described; empty where all are so.
+    """
+
+    t: Array
+    starts: tuple[int, ...]
+    q: Array
+    dq: Array
+    ddq: Array
+    tau: Array
+    step: float
+    cycles: tuple[Cycle | None, ...]
+    cutoff: float
+    floor: Array
+    unsure: NDArray[np.bool_]
+    names: tuple[str, ...]
+    payloads: tuple[Array, ...] = ()
+    fields: tuple[Array | None, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return int(self.q.shape[1])
+
+    @property
+    def runs(self) -> tuple[slice, ...]:
+        """Each log's rows."""
+        return tuple(slice(a, b) for a, b in pairwise((*self.starts, len(self.t))))
+
+    @property
+    def bodies(self) -> tuple[Array, ...]:
+        """Each log's known payload (10,), zeros for none."""
+        return self.payloads or (np.zeros(10),) * len(self.starts)
+
+    @property
+    def gravities(self) -> tuple[Array | None, ...]:
+        """Each log's gravity (3,) in the base frame [m/s2], None as the robot is described."""
+        return self.fields or (None,) * len(self.starts)
+
+    @property
+    def duration(self) -> float:
+        """Time recorded, without the pauses between logs [s]."""
+        return len(self.t) * self.step
+
+    @property
+    def periodic(self) -> bool:
+        """Whether every log repeats its motion."""
+        return all(cycle is not None for cycle in self.cycles)
+
+
+def cut(whole: Recording, rows: slice) -> Recording:
+    """Takes rows of a recording, and the logs that begin in them."""
+    begins = (0, *(start - rows.start for start in whole.starts if rows.start < start < rows.stop))
+    first = sum(start <= rows.start for start in whole.starts) - 1
+    logs = slice(first, first + len(begins))
+    return replace(
+        whole,
+        t=whole.t[rows],
+        starts=begins,
+        q=whole.q[rows],
+        dq=whole.dq[rows],
+        ddq=whole.ddq[rows],
+        tau=whole.tau[rows],
+        unsure=whole.unsure[rows],
+        cycles=(None,) * len(begins),
+        names=whole.names[logs],
+        payloads=whole.payloads[logs],
+        fields=whole.fields[logs],
+    )
+
+
+def following(first: Recording, second: Recording) -> Recording:
+    """Joins two recordings of one sample period on one clock, the first before the second."""
+    starts = (*first.starts, *(len(first) + start for start in second.starts))
+
+    def both(name: str) -> Array:
+        return np.concatenate([getattr(first, name), getattr(second, name)])
+
+    return replace(
+        first,
+        t=both("t"),
+        q=both("q"),
+        dq=both("dq"),
+        ddq=both("ddq"),
+        tau=both("tau"),
+        unsure=both("unsure").astype(bool),
+        starts=starts,
+        cycles=(*first.cycles, *second.cycles),
+        names=(*first.names, *second.names),
+        payloads=(*first.bodies, *second.bodies) if first.payloads or second.payloads else (),
+        fields=(*first.gravities, *second.gravities) if first.fields or second.fields else (),
+    )

@@ -1,0 +1,170 @@
+"""Specification of a diagnosis of logs under two gravities, whose torque is pinocchio's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from estimation import load_model, predict
+from estimation.diagnosis import Diagnosis, diagnose
+from estimation.diagnosis.baseline import base_parameters, build_baseline
+from estimation.diagnosis.carried import lightened, point_mass, situation_on
+from estimation.diagnosis.simulating import Plant
+from estimation.diagnosis.states import record
+from robots.regressor import default_model
+from robots.robot import Robot
+from robots.signals import Log, Motion
+
+ANGLE = np.radians(15.0)
+TILTED = 9.81 * np.array([0.0, -np.sin(ANGLE), -np.cos(ANGLE)])
+MASS, CENTRE = 1.5, (0.02, -0.03, 0.1)
+WIDTH = 1e-3  # [rad/s] of the sign
+SOME = ("torque_constant_error", "base_tilt", "spring", "payload_change", "friction_step")
+SIMPLE = "coulomb-viscous"
+Torque = Callable[..., np.ndarray]
+Build = Callable[..., Log]
+
+
+@pytest.fixture(scope="module")
+def build(upright: Robot, fourier_motion: Callable[..., Motion], pinocchio_torque: Torque) -> Build:
+    """A log whose torque is pinocchio's, with drives that give a gain times their torque, on an askew base."""
+
+    def make(
+        seed: int,
+        gravity: np.ndarray | None = None,
+        mass: float = 0.0,
+        gain: tuple[float, ...] = (1.0, 1.0, 1.0),
+        askew: tuple[float, ...] = (0.0, 0.0, 0.0),
+    ) -> Log:
+        motion = fourier_motion(upright, seed)
+        field = pin.exp3(-np.array(askew)) @ (upright.chain.gravity if gravity is None else gravity)
+        f = upright.friction
+        tau = f[:, 0] * np.tanh(motion.dq / WIDTH) + f[:, 1] * motion.dq + upright.rotor_inertia * motion.ddq
+        tau = (tau + pinocchio_torque(upright, motion, field, mass, CENTRE)) * gain
+        tau = tau + 0.02 * np.random.default_rng(seed).normal(size=tau.shape)
+        payload = point_mass(mass, CENTRE) if mass else None
+        return Log(t=motion.t + 100.0 * seed, q=motion.q, tau=tau, gravity=gravity, payload=payload)
+
+    return make
+
+
+def test_each_log_is_evaluated_as_its_base_stood(upright: Robot, build: Build, pinocchio_torque: Torque) -> None:
+    """Columns, what effects feel, and the robot that is simulated: pinocchio's torque log by log, payloads included."""
+    logs = (build(0), build(1, TILTED, MASS), build(2, TILTED))
+    recording = record(upright, logs)
+    light = lightened(upright, recording)
+    base = base_parameters(upright, SIMPLE, (WIDTH,) * 3, [TILTED])
+    baseline = build_baseline(base, light)
+    parameters = np.array(base.model.nominal)
+    values = base.from_standard(parameters)
+    now = situation_on(light, baseline.base.model, parameters)
+    plant = Plant(model=baseline.base.model, columns=base.independent, values=values)
+    for run, log in zip(recording.runs, logs, strict=True):
+        motion = Motion(recording.t[run], recording.q[run], recording.dq[run], recording.ddq[run])
+        bare = pinocchio_torque(upright, motion, log.gravity)
+        full = pinocchio_torque(upright, motion, log.gravity, MASS if log.payload is not None else 0.0, CENTRE)
+        size = 1e-9 * np.abs(full).max()
+        assert (recording.tau - light.tau)[run] == pytest.approx(full - bare, abs=size)
+        rotors = upright.rotor_inertia * motion.ddq
+        assert now.rigid[run] == pytest.approx(full + rotors, abs=size)
+        own = [i for i, column in enumerate(base.columns) if column.term == "rigid_body"]
+        # Of several rotors some are grouped with their links.
+        rigid = np.where([c.term in ("rigid_body", "rotor_inertia") for c in base.model.columns], parameters, 0.0)
+        grouped = base.from_standard(rigid)
+        assert baseline.regressor[run] @ grouped == pytest.approx(bare + rotors, abs=size)
+        assert len(own) > 0
+        part = replace(
+            light,
+            t=light.t[run],
+            starts=(0,),
+            q=light.q[run],
+            dq=light.dq[run],
+            ddq=light.ddq[run],
+            payloads=(light.bodies[recording.runs.index(run)],),
+            fields=(light.gravities[recording.runs.index(run)],),
+        )
+        states = (part.q, part.dq, part.ddq)
+        # The plant has friction besides, and the mass; without bodies it would differ by the payload's torque.
+        carried = plant.carried(part, states)
+        assert carried == pytest.approx(full - bare, abs=size)
+        assert plant.base(part, states) - carried == pytest.approx(baseline.regressor[run] @ values, abs=1e-6)
+        assert plant.at(part, states).sensitivity("gravity") == pytest.approx(now.sensitivity("gravity")[run], abs=1e-5)
+    assert now.robot is upright
+    assert now.gravity[recording.runs[1]] == pytest.approx(
+        np.broadcast_to(TILTED, (len(light.t[recording.runs[1]]), 3))
+    )
+
+
+@pytest.fixture(scope="module")
+def gained(upright: Robot, build: Build) -> tuple[Diagnosis, tuple[Log, Log]]:
+    """The diagnosis of an arm whose shoulder says 4 % too much torque, by a level and a tilted log."""
+    gain = (1.0, 1.04, 1.0)
+    logs = (build(0, gain=gain), build(1, TILTED, gain=gain))
+    return diagnose(upright, logs, candidates=SOME, friction=SIMPLE), logs
+
+
+def test_a_wrong_torque_constant_is_told_from_a_tilt_and_a_mass(gained: tuple[Diagnosis, tuple[Log, Log]]) -> None:
+    """Named on its joint with its size, by logs under two gravities; unseen errors fall."""
+    result, _ = gained
+    assert result.verdict == "named"
+    (finding,) = result.findings
+    assert (finding.effect, finding.joint) == ("torque_constant_error", 2)
+    (error,) = finding.parameters
+    assert abs(error.value) == pytest.approx(0.04, abs=0.01)
+    assert result.extended[1] < result.baseline[1]
+
+
+def test_the_extended_model_predicts_on_the_base_as_described_and_as_tilted(
+    gained: tuple[Diagnosis, tuple[Log, Log]], build: Build, tmp_path: Path
+) -> None:
+    """Saved and read again it holds under the description's gravity, and under the one that was told."""
+    result, _ = gained
+    result.save(tmp_path)
+    model = load_model(tmp_path)
+    assert model.gravities == (tuple(TILTED),)
+    assert {"mPx_1", "mPy_1"} <= set(model.names)
+    gain = (1.0, 1.04, 1.0)
+    for log in (build(3, gain=gain), build(4, TILTED, gain=gain), build(5, TILTED, MASS, gain=gain)):
+        # Noise is 0.02 N m of some 2 to 15; the rest is what smoothing leaves at reversals.
+        assert np.all(predict(model, log).nrmse < 0.03)
+
+
+def test_a_tilt_that_was_not_told_is_not_taken_for_nothing(upright: Robot, build: Build) -> None:
+    """A robot without fault: told of the tilt, each log predicts the other to the noise; not told, not at all."""
+    logs = (build(0), build(1, TILTED))
+    told = diagnose(upright, logs, candidates=SOME, friction=SIMPLE)
+    assert told.verdict == "none"
+    untold = diagnose(upright, [logs[0], replace(logs[1], gravity=None)], candidates=SOME, friction=SIMPLE)
+    assert np.all(np.array(told.baseline) < 0.05)
+    assert max(untold.baseline) > 0.5
+
+
+def test_a_base_askew_on_its_mount_is_found_under_two_gravities(upright: Robot, build: Build) -> None:
+    """Gravity is off by the same small rotation of the base frame in both logs: its angles come back to 0.1 degrees."""
+    askew = (0.03, -0.02, 0.0)
+    logs = (build(0, askew=askew), build(1, TILTED, askew=askew))
+    result = diagnose(upright, logs, held_out=build(2, TILTED, askew=askew), candidates=SOME, friction=SIMPLE)
+    finding = result.findings[0]
+    assert finding.effect == "base_tilt"
+    assert [p.value for p in finding.parameters] == pytest.approx(askew[:2], abs=2e-3)
+    assert finding.gain is not None
+    assert finding.gain.ci95[0] > 0
+
+
+def test_unseen_logs_may_stand_as_none_before(upright: Robot, build: Build) -> None:
+    """Fitted on a level base, judged on a tilted one: what only the tilt shows is the description's."""
+    result = diagnose(upright, build(0), held_out=build(1, TILTED), candidates=SOME, friction=SIMPLE)
+    assert result.verdict == "none"
+    assert np.all(np.array(result.baseline) < 0.05)
+
+
+def test_the_default_model_is_one_object_a_gravity(upright: Robot) -> None:
+    """What was compiled for a gravity is kept: the same model comes back for it, and itself for its own."""
+    model = default_model(upright)
+    assert model.under(TILTED) is model.under(tuple(TILTED))
+    assert model.under(None) is model.under(upright.chain.gravity) is model
