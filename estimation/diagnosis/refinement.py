@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +48,12 @@ class Member:
         """Gain less what its parameters are worth: Schwarz's criterion, larger is better."""
         prior = RARE if self.hypothesis.effect.rare else 0.0
         return self.gain - self.degrees * float(np.log(rows * len(self.group.joints))) - prior
+
+    def gain_on(self, joints: Collection[int]) -> float:
+        """What of the gain is on some joints, counted from 0, by its torque's energy there."""
+        energies = [float(np.sum((X @ self.coefficients) ** 2)) for X in self.group.columns]
+        there = sum(e for j, e in zip(self.group.joints, energies, strict=True) if j in joints)
+        return self.gain * there / max(sum(energies), 1e-300)
 
 
 def refine(

@@ -17,8 +17,8 @@ from robots.common.parallel import available_cores
 CONTENDERS = 7
 # A hypothesis whose grid point explains less than this share of the best one's gain is no contender.
 NEAR = 0.3
-# A further effect on the joints of one that is found must explain this share of what that one explains: formulas are
-# true to some per cent of an effect, and what they leave must not be taken for another.
+# A further effect must explain this share of what one that is found explains on its joints: formulas are true to some
+# per cent of an effect, and what they leave must not be taken for another.
 BEYOND = 0.08
 MOST = 4  # effects at once
 # What is reported must be worth its parameters by so much (Schwarz): strong evidence, beside a small p-value.
@@ -114,8 +114,7 @@ def _best(problem: Problem, outcomes: Sequence[Outcome], accepted: Accepted) -> 
 
 
 def _beyond(candidate: Member, members: Sequence[Member]) -> bool:
-    shared = [m.gain for m in members if set(m.group.joints) & set(candidate.group.joints)]
-    return not shared or candidate.gain >= BEYOND * max(shared)
+    return candidate.gain >= BEYOND * max((m.gain_on(candidate.group.joints) for m in members), default=0.0)
 
 
 def _polished(

@@ -17,7 +17,8 @@ ENOUGH = 0.7
 # Rivals within this of the best BIC stay possible.
 CLOSE = 10.0
 MOST_PATTERNS = 3
-# A pattern beside named effects counts when it explains this share of what they do: formulas are true to some per cent.
+# A pattern beside named effects counts when it explains this share of what they do on its joint: formulas are true to
+# some per cent.
 BEYOND = 0.05
 # A pattern is a flexible thing: beside what is named it must be worth its parameters by this much (Schwarz), strong
 # evidence, for formulas are not exact. Where nothing is named it must be no more than sure.
@@ -144,7 +145,7 @@ def _patterns(
             break
         member = refine(problem, best.hypothesis, best.shape, accepted)
         before = (*named, *members)
-        if _worth(member) < BEYOND * sum(m.gain for m in before):
+        if _worth(member) < BEYOND * sum(m.gain_on(member.group.joints) for m in before):
             break
         if member.bic(problem.rows) < LEAST and (before or not alone or p > SURE):
             break

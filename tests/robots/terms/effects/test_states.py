@@ -115,7 +115,7 @@ def test_a_zero_that_wanders_is_followed(seen):
     now = seen()
     duration = float(now.t[-1])
     X = EFFECTS["torque_sensor_drift"].local(now, 1, (0.0, duration / 4))
-    steps = np.array([1.0, -2.0, 0.5, 3.0, 9.0, 9.0, 9.0, 9.0])
+    steps = np.array([1.0, -2.0, 0.5, 3.0, *[9.0] * 12])
     knots = np.linspace(0, duration, 5)
     np.testing.assert_allclose(X @ steps, np.interp(now.t, knots, [0, 1, -1, -0.5, 2.5]), atol=1e-9)
 
