@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.comparison import VELOCITY_SCALES, Candidates, Comparison
+from estimation.comparison import VELOCITY_SCALES, Comparison
 from estimation.estimators import Estimator
 from estimation.preparation import Prepared
 from estimation.preprocessing import Smoother
 from estimation.pulls import Pull
+from estimation.trials import Candidates
 from robots.base_parameters import BaseParameters
 
 Array = NDArray[np.float64]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +15,7 @@ from estimation.preparation import Prepared, Rows, rows_of
 from estimation.preprocessing import Harmonics, LowPass, Smoother, SmoothingSpline
 from estimation.pulls import Pull, description_pull, friction_levels
 from estimation.regression import JointRegressor, summed
+from estimation.trials import Candidates, Trial, smallest, strongest
 from robots.base_parameters import BaseParameters
 
 Array = NDArray[np.float64]
@@ -25,8 +26,8 @@ WIDER = np.array(VELOCITY_SCALES[1:])
 # Share of its residual that a wider sign must save a joint. Cross-validation would prefer wide ones even where the
 # truth is a sign, and bias the friction by many standard errors.
 SAVING = 0.03
-# How much worse, in mean log error, a smaller ridge or a lower cut-off may be and still be taken.
-RIDGE_SLACK, CUTOFF_SLACK = 0.01, 0.0005
+# How much worse, in mean log error, a lower cut-off may be and still be taken.
+CUTOFF_SLACK = 0.0005
 # How much better another smoother or a pull towards the description must be than the low-pass and none.
 SMOOTHER_GAIN, PULL_GAIN = 0.005, 0.03
 # How much worse, in log error, a single joint may become by a pull.
@@ -43,57 +44,6 @@ MOST_ROWS, STRETCHES = 24_000, 10
 AVERAGED = 0.02
 # ... as long as so many averages remain.
 LEAST_AVERAGES = 400
-
-
-@dataclass(frozen=True, kw_only=True)
-class Candidates:
-    """What to choose from.
-
-    Attributes:
-        cutoffs: of the smoothing [Hz]; those above 0.4 of the sampling rate are left out.
-        ridges: see `Moments.solve`.
-        blocks: contiguous pieces of the logs, each predicted from the others.
-        smoothers: which smoothers besides the low-pass: ``spline``, and ``harmonics`` where the motion is periodic.
-        pull: whether the regularisation may pull towards the robot's description.
-        period: of the motion [s] where it is known; None leaves it to the log.
-    """
-
-    cutoffs: tuple[float, ...] = (1.5, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 30.0, 50.0)
-    ridges: tuple[float, ...] = (1e-8, 1e-7, 1e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 1e-2)
-    blocks: int = 10
-    smoothers: tuple[str, ...] = ("spline", "harmonics")
-    pull: bool = True
-    period: float | None = None
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One setting: its ridge and pull, each joint's index into the velocity scales, and its left-out errors."""
-
-    ridge: float
-    pull: Pull | None
-    scales: tuple[int, ...]
-    logs: Array  # of the errors (n,) relative to a constant
-
-    @property
-    def cost(self) -> float:
-        """Mean log of the errors relative to a constant, a joint worse than a constant counting as one."""
-        return float(np.minimum(self.logs, 0.0).mean())
-
-
-def _smallest(trials: Sequence[Trial]) -> Trial:
-    """The smallest ridge that is as good as the best; the trials come with ascending ridges."""
-    best = min(trial.cost for trial in trials)
-    return next(trial for trial in trials if trial.cost <= best + RIDGE_SLACK)
-
-
-def _strongest(trials: Sequence[Trial]) -> Trial:
-    """The largest ridge that is as good as the best: another motion asks for more than blocks of the same one do.
-
-    Of a pull towards zero the smallest is taken, which biases least; a description is where open directions belong.
-    """
-    best = min(trial.cost for trial in trials)
-    return [trial for trial in trials if trial.cost <= best + RIDGE_SLACK][-1]
 
 
 def _fastest(log: Prepared) -> Array:
@@ -154,8 +104,8 @@ class Comparison:
             # No joint pays for the others: small torques are lost in a mean that big ones gain.
             fair = [trial for trial in pulled if (trial.logs <= tried[0].logs + UNFAIR).all()]
             if fair and min(trial.cost for trial in fair) < tried[0].cost - PULL_GAIN:
-                return tried[0], _strongest(fair)
-        return tried[0], _smallest(tried)
+                return tried[0], strongest(fair)
+        return tried[0], smallest(tried)
 
     def blocks(self, smoother: Smoother, averaged: int | None = None) -> Sides:
         """Normal equations of each block, the sign columns of the wider scales appended after the base columns."""

@@ -18,10 +18,10 @@ from estimation.known_setup import gravities_of, require_plain
 from estimation.model import Model
 from estimation.preparation import Prepared, prepare
 from estimation.preprocessing import Harmonics
+from estimation.provenance import describe_logs
 from estimation.uncertainty import fast_noise, period_noise
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
-from robots.common.files import sha256
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.regressor import default_model
@@ -243,19 +243,8 @@ def _determined(found: Fit, joints: Sequence[JointFit]) -> NDArray[np.bool_]:
 def _provenance(
     logs: Sequence[Log], method: Estimator, choice: Choice, joints: Sequence[JointFit], seed: int
 ) -> dict[str, object]:
-    described = []
-    for log in logs:
-        file = log.metadata.get("file")
-        described.append(
-            {
-                "name": log.name,
-                "sha256": sha256(file) if file else None,
-                "samples": len(log),
-                "duration": log.duration,
-            }
-        )
     return {
-        "logs": described,
+        "logs": describe_logs(logs),
         "method": method.name,
         "tool_version": VERSION,
         "cutoff_hz": choice.cutoff,

@@ -27,7 +27,42 @@ JITTER = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class _Samples:
+    """Joint positions at increasing times, which may come with more.
+
+    Attributes:
+        t: time [s], (N,).
+        q: positions [rad or m], (N, n).
+    """
+
+    t: FloatArray
+    q: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # A default pickle would return writable arrays.
+        return _rebuild, (type(self), {item.name: getattr(self, item.name) for item in fields(self)})
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return int(self.q.shape[1])
+
+    @property
+    def duration(self) -> float:
+        """The time from the first to the last sample [s]."""
+        return float(self.t[-1] - self.t[0])
+
+    @property
+    def period(self) -> float | None:
+        """The sample period [s], or None if the steps differ by more than a part in 10^6."""
+        return uniform_period(self.t)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion(_Samples):
     """Positions, velocities and accelerations of n joints at N instants.
 
     Args:
@@ -51,28 +86,6 @@ class Motion:
         _freeze(self, t=t, q=q)
         for name in ("dq", "ddq"):
             _freeze(self, **{name: checked_joints(name, getattr(self, name), len(t), q.shape[1])})
-
-    def __len__(self) -> int:
-        return len(self.t)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        # A default pickle would return writable arrays.
-        return _rebuild, (type(self), {item.name: getattr(self, item.name) for item in fields(self)})
-
-    @property
-    def n(self) -> int:
-        """The number of joints."""
-        return int(self.q.shape[1])
-
-    @property
-    def duration(self) -> float:
-        """The time from the first to the last sample [s]."""
-        return float(self.t[-1] - self.t[0])
-
-    @property
-    def period(self) -> float | None:
-        """The sample period [s], or None if the steps differ by more than a part in 10^6."""
-        return uniform_period(self.t)
 
     def slice(self, start_index: int | None, stop_index: int | None) -> Motion:
         """Returns the samples from ``start_index`` up to, not including, ``stop_index``.
@@ -117,7 +130,7 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False)
-class Log:
+class Log(_Samples):
     """What was recorded of a motion of n joints at N instants.
 
     Args:
@@ -181,31 +194,10 @@ class Log:
             _freeze(self, gravity=checked_gravity(self.gravity))
         object.__setattr__(self, "metadata", dict(self.metadata))
 
-    def __len__(self) -> int:
-        return len(self.t)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (type(self), {item.name: getattr(self, item.name) for item in fields(self)})
-
-    @property
-    def n(self) -> int:
-        """The number of joints."""
-        return int(self.q.shape[1])
-
     @property
     def has_torque(self) -> bool:
         """Whether joint torques were recorded (or computed) and not only currents."""
         return self.tau is not None
-
-    @property
-    def duration(self) -> float:
-        """The time from the first to the last sample [s]."""
-        return float(self.t[-1] - self.t[0])
-
-    @property
-    def period(self) -> float | None:
-        """The sample period [s], or None if the steps differ by more than a part in 10^6."""
-        return uniform_period(self.t)
 
     def rows(self, part: slice | NDArray[np.intp]) -> Log:
         """Returns the log of some of the samples.
@@ -246,5 +238,5 @@ def _freeze(owner: object, **arrays: FloatArray) -> None:
         object.__setattr__(owner, name, array)
 
 
-def _rebuild(kind: type[Motion] | type[Log], values: dict[str, Any]) -> Motion | Log:
+def _rebuild(kind: type[_Samples], values: dict[str, Any]) -> _Samples:
     return kind(**values)

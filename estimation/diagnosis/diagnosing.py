@@ -18,7 +18,8 @@ from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.limits import find_limits
 from estimation.diagnosis.noise import estimate_whitening
 from estimation.diagnosis.patterns import all_patterns
-from estimation.diagnosis.problem import Problem, fit_values, pose
+from estimation.diagnosis.posing import fit_values, pose
+from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.regularisation import held, pull_of
 from estimation.diagnosis.reporting import Told, assemble
 from estimation.diagnosis.scan import Entry, measure

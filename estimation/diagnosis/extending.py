@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.extension import Extension
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.problem import Problem, accept, score
+from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.regularisation import held, row_weight
+from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.shrinkage import pull_on
 from estimation.identification import NEGLIGIBLE, RELATIVE
 from estimation.model import Model

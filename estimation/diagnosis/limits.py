@@ -14,9 +14,11 @@ from estimation.diagnosis.band import Band
 from estimation.diagnosis.baseline import build_baseline
 from estimation.diagnosis.gaps import Gaps
 from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
+from estimation.diagnosis.posing import pose
 from estimation.diagnosis.power import beside, detectable_energy, resolving_energy, size_per_energy, unit_mixtures
-from estimation.diagnosis.problem import Problem, pose, visible_root
+from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.scan import Entry, measure
+from estimation.diagnosis.scoring import visible_root
 from estimation.diagnosis.states import Recording
 from estimation.diagnosis.whitening import Whitening
 from estimation.pulls import Pull

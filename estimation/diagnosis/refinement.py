@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.problem import Accepted, Group, Problem, score
+from estimation.diagnosis.problem import Group, Problem
+from estimation.diagnosis.scoring import Accepted, score
 
 Array = NDArray[np.float64]
 

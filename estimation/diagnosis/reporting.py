@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.carried import situation_on, unloaded
 from estimation.diagnosis.diagnosis import Diagnosis, Trace
-from estimation.diagnosis.extending import Fitted, fit_extended
-from estimation.diagnosis.findings import Finding, Gain, Parameter
+from estimation.diagnosis.extending import fit_extended
+from estimation.diagnosis.findings import Finding, Gain
 from estimation.diagnosis.gain import Unseen
 from estimation.diagnosis.hidden_springs import hidden_springs
 from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
-from estimation.diagnosis.patterns import Pattern
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import cut
 from estimation.diagnosis.refinement import Member
@@ -25,10 +24,10 @@ from estimation.diagnosis.unseen import Measured, measure_unseen, simulate_unsee
 from estimation.diagnosis.verdict import CLOSE, Judgement, is_open
 from estimation.diagnosis.windup import EFFECT as ELASTICITY
 from estimation.diagnosis.windup import Windup, measure_windups
-from robots.common.files import sha256
+from estimation.diagnosis.wording import word_finding
+from estimation.provenance import describe_logs
 from robots.robot import Robot
 from robots.signals import Log
-from robots.terms.base import force_unit, length_unit
 from robots.version import VERSION
 
 Array = NDArray[np.float64]
@@ -76,7 +75,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         verdict = "none" if not members else "ambiguous" if any(map(is_open, founds)) else "named"
     fitted = fit_extended(problem, members, _provenance(told))
     findings = tuple(
-        _finding(
+        word_finding(
             robot,
             problem,
             member,
@@ -91,7 +90,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     if spoiling:
         fit = fit_extended(problem, [*members, *(member for member, _, _ in spoiling)], {})
         findings += tuple(
-            _finding(robot, problem, member, fit, i, p_value, None, gain)
+            word_finding(robot, problem, member, fit, i, p_value, None, gain)
             for i, (member, p_value, gain) in enumerate(spoiling, start=len(members))
         )
     unseen = seen.unseen
@@ -161,71 +160,6 @@ def _windups(told: Told, seen: Measured) -> tuple[Windup, ...]:
     return measure_windups(now, told.problem.recording, told.logs, false_alarm=told.false_alarm, unseen=unseen)
 
 
-def _finding(
-    robot: Robot,
-    problem: Problem,
-    member: Member,
-    fitted: Fitted,
-    i: int,
-    p_value: float,
-    found: Found | None,
-    gain: Gain,
-) -> Finding:
-    extension, known = fitted.model.extensions[i], fitted.effects[i]
-    hypothesis = member.hypothesis
-    joint = hypothesis.joint
-    units = {}
-    if joint is not None:
-        units = {"force": force_unit(robot, joint - 1), "length": length_unit(robot, joint - 1)}
-    sentence = hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units)
-    pattern = hypothesis.name if isinstance(hypothesis.effect, Pattern) else ""
-    rivals = [] if found is None else [(rival.hypothesis, worse) for rival, worse in found.rivals]
-    return Finding(
-        effect="unexplained" if pattern else hypothesis.name,
-        joint=joint,
-        parameters=_parameters(robot, member, fitted, i, known),
-        p_value=p_value,
-        delta_bic=member.bic(problem.rows),
-        gain=gain,
-        rivals=tuple(
-            (h.name if h.joint in (joint, None) else f"{h.name} of joint {h.joint}", float(worse))
-            for h, worse in rivals
-        ),
-        sentence=sentence,
-        visible=member.visible,
-        coordinate=hypothesis.effect.coordinate(problem.situation, joint, member.shape)[0],
-        pattern=pattern,
-    )
-
-
-def _parameters(
-    robot: Robot, member: Member, fitted: Fitted, i: int, known: NDArray[np.bool_]
-) -> tuple[Parameter, ...]:
-    extension = fitted.model.extensions[i]
-    effect = member.hypothesis.effect
-    described = [(c.name, c.unit, "linear") for c in effect.parameters(robot, extension.joint)]
-    described += [(s.name, s.unit, s.scale) for s in effect.shapes]
-    values = [*extension.coefficients.tolist(), *extension.shape]
-    errors = np.sqrt(np.maximum(np.diag(extension.covariance), 0.0))
-    result = []
-    for (name, unit, scale), value, error, sure in zip(described, values, errors, known, strict=True):
-        interval = (value - 1.96 * error, value + 1.96 * error)
-        if scale == "log" and np.isfinite(error) and value > 0:
-            factor = float(np.exp(1.96 * error / value))
-            interval = (value / factor, value * factor)
-        result.append(
-            Parameter(
-                name=name,
-                value=float(value),
-                unit=unit,
-                standard_error=float(error) if np.isfinite(error) else float("nan"),
-                ci95=(float(interval[0]), float(interval[1])) if np.isfinite(error) else (-np.inf, np.inf),
-                determined=bool(sure),
-            )
-        )
-    return tuple(result)
-
-
 def _next(problem: Problem, founds: Sequence[Found]) -> NextExperiment | None:
     """Plans the experiment that tells the causes that are left apart."""
     for found in founds:
@@ -280,20 +214,9 @@ def _trace(unseen: Unseen, seen_as: Sequence[Array], windups: Sequence[Windup]) 
 
 def _provenance(told: Told) -> dict[str, object]:
     problem = told.problem
-    described = []
-    for log in told.logs:
-        file = log.metadata.get("file")
-        described.append(
-            {
-                "name": log.name,
-                "sha256": sha256(file) if file else None,
-                "samples": len(log),
-                "duration": log.duration,
-            }
-        )
     torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
     return {
-        "logs": described,
+        "logs": describe_logs(told.logs),
         "method": "diagnosis",
         "tool_version": VERSION,
         "cutoff_hz": float(max(problem.recording.cutoff, *(band.cutoff for band in problem.whitening.bands))),

@@ -13,7 +13,8 @@ from scipy.special import gammaincc, gammaln
 from scipy.stats import gumbel_r
 
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.problem import Accepted, Group, Problem, score
+from estimation.diagnosis.problem import Group, Problem
+from estimation.diagnosis.scoring import Accepted, score
 from robots.common.parallel import available_cores
 
 Array = NDArray[np.float64]

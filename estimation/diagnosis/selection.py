@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.diagnosis.problem import Accepted, Problem, accept, score
+from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scan import Entry, Outcome, Scan, scan
+from estimation.diagnosis.scoring import Accepted, accept, score
 from robots.common.parallel import available_cores
 
 # Hypotheses refined at each step, the best by their point on the grid.

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from estimation.diagnosis.problem import Problem, Score, accept, score
+from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.regularisation import row_weight
+from estimation.diagnosis.scoring import Score, accept, score
 from estimation.pulls import Pull
 
 Array = NDArray[np.float64]

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.diagnosis.problem import Problem, accept
+from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scan import Entry, scan
+from estimation.diagnosis.scoring import accept
 from estimation.diagnosis.selection import Found, Selection
 
 # Named effects that explain less than this share of what stands out of the noise do not explain it.

@@ -11,7 +11,8 @@ from scipy.interpolate import CubicSpline
 from scipy.stats import t as student
 
 from estimation.diagnosis.extension import Extension
-from estimation.diagnosis.findings import Finding, Gain, Parameter
+from estimation.diagnosis.findings import Finding, Parameter
+from estimation.diagnosis.jackknife import blocks_of, gain_by_blocks, independent_rows, jackknife
 from estimation.diagnosis.states import Recording
 from robots.signals import Log
 from robots.terms.base import force_unit, length_unit
@@ -22,8 +23,6 @@ from robots.terms.effects.situation import Situation
 Array = NDArray[np.float64]
 
 EFFECT = "joint_elasticity"
-# Blocks that are left out in turn: they count as independent.
-FEWEST, MOST, BLOCK = 10, 30, 4.0  # [s] of a block where there may be more of them
 # Share of the load's energy that zero, delay, friction and eccentricity must leave.
 VISIBLE = 1e-2
 ALIGNED = 2  # times that the delay is taken off and found again
@@ -160,10 +159,10 @@ def _judged(
     hidden = own.load - alone @ _solve(alone, own.load)
     if not hidden @ hidden > VISIBLE * np.sum((own.load - own.load.mean()) ** 2):
         return None
-    blocks = _blocks(own.t)
+    blocks = blocks_of(own.t)
     values = _solve(whole, w)
     folds = [_solve(whole[~b], w[~b]) for b in blocks]
-    error = _jackknife(np.stack(folds))
+    error = jackknife(np.stack(folds))
     freedom = len(blocks) - 1
     quantile = float(student.ppf(0.975, freedom))
     p_value = min(tests * float(student.sf(values[-1] / max(error[-1], 1e-300), freedom)), 1.0)
@@ -178,12 +177,12 @@ def _judged(
     else:
         one, two = _solve(alone, w), values
         level, both = other.windup, np.column_stack([other.rest, other.load])
-        errors = [(level[b] - other.rest[b] @ one, level[b] - both[b] @ two) for b in _blocks(other.t)]
-    gain = _gain(errors, level)
+        errors = [(level[b] - other.rest[b] @ one, level[b] - both[b] @ two) for b in blocks_of(other.t)]
+    gain = gain_by_blocks(errors, level)
     if gain.ci95[1] < 0:
         return None
     residual = w - whole @ values
-    count = _independent(residual)
+    count = independent_rows(residual)
     squares = [float(np.sum((w - X @ _solve(X, w)) ** 2)) for X in (alone, np.column_stack([alone, own.rival]))]
     better, worse = (count * float(np.log(s / (residual @ residual))) for s in squares)
     robot = now.robot
@@ -221,44 +220,6 @@ def _judged(
 def _solve(X: Array, w: Array) -> Array:
     scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
     return np.asarray(np.linalg.lstsq(X / scale, w, rcond=1e-9)[0] / scale)
-
-
-def _blocks(t: Array) -> list[NDArray[np.bool_]]:
-    """Cuts rows (M,) into stretches of about as many rows, in the order of time."""
-    count = int(np.clip((len(t) * float(np.median(np.diff(t)))) / BLOCK, FEWEST, MOST))
-    number = np.minimum(np.arange(len(t)) * count // len(t), count - 1)
-    return [number == k for k in range(count)]
-
-
-def _jackknife(values: Array) -> Array:
-    """Standard errors (...) from estimates (B, ...) that leave out one block each."""
-    return np.asarray(np.sqrt((len(values) - 1) * np.mean((values - values.mean(axis=0)) ** 2, axis=0)))
-
-
-def _gain(errors: Sequence[tuple[Array, Array]], level: Array) -> Gain:
-    """The fall of the error, over the wind-up's standard deviation, with its interval by blocks."""
-    squares = np.array([[float(one @ one), float(two @ two), float(len(one))] for one, two in errors])
-    rest = squares.sum(axis=0) - squares
-    spread = max(float(level.std()), 1e-300)
-
-    def shares(sums: Array) -> Array:
-        return np.asarray(np.sqrt(sums[..., :2] / sums[..., 2:]) / spread)
-
-    before, after = (float(value) for value in shares(squares.sum(axis=0)))
-    falls = -np.diff(shares(rest), axis=1)[:, 0]
-    reach = float(student.ppf(0.975, len(falls) - 1)) * float(_jackknife(falls))
-    return Gain(nrmse_before=before, nrmse_after=after, ci95=(before - after - reach, before - after + reach))
-
-
-def _independent(residual: Array) -> float:
-    """The number of independent rows that tell as much as rows (M,) that resemble their neighbours."""
-    series = residual - residual.mean()
-    power = np.abs(np.fft.rfft(series, 2 * len(series))) ** 2
-    correlation = np.fft.irfft(power)[: len(series)]
-    correlation = correlation / max(correlation[0], 1e-300)
-    below = np.flatnonzero(correlation <= 0)
-    last = int(below[0]) if len(below) else len(series)
-    return max(len(series) / (1 + 2 * float(correlation[1:last].sum())), 2.0)
 
 
 def _parameter(name: str, value: float, error: float, unit: str, quantile: float) -> Parameter:

@@ -8,16 +8,13 @@ from operator import add
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.data import RegressionData
 from estimation.estimators.regularisation import torque_change
-from estimation.estimators.simulated import Instruments, Loop, simulated_moments
-from estimation.estimators.wls import WeightedLeastSquares
+from estimation.estimators.simulated import SETTLED, Instruments, SimulatingEstimator, simulated_moments
 from robots.signals import Motion
 
 ROUNDS = 12
-# Parameters have settled when the torque of their change is below this share of the residual, in every joint.
-SETTLED = 0.01
 
 
-class DirectAndInverse(WeightedLeastSquares):
+class DirectAndInverse(SimulatingEstimator):
     """min ||tau - tau_s(pi)||^2, tau_s the torque of the closed loop simulated with pi along the reference (DIDIM).
 
     The simulated motion hardly depends on the parameters while the controller tracks, so the Jacobian of tau_s is the
@@ -29,18 +26,9 @@ class DirectAndInverse(WeightedLeastSquares):
     of robot dynamics", IEEE Transactions on Control Systems Technology 21, 2013, 10.1109/TCST.2012.2185697.
 
     The solution's extras: ``simulated``, the motions, ``rounds``, and whether it ``settled``.
-
-    Args:
-        loop: what is known of the control loop.
-        temper: see `WeightedLeastSquares`.
     """
 
     name = "didim"
-    simulates = True
-
-    def __init__(self, loop: Loop | None = None, temper: float = 0.5) -> None:
-        super().__init__(temper)
-        self.loop = loop or Loop()
 
     def refine(self, data: RegressionData, values: Array, weights: Array) -> Solution:
         """Iterates simulation and least squares until the parameters settle.

@@ -7,17 +7,14 @@ import numpy as np
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.data import RegressionData
 from estimation.estimators.regularisation import regularisation, solve_scaled, torque_change
-from estimation.estimators.simulated import Instruments, Loop, instrumented_moments
-from estimation.estimators.wls import WeightedLeastSquares
+from estimation.estimators.simulated import SETTLED, Instruments, SimulatingEstimator, instrumented_moments
 from robots.common.errors import SolverError
 from robots.signals import Motion
 
 ROUNDS = 10
-# Parameters have settled when the torque of their change is below this share of the residual, in every joint.
-SETTLED = 0.01
 
 
-class InstrumentalVariables(WeightedLeastSquares):
+class InstrumentalVariables(SimulatingEstimator):
     """pi = (Z'W Y)^-1 Z'W tau, Z the regressor of the identified model's own simulated motion (IDIM-IV, Janot 2014).
 
     Y holds the measured motion, Z that of the closed loop simulated along the same reference with the last estimate:
@@ -29,18 +26,9 @@ class InstrumentalVariables(WeightedLeastSquares):
     identification", IEEE Transactions on Control Systems Technology 22, 2014, 10.1109/TCST.2013.2246163.
 
     The solution's extras: ``simulated``, the motions behind Z, ``rounds``, and whether it ``settled``.
-
-    Args:
-        loop: what is known of the control loop.
-        temper: see `WeightedLeastSquares`.
     """
 
     name = "iv"
-    simulates = True
-
-    def __init__(self, loop: Loop | None = None, temper: float = 0.5) -> None:
-        super().__init__(temper)
-        self.loop = loop or Loop()
 
     def refine(self, data: RegressionData, values: Array, weights: Array) -> Solution:
         """Iterates simulation and instrumental-variable estimate until the parameters settle.

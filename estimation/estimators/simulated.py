@@ -15,6 +15,7 @@ from estimation.estimators.consistent import PhysicallyConsistent
 from estimation.estimators.data import FittedRows, RegressionData
 from estimation.estimators.position_noise import smoothed_noise
 from estimation.estimators.spread import Equations, honest_covariance, regressor_rows
+from estimation.estimators.wls import WeightedLeastSquares
 from estimation.moments import Moments
 from robots.common.errors import InputError
 from robots.signals import Motion
@@ -31,6 +32,8 @@ SLOW, CERTAIN, LEFT_OUT = 0.008, 3.0, 0.2
 CHUNK = 4096
 # Smallest eigenvalue of an inertia matrix, as a share of its smallest diagonal entry, that a simulation stands.
 INDEFINITE = 0.02
+# Parameters have settled when the torque of their change is below this share of the residual, in every joint.
+SETTLED = 0.01
 # Of the physically consistent fit that stands in, see `PhysicallyConsistent`.
 PULL = 1e-3
 
@@ -47,6 +50,21 @@ class Loop:
 
     controller: Controller | None = None
     reference: Sequence[Motion] | None = None
+
+
+class SimulatingEstimator(WeightedLeastSquares):
+    """An estimator that starts from weighted least squares and goes by the simulated closed loop.
+
+    Args:
+        loop: what is known of the control loop.
+        temper: see `WeightedLeastSquares`.
+    """
+
+    simulates = True
+
+    def __init__(self, loop: Loop | None = None, temper: float = 0.5) -> None:
+        super().__init__(temper)
+        self.loop = loop or Loop()
 
 
 class Instruments:

@@ -158,3 +158,19 @@ def _stated_units(table: Table) -> dict[str, str]:
 
 def _normal(unit: str) -> str:
     return re.sub(r"[\s*.^·]", "", unit)
+
+
+def refuse_text(table: Table, name: str) -> None:
+    """Refuses a column of a log that holds text.
+
+    Raises:
+        InputError: with its first cell.
+    """
+    if table.is_text(name):
+        raise InputError(
+            f"found {str(table.columns[name][0])[:40]!r}",
+            file=table.path,
+            column=name,
+            row=table.first_row,
+            allowed="a number",
+        )

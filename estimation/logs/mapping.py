@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from os import PathLike
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, field_validator
 
-from estimation.logs.columns import BY_FIELD, Quantity, column_name, unit_factor
 from robots.common.config import Config, read_config
-from robots.common.errors import InputError
-from robots.common.table import Column, Table
 
 
 def _listed(value: Any) -> Any:
@@ -111,23 +107,6 @@ class LogMapping(Config):
     topic: str | None = None
 
 
-_FIELDS = {
-    "time": "t",
-    "position": "q",
-    "velocity": "dq",
-    "acceleration": "ddq",
-    "torque": "tau",
-    "current": "current",
-    "temperature": "temperature",
-    "link_position": "qlink",
-    "ambient": "ambient",
-    "segment": "segment",
-    "cycle": "cycle",
-}
-# What the gear does to a motor-side value: positions shrink, torques grow.
-_GEARED = {"q": -1, "dq": -1, "ddq": -1, "qlink": -1, "tau": 1, "current": 0, "temperature": 0}
-
-
 def read_mapping(path: str | PathLike[str]) -> LogMapping:
     """Reads a mapping YAML.
 
@@ -135,185 +114,3 @@ def read_mapping(path: str | PathLike[str]) -> LogMapping:
         InputError: a missing file, an unknown key (with the nearest known one), or a value out of range, with its line.
     """
     return read_config(path, LogMapping)
-
-
-def count_joints(mapping: LogMapping, names: Sequence[str], n: int | None) -> int:
-    """Finds the number of joints: as known, as listed, or as many as the position's pattern finds columns for.
-
-    Args:
-        mapping: of the file.
-        names: the file's columns.
-        n: the number of joints where it is known.
-    """
-    if n is not None:
-        return n
-    for listed in (mapping.joints, mapping.gear_ratio):
-        if listed is not None:
-            return len(listed)
-    entry = mapping.position
-    if entry is None:
-        return 0
-    if len(entry.columns) > 1:
-        return len(entry.columns)
-    present = set(names)
-    joints = 0
-    if entry.columns[0] in present:
-        return 1
-    while _columns(entry, mapping, joints + 1, present)[-1] in present:
-        joints += 1
-    return max(joints, 1)
-
-
-def map_table(table: Table, mapping: LogMapping, joints: int) -> Table:
-    """Renames and converts a table's columns to those of a log, in SI units.
-
-    Args:
-        table: as it was read.
-        mapping: what its columns mean; quantities it does not name keep the names of a log.
-        joints: the number of joints.
-
-    Raises:
-        InputError: a column that is not there or holds text, a list of another length than there are joints, a missing
-            gear ratio, rating or unit.
-    """
-    columns: dict[str, Column] = {}
-    units: dict[str, str] = {}
-    taken: set[str] = set()
-    for key, field in _FIELDS.items():
-        entry, quantity = getattr(mapping, key), BY_FIELD[field]
-        if entry is None:
-            continue
-        if isinstance(entry, Single):
-            columns[quantity.prefix] = _value(table, entry.column) * _factor(table, quantity, entry.column, entry.unit)
-            taken.add(entry.column)
-            continue
-        names = _columns(entry, mapping, joints, set(table.names))
-        if len(names) != joints:
-            raise InputError(
-                f"the mapping has {len(names)} columns of {quantity.prefix}", file=table.path, allowed=f"{joints}"
-            )
-        present = set(table.names)
-        for joint, name in enumerate(names, start=1):
-            # Not every joint has a thermometer, or an encoder behind its gear.
-            if not quantity.complete and name not in present and present.intersection(names):
-                continue
-            columns[column_name(quantity, joint)] = _converted(table, mapping, entry, quantity, joint, name, joints)
-        taken.update(names)
-    if mapping.torque_constant is not None:
-        _add_torque(table, mapping, columns, joints)
-    for name in table.names:
-        if name not in taken and name not in columns:
-            columns[name] = table.columns[name]
-            if name in table.units:
-                units[name] = table.units[name]
-    metadata = {key: value for key, value in table.metadata.items() if key != "units" or units}
-    return Table(
-        columns=columns,
-        metadata=metadata,
-        path=table.path,
-        first_row=table.first_row,
-        units=units,
-        skipped=table.skipped,
-    )
-
-
-def _converted(
-    table: Table, mapping: LogMapping, entry: PerJoint, quantity: Quantity, joint: int, name: str, joints: int
-) -> Column:
-    def own(what: str, values: list[float]) -> float:
-        if len(values) not in (1, joints):
-            raise InputError(
-                f"the mapping's {what} of {quantity.prefix} has {len(values)} values",
-                file=table.path,
-                allowed=f"1 or {joints}",
-            )
-        return values[joint - 1] if len(values) > 1 else values[0]
-
-    factor = own("sign", entry.sign) * own("scale", entry.scale)
-    if entry.unit == "%":
-        if entry.rated is None:
-            raise InputError(
-                f"the mapping gives {quantity.prefix} in % without `rated`",
-                file=table.path,
-                column=name,
-                remedy="state the rated values [N m, N or A] of all joints",
-            )
-        factor *= own("rated", entry.rated) / 100.0
-    else:
-        factor *= _factor(table, quantity, name, entry.unit)
-    if entry.side == "motor":
-        factor *= _gear(table, mapping, joint, joints) ** _GEARED[quantity.field]
-    with np.errstate(all="ignore"):
-        return np.asarray(_value(table, name) * factor + own("offset", entry.offset))
-
-
-def _add_torque(table: Table, mapping: LogMapping, columns: dict[str, Column], joints: int) -> None:
-    """Torques from currents, beside torques that the file has itself: those count."""
-    constant = mapping.torque_constant
-    assert constant is not None
-    if len(constant) != joints:
-        raise InputError(f"the mapping has {len(constant)} torque constants", file=table.path, allowed=f"{joints}")
-    if any(f"tau{joint}" in columns for joint in range(1, joints + 1)) or mapping.torque is not None:
-        return
-    side = mapping.current.side if mapping.current is not None else "link"
-    for joint in range(1, joints + 1):
-        current = columns.get(f"i{joint}", table.columns.get(f"i{joint}"))
-        if current is None or current.dtype == np.dtype(object):
-            raise InputError(
-                "the mapping has torque constants, but the column is missing", file=table.path, column=f"i{joint}"
-            )
-        gear = _gear(table, mapping, joint, joints) if side == "motor" else 1.0
-        columns[f"tau{joint}"] = current * (constant[joint - 1] * gear)
-
-
-def _gear(table: Table, mapping: LogMapping, joint: int, joints: int) -> float:
-    ratios = mapping.gear_ratio
-    if ratios is None or len(ratios) != joints or ratios[joint - 1] == 0.0:
-        raise InputError(
-            f"the mapping has {'no' if ratios is None else len(ratios)} gear ratios",
-            file=table.path,
-            allowed=f"{joints}, none of them zero",
-            remedy="state gear_ratio",
-        )
-    return ratios[joint - 1]
-
-
-def _columns(entry: PerJoint, mapping: LogMapping, joints: int, present: set[str]) -> list[str]:
-    """The columns of one quantity, one a joint."""
-    pattern = entry.columns[0]
-    if len(entry.columns) > 1 or (joints == 1 and pattern in present):
-        return list(entry.columns)
-    if "{joint}" not in pattern and "{index}" not in pattern:
-        # A matrix of a MAT or npz file comes as columns that are numbered from 1.
-        pattern += "{joint}"
-        named = [str(joint) for joint in range(1, joints + 1)]
-    else:
-        named = mapping.joints or [str(joint) for joint in range(1, joints + 1)]
-    return [
-        pattern.replace("{joint}", name).replace("{index}", str(index)) for index, name in enumerate(named[:joints])
-    ]
-
-
-def _value(table: Table, name: str) -> Column:
-    if name not in table.columns:
-        present = ", ".join((*table.names, *table.skipped))
-        raise InputError(
-            "the mapping names a column that is not there",
-            file=table.path,
-            column=name,
-            allowed=present[:300] + (" ..." if len(present) > 300 else ""),
-        )
-    if table.is_text(name):
-        raise InputError(
-            f"found {str(table.columns[name][0])[:40]!r}",
-            file=table.path,
-            column=name,
-            row=table.first_row,
-            allowed="a number",
-        )
-    return table.columns[name]
-
-
-def _factor(table: Table, quantity: Quantity, name: str, unit: str | None) -> float:
-    stated = unit if unit is not None else table.units.get(name)
-    return 1.0 if stated is None else unit_factor(quantity, stated, file=table.path, column=name)

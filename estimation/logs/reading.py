@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.logs.campaigns import MAPPING, in_order, log_files
-from estimation.logs.columns import BY_FIELD, QUANTITIES, Quantity, column_name, parse_name, unit_factors
+from estimation.logs.columns import BY_FIELD, QUANTITIES, Quantity, column_name, parse_name, refuse_text, unit_factors
 from estimation.logs.formats import is_bag_folder, read_foreign
-from estimation.logs.mapping import LogMapping, count_joints, map_table, read_mapping
+from estimation.logs.mapped_tables import count_joints, map_table
+from estimation.logs.mapping import LogMapping, read_mapping
 from estimation.logs.repairs import drop_repeated_rows
 from robots.common.errors import InputError
 from robots.common.table import Table
@@ -54,14 +55,7 @@ def read_log(
     quantities = _checked_names(table)
     count = _count_joints(table, quantities, n)
     for name in table.names:
-        if table.is_text(name):
-            raise InputError(
-                f"found {str(table.columns[name][0])[:40]!r}",
-                file=table.path,
-                column=name,
-                row=table.first_row,
-                allowed="a number",
-            )
+        refuse_text(table, name)
     whole = table
     table, kept, repairs = drop_repeated_rows(table)
     if len(table) < 2:

@@ -45,9 +45,9 @@ def gather(
     J = problem.sensitivities(solution.coordinates, solution.states)
     for r, run in enumerate(problem.runs):
         # A run that starts at surroundings which are themselves estimated moves with them.
-        slots = problem.start_slots(r)
+        slots = problem.layout.start_slots(r)
         if run.ambient is None and not free[slots].any():
-            J[:, problem.ambient_slot(r)] += J[:, slots].sum(axis=1)
+            J[:, problem.layout.ambient_slot(r)] += J[:, slots].sum(axis=1)
     slopes = J * weights[:, None]
     residual = weights * (problem.predict(solution.coordinates, solution.states) - problem.measured)
     inside = slopes[:, free]
@@ -71,7 +71,7 @@ def gather(
 
 def _prior_information(problem: Transcription, prior: Array) -> Array:
     information = np.zeros(problem.size)
-    information[problem.ambient_slots] = prior**2
+    information[problem.layout.ambient_slots] = prior**2
     return information
 
 

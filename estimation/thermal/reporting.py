@@ -110,13 +110,13 @@ def _slow(
 def _remarks(search: Search, solution: Solution, parameters: tuple[Quantity, ...], warm: tuple[int, ...]) -> list[str]:
     remarks = []
     for r in warm:
-        start = ", ".join(f"{value:.1f}" for value in search.problem.start_at(solution.coordinates, r))
+        start = ", ".join(f"{value:.1f}" for value in search.layout.start_at(solution.coordinates, r))
         remarks.append(f"{search.runs[r].name} does not start at the surroundings' temperature but at {start} degC.")
-    lower, upper = search.problem.bounds()
+    lower, upper = search.layout.bounds()
     for i, parameter in enumerate(search.kind.parameters):
         edge = min(abs(solution.coordinates[i] - lower[i]), abs(solution.coordinates[i] - upper[i]))
         if search.free[i] and edge < 1e-3 and not (parameter.lower == 0.0 and parameter.name != "alpha"):
-            value = search.problem.values_at(solution.coordinates)[parameter.name]
+            value = search.layout.values_at(solution.coordinates)[parameter.name]
             remarks.append(f"{parameter.name} is at its bound, {value:.4g}.")
     lost = [p.name for p in parameters if not p.determined and p.name not in search.structure.conventions]
     if lost and not search.structure.conventions:
@@ -131,7 +131,7 @@ def _run_fits(search: Search, solution: Solution, predicted: Array) -> tuple[Run
     for row, values in zip(search.problem.rows, split(search.problem.rows, predicted), strict=True):
         run = search.runs[row.run]
         cold = np.asarray(run.cold_friction)[row.index] if row.channel == "friction" else np.ones(len(row.index))
-        around = search.problem.ambient_at(solution.coordinates, row.run)
+        around = search.layout.ambient_at(solution.coordinates, row.run)
         if run.ambient is not None:
             around = first_ambient(run, search.T0)
         found.append(
@@ -143,7 +143,7 @@ def _run_fits(search: Search, solution: Solution, predicted: Array) -> tuple[Run
                 measured=row.measured * cold,
                 predicted=values * cold,
                 power=_mean_power(run),
-                start=tuple(float(v) for v in search.problem.start_at(solution.coordinates, row.run)),
+                start=tuple(float(v) for v in search.layout.start_at(solution.coordinates, row.run)),
                 ambient=around,
             )
         )

@@ -55,6 +55,7 @@ class Search:
         first = 1.0 if self.kind.name == "fractional" else MeshSettings.first
         self.settings = MeshSettings(first=first)
         self.problem = Transcription(self.kind, self.runs, self.settings, self.T0)
+        self.layout = self.problem.layout
         self.levels: NoiseLevels = first_guess(self.problem.rows)
         self.weights = self.levels.weights(self.problem.rows, self.problem.measured)
         self.heat_known = self.runs[0].power is not None
@@ -65,11 +66,11 @@ class Search:
         for i, parameter in enumerate(self.kind.parameters):
             self.free[i] = parameter.name not in self.structure.fixed
         for r, run in enumerate(self.runs):
-            zones = self.problem.start_slots(r)
+            zones = self.layout.start_slots(r)
             # A thermometer tells where its zone starts.
             seen = self.start == "auto" and bool(run.readings(self.kind))
             self.free[zones] = self.start == "free" or seen
-            self.free[self.problem.ambient_slot(r)] = run.ambient is None
+            self.free[self.layout.ambient_slot(r)] = run.ambient is None
 
     # Where to begin.
 
@@ -91,11 +92,11 @@ class Search:
         starts, ambients = [], []
         for r, run in enumerate(self.runs):
             around = first_ambient(run, self.T0)
-            open_ = self.free[self.problem.start_slots(r)].any()
+            open_ = self.free[self.layout.start_slots(r)].any()
             seen = [values[np.isfinite(values)][0] for values in run.readings(self.kind).values()]
             starts.append(np.full(len(self.kind.zones), seen[0] if seen and open_ else around))
             ambients.append(around if run.ambient is not None or not seen else seen[0])
-        return self.problem.to_coordinates(values, starts, ambients)
+        return self.layout.to_coordinates(values, starts, ambients)
 
     def cost(self, coordinates: Array) -> float:
         """Half the weighted squares at coordinates."""
@@ -111,9 +112,9 @@ class Search:
         """Moves fixed starts to the surroundings."""
         tied = coordinates.copy()
         for r, run in enumerate(self.runs):
-            slots = self.problem.start_slots(r)
+            slots = self.layout.start_slots(r)
             if not self.free[slots].any() and run.ambient is None:
-                tied[slots] = tied[self.problem.ambient_slot(r)]
+                tied[slots] = tied[self.layout.ambient_slot(r)]
         return tied
 
     def search(self, starts: int, rng: np.random.Generator) -> Solution:
@@ -146,7 +147,7 @@ class Search:
 
     def warm_starts(self, solution: Solution) -> tuple[Solution, tuple[int, ...]]:
         """Frees the start temperatures of runs that ask for it: those that come out far from the surroundings'."""
-        closed = [r for r in range(len(self.runs)) if not self.free[self.problem.start_slots(r)].any()]
+        closed = [r for r in range(len(self.runs)) if not self.free[self.layout.start_slots(r)].any()]
         before, levels, weights = self.free.copy(), self.levels, self.weights
         if not closed:
             return solution, ()
@@ -163,16 +164,16 @@ class Search:
 
     def _open(self, runs: Sequence[int]) -> None:
         for r in runs:
-            self.free[self.problem.start_slots(r)] = True
+            self.free[self.layout.start_slots(r)] = True
 
     def _hot(self, solution: Solution, info: Information, run: int) -> bool:
         """Whether a run's start is further from the surroundings than chance and half a degree allow."""
-        slots = self.problem.start_slots(run)
+        slots = self.layout.start_slots(run)
         around = np.zeros(self.problem.size)
-        gap = self.problem.start_at(solution.coordinates, run) - first_ambient(self.runs[run], self.T0)
+        gap = self.layout.start_at(solution.coordinates, run) - first_ambient(self.runs[run], self.T0)
         if self.runs[run].ambient is None:
-            gap = self.problem.start_at(solution.coordinates, run) - self.problem.ambient_at(solution.coordinates, run)
-            around[self.problem.ambient_slot(run)] = 1.0
+            gap = self.layout.start_at(solution.coordinates, run) - self.layout.ambient_at(solution.coordinates, run)
+            around[self.layout.ambient_slot(run)] = 1.0
         # Of the difference, in coordinates: starts less surroundings.
         pick = np.eye(self.problem.size)[slots] - around
         spread = pick @ info.covariance @ pick.T * DEGREES**2
@@ -194,7 +195,7 @@ class Search:
 
     def model_at(self, coordinates: Array) -> ThermalModel:
         """Builds the model from the coordinates of its parameters (p,)."""
-        lower, upper = self.problem.bounds()
+        lower, upper = self.layout.bounds()
         # The solver keeps bounds to rounding.
         inside = [float(np.clip(c, lower[i], upper[i])) for i, c in enumerate(coordinates[: len(self.kind.parameters)])]
         values = {p.name: float(from_coordinate(p, inside[i])) for i, p in enumerate(self.kind.parameters)}

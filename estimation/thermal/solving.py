@@ -42,7 +42,7 @@ def solve(
     Returns:
         The end, successful or not.
     """
-    lower, upper = problem.bounds()
+    lower, upper = problem.layout.bounds()
     begin = np.where(free, np.clip(coordinates, lower + 1e-9, upper - 1e-9), coordinates)
     if problem.state_size > LONG_MEMORY:
         return _solve_reduced(problem, begin, free, (weights, prior), slow)
@@ -58,8 +58,8 @@ def _solve_reduced(
 ) -> Solution:
     """Minimises over the coordinates alone, the states of the collocation eliminated with their exact derivatives."""
     rows, prior = weights
-    lower, upper = problem.bounds()
-    slots, which = problem.ambient_slots, np.flatnonzero(free)
+    lower, upper = problem.layout.bounds()
+    slots, which = problem.layout.ambient_slots, np.flatnonzero(free)
     latest: dict[str, Any] = {}
 
     def at(moved: Array) -> tuple[Array, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-from estimation.thermal.coordinates import DEGREES, from_coordinate, to_coordinate
+from estimation.thermal.coordinates import DEGREES, Layout, from_coordinate
 from estimation.thermal.measurements import rows_of
 from estimation.thermal.mesh import DEGREE, Mesh, MeshSettings, build_mesh, radau
 from estimation.thermal.runs import ThermalRun
@@ -57,47 +57,12 @@ class Transcription:
         self.kind, self.runs, self.T0 = kind, tuple(runs), T0
         self.meshes = tuple(build_mesh(run, settings) for run in runs)
         self.rows = tuple(rows_of(kind, runs))
-        self.size = len(kind.parameters) + len(runs) * (len(kind.zones) + 1)
+        self.layout = Layout(kind, self.runs, T0)
+        self.size = self.layout.size
         self._states = kind.state_count(coarse=True)
         self._scale = self._state_scale()
         self._solvers: dict[bool, casadi.Function] = {}
         self._build()
-
-    # Where things are among the coordinates.
-
-    def start_slots(self, run: int) -> slice:
-        """Coordinates of a run's start temperatures."""
-        first = len(self.kind.parameters) + run * (len(self.kind.zones) + 1)
-        return slice(first, first + len(self.kind.zones))
-
-    def ambient_slot(self, run: int) -> int:
-        """Coordinate of a run's surroundings."""
-        return self.start_slots(run).stop
-
-    @property
-    def ambient_slots(self) -> NDArray[np.intp]:
-        """Coordinates of all runs' surroundings (R,)."""
-        return np.array([self.ambient_slot(run) for run in range(len(self.runs))], dtype=np.intp)
-
-    def to_coordinates(self, values: Mapping[str, float], starts: Sequence[Array], ambients: Sequence[float]) -> Array:
-        """Collects coordinates (P,) from parameters, start temperatures and surroundings [degC]."""
-        parts = [[to_coordinate(p, values[p.name]) for p in self.kind.parameters]]
-        for start, around in zip(starts, ambients, strict=True):
-            parts.append([*((np.asarray(start) - self.T0) / DEGREES), (around - self.T0) / DEGREES])
-        return np.concatenate([np.asarray(part, dtype=np.float64) for part in parts])
-
-    def values_at(self, coordinates: Array) -> dict[str, float]:
-        """Gives the parameters by name, and T0."""
-        found = {p.name: float(from_coordinate(p, coordinates[i])) for i, p in enumerate(self.kind.parameters)}
-        return {**found, "T0": self.T0}
-
-    def start_at(self, coordinates: Array, run: int) -> Array:
-        """Gives a run's start temperatures (z,) [degC]."""
-        return self.T0 + DEGREES * coordinates[self.start_slots(run)]
-
-    def ambient_at(self, coordinates: Array, run: int) -> float:
-        """Gives a run's surroundings [degC] where they were not measured."""
-        return self.T0 + DEGREES * float(coordinates[self.ambient_slot(run)])
 
     @property
     def state_size(self) -> int:
@@ -164,11 +129,12 @@ class Transcription:
         residuals, seen = [], []
         for r, mesh in enumerate(self.meshes):
             inner = casadi.reshape(states[int(offsets[r]) : int(offsets[r + 1])], self._states, DEGREE * mesh.count)
-            starts = symbols[self.start_slots(r)]
+            starts = symbols[self.layout.start_slots(r)]
             parts = [starts[i] for i in range(len(self.kind.zones))]
             first = casadi.vertcat(*self.kind.start_state(parts, self._states))
             nodes = casadi.horzcat(first, inner)
-            residuals.append(casadi.vec(self._map_interval(mesh, nodes, inner, theta, symbols[self.ambient_slot(r)])))
+            own = symbols[self.layout.ambient_slot(r)]
+            residuals.append(casadi.vec(self._map_interval(mesh, nodes, inner, theta, own)))
             reached = zones.map(1 + DEGREE * mesh.count)(nodes, casadi.repmat(theta, 1, 1 + DEGREE * mesh.count))
             sampling = casadi.DM(csc_matrix(mesh.sampling))
             seen.append(casadi.mtimes(sampling, reached.T))
@@ -182,7 +148,7 @@ class Transcription:
         g, y = casadi.vertcat(*residuals), casadi.vertcat(*outputs)
         weights = casadi.MX.sym("weights", y.shape[0])
         prior = casadi.MX.sym("prior", len(self.runs))
-        around = symbols[self.ambient_slots.tolist()]
+        around = symbols[self.layout.ambient_slots.tolist()]
         cost = (casadi.sumsqr(weights * (y - self.measured)) + casadi.sumsqr(prior * around)) / 2
         self._nlp = {"x": casadi.vertcat(symbols, states), "f": cost, "g": g, "p": casadi.vertcat(weights, prior)}
         self._symbols, self._states_symbol = symbols, states
@@ -239,7 +205,7 @@ class Transcription:
         max_iterations: int = 200,
     ) -> Solution:
         """Minimises the weighted squares by IPOPT over states and coordinates; see `solve` for the arguments."""
-        lower, upper = self.bounds()
+        lower, upper = self.layout.bounds()
         begin = coordinates
         lower, upper = np.where(free, lower, begin), np.where(free, upper, begin)
         states = self.follow(begin)
@@ -273,7 +239,7 @@ class Transcription:
         """Evaluates coordinates: the heat balance is kept to the last digit, whatever the solver's tolerance."""
         states = self.follow(coordinates)
         residual = weights * (self.predict(coordinates, states) - self.measured)
-        around = prior * coordinates[self.ambient_slots]
+        around = prior * coordinates[self.layout.ambient_slots]
         return Solution(
             coordinates=coordinates,
             states=states,
@@ -318,16 +284,5 @@ class Transcription:
 
     def slow_gap(self, coordinates: Array, power: float, constant: float) -> float:
         """Logarithm of the slowest time constant at a power over a given one."""
-        model = self.kind(**{k: v for k, v in self.values_at(coordinates).items() if k != "T0"})
+        model = self.kind(**{k: v for k, v in self.layout.values_at(coordinates).items() if k != "T0"})
         return float(np.log(model.time_constants(power)[0] / constant))
-
-    def bounds(self) -> tuple[Array, Array]:
-        """Gives the least and greatest coordinates (P,)."""
-        lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
-        for i, parameter in enumerate(self.kind.parameters):
-            lower[i] = to_coordinate(parameter, parameter.lower)
-            upper[i] = to_coordinate(parameter, parameter.upper)
-            if parameter.name == "beta" and self.runs[0].power is None:
-                # It stands for the heat itself.
-                lower[i], upper[i] = to_coordinate(parameter, 1e-6), to_coordinate(parameter, 1e6)
-        return lower, upper

@@ -13,6 +13,7 @@ from oed.cli.options import (
     JointsOption,
     JsonOption,
     LockOption,
+    OutOption,
     PngOption,
     QuietOption,
     RobotOption,
@@ -62,7 +63,7 @@ def diagnose(
         float, typer.Option(min=0.0, help="With --limits: torque noise expected, as a share of the torque RMS.")
     ] = 0.02,
     seed: SeedOption = 0,
-    out: Annotated[Path, typer.Option("--out", help="Folder for the results.")] = Path("diagnosed"),
+    out: OutOption = Path("diagnosed"),
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,

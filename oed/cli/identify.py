@@ -16,6 +16,7 @@ from oed.cli.options import (
     LockOption,
     LogOption,
     MappingOption,
+    OutOption,
     PngOption,
     QuietOption,
     RobotOption,
@@ -37,7 +38,7 @@ def identify(
     rotor: Annotated[bool, typer.Option(help="With rotor inertias.")] = True,
     offset: Annotated[bool, typer.Option(help="With a torque offset on each joint.")] = True,
     seed: SeedOption = 0,
-    out: Annotated[Path, typer.Option("--out", help="Folder for the results.")] = Path("identified"),
+    out: OutOption = Path("identified"),
     urdf: Annotated[
         Path | None, typer.Option("--urdf", help="Also write a URDF with the identified bodies.", show_default=False)
     ] = None,

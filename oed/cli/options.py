@@ -41,6 +41,19 @@ WorkersOption = Annotated[
     int | None,
     typer.Option("--workers", min=1, help="Parallel processes; as many as cores by default.", show_default=False),
 ]
+OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
+FrictionOption = Annotated[str, typer.Option("--friction", help="The model to fit: polynomial or coulomb-viscous.")]
+HarmonicsOption = Annotated[int, typer.Option("--harmonics", help="Harmonics of the Fourier series.")]
+BaseFrequencyOption = Annotated[float, typer.Option("--base-frequency", help="Frequency of the first harmonic [Hz].")]
+CollisionOption = Annotated[
+    bool, typer.Option("--collision", help="Keep clear of the arm itself and of the obstacles in its file.")
+]
+VelocityFractionOption = Annotated[
+    float, typer.Option("--velocity-fraction", help="Share of the velocity limits to use.")
+]
+TorqueMarginOption = Annotated[
+    float, typer.Option("--torque-margin", help="Share of the torque limits kept in reserve.")
+]
 PngOption = Annotated[bool, typer.Option("--png", help="Write the report's pictures as PNG files, too.")]
 
 

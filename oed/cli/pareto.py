@@ -9,8 +9,13 @@ import typer
 
 from oed.cli.console import Console
 from oed.cli.options import (
+    BaseFrequencyOption,
+    CollisionOption,
     ForceOption,
+    FrictionOption,
+    HarmonicsOption,
     JsonOption,
+    OutOption,
     PngOption,
     QuietOption,
     RobotOption,
@@ -24,17 +29,15 @@ def pareto(
     robot: RobotOption,
     criteria: Annotated[str, typer.Option(help="Two or three of cond, d, a, e, separated by commas.")] = "cond,d",
     points: Annotated[int, typer.Option(help="Designs from one criterion to another, both ends included.")] = 5,
-    friction: Annotated[str, typer.Option(help="The model to fit: polynomial or coulomb-viscous.")] = "polynomial",
-    harmonics: Annotated[int, typer.Option(help="Harmonics of the Fourier series.")] = 5,
-    base_frequency: Annotated[float, typer.Option(help="Frequency of the first harmonic [Hz].")] = 0.1,
-    collision: Annotated[
-        bool, typer.Option("--collision", help="Keep clear of the arm itself and of the obstacles in its file.")
-    ] = False,
+    friction: FrictionOption = "polynomial",
+    harmonics: HarmonicsOption = 5,
+    base_frequency: BaseFrequencyOption = 0.1,
+    collision: CollisionOption = False,
     scaling: Annotated[str, typer.Option(help="Columns the criteria judge: none, nominal or unit.")] = "none",
     effort: Annotated[str, typer.Option(help="How long to search for each: quick, standard or thorough.")] = "quick",
     seed: SeedOption = 0,
     workers: WorkersOption = None,
-    out: Annotated[Path, typer.Option("--out", help="Folder for the results.")] = Path("pareto"),
+    out: OutOption = Path("pareto"),
     png: PngOption = False,
     force: ForceOption = False,
     json: JsonOption = False,

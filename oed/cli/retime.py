@@ -8,7 +8,16 @@ from typing import Annotated
 import typer
 
 from oed.cli.console import Console
-from oed.cli.options import ROBOT, ForceOption, JsonOption, PngOption, QuietOption, robot_from
+from oed.cli.options import (
+    ROBOT,
+    ForceOption,
+    FrictionOption,
+    JsonOption,
+    OutOption,
+    PngOption,
+    QuietOption,
+    robot_from,
+)
 
 
 def retime(
@@ -19,9 +28,9 @@ def retime(
         typer.Option("--robot", help=f"{ROBOT}; by default the one that the file names.", show_default=False),
     ] = None,
     criterion: Annotated[str, typer.Option(help="The criterion to compare: cond, d, a, e or cond-d.")] = "cond",
-    friction: Annotated[str, typer.Option(help="The model to fit: polynomial or coulomb-viscous.")] = "polynomial",
+    friction: FrictionOption = "polynomial",
     tolerance: Annotated[float, typer.Option(help="How far ruckig's polyline may leave the path [rad].")] = 0.01,
-    out: Annotated[Path, typer.Option("--out", help="Folder for the results.")] = Path("retimed"),
+    out: OutOption = Path("retimed"),
     png: PngOption = False,
     force: ForceOption = False,
     json: JsonOption = False,

@@ -91,17 +91,36 @@ class TorqueLimit(PointwiseLimit):
         """
         q = np.atleast_2d(np.asarray(pose, dtype=float))
         still = np.zeros_like(q)
-        values = self.values(q, still, still)[0]
-        worst = int(np.argmax(np.abs(values)))
-        if abs(values[worst]) > 1:
-            joint = self.joints[worst]
-            usable = (1 - self.margin) * float(self._bound[joint - 1])
-            need = abs(values[worst]) * usable
-            raise InfeasibleError(
-                f"holding the pose takes {need:.4g}, more than the usable torque limit {usable:.4g}",
-                joint=joint,
-                allowed=f"a torque limit of {need / (1 - self.margin):.4g} or more",
-            )
+        shares = np.abs(self.values(q, still, still)[0])
+        refuse_holding(shares, self.joints, self._bound, self.margin, "usable torque limit", "torque limit")
+
+
+def refuse_holding(
+    shares: Array, joints: Sequence[int], limit: Array, margin: float, usable_name: str, name: str
+) -> None:
+    """Refuses a pose whose holding torque is above what a joint may use.
+
+    Args:
+        shares: holding torque over the usable limit (R,), zero or more.
+        joints: R joints, counted from 1.
+        limit: of all joints (n,) [N m or N].
+        margin: share of the limit that is kept in reserve.
+        usable_name: what is passed, in words.
+        name: what would have to be larger, in words.
+
+    Raises:
+        InfeasibleError: naming the joint, its holding torque, and the limit that would do.
+    """
+    worst = int(np.argmax(shares))
+    if shares[worst] > 1:
+        joint = joints[worst]
+        usable = (1 - margin) * float(limit[joint - 1])
+        need = float(shares[worst]) * usable
+        raise InfeasibleError(
+            f"holding the pose takes {need:.4g}, more than the {usable_name} {usable:.4g}",
+            joint=joint,
+            allowed=f"a {name} of {need / (1 - margin):.4g} or more",
+        )
 
 
 def _rebuild(

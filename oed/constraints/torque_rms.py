@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from oed.constraints.torque import TorqueLimit
-from robots.common.errors import InfeasibleError
+from oed.constraints.torque import TorqueLimit, refuse_holding
 from robots.plants import PlantEffect
 from robots.regressor import TorqueModel
 
@@ -70,17 +69,8 @@ class TorqueRms:
             InfeasibleError: naming the joint, its holding torque, and the limit that would do.
         """
         q = np.atleast_2d(np.asarray(pose, dtype=float))
-        values = self.values(q, np.zeros_like(q), np.zeros_like(q))
-        worst = int(np.argmax(values))
-        if values[worst] > 1:
-            joint = self.joints[worst]
-            usable = (1 - self.margin) * float(self.limit[joint - 1])
-            need = float(values[worst]) * usable
-            raise InfeasibleError(
-                f"holding the pose takes {need:.4g}, more than the usable limit of RMS torque {usable:.4g}",
-                joint=joint,
-                allowed=f"a limit of {need / (1 - self.margin):.4g} or more",
-            )
+        shares = self.values(q, np.zeros_like(q), np.zeros_like(q))
+        refuse_holding(shares, self.joints, self.limit, self.margin, "usable limit of RMS torque", "limit")
 
 
 def _rebuild(

@@ -2,34 +2,32 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from threadpoolctl import threadpool_limits
 
 from oed.constraints.geometric import GeometricLimit
 from oed.criteria import Criterion, Prior
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.assembly import assemble, rest_pose
-from oed.experiments.board import Board, outlive_interrupts, stopped_by_interrupt
 from oed.experiments.checks import check_options, check_period, usable_limits
 from oed.experiments.essential import essential_part
+from oed.experiments.islands import search_islands
 from oed.experiments.judging import choose_weighting
 from oed.experiments.margins import measured_margins
 from oed.experiments.problem import FourierProblem
 from oed.experiments.quality import design_model, measure
 from oed.experiments.result import Design, Outcome
 from oed.experiments.safety import choose_safety, collision_data
-from oed.experiments.search import EFFORTS, Effort, Found, Island
+from oed.experiments.search import EFFORTS, Effort, Found
 from oed.experiments.solvers import InteriorPoint, Solver
 from oed.trajectories import FourierSeries, count_periods
 from robots.base_parameters import find_base_parameters
-from robots.common.errors import InfeasibleError, InputError, OedError
-from robots.common.parallel import one_blas_thread, parallel_map
+from robots.common.errors import InfeasibleError, InputError
+from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.plants import PlantEffect
 from robots.robot import Robot
@@ -194,32 +192,17 @@ def design(
     rest = replace(rest, offsets=problem.centre)
     assemble(rest, limits, period=robot.period, home=safety.home, strokes=strokes)
     problem.cost(np.zeros(problem.size))  # compiles, once for all processes
-    sign = -1.0 if chosen.larger_is_better else 1.0
-    work_name = f"designing for {robot.name}"
-    with (
-        Board.watched(work.islands, work.steps, progress or SILENT, work_name, sign) as board,
-        stopped_by_interrupt(board, wanted=keep_on_interrupt),
-    ):
-        deadline = time.time() + time_limit
-        tasks = [
-            _Task(
-                problem=problem,
-                effort=work,
-                solver=local,
-                seed=seed,
-                number=number,
-                deadline=deadline,
-                board=board,
-                outlive=keep_on_interrupt,
-            )
-            for number in range(work.islands)
-        ]
-        try:
-            results = parallel_map(_search, tasks, executor=executor, workers=workers)
-        except OedError as error:
-            if board.stopped:  # by a Ctrl-C that met workers which had not begun
-                raise KeyboardInterrupt from error
-            raise
+    results = search_islands(
+        problem,
+        work,
+        local,
+        seed=seed,
+        time_limit=time_limit,
+        keep_on_interrupt=keep_on_interrupt,
+        workers=workers,
+        executor=executor,
+        progress=progress or SILENT,
+    )
     best = min(results, key=lambda found: found.cost)
     if not np.isfinite(best.cost):
         raise InfeasibleError(
@@ -270,36 +253,3 @@ def _outcome(found: Found) -> Outcome:
         status=found.status,
         starts=found.starts,
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Task:
-    """All that an island needs, for another process."""
-
-    problem: FourierProblem
-    effort: Effort
-    solver: Solver
-    seed: int
-    number: int
-    deadline: float
-    board: Board
-    outlive: bool
-
-
-@one_blas_thread()
-def _search(task: _Task) -> Found:
-    if task.outlive:
-        outlive_interrupts()
-    island = Island(
-        task.problem,
-        task.effort,
-        task.solver,
-        task.seed,
-        task.number,
-        tell=task.board.teller(task.number),
-        deadline=task.deadline,
-        halted=lambda: task.board.stopped,
-    )
-    # Threads inside small matrix products cost more than they bring, and would make the result depend on their number.
-    with threadpool_limits(limits=1):
-        return island.search()

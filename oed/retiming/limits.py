@@ -102,3 +102,23 @@ def require_inside(q: Array, limits: Limits, tolerance: float = 1e-9) -> None:
             joint=int(column) + 1,
             allowed=f"{limits.lower[column]:.6g} to {limits.upper[column]:.6g} rad",
         )
+
+
+def too_weak_to_hold(held: Array, limit: Array, what: str) -> InfeasibleError | None:
+    """Names the joint that cannot hold the arm somewhere on a path; None where all can.
+
+    Args:
+        held: torque at rest on the path (M, n) [N m].
+        limit: of the torque (n,) [N m].
+        what: asks for that torque, in words with the verb.
+    """
+    ratio = np.abs(held) / np.maximum(limit, 1e-300)
+    row, column = np.unravel_index(int(ratio.argmax()), ratio.shape)
+    if ratio[row, column] <= 1.0:
+        return None
+    return InfeasibleError(
+        f"{what} {abs(held[row, column]):.4g} N m on the path",
+        joint=int(column) + 1,
+        allowed=f"{limit[column]:.4g} N m",
+        remedy="choose a path through poses that the joint can hold, or correct the torque limit",
+    )

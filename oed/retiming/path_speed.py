@@ -17,6 +17,7 @@ from toppra.constraint import (
     canlinear_colloc_to_interpolate,
 )
 
+from oed.retiming.limits import too_weak_to_hold
 from oed.retiming.paths import PathPiece
 from robots.common.errors import InfeasibleError
 from robots.limits import Limits
@@ -157,13 +158,7 @@ def _infeasible(path: _SplinePath, grid: Array, torque: TorqueConstraint | None)
         held = torque.inverse_dynamics(q, np.zeros_like(q), np.zeros_like(q))
         if torque.friction is not None:
             held = held + torque.friction(1e-6 * slope)
-        ratio = np.abs(held) / np.maximum(torque.limit, 1e-300)
-        row, column = np.unravel_index(int(ratio.argmax()), ratio.shape)
-        if ratio[row, column] > 1.0:
-            return InfeasibleError(
-                f"gravity and friction alone need {abs(held[row, column]):.4g} N m on the path",
-                joint=int(column) + 1,
-                allowed=f"{torque.limit[column]:.4g} N m",
-                remedy="choose a path through poses that the joint can hold, or correct the torque limit",
-            )
+        weak = too_weak_to_hold(held, torque.limit, "gravity and friction alone need")
+        if weak is not None:
+            return weak
     return InfeasibleError("TOPP-RA finds no timing of this path within the limits", remedy="smooth the path")

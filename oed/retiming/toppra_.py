@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from oed.retiming.limits import finite_limits, limit_usage, require_inside
+from oed.retiming.limits import finite_limits, limit_usage, require_inside, too_weak_to_hold
 from oed.retiming.paths import PathPiece, split_path
 from oed.retiming.refinement import ORDERS, Torque, refine
 from oed.retiming.result import KEPT, Retimed
@@ -220,15 +220,9 @@ def _too_weak(piece: PathPiece, limits: Limits, torque: Torque) -> InfeasibleErr
     q = piece.spline(np.linspace(0.0, piece.length, 501))
     held = torque(Motion(np.arange(501.0), q, np.zeros_like(q), np.zeros_like(q)))
     if held is not None:
-        ratio = np.abs(held) / np.maximum(limits.torque, 1e-300)
-        row, column = np.unravel_index(int(ratio.argmax()), ratio.shape)
-        if ratio[row, column] > 1.0:
-            return InfeasibleError(
-                f"gravity alone needs {abs(held[row, column]):.4g} N m on the path",
-                joint=int(column) + 1,
-                allowed=f"{limits.torque[column]:.4g} N m",
-                remedy="choose a path through poses that the joint can hold, or correct the torque limit",
-            )
+        weak = too_weak_to_hold(held, limits.torque, "gravity alone needs")
+        if weak is not None:
+            return weak
     return InfeasibleError("no slower timing of this path keeps the limits", remedy="check the torque limits")
 
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import expm
 
 from robots.common.errors import InputError
+from robots.thermal.checks import checked_ambient, checked_power, checked_steps
 from robots.thermal.parameters import Inputs, ThermalParameter
 
 Array = NDArray[np.float64]
@@ -294,31 +295,4 @@ class ThermalModel(ABC):
         return full[:, :size, :size], full[:, :size, size:]
 
     def _ambient(self, ambient: ArrayLike | None) -> Array:
-        around = np.asarray(self.ambient if ambient is None else ambient, dtype=np.float64)
-        if not np.isfinite(around).all():
-            raise InputError("thermal model: an ambient temperature is not finite", allowed="finite numbers [degC]")
-        return around
-
-
-def checked_power(power: ArrayLike) -> Array:
-    """Gives powers as an array.
-
-    Raises:
-        InputError: one is negative or not finite: friction never gives power back.
-    """
-    W = np.asarray(power, dtype=np.float64)
-    if not np.all(np.isfinite(W) & (W >= 0.0)):
-        raise InputError("thermal model: a friction power is negative or not finite", allowed="zero or more watts")
-    return W
-
-
-def checked_steps(steps: ArrayLike) -> Array:
-    """Gives times as an array.
-
-    Raises:
-        InputError: one is negative or not finite.
-    """
-    h = np.asarray(steps, dtype=np.float64)
-    if not np.all(np.isfinite(h) & (h >= 0.0)):
-        raise InputError("thermal model: a time step is negative or not finite", allowed="zero or more seconds")
-    return h
+        return checked_ambient(self.ambient if ambient is None else ambient)

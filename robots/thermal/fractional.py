@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.common.errors import InputError
-from robots.thermal.base import ThermalModel, checked_power, checked_steps
+from robots.thermal.base import ThermalModel
+from robots.thermal.checks import checked_power, checked_steps
 from robots.thermal.mittag_leffler import mittag_leffler
 from robots.thermal.parameters import ALPHA, BETA, Inputs, ThermalParameter, capacity, exchange
 

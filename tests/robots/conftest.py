@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -13,6 +14,7 @@ from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits
 from robots.loading import load_robot
 from robots.robot import Robot
+from tests.robots.robot_files import URDF
 
 TO_OURS = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]  # pinocchio lists Iyy before Ixz
 
@@ -122,3 +124,23 @@ def catalogue_robot() -> Callable[[str], Robot]:
         return robot if robot.has_inertia else replace(robot, inertia=_made(list(robot.chain.joints)).inertia)
 
     return load
+
+
+@pytest.fixture
+def urdf(tmp_path: Path) -> Path:
+    """The URDF of two joints."""
+    path = tmp_path / "two.urdf"
+    path.write_text(URDF)
+    return path
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[[str], Path]:
+    """Write a robot's YAML file."""
+
+    def write(text: str) -> Path:
+        path = tmp_path / "robot.yaml"
+        path.write_text(text)
+        return path
+
+    return write

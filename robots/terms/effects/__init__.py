@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robots.terms.effects.asymmetric_friction import AsymmetricFriction
 from robots.terms.effects.backlash import Backlash
-from robots.terms.effects.base import Coefficient, Effect, JointEffect, Shape, Situation, StaticEffect
+from robots.terms.effects.base import Coefficient, Effect, JointEffect, Shape, Situation
 from robots.terms.effects.base_tilt import BaseTilt
 from robots.terms.effects.current_clipping import CurrentClipping
 from robots.terms.effects.current_lag import CurrentLag
@@ -25,6 +25,7 @@ from robots.terms.effects.presliding_hysteresis import PreslidingHysteresis
 from robots.terms.effects.shear_thinning import ShearThinning
 from robots.terms.effects.situation import situation
 from robots.terms.effects.spring import Spring
+from robots.terms.effects.static import StaticEffect
 from robots.terms.effects.stribeck import Stribeck
 from robots.terms.effects.thermal_friction import ThermalFriction
 from robots.terms.effects.time_delay import TimeDelay

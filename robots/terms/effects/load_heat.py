@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
+from robots.terms.effects.base import Coefficient, Place, Shape, Situation
+from robots.terms.effects.heat import HeatEffect
 from robots.terms.effects.states import relaxation
 
 if TYPE_CHECKING:
@@ -17,13 +18,12 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class LoadHeat(JointEffect):
+class LoadHeat(HeatEffect):
     """tau = -x (a sign(dq) + b dq), dx/dt = tau^2 - x / T: x is copper heat, at rest as in motion."""
 
     name: ClassVar[str] = "load_heat"
     title: ClassVar[str] = "friction that falls as the motor's current heats the joint"
     rare: ClassVar[bool] = True
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("time_constant", "s", 5.0, 7200.0, "log", (45.0, 400.0, 3600.0)),)
     rivals: ClassVar[tuple[str, ...]] = ("thermal_friction", "friction_step", "torque_constant_heat")
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "pause")
@@ -34,12 +34,6 @@ class LoadHeat(JointEffect):
         force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
         heat = f"(({force})2 ks)"
         return Coefficient("coulomb_fall", f"{force}/{heat}"), Coefficient("viscous_fall", f"{force} s/{length}/{heat}")
-
-    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists time constants up to three times the data's duration."""
-        duration = float(situation.t[-1] - situation.t[0])
-        values = [value for value in self.shapes[0].grid if value <= 3.0 * duration]
-        return tuple((value,) for value in values) or ((self.shapes[0].grid[0],),)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates -x sign(dq) and -x dq."""

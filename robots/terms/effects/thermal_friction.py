@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
+from robots.terms.effects.base import Coefficient, Place, Shape, Situation
+from robots.terms.effects.heat import HeatEffect
 from robots.terms.effects.states import relaxation
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class ThermalFriction(JointEffect):
+class ThermalFriction(HeatEffect):
     """tau = -x (a sign(dq) + b dq), dx/dt = P - x / T: x is the heat kept of the friction power P.
 
     Temperature is heat over capacity; without a sensor, capacity and the friction's change per degree cannot be told
@@ -26,7 +27,6 @@ class ThermalFriction(JointEffect):
 
     name: ClassVar[str] = "thermal_friction"
     title: ClassVar[str] = "friction that falls as the joint warms up"
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("time_constant", "s", 5.0, 7200.0, "log", (15.0, 45.0, 135.0, 400.0, 1200.0, 3600.0)),
     )
@@ -41,12 +41,6 @@ class ThermalFriction(JointEffect):
             Coefficient("coulomb_fall", f"{force}/kJ"),
             Coefficient("viscous_fall", f"{force} s/{length}/kJ"),
         )
-
-    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists time constants up to three times the data's duration: all slower ones look like the slowest."""
-        duration = float(situation.t[-1] - situation.t[0])
-        values = [value for value in self.shapes[0].grid if value <= 3.0 * duration]
-        return tuple((value,) for value in values) or ((self.shapes[0].grid[0],),)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates -x sign(dq) and -x dq, x in kJ."""

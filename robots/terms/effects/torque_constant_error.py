@@ -8,7 +8,8 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.effects.base import Coefficient, Instant, Place, Situation, StaticJointEffect
+from robots.terms.effects.base import Coefficient, Place, Situation
+from robots.terms.effects.static import Instant, StaticJointEffect
 
 if TYPE_CHECKING:
     from robots.robot import Robot

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit
-from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
+from robots.terms.effects.base import Coefficient, Place, Shape, Situation
+from robots.terms.effects.heat import HeatEffect
 from robots.terms.effects.load_heat import copper_heat
 
 if TYPE_CHECKING:
@@ -17,13 +18,12 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class TorqueConstantHeat(JointEffect):
+class TorqueConstantHeat(HeatEffect):
     """tau = c x tau, dx/dt = tau^2 - x / T: magnets weaken as copper heat x builds up."""
 
     name: ClassVar[str] = "torque_constant_heat"
     title: ClassVar[str] = "a torque constant that falls as the motor warms up"
     rare: ClassVar[bool] = True
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("time_constant", "s", 5.0, 7200.0, "log", (45.0, 400.0, 3600.0)),)
     rivals: ClassVar[tuple[str, ...]] = ("thermal_friction", "torque_sensor_drift", "payload_change")
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "pause")
@@ -32,12 +32,6 @@ class TorqueConstantHeat(JointEffect):
         """Describes the relative rise of the logged torque per squared torque and time."""
         assert joint is not None
         return (Coefficient("rise_per_heat", f"1/(({force_unit(robot, joint - 1)})2 ks)"),)
-
-    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists time constants up to three times the data's duration."""
-        duration = float(situation.t[-1] - situation.t[0])
-        values = [value for value in self.shapes[0].grid if value <= 3.0 * duration]
-        return tuple((value,) for value in values) or ((self.shapes[0].grid[0],),)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates x tau."""

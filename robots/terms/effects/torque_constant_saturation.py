@@ -8,8 +8,9 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.effects.base import Coefficient, Instant, Place, Shape, Situation, StaticJointEffect
+from robots.terms.effects.base import Coefficient, Place, Shape, Situation
 from robots.terms.effects.states import torque_reference
+from robots.terms.effects.static import Instant, StaticJointEffect
 
 if TYPE_CHECKING:
     from robots.robot import Robot

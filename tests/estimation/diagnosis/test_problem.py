@@ -11,9 +11,11 @@ from scipy.stats import chi2
 from estimation.diagnosis.baseline import base_parameters, build_baseline, inertia_of
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.noise import estimate_whitening
-from estimation.diagnosis.problem import Problem, accept, fit_values, pose, score
+from estimation.diagnosis.posing import fit_values, pose
+from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.regularisation import pull_of
 from estimation.diagnosis.scan import measure, scan, surprise
+from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.states import record
 from robots.plants import Plant
 from robots.robot import Robot

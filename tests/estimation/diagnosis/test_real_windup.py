@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from estimation.diagnosis.baseline import base_parameters, build_baseline
-from estimation.diagnosis.problem import fit_values
+from estimation.diagnosis.posing import fit_values
 from estimation.diagnosis.regularisation import pull_of
 from estimation.diagnosis.states import record
 from estimation.diagnosis.windup import measure_windups

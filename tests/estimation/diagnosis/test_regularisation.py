@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.baseline import base_parameters, build_baseline
-from estimation.diagnosis.problem import fit_values
+from estimation.diagnosis.posing import fit_values
 from estimation.diagnosis.regularisation import held, pull_of
 from estimation.diagnosis.states import record
 from estimation.pulls import Pull

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from estimation.diagnosis import Diagnosis, diagnose
 from estimation.diagnosis.baseline import base_parameters, build_baseline
-from estimation.diagnosis.problem import fit_values
+from estimation.diagnosis.posing import fit_values
 from estimation.diagnosis.regularisation import pull_of
 from estimation.diagnosis.states import record
 from estimation.diagnosis.windup import Windup, measure_windups

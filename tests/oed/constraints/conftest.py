@@ -4,7 +4,7 @@ import pytest
 from robots.limits import Limits
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def limits() -> Limits:
     return Limits(
         lower=np.array([-2.9, -0.2]),

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from oed.constraints import kinematic_rows, series_extremes
 from robots.common.errors import InfeasibleError, InputError
-from robots.limits import Limits
 
 HARMONICS, SAMPLES, FREQUENCY = 4, 40, 0.2
 
@@ -25,17 +24,6 @@ def _basis() -> list[np.ndarray]:
     ]
 
 
-def _limits() -> Limits:
-    return Limits(
-        lower=np.array([-2.9, -0.2]),
-        upper=np.array([2.9, 0.3]),
-        velocity=np.array([4.0, 3.0]),
-        acceleration=np.array([16.0, 12.0]),
-        jerk=np.array([320.0, 200.0]),
-        torque=np.array([120.0, 150.0]),
-    )
-
-
 def test_rows_are_the_kinematics_at_the_samples(limits):
     """Each row times a joint's coefficients is the labelled quantity at the labelled sample."""
     basis = _basis()
@@ -51,9 +39,8 @@ def test_rows_are_the_kinematics_at_the_samples(limits):
 
 @settings(deadline=None)
 @given(seed=st.integers(0, 10_000))
-def test_coefficients_that_keep_the_rows_keep_the_limits_at_all_times(seed):
+def test_coefficients_that_keep_the_rows_keep_the_limits_at_all_times(limits, seed):
     """The farthest step in any direction that the rows allow keeps every limit between the samples too."""
-    limits = _limits()
     rows = kinematic_rows(_basis(), limits, degree=HARMONICS)
     start = np.zeros((2, 2 * HARMONICS + 1))
     start[:, 0] = (limits.lower + limits.upper) / 2

@@ -27,16 +27,6 @@ collision:
 """
 
 
-@pytest.fixture
-def write(tmp_path):
-    def write(text):
-        path = tmp_path / "two.yaml"
-        path.write_text(text)
-        return path
-
-    return write
-
-
 def test_a_robots_file_states_its_shapes(write):
     """Capsules, obstacles and pairs to be ignored come from the robot's file; what is sourced does not warn."""
     robot = load_robot(write(YAML))
@@ -57,10 +47,10 @@ def test_a_robots_file_states_its_shapes(write):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("link: 1,", "link: 3,", r"two.yaml: column collision.links\[1\].link: a capsule on link 3; allowed: 0"),
+        ("link: 1,", "link: 3,", r"robot.yaml: column collision.links\[1\].link: a capsule on link 3; allowed: 0"),
         ("radius: 0.05", "radius: -1", r"collision.links\[1\].radius"),
         ("floor: -0.1", "flor: -0.1", "unknown key 'flor'.*did you mean 'floor'"),
-        ("[1, table]", "[1, sofa]", "two.yaml.*'sofa'"),
+        ("[1, table]", "[1, sofa]", "robot.yaml.*'sofa'"),
         ("name: post", "name: table", "two obstacles are called 'table'"),
     ],
 )

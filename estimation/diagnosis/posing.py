@@ -1,0 +1,89 @@
+"""Poses the whitened regression: fits the base model, projects it out, and prepares the null."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.baseline import FAINT, Baseline
+from estimation.diagnosis.orthonormal import orthonormal
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.regularisation import held, pull_of
+from estimation.diagnosis.states import Recording
+from estimation.diagnosis.whitening import Whitening
+from estimation.pulls import Pull
+
+Array = NDArray[np.float64]
+
+
+def pose(
+    recording: Recording,
+    baseline: Baseline,
+    whitening: Whitening,
+    *,
+    draws: int,
+    rng: np.random.Generator,
+    extra: Array | None = None,
+    pull: Pull | None = None,
+) -> Problem:
+    """Fits the base model to white data and prepares the null.
+
+    Args:
+        recording: the data.
+        baseline: the base model.
+        whitening: makes the noise white.
+        draws: noise drawn for the null; 0 for none.
+        rng: draws it.
+        extra: torque (N, n) of effects that are known already, taken off before the base model's situation is computed.
+        pull: what holds base parameters that the data leave open; by default `pull_of`.
+    """
+    n = recording.n
+    root = np.linalg.cholesky(whitening.precision)  # P = L L'
+    columns = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
+    norms = np.sqrt((columns**2).sum(axis=(0, 1)))
+    white = whitening.all(columns[:, :, norms > 0])
+    N = len(white)
+    mixed = np.einsum("jk,njb->nkb", root, white, optimize=True)
+    Q = orthonormal(mixed.reshape(N * n, -1), FAINT).reshape(N, n, -1)
+    tau = whitening.all(recording.tau)
+    tilted = tau @ root
+    tilted = tilted - np.einsum("nkb,b->nk", Q, np.einsum("nkb,nk->b", Q, tilted, optimize=True), optimize=True)
+    noise = whitening.draw(N, draws, rng) if draws else np.zeros((N, n, 0), np.float32)
+    projected = np.zeros((Q.shape[2], draws))
+    pressed = np.empty((n, N, draws), np.float32)
+    P, L = whitening.precision.astype(np.float32), root.astype(np.float32)
+    for k in range(n):
+        part = sum(L[j, k] * noise[:, j] for j in range(n) if L[j, k])
+        if draws:
+            projected += (Q[:, k].astype(np.float32).T @ part).astype(float)
+        pressed[k] = sum(P[j, k] * noise[:, j] for j in range(n) if P[j, k])
+    pull = pull or pull_of(baseline, recording, whitening)
+    values = fit_values(baseline, whitening.scale, recording.unsure, recording.tau, pull)
+    remainder = recording.tau - baseline.regressor @ values
+    if extra is not None:
+        values = fit_values(baseline, whitening.scale, recording.unsure, recording.tau - extra, pull)
+    return Problem(
+        recording=recording,
+        baseline=baseline,
+        whitening=whitening,
+        situation=baseline.situation(recording, values),
+        mixed=np.ascontiguousarray(np.einsum("jk,nkb->jnb", root, Q, optimize=True)),
+        residual=tilted @ root.T,
+        white=np.linalg.solve(root.T, tilted.T).T,
+        energy=float(np.sum(tilted**2)),
+        nulls=(pressed, projected),
+        remainder=remainder,
+        pull=pull,
+    )
+
+
+def fit_values(baseline: Baseline, scale: Array, unsure: NDArray[np.bool_], tau: Array, pull: Pull) -> Array:
+    """Fits base parameters (b,) to torque (N, n), each joint weighed by its noise.
+
+    Directions that the log does not determine go where the pull has them.
+    """
+    weights = 1.0 / scale
+    counts = weights * ~unsure
+    Y = np.concatenate([baseline.regressor, baseline.nuisance], axis=2) * counts[:, :, None]
+    flat = Y.reshape(-1, Y.shape[2])
+    return held(flat.T @ flat, flat.T @ (tau * counts).reshape(-1), pull)[: baseline.base.size]

@@ -1,0 +1,92 @@
+"""A fitted effect as a finding: its parameters with intervals, its rivals, its gain, and what it means in words."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.extending import Fitted
+from estimation.diagnosis.findings import Finding, Gain, Parameter
+from estimation.diagnosis.patterns import Pattern
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.refinement import Member
+from estimation.diagnosis.selection import Found
+from robots.robot import Robot
+from robots.terms.base import force_unit, length_unit
+
+
+def word_finding(
+    robot: Robot,
+    problem: Problem,
+    member: Member,
+    fitted: Fitted,
+    i: int,
+    p_value: float,
+    found: Found | None,
+    gain: Gain,
+) -> Finding:
+    """Puts one effect of the extended model into words and numbers.
+
+    Args:
+        robot: of the logs.
+        problem: what the effect was found in.
+        member: the effect.
+        fitted: the extended model that holds it.
+        i: its place there.
+        p_value: of the effect.
+        found: with its rivals; None for a free function.
+        gain: on unseen data.
+    """
+    extension, known = fitted.model.extensions[i], fitted.effects[i]
+    hypothesis = member.hypothesis
+    joint = hypothesis.joint
+    units = {}
+    if joint is not None:
+        units = {"force": force_unit(robot, joint - 1), "length": length_unit(robot, joint - 1)}
+    sentence = hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units)
+    pattern = hypothesis.name if isinstance(hypothesis.effect, Pattern) else ""
+    rivals = [] if found is None else [(rival.hypothesis, worse) for rival, worse in found.rivals]
+    return Finding(
+        effect="unexplained" if pattern else hypothesis.name,
+        joint=joint,
+        parameters=_parameters(robot, member, fitted, i, known),
+        p_value=p_value,
+        delta_bic=member.bic(problem.rows),
+        gain=gain,
+        rivals=tuple(
+            (h.name if h.joint in (joint, None) else f"{h.name} of joint {h.joint}", float(worse))
+            for h, worse in rivals
+        ),
+        sentence=sentence,
+        visible=member.visible,
+        coordinate=hypothesis.effect.coordinate(problem.situation, joint, member.shape)[0],
+        pattern=pattern,
+    )
+
+
+def _parameters(
+    robot: Robot, member: Member, fitted: Fitted, i: int, known: NDArray[np.bool_]
+) -> tuple[Parameter, ...]:
+    extension = fitted.model.extensions[i]
+    effect = member.hypothesis.effect
+    described = [(c.name, c.unit, "linear") for c in effect.parameters(robot, extension.joint)]
+    described += [(s.name, s.unit, s.scale) for s in effect.shapes]
+    values = [*extension.coefficients.tolist(), *extension.shape]
+    errors = np.sqrt(np.maximum(np.diag(extension.covariance), 0.0))
+    result = []
+    for (name, unit, scale), value, error, sure in zip(described, values, errors, known, strict=True):
+        interval = (value - 1.96 * error, value + 1.96 * error)
+        if scale == "log" and np.isfinite(error) and value > 0:
+            factor = float(np.exp(1.96 * error / value))
+            interval = (value / factor, value * factor)
+        result.append(
+            Parameter(
+                name=name,
+                value=float(value),
+                unit=unit,
+                standard_error=float(error) if np.isfinite(error) else float("nan"),
+                ci95=(float(interval[0]), float(interval[1])) if np.isfinite(error) else (-np.inf, np.inf),
+                determined=bool(sure),
+            )
+        )
+    return tuple(result)

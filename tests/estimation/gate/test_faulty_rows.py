@@ -1,0 +1,87 @@
+"""What the gate says of rows that are missing, torn, repeated or coarse."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.gate import check_log
+from robots.signals import Log
+from tests.estimation.gate.findings_of import found, joints
+
+
+def test_clipped_torques_are_told(good, spoilt):
+    """Torques that pile up at a limit name the share of the rows."""
+    limit = np.quantile(np.abs(good().tau), 0.95, axis=0)
+    report = spoilt(tau=np.clip(good().tau, -limit, limit))
+    assert joints(report, "clipped") == [1, 2, 3, 4, 5, 6]
+    assert found(report, "clipped")[0].value == pytest.approx(5.0, abs=0.5)
+
+
+def test_gap_cuts_the_log(er3a, good):
+    """Across a gap nothing is interpolated: the usable parts end and begin at it."""
+    log = good()
+    keep = np.r_[0:2000, 2600 : len(log)]
+    cut = Log(log.t[keep], log.q[keep], tau=log.tau[keep])
+    report = check_log(er3a, cut)
+    assert found(report, "gap")[0].value == pytest.approx(2.404)
+    assert report.parts == ((0, 2000), (2000, len(cut)))
+    first, second = report.usable(cut)
+    assert (len(first), second.t[0]) == (2000, log.t[2600])
+
+
+def test_spikes_are_left_out(good, spoilt):
+    """Single rows that stick out are named and left out of what is usable."""
+    log = good()
+    q, tau = log.q.copy(), log.tau.copy()
+    q[500, 1] += 0.3
+    tau[[700, 900], 3] = 1e6
+    report = spoilt(q=q, tau=tau)
+    assert report.spikes.tolist() == [500, 700, 900]
+    assert not report.refused
+    (usable,) = report.usable(replace(log, q=q, tau=tau))
+    assert len(usable) == len(log) - 3
+    assert np.abs(usable.tau).max() < 1e3
+
+
+def test_lost_torques_are_left_out(good, spoilt):
+    """Exact zeros in a torque that is never zero are lost messages."""
+    tau = good().tau.copy()
+    rows = np.arange(100, 4000, 97)
+    tau[rows, 2] = 0.0
+    assert set(rows) == set(spoilt(tau=tau).spikes)
+
+
+def test_repeated_rows_are_counted(good, spoilt):
+    """Rows that repeat the row before while the arm moves are counted."""
+    log = good()
+    q, tau = log.q.copy(), log.tau.copy()
+    rows = np.arange(10, len(log) - 10, 8)
+    q[rows], tau[rows] = q[rows - 1], tau[rows - 1]
+    (finding,) = found(spoilt(q=q, tau=tau), "repeated_rows")
+    assert finding.value == pytest.approx(12.5, abs=0.2)
+    assert finding.severity == "warning"
+
+
+def test_hung_column_is_told(good, spoilt):
+    """A torque that holds one value while the arm moves, and jumps then, hung."""
+    tau = good().tau.copy()
+    tau[1000:1400, 0] = tau[1000, 0]
+    (finding,) = found(spoilt(tau=tau), "stuck")
+    assert (finding.column, finding.row) == ("tau1", 1001)
+
+
+def test_position_that_jumps_is_refused(good, spoilt):
+    """An encoder that is set anew in the middle of a log makes it useless."""
+    q = good().q.copy()
+    q[2500:, 4] += 0.5
+    (finding,) = found(spoilt(q=q), "jump")
+    assert (finding.severity, finding.joint, finding.row) == ("refuse", 5, 2501)
+
+
+def test_quantised_position_and_torque_are_told(good, spoilt):
+    """Steps that are coarse against what they measure are stated."""
+    log = good()
+    report = spoilt(q=np.round(log.q, 1), tau=np.round(log.tau / 5) * 5)
+    assert found(report, "quantised_position")[0].value == pytest.approx(0.1)
+    assert found(report, "quantised_torque")[0].value == pytest.approx(5.0)
