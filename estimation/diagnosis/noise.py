@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from estimation.diagnosis.band import find_bands
 from estimation.diagnosis.gaps import find_gaps, free_columns, long_gap
@@ -36,6 +37,8 @@ QUIETEST = 1e-3
 LOWEST_ORDER = 4
 # White rows beyond so many standard deviations weigh as if they were there (Huber): kicks that no filter undoes.
 HUBER = 3.5
+# But not where rows stick out for so long [s] together and no reversal is nearer than this [s].
+TOGETHER, KICKED = 0.05, 0.15
 
 
 def estimate_whitening(recording: Recording, residual: Array, parameters: int, inertia: Array) -> Whitening:
@@ -106,7 +109,20 @@ def estimate_whitening(recording: Recording, residual: Array, parameters: int, i
     left = np.where(resting, np.nan, np.abs(plain.all(residual)))
     level = np.array([np.nanmedian(column) if np.isfinite(column).any() else 1.0 for column in left.T]) / 0.6745
     weights = np.minimum(1.0, HUBER * np.maximum(level, 0.1) / np.maximum(left, 1e-12))
+    weights[_pushed(weights < 1.0, recording, stride)] = 1.0
     return replace(plain, weights=np.where(resting, 0.0, weights))
+
+
+def _pushed(outside: NDArray[np.bool_], recording: Recording, stride: int) -> NDArray[np.bool_]:
+    """Marks white rows (N, n) that stick out together, away from the joint's reversals: a push is an effect."""
+    step = recording.step * stride
+    width, reach = max(3, round(TOGETHER / step)), round(KICKED / recording.step)
+    crowded = uniform_filter1d(outside.astype(float), width, axis=0) >= 0.5
+    near = [
+        maximum_filter1d(recording.unsure[run].astype(np.int8), 2 * reach + 1, axis=0)[::stride]
+        for run in recording.runs
+    ]
+    return outside & crowded & (np.concatenate(near) == 0)
 
 
 def _levels(white: Sequence[Array], step: float, slowest: float, fastest: Array) -> Array:
