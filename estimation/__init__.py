@@ -25,6 +25,7 @@ _EXPORTS = {
     "identify_drive_gains": "estimation.payloads",
     "identify_payload": "estimation.payloads",
     "load_model": "estimation.model",
+    "on_one_clock": "estimation.clocks",
     "predict": "estimation.prediction",
     "read_log": "estimation.logs",
     "read_logs": "estimation.logs",

@@ -1,9 +1,13 @@
-"""Settings of all tests."""
+"""Settings of all tests, and logs of real robots."""
 
 from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
 
 # Tests run in several processes: a linear algebra library that starts a thread a core in each of them only waits.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -11,3 +15,18 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 # A shell ignores Ctrl-C for what it starts in the background, and so would the tests of Ctrl-C.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+DATA = Path(__file__).parents[2] / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def data() -> Callable[[str], Path]:
+    """Find a folder of measured logs, or skip."""
+
+    def find(name: str) -> Path:
+        folder = DATA / name
+        if not folder.is_dir():
+            pytest.skip(f"the measured logs of {name} are not at hand ({folder})")
+        return folder
+
+    return find

@@ -228,7 +228,7 @@ def _cleaned(problem: Problem, baseline: Baseline, selection: Selection) -> tupl
     for found in selection.found:
         blocks.append(dense(problem, found.member.hypothesis, found.member.shape))
     full = np.concatenate(blocks, axis=2)
-    weights = ~problem.recording.unsure / problem.whitening.scale
+    weights = ~problem.recording.unsure / problem.whitening.scales(len(problem.recording))
     flat = (full * weights[:, :, None]).reshape(-1, full.shape[2])
     values = held(flat.T @ flat, flat.T @ (problem.recording.tau * weights).reshape(-1), problem.pull)
     known = len(problem.pull.target)

@@ -100,7 +100,7 @@ def cross_validated(problem: Problem, effects: Sequence[Array], pull: Pull) -> U
             "so that the gain on another motion may differ"
         )
     base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
-    weights = ~recording.unsure / problem.whitening.scale
+    weights = ~recording.unsure / problem.whitening.scales(len(recording))
     full = np.concatenate([base, *effects], axis=2)
     weighted = full * weights[:, :, None]
     target = recording.tau * weights
@@ -135,7 +135,7 @@ def on_held_out(
     """
     recording = problem.recording
     base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
-    weights = ~recording.unsure / problem.whitening.scale
+    weights = ~recording.unsure / problem.whitening.scales(len(recording))
     full = np.concatenate([base, *effects], axis=2)
     gram, cross = _moments(full * weights[:, :, None], recording.tau * weights)
     other = np.concatenate([unseen_base, *unseen_effects], axis=2)

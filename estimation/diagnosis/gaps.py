@@ -114,14 +114,14 @@ def free_columns(
         beside = int(np.ceil(1.5 * width)) + 2
         pieces: list[tuple[int, Array]] = []
         first_row = 0
-        for run_start, run_stop in pairwise((*whitening.starts, len(column))):
+        for run, (run_start, run_stop) in enumerate(pairwise((*whitening.starts, len(column)))):
             for gap in spans(column[run_start:run_stop]):
                 for start, stop in _short(*gap, longest, beside, run_stop - run_start):
                     x = np.linspace(-1, 1, stop - start) if stop - start > 1 else np.zeros(1)
                     number = min(stop - start, int(np.ceil((stop - start) / width)) + 1)
                     shapes = np.asarray(np.polynomial.legendre.legvander(x, number - 1), dtype=np.float64)
                     row, white = _white_gap(whitening, j, start, shapes, run_stop - run_start)
-                    pieces.append((first_row + row, white))
+                    pieces.append((first_row + row, white / whitening.level(run, j)))
             first_row += -(-(run_stop - run_start) // whitening.stride)
         result.append(_sparse([_orthonormal_block(block) for block in _touching(pieces)], first_row))
     return tuple(result)

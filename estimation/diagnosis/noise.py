@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from estimation.diagnosis.band import find_bands
 from estimation.diagnosis.gaps import find_gaps, free_columns, long_gap
@@ -29,10 +30,15 @@ MEMORY = 0.2
 FLAT = 1.0
 FEWEST = 4.0  # periods of that frequency without which nothing is said of it
 ROUNDS = 20
+# A log's own level counts against that of all logs as its frequencies do against so many.
+FEW = 20.0
+QUIETEST = 1e-3
 # Of the noise's process: fewer coefficients would not tell a colour from white, however seldom rows are.
 LOWEST_ORDER = 4
 # White rows beyond so many standard deviations weigh as if they were there (Huber): kicks that no filter undoes.
 HUBER = 3.5
+# But not where rows stick out for so long [s] together and no reversal is nearer than this [s].
+TOGETHER, KICKED = 0.05, 0.15
 
 
 def estimate_whitening(recording: Recording, residual: Array, parameters: int, inertia: Array) -> Whitening:
@@ -67,6 +73,11 @@ def estimate_whitening(recording: Recording, residual: Array, parameters: int, i
     tells = sum(map(len, pieces)) * step * FLAT >= FEWEST
     slowest, fastest = FLAT if tells else 0.0, INSIDE * cutoffs
     noise = _colour(pieces, step, counts, parameters, slowest, fastest)
+    levels = None
+    if len(pieces) > 1:
+        levels = _levels([noise.whitened(piece) for piece in pieces], step, slowest, fastest)
+        pieces = [piece / level for piece, level in zip(pieces, levels, strict=True)]
+        noise = _colour(pieces, step, counts, parameters, slowest, fastest)
     trimmed = max(len(a) for a in noise.coefficients)
     innovations = np.concatenate([noise.whitened(piece)[min(trimmed, len(piece) // 2) :] for piece in pieces])
     # White noise has as much power at each frequency: what effects add to the slow ones is left out, and above the band
@@ -91,13 +102,44 @@ def estimate_whitening(recording: Recording, residual: Array, parameters: int, i
         innovations=white,
         gaps=gaps,
         bands=bands,
+        levels=levels,
     )
     free = free_columns(recording.unsure, longest, plain, widths.tolist())
     plain = replace(plain, gaps=replace(gaps, free=free))
     left = np.where(resting, np.nan, np.abs(plain.all(residual)))
     level = np.array([np.nanmedian(column) if np.isfinite(column).any() else 1.0 for column in left.T]) / 0.6745
     weights = np.minimum(1.0, HUBER * np.maximum(level, 0.1) / np.maximum(left, 1e-12))
+    weights[_pushed(weights < 1.0, recording, stride)] = 1.0
     return replace(plain, weights=np.where(resting, 0.0, weights))
+
+
+def _pushed(outside: NDArray[np.bool_], recording: Recording, stride: int) -> NDArray[np.bool_]:
+    """Marks white rows (N, n) that stick out together, away from the joint's reversals: a push is an effect."""
+    step = recording.step * stride
+    width, reach = max(3, round(TOGETHER / step)), round(KICKED / recording.step)
+    crowded = uniform_filter1d(outside.astype(float), width, axis=0) >= 0.5
+    near = [
+        maximum_filter1d(recording.unsure[run].astype(np.int8), 2 * reach + 1, axis=0)[::stride]
+        for run in recording.runs
+    ]
+    return outside & crowded & (np.concatenate(near) == 0)
+
+
+def _levels(white: Sequence[Array], step: float, slowest: float, fastest: Array) -> Array:
+    """Gives the noise of each log over that of all (logs, n), from whitened residuals (N, n) of each.
+
+    By the faster half of what is known: a torque that acts in one log only is slow. A log of few frequencies is taken
+    to be as noisy as the others.
+    """
+    powers, numbers = np.empty((2, len(white), len(fastest)))
+    for i, rows in enumerate(white):
+        f = np.fft.rfftfreq(len(rows), step)[:, None]
+        inside = (f >= np.maximum(slowest, fastest / 2)) & (f < fastest)
+        numbers[i] = inside.sum(axis=0)
+        powers[i] = (np.abs(np.fft.rfft(rows, axis=0)) ** 2 * inside).sum(axis=0) / len(rows)
+    mean = np.maximum(powers.sum(axis=0) / np.maximum(numbers.sum(axis=0), 1), 1e-300)
+    ratio = np.maximum(powers / np.maximum(numbers, 1) / mean, QUIETEST**2)
+    return np.asarray(np.where(numbers > 0, ratio ** (0.5 * numbers / (numbers + FEW)), 1.0))
 
 
 def _unit(spectrum: NDArray[np.complex128], rows: int) -> Array:

@@ -58,10 +58,10 @@ def pose(
             projected += (Q[:, k].astype(np.float32).T @ part).astype(float)
         pressed[k] = sum(P[j, k] * noise[:, j] for j in range(n) if P[j, k])
     pull = pull or pull_of(baseline, recording, whitening)
-    values = fit_values(baseline, whitening.scale, recording.unsure, recording.tau, pull)
+    values = fit_values(baseline, whitening.scales(len(recording)), recording.unsure, recording.tau, pull)
     remainder = recording.tau - baseline.regressor @ values
     if extra is not None:
-        values = fit_values(baseline, whitening.scale, recording.unsure, recording.tau - extra, pull)
+        values = fit_values(baseline, whitening.scales(len(recording)), recording.unsure, recording.tau - extra, pull)
     return Problem(
         recording=recording,
         baseline=baseline,
@@ -78,7 +78,7 @@ def pose(
 
 
 def fit_values(baseline: Baseline, scale: Array, unsure: NDArray[np.bool_], tau: Array, pull: Pull) -> Array:
-    """Fits base parameters (b,) to torque (N, n), each joint weighed by its noise.
+    """Fits base parameters (b,) to torque (N, n), weighed by the noise of each joint (n,) or of each row too (N, n).
 
     Directions that the log does not determine go where the pull has them.
     """

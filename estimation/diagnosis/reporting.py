@@ -32,6 +32,8 @@ from robots.version import VERSION
 
 Array = NDArray[np.float64]
 
+# Error on unseen data that is worth a word: so many times that of the fit, and more than this share of the torque.
+STRANGE, ODD = 3.0, 0.2
 SHOWN = 4000  # rows of the curves kept for pictures
 HARM = 1.05  # times the unseen error: an effect that makes it so much larger is left out, sure or not
 
@@ -179,6 +181,7 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
             f"Joint{'s' if len(still) > 1 else ''} {names} hardly moved: their friction, gears and rotors cannot be "
             "judged; what gravity and the other joints ask of them can."
         )
+    notes += _strange(told.problem, before)
     for finding in findings:
         lost = [p for p in finding.parameters if not p.determined and p.unit == "s" and np.isnan(p.standard_error)]
         for parameter in lost:
@@ -199,6 +202,20 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
     sprung = {finding.joint for finding in findings if finding.effect == "spring"}
     notes += [text for joint, text in hidden_springs(told.problem, told.false_alarm) if joint not in sprung]
     return tuple(notes)
+
+
+def _strange(problem: Problem, before: Array) -> list[str]:
+    """Says where the base model predicts logs far worse than it fits them: a verdict of none is then worth little."""
+    counts = ~problem.recording.unsure
+    number = np.maximum(counts.sum(axis=0), 1)
+    torque = np.sqrt((problem.recording.tau**2 * counts).sum(axis=0) / number)
+    fitted = np.sqrt((problem.remainder**2 * counts).sum(axis=0) / number) / np.maximum(torque, 1e-12)
+    return [
+        f"Joint {j + 1}: the base model leaves {100 * fitted[j]:.0f} % of the torque that it was fitted to and "
+        f"{100 * before[j]:.0f} % of the torque that it was not. The logs differ in something that was not found, or "
+        "some of them do not tell its parameters."
+        for j in np.flatnonzero(before > np.maximum(STRANGE * fitted, ODD))
+    ]
 
 
 def _trace(unseen: Unseen, seen_as: Sequence[Array], windups: Sequence[Windup]) -> Trace:

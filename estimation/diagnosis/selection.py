@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.quiet_logs import profile_gain
 from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scan import Entry, Outcome, Scan, scan
 from estimation.diagnosis.scoring import Accepted, accept, score
@@ -81,7 +82,7 @@ def select(
             break
         advance(f"{result.outcomes[0].hypothesis.label}")
         best = _best(problem, contenders(problem, result, members), accepted)
-        if not best or best[0].bic(problem.rows) <= LEAST or not _beyond(best[0], members):
+        if not best or not _beyond(problem, best[0], members) or not _worth_it(problem, best[0], members):
             break
         members.append(best[0])
         p_values.append(p)
@@ -90,7 +91,7 @@ def select(
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
     found = _found(problem, entries, members, p_values, rng)
-    sure = [f for f in found if f.member.bic(problem.rows) > LEAST]
+    sure = [f for f in found if _worth_it(problem, f.member, members[1:])]
     order = sorted(sure, key=lambda f: -f.member.gain)
     last = result if members else first
     return Selection(tuple(order), first, last, accept(problem, tuple(f.member.group for f in order)))
@@ -114,8 +115,22 @@ def _best(problem: Problem, outcomes: Sequence[Outcome], accepted: Accepted) -> 
     return sorted(refined, key=lambda member: -member.bic(problem.rows))
 
 
-def _beyond(candidate: Member, members: Sequence[Member]) -> bool:
-    return candidate.gain >= BEYOND * max((m.gain_on(candidate.group.joints) for m in members), default=0.0)
+def _worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
+    worth = candidate.bic(problem.rows)
+    if worth <= LEAST and not members and len(problem.recording.runs) > 1:
+        worth += profile_gain(problem, candidate) - candidate.gain
+    return worth > LEAST
+
+
+def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
+    """Whether a candidate is worth it by the joints alone on which it is more than what others may leave."""
+    able = [
+        j
+        for j in candidate.group.joints
+        if candidate.gain_on([j]) >= BEYOND * max((m.gain_on([j]) for m in members), default=0.0)
+    ]
+    lost = candidate.gain - candidate.gain_on(able)
+    return not members or candidate.bic(problem.rows) - lost > LEAST
 
 
 def _polished(

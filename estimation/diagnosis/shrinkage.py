@@ -30,7 +30,8 @@ def shrinkage(result: Score) -> Array:
     to within their error; those that base model or other columns nearly imitate stay where the others suggest.
     """
     raw = np.where(np.isfinite(result.raw), result.raw, np.diag(result.gram))
-    raw = np.maximum(raw, 1e-300)
+    # A column that does not act here stays at zero, and may act elsewhere.
+    raw = np.maximum(raw, max(1e-12 * float(raw.max(initial=0.0)), 1e-300))
     scale = 1.0 / np.sqrt(raw)
     shown, directions = np.linalg.eigh(result.gram * scale[:, None] * scale)
     kept = shown > FAINT

@@ -70,7 +70,8 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
                 file=after.log.metadata.get("file", after.log.name or None),
                 column="t",
                 allowed="one clock for all logs of a robot, one after the other",
-                remedy="shift t by the time at which the log was recorded",
+                remedy="shift t by the time at which the log was recorded; where that is not known, --own-clocks or "
+                "estimation.on_one_clock put the logs one after the other",
             )
     if step is None:
         step = _step(prepared)

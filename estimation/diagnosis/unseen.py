@@ -187,7 +187,7 @@ def _fits(problem: Problem, measured: Measured, left_out: slice | None) -> tuple
     full = np.concatenate(
         [problem.baseline.regressor[rows], problem.baseline.nuisance[rows], *(X[rows] for X in effects)], axis=2
     )
-    weights = ~recording.unsure[rows] / problem.whitening.scale
+    weights = (~recording.unsure / problem.whitening.scales(len(recording)))[rows]
     flat = (full * weights[:, :, None]).reshape(-1, full.shape[2])
     gram, cross = flat.T @ flat, flat.T @ (recording.tau[rows] * weights).reshape(-1)
     # Thinned rows count for all.

@@ -27,6 +27,7 @@ class Whitening:
         gaps: rows of each joint that do not count.
         bands: each joint's: where motion is known. Rows are thinned alike.
         weights: of the white rows (N, n): those that no noise explains count less; None for ones.
+        levels: of the noise of each log, in units of `scale` (logs, n); None for ones.
     """
 
     coefficients: tuple[Array, ...]
@@ -37,11 +38,21 @@ class Whitening:
     gaps: Gaps
     bands: tuple[Band, ...]
     weights: Array | None = None
+    levels: Array | None = None
 
     @property
     def stride(self) -> int:
         """Rows of a log that become one."""
         return self.bands[0].stride
+
+    def level(self, run: int, joint: int) -> float:
+        """The noise of a log, in units of `scale`."""
+        return 1.0 if self.levels is None else float(self.levels[run, joint])
+
+    def scales(self, rows: int) -> Array:
+        """Gives the standard deviation of the innovations of each of a recording's rows (N, n) [N m or N]."""
+        levels = np.ones((len(self.starts), len(self.scale))) if self.levels is None else self.levels
+        return np.repeat(levels * self.scale, np.diff([*self.starts, rows]), axis=0)
 
     def apply(self, series: Array, joint: int) -> Array:
         """Whitens columns (N,) or (N, k) of one joint, counted from 0."""
@@ -52,8 +63,8 @@ class Whitening:
         series = self.gaps.bridged(series, joint)
         taps = np.concatenate([[1.0], -self.coefficients[joint]]) / self.scale[joint]
         parts = []
-        for start, stop in pairwise((*self.starts, len(series))):
-            white = self.bands[joint].passed(series[start:stop], taps)
+        for run, (start, stop) in enumerate(pairwise((*self.starts, len(series)))):
+            white = self.bands[joint].passed(series[start:stop], taps / self.level(run, joint))
             # Before the log there is nothing to predict from: its first rows would weigh as if they were shocks.
             lead = min(len(taps) - 1, len(white))
             white[:lead] *= np.linspace(0, 1, len(taps))[1 : lead + 1, *(None,) * (series.ndim - 1)]

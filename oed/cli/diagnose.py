@@ -43,6 +43,12 @@ def diagnose(
     ] = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
+    own_clocks: Annotated[
+        bool,
+        typer.Option(
+            "--own-clocks", help="Each log began its clock anew: they count one after the other, a minute apart."
+        ),
+    ] = False,
     friction: Annotated[str, typer.Option(help="Of the base model: polynomial or coulomb-viscous.")] = "polynomial",
     limits: Annotated[
         bool, typer.Option("--limits", help="Before any experiment: say what --trajectory could show.")
@@ -84,7 +90,9 @@ def diagnose(
             if not log or trajectory or model:
                 raise typer.BadParameter("give --log, or --limits with --trajectory", ctx=context)
             known = (payload, gravity)
-            summary, data = _diagnosis(described, log, held_out or [], known, friction, seed, out, png, force, progress)
+            summary, data = _diagnosis(
+                described, log, held_out or [], known, own_clocks, friction, seed, out, png, force, progress
+            )
     console.result(f"{summary}\nwritten to {out.resolve()}", data)
 
 
@@ -166,6 +174,7 @@ def _diagnosis(
     logs: list[Path],
     held_out: list[Path],
     known: tuple[list[str] | None, list[str] | None],
+    own_clocks: bool,
     friction: str,
     seed: int,
     out: Path,
@@ -174,7 +183,7 @@ def _diagnosis(
     progress: Progress,
 ) -> tuple[str, dict[str, Any]]:
     """Diagnoses logs: diagnosis.json, model.json, report.html and, where new motions are proposed, those."""
-    from estimation import read_logs
+    from estimation import on_one_clock, read_logs
     from estimation.diagnosis.diagnosing import diagnose as run
     from estimation.diagnosis.next_experiment_motions import MADE, at_rate
     from oed.exports import write_trajectory
@@ -186,6 +195,8 @@ def _diagnosis(
         other = list(read_logs(held_out, n=robot.n)) if held_out else []
         # Held-out logs count on after the others.
         both = told([*read, *other], *known)
+        if own_clocks:
+            both = on_one_clock(both)
         read, other = both[: len(read)], both[len(read) :]
         result = run(robot, read, held_out=other or None, friction=friction, seed=seed, progress=progress)
         result.save(folder.path("diagnosis.json").parent)

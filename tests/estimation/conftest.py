@@ -1,9 +1,8 @@
-"""A small arm and a motion that excites it; the six-joint robot's experiment; logs of real robots."""
+"""A small arm and a motion that excites it; the six-joint robot's experiment."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -15,8 +14,6 @@ from robots.limits import Limits
 from robots.plants import Plant, Sensors, nominal_plant, simulate
 from robots.robot import Robot
 from robots.signals import Log, Motion
-
-DATA = Path(__file__).parents[3] / "shared" / "data"
 
 
 def _fourier_motion(robot: Robot, seed: int = 0, duration: float = 20.0, period: float = 0.004) -> Motion:
@@ -84,19 +81,6 @@ def arm_log(arm_plant: Callable[..., Plant]) -> Callable[..., Log]:
         return simulate(plant, _fourier_motion(plant.robot, motion_seed), seed=seed)
 
     return build
-
-
-@pytest.fixture(scope="session")
-def data() -> Callable[[str], Path]:
-    """Find a folder of measured logs, or skip."""
-
-    def find(name: str) -> Path:
-        folder = DATA / name
-        if not folder.is_dir():
-            pytest.skip(f"the measured logs of {name} are not at hand ({folder})")
-        return folder
-
-    return find
 
 
 @pytest.fixture(scope="session")

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 SAMPLES_PER_PERIOD = 2.5
 """A ripple that passes in fewer samples is not resolved."""
+WAVES = 2.0
+"""Waves over the joint's range below which a ripple looks like gravity or a spring."""
 LARGEST = 400
 """Orders on the grid at most: a longer list costs more in false alarms than its orders are likely."""
 
@@ -29,7 +31,8 @@ class TorqueRipple(StaticJointEffect):
 
     l is the load, as a share of the joint's torque limit (of 100 N m where it has none): teeth mesh harder under it.
 
-    Orders are those that the data resolve, known gear or not. Below 3 per turn, gravity and springs look alike.
+    Orders are those that the data resolve, known gear or not. Below 3 per turn, or two waves over the joint's range,
+    gravity and springs look alike.
     """
 
     name: ClassVar[str] = "torque_ripple"
@@ -54,13 +57,13 @@ class TorqueRipple(StaticJointEffect):
         spacing, top = self._resolution(situation, joint)
         if not top:
             return ()
-        low = self.shapes[0].lower
+        low = self._lowest(situation, joint)
         count = int(min(max((top - low) / spacing, 0), LARGEST))  # a known gear's orders may lie beyond
         orders = set((low + spacing * np.arange(count + 1)).tolist())
         ratio = abs(float(situation.robot.gear_ratio[joint - 1]))
         orders |= {h * ratio for h in (1, 2, 4) if ratio > 1 and low <= h * ratio <= top}
         # Whole orders are the likely ones: the nearest point of the grid moves to each.
-        whole = {float(h) for h in range(3, 13) if h <= top}
+        whole = {float(h) for h in range(3, 13) if low <= h <= top}
         return tuple(
             (order,) for order in sorted({o for o in orders if all(abs(o - h) > spacing / 2 for h in whole)} | whole)
         )
@@ -68,7 +71,13 @@ class TorqueRipple(StaticJointEffect):
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Keeps the order within what the samples resolve."""
         assert joint is not None
-        return ((self.shapes[0].lower, max(self._resolution(situation, joint)[1], 3.0)),)
+        lowest = self._lowest(situation, joint)
+        return ((lowest, max(self._resolution(situation, joint)[1], lowest + 0.5)),)
+
+    def _lowest(self, situation: Situation, joint: int) -> float:
+        """Gives the least order: fewer waves over the joint's range are no ripple but any smooth function."""
+        reach = float(np.ptp(situation.q[:, joint - 1]))
+        return float(np.clip(2 * np.pi * WAVES / max(reach, 1e-9), self.shapes[0].lower, 0.5 * self.shapes[0].upper))
 
     def _resolution(self, situation: Situation, joint: int) -> tuple[float, float]:
         """Gives the grid's spacing and its highest order; zeros for a joint that does not move."""

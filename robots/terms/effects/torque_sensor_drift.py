@@ -40,14 +40,15 @@ class TorqueSensorDrift(JointEffect):
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists a line, and zeros that wander in more and more stretches."""
-        (origin, _), (_, longest) = self.bounds(situation, joint)
-        return tuple((origin, longest / pieces) for pieces in (1, 2, 4, 8, STRETCHES))
+        (origin, _), (shortest, longest) = self.bounds(situation, joint)
+        pieces = [count for count in (1, 2, 4, 8, STRETCHES) if longest / count >= shortest]
+        return tuple((origin, longest / count) for count in pieces)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Fixes the origin, which only dates the drift; the stretches cover the data."""
         origin = float(situation.t[0])
         duration = max(float(situation.t[-1]) - origin, 1.0)
-        return (origin, origin), (duration / STRETCHES, duration)
+        return (origin, origin), (min(max(duration / STRETCHES, SHORTEST), duration), duration)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates a ramp per stretch; those that begin after the data are zero."""
@@ -70,3 +71,5 @@ class TorqueSensorDrift(JointEffect):
 
 STRETCHES = 16
 """Stretches of a zero that wanders."""
+SHORTEST = 3.5
+"""Least time of a stretch [s]: what changes faster goes with the motion, not with time."""

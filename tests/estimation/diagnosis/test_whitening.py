@@ -189,3 +189,20 @@ def test_a_band_without_filter_only_thins() -> None:
     """Without taps every stride-th row is kept as it is."""
     series = np.arange(10.0)
     assert Band(np.zeros(0), 2, 1.0).passed(series) == pytest.approx(series[::2])
+
+
+def test_a_push_counts_and_a_kick_at_a_reversal_does_not() -> None:
+    """A push of a sixth of a second, twenty times the noise, keeps its weight; beside a reversal the same loses it."""
+    noise = _noise(20_000)
+    unsure = np.zeros((20_000, 2), dtype=bool)
+    unsure[12_000:12_006] = True
+    residual = noise.copy()
+    push = 20 * noise.std(axis=0) * np.sin(np.pi * np.linspace(0, 1, 42))[:, None]
+    residual[5_000:5_042] += push
+    residual[12_008:12_050] += push
+    whitening = estimate_whitening(_recording(20_000, unsure=unsure), residual, 0, np.eye(2))
+    stride = whitening.stride
+    assert whitening.weights is not None
+    pushed, kicked = (whitening.weights[(at + 8) // stride : (at + 34) // stride] for at in (5_000, 12_008))
+    assert np.mean(pushed == 1.0) > 0.8
+    assert np.mean(kicked < 0.9) > 0.5

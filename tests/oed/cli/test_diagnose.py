@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -155,3 +157,18 @@ def test_bad_use_is_told(arguments, message, run, robot: Path, tmp_path: Path) -
     assert message in result.err.replace("\n", " ")
     assert "Traceback" not in result.err
     assert not (tmp_path / "out").exists()
+
+
+def test_logs_with_clocks_of_their_own(data: Callable[[str], Path], run: Callable[..., Any], tmp_path: Path) -> None:
+    """Logs that overlap are refused with what to do; put one after the other, they are diagnosed."""
+    folder = data("simple_pendulum_dfki")
+    line = ["diagnose", "--robot", folder / "simple_pendulum.urdf", "--out", tmp_path / "out"]
+    for name in ("ddp", "dircol", "gravity_comp"):
+        line += ["--log", folder / f"{name}.parquet"]
+    refused = run(*line)
+    assert refused.code == 2
+    assert "--own-clocks" in refused.err
+    assert not (tmp_path / "out").exists()
+    done = run(*line, "--own-clocks")
+    assert done.code == 0, done.err
+    assert "hand_guiding" in done.out
