@@ -104,14 +104,23 @@ def diagnose_case(case: Case, robot: Robot) -> tuple[Any, dict[str, Any]]:
         if limit["effect"] == effect.name and limit["joint"] == effect.joint
     ]
     if unseen and case.effects:
-        # On the same stretches: the diagnosis leaves out the ends, where filters err and joints come to rest.
-        seen = [diagnosis.trace.t[(diagnosis.trace.t >= log.t[0]) & (diagnosis.trace.t <= log.t[-1])] for log in unseen]
-        before, after = case.oracle_gain([(float(t[0]), float(t[-1])) for t in seen])
-        size = np.mean(np.concatenate([log.tau for log in unseen]) ** 2, axis=0)
+        # On the same rows: the diagnosis leaves out ends, where filters err, and rows whose direction it does not know.
+        counted = [_counted(diagnosis.trace, log) for log in unseen]
+        before, after = case.oracle_gain(counted)
+        squares = [(log.tau**2 * counts).sum(axis=0) for log, counts in zip(unseen, counted, strict=True)]
+        size = np.sum(squares, axis=0) / np.sum([counts.sum(axis=0) for counts in counted], axis=0)
         row["oracle_before"], row["oracle_after"] = float((before / size).sum()), float((after / size).sum())
         told = (np.square(said["baseline"]["nrmse"]), np.square(said["extended"]["nrmse"]))
         row["before"], row["after_extension"] = float(told[0].sum()), float(told[1].sum())
     return diagnosis, row
+
+
+def _counted(trace: Any, log: Log) -> np.ndarray:
+    """Marks the samples (N, n) of an unseen log on which the diagnosis measured its gain, by its curves."""
+    nearest = np.clip(np.searchsorted(trace.t, log.t), 1, len(trace.t) - 1)
+    nearest -= log.t - trace.t[nearest - 1] < trace.t[nearest] - log.t
+    close = np.abs(trace.t[nearest] - log.t) <= np.median(np.diff(trace.t))
+    return np.isfinite(trace.before[nearest]) & close[:, None]
 
 
 def _finding(finding: dict[str, Any]) -> dict[str, Any]:

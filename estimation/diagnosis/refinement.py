@@ -63,7 +63,8 @@ def refine(
     """Searches the shape that explains most for its number of parameters, from a point of the grid.
 
     The linear coefficients and the base model are projected out at every step (variable projection, Golub and Pereyra
-    1973), so that the search has as many dimensions as the effect has shape parameters.
+    1973), so that the search has as many dimensions as the effect has shape parameters. Shapes that machines are built
+    with are then tried, without a parameter to pay for.
     """
     situation = problem.situation
     lower, upper = hypothesis.coefficient_bounds(situation.robot)
@@ -72,12 +73,12 @@ def refine(
     free = [k for k, (low, high) in enumerate(bounds) if high > low]
     best: list[Member] = []
 
-    def evaluate(shape: tuple[float, ...]) -> float:
+    def evaluate(shape: tuple[float, ...], fitted: int = len(free)) -> float:
         joints, columns = problem.columns_of(hypothesis, shape)
         group = problem.group(joints, columns)
         result = score(problem, group, accepted)
         gain, coefficients = result.bounded(lower, upper)
-        member = Member(hypothesis, shape, group, gain, coefficients, result.degrees + len(free), result.visible)
+        member = Member(hypothesis, shape, group, gain, coefficients, result.degrees + fitted, result.visible)
         worth = member.bic(problem.rows)
         if not best or worth > best[0].bic(problem.rows):
             best[:] = [member]
@@ -93,6 +94,9 @@ def refine(
             return evaluate(tuple(shape))
 
         _search(along, tuple(start[k] for k in free), tuple(bounds[k] for k in free), [scales[k] for k in free], effort)
+        refined = best[0].shape
+        for shape in hypothesis.effect.likely(situation, hypothesis.joint, refined):
+            evaluate(shape, sum(shape[k] == refined[k] for k in free))
     return best[0]
 
 

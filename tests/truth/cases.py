@@ -65,23 +65,18 @@ class Case:
         """RMS of each joint's torque (n,) without noise."""
         return np.sqrt(np.concatenate([r.clean for r in self.logs]).__pow__(2).mean(axis=0))
 
-    def oracle_gain(self, within: Sequence[tuple[float, float]] | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def oracle_gain(self, counted: Sequence[np.ndarray] | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Mean squared errors (n,) on the unseen logs of the base model, and of it with the effects' own torques.
 
-        Both are least squares on the logs, with the motion as it was and each effect's own torque as one column. Rows
-        beside a joint's reversal do not count: from a log nobody knows which sign its friction has there.
+        Both are least squares on the logs, with the motion as it was and each effect's own torque as one column.
 
         Args:
-            within: first and last time [s] of what counts of each unseen log; all of it by default.
+            counted: rows (N, n) of each unseen log that count; by default all but those beside a joint's reversal: from
+                a log nobody knows which sign its friction has there.
         """
         level = self.level()
-        ends = within or [(r.t[0], r.t[-1]) for r in self.unseen]
-        counted = np.concatenate(
-            [
-                (_away_from_reversals(r.v_true) & ((r.t >= first) & (r.t <= last))[:, None])[::EVERY]
-                for r, (first, last) in zip(self.unseen, ends, strict=True)
-            ]
-        )
+        chosen = counted or [_away_from_reversals(r.v_true) for r in self.unseen]
+        counts = np.concatenate([rows[::EVERY] for rows in chosen])
         errors = []
         for columns in (False, True):
             Y, y, parts = self._stack(self.logs, columns)
@@ -91,7 +86,7 @@ class Case:
             Y, y, parts = self._stack(self.unseen, columns)
             if columns:
                 Y = np.concatenate([Y, parts], axis=2)
-            errors.append(((y - Y @ fit) ** 2 * counted).sum(axis=0) / counted.sum(axis=0))
+            errors.append(((y - Y @ fit) ** 2 * counts).sum(axis=0) / counts.sum(axis=0))
         return errors[0], errors[1]
 
     def _stack(self, records: Sequence[Record], parts: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:

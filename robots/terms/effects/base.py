@@ -142,6 +142,13 @@ class Effect(ABC):
         """Gives the range of each shape parameter in which this data allow it to be refined."""
         return tuple((shape.lower, shape.upper) for shape in self.shapes)
 
+    def likely(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+        """Lists shapes near a refined one that machines are built with, such as whole numbers of waves a turn.
+
+        A shape parameter that takes such a value instead of its own is not counted as fitted.
+        """
+        return ()
+
     def acts_on(self, robot: Robot, joint: Place) -> tuple[int, ...]:
         """Lists the joints, counted from 0, whose torque the effect can change: the rows of `columns` not all zero."""
         return tuple(range(robot.n))

@@ -41,6 +41,13 @@ class PositionDependentFriction(StaticJointEffect):
         reach = float(np.ptp(situation.q[:, joint - 1]))
         return tuple((order,) for order in self.shapes[0].grid if order * reach > 1.0)
 
+    def likely(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+        """Gives the nearest whole order, where the joint's range does not tell it from the one found."""
+        assert joint is not None
+        order = max(float(round(shape[0])), 1.0)
+        reach = float(np.ptp(situation.q[:, joint - 1]))
+        return ((order,),) if abs(order - shape[0]) * reach <= np.pi else ()
+
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds sign(dq) cos(h q) and sign(dq) sin(h q)."""
         return casadi.horzcat(at.sign * casadi.cos(at.shape[0] * at.q), at.sign * casadi.sin(at.shape[0] * at.q))

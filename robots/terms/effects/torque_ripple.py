@@ -79,6 +79,16 @@ class TorqueRipple(StaticJointEffect):
         reach = float(np.ptp(situation.q[:, joint - 1]))
         return float(np.clip(2 * np.pi * WAVES / max(reach, 1e-9), self.shapes[0].lower, 0.5 * self.shapes[0].upper))
 
+    def likely(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+        """Lists whole orders up to 12, and those of a known gear, within the resolution of an order."""
+        assert joint is not None
+        spacing = self._resolution(situation, joint)[0]
+        ratio = abs(float(situation.robot.gear_ratio[joint - 1]))
+        built = {float(round(shape[0]))} if shape[0] < 12.5 else set()
+        built |= {h * ratio for h in (1, 2, 4) if ratio > 1}
+        ((low, high),) = self.bounds(situation, joint)
+        return tuple((order,) for order in sorted(built) if abs(order - shape[0]) <= spacing and low <= order <= high)
+
     def _resolution(self, situation: Situation, joint: int) -> tuple[float, float]:
         """Gives the grid's spacing and its highest order; zeros for a joint that does not move."""
         q, speed = situation.q[:, joint - 1], np.abs(situation.dq[:, joint - 1])
