@@ -28,6 +28,7 @@ from estimation.diagnosis.states import Recording, record
 from estimation.diagnosis.verdict import Judgement, judge
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError, NotIdentifiableError
+from robots.common.memory import give_back
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
@@ -114,12 +115,16 @@ def diagnose(
         bar.update(0.85, "limits of what the logs can show")
         limits = find_limits(search.problem, search.entries, false_alarm=false_alarm)
         bar.update(0.93, "gain on unseen data")
+        problem, selection = search.problem, search.selection
+        # The columns of all hypotheses are most of what is kept: the fits to come need room.
+        del search, patterns
+        give_back()
         told = Told(
-            problem=search.problem,
-            selection=search.selection,
+            problem=problem,
+            selection=selection,
             judgement=judgement,
             limits=limits,
-            excess=residual_shares(search.problem),
+            excess=residual_shares(problem),
             logs=tuple(data),
             held_out=tuple(other),
             false_alarm=false_alarm,
@@ -171,6 +176,7 @@ def _search(
                 break
             # Its columns are most of what a diagnosis keeps in memory: they go before others come.
             search = None
+            give_back()
         rng = np.random.default_rng(seed)
         problem = pose(recording, baseline, whitening, draws=DRAWS, rng=rng, extra=extra)
         search = _searched(problem, hypotheses, false_alarm, rng, bar, share)
@@ -192,6 +198,7 @@ def _searched(
     share: float,
 ) -> Search:
     entries = measure(problem, hypotheses, _teller(bar, share, 0.2))
+    give_back()
     advance = _noter(bar, share + 0.25)
     return Search(problem, entries, select(problem, entries, false_alarm=false_alarm, rng=rng, advance=advance))
 

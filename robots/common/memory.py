@@ -1,0 +1,21 @@
+"""Memory that is not needed any more."""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+
+
+def give_back() -> None:
+    """Returns freed memory to the system, where the C library keeps it otherwise (glibc).
+
+    What threads allocate and free in pieces stays in their arenas: after a search, half of what a process holds.
+    """
+    if not sys.platform.startswith("linux"):
+        return
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
+
+
+__all__ = ["give_back"]
