@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.carried import situation_on, unloaded
 from estimation.diagnosis.diagnosis import Diagnosis, Trace
 from estimation.diagnosis.extending import fit_extended
-from estimation.diagnosis.findings import Finding, Gain
+from estimation.diagnosis.findings import Finding
 from estimation.diagnosis.gain import Unseen
 from estimation.diagnosis.hidden_springs import hidden_springs
 from estimation.diagnosis.limits import Limit
@@ -61,7 +61,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     p_values = [*(found.p_value for found in founds), *judgement.p_values]
     seen = _seen(robot, told, members)
     dropped, spoiling = [], []
-    while harmful := [i for i, gain in enumerate(seen.gains) if _harms(gain) and not _elsewhere(told, members[i])]:
+    while harmful := [i for i, member in enumerate(members) if _harms(seen, i) and not _elsewhere(told, member)]:
         # What makes unseen errors larger is no cause, however well it fits: a few rows at the end of a log.
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         member, p_value = members.pop(worst), p_values.pop(worst)
@@ -74,7 +74,8 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         seen = _seen(robot, told, members)
     verdict = judgement.verdict
     if dropped and len(members) == len(founds) and not spoiling:
-        verdict = "none" if not members else "ambiguous" if any(map(is_open, founds)) else "named"
+        # Something did stand out of the noise, if no name holds.
+        verdict = "unexplained" if not members else "ambiguous" if any(map(is_open, founds)) else "named"
     fitted = fit_extended(problem, members, _provenance(told))
     findings = tuple(
         word_finding(
@@ -136,9 +137,9 @@ def _left_out(dropped: Sequence[str], spoiling: Sequence[Member]) -> list[str]:
     return [*(_DROPPED.format(name) for name in dropped), *(_SPOILING.format(joint) for joint in joints)]
 
 
-def _harms(gain: Gain) -> bool:
-    """Whether unseen errors are surely larger with an effect, or larger by so much that it is no gain to have it."""
-    return gain.ci95[1] < 0 or gain.nrmse_after > HARM * gain.nrmse_before
+def _harms(seen: Measured, i: int) -> bool:
+    """Whether unseen errors are surely larger with a member, or larger by so much that it is no gain to have it."""
+    return seen.gains[i].ci95[1] < 0 or seen.rises[i] > HARM
 
 
 def _elsewhere(told: Told, member: Member) -> bool:

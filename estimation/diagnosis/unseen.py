@@ -43,6 +43,7 @@ class Measured:
     Attributes:
         unseen: of all models.
         gains: what each member brings there.
+        rises: by what factor each member changes the error of all joints that it acts on.
         coordinates: on which each member shows there (M,).
         whole: the unseen data, after the logs of the fit where heat may last from them.
         first: row of `whole` at which the unseen data begin.
@@ -53,6 +54,7 @@ class Measured:
 
     unseen: Unseen
     gains: tuple[Gain, ...]
+    rises: tuple[float, ...]
     coordinates: tuple[Array, ...]
     whole: Recording
     first: int
@@ -88,6 +90,7 @@ def measure_unseen(
     return Measured(
         unseen=unseen,
         gains=tuple(_gain(unseen, i, member, rng) for i, member in enumerate(members)),
+        rises=tuple(_rise(unseen, i, member) for i, member in enumerate(members)),
         coordinates=tuple(m.hypothesis.effect.coordinate(now, m.hypothesis.joint, m.shape)[1][there] for m in members),
         whole=whole,
         first=first,
@@ -211,6 +214,12 @@ def _gain(unseen: Unseen, i: int, member: Member, rng: np.random.Generator) -> G
         nrmse_after=float(unseen.nrmse(last)[joints].mean()),
         ci95=(low, high),
     )
+
+
+def _rise(unseen: Unseen, i: int, member: Member) -> float:
+    joints = list(member.group.joints)
+    before, after = (float(np.sum(unseen.nrmse(model)[joints] ** 2)) for model in (i + 1, len(unseen.errors) - 1))
+    return float(np.sqrt(after / max(before, 1e-300)))
 
 
 def _on_logs(
