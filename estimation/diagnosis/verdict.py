@@ -24,7 +24,7 @@ BEYOND = 0.05
 # A pattern is a flexible thing: beside what is named it must be worth its parameters by this much (Schwarz), strong
 # evidence, for formulas are not exact. Where nothing is named it must be no more than sure.
 LEAST = 10.0
-SURE = 1e-4
+SURE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
