@@ -63,3 +63,14 @@ def test_a_joint_that_does_not_move_has_no_order(seen):
     now = seen()
     still = situation(now.model, now.parameters, now.t, 0 * now.q, 0 * now.dq, 0 * now.ddq)
     assert RIPPLE.grid(still, 2) == ()
+
+
+def test_orders_of_a_known_gear_and_whole_ones_are_likely(random_robot, seen):
+    """Near an order that was found, those that a machine is built with are offered, and others are not."""
+    robot = replace(random_robot(3, 4), gear_ratio=np.full(4, 30.5))
+    now = seen(robot=robot)
+    joint = 1 + int(np.argmax(np.ptp(now.q, axis=0)))
+    resolution = np.pi / np.ptp(now.q[:, joint - 1])
+    assert (61.0,) in RIPPLE.likely(now, joint, (61.0 + 0.5 * resolution,))
+    assert RIPPLE.likely(now, joint, (61.0 + 1.5 * resolution,)) == ()
+    assert RIPPLE.likely(now, joint, (45.3,)) == ()
