@@ -30,6 +30,7 @@ from estimation.gate.values import (
     few_rows,
     notes_of_reader,
     once,
+    same_columns,
     too_little,
     too_short,
 )
@@ -84,6 +85,7 @@ def check_log(robot: Robot, log: Log) -> GateReport:
         *notes_of_reader(log),
         *check_clipping(columns),
         *constant_torques(columns),
+        *same_columns(columns),
         *check_motion(robot, columns),
         *check_jumps(log.t, columns, spikes, np.array([first for first, _ in timing.parts[1:]], dtype=np.intp)),
     ]

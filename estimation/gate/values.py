@@ -14,6 +14,8 @@ from robots.signals import Log
 ABSURD_Q, ABSURD_TAU = 1e6, 1e8
 # Parameters of a joint and its link, and rows that each of them deserves.
 PER_JOINT, ROWS_PER_PARAMETER = 14, 10
+# Rows by which most columns are told apart.
+LOOKED_AT = 50
 
 
 def too_little(log: Log, timing: Timing) -> Finding:
@@ -65,6 +67,39 @@ def absurd_values(columns: Columns) -> list[Finding]:
                         row=row + 1,
                     )
                 )
+    return findings
+
+
+def same_columns(columns: Columns) -> list[Finding]:
+    """Tells a column that has the values of another in every row: two joints are never so alike, a copy is."""
+    known = [(f"q{j}", column) for j, column in enumerate(columns.q, start=1)]
+    if columns.signal is not None:
+        known += [(f"{columns.prefix}{j}", column) for j, column in enumerate(columns.signal, start=1)]
+    moving = [(name, column) for name, column in known if column.min() < column.max()]
+    findings = []
+    for i, (name, column) in enumerate(moving):
+        step = max(1, len(column) // LOOKED_AT)
+        twin = next(
+            (
+                other
+                for other, values in moving[:i]
+                if np.array_equal(values[::step], column[::step]) and np.array_equal(values, column)
+            ),
+            None,
+        )
+        if twin is not None:
+            findings.append(
+                Finding(
+                    name="same_column",
+                    severity="warning",
+                    text=f"has the values of {twin} in every row",
+                    action="one was copied over the other: neither joint's parameters are to be trusted",
+                    value=float(len(column)),
+                    unit="rows",
+                    column=name,
+                    joint=int(name.lstrip("qtaui")),
+                )
+            )
     return findings
 
 

@@ -66,7 +66,9 @@ def resample(t: Array, q: Array) -> Resampled:
     period = float(np.mean(steps) if even else np.median(steps))
     grid = t[0] + period * np.arange(int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1)
     if stale.any() or not even:
-        values = PchipInterpolator(kept_t, kept_q)(np.minimum(grid, kept_t[-1]))
+        # Positions that differ by denormal numbers have slopes whose harmonic mean overflows on its way to zero.
+        with np.errstate(over="ignore"):
+            values = PchipInterpolator(kept_t, kept_q)(np.minimum(grid, kept_t[-1]))
     elif len(grid) == len(t) and np.abs(grid - t).max() <= 1e-6 * period:
         values = q
     else:

@@ -85,3 +85,17 @@ def test_quantised_position_and_torque_are_told(good, spoilt):
     report = spoilt(q=np.round(log.q, 1), tau=np.round(log.tau / 5) * 5)
     assert found(report, "quantised_position")[0].value == pytest.approx(0.1)
     assert found(report, "quantised_torque")[0].value == pytest.approx(5.0)
+
+
+def test_a_column_copied_over_another_is_told(good, spoilt):
+    """Two columns that are the same in every row are one that was copied; those that differ in one row are not."""
+    log = good()
+    tau = log.tau.copy()
+    tau[:, 4] = tau[:, 1]
+    report = spoilt(tau=tau)
+    (finding,) = found(report, "same_column")
+    assert (finding.column, finding.joint, finding.severity) == ("tau5", 5, "warning")
+    assert "tau2" in finding.text
+    tau[1234, 4] += 1e-6
+    assert not found(spoilt(tau=tau), "same_column")
+    assert not found(spoilt(tau=log.tau), "same_column")

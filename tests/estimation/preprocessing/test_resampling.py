@@ -106,3 +106,13 @@ def test_too_short_a_log_is_refused():
     t = even(19)
     with pytest.raises(InputError, match="19 rows; allowed: 20 or more"):
         resample(t, wave(t))
+
+
+def test_steps_of_denormal_size_are_no_error():
+    """A position that changes by less than any encoder's step, at uneven times, is interpolated like any other."""
+    rng = np.random.default_rng(0)
+    t = np.cumsum(rng.uniform(0.005, 0.015, 200))
+    q = np.column_stack([np.sin(t), np.cumsum(rng.choice([1e-312, 3e-312], 200))])
+    grid = resample(t, q)
+    assert np.isfinite(grid.q).all()
+    np.testing.assert_allclose(grid.q[:, 1], 0.0, atol=1e-300)
