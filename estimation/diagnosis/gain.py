@@ -18,6 +18,11 @@ Array = NDArray[np.float64]
 
 PARTS = 5
 RESAMPLES = 500
+# Below this fall in error, as a share of it, a fit says nothing of what should be left of it on unseen data.
+WORTH = 0.05
+# A model that errs on unseen rows by so many times its error on seen ones, and by this share of the torque, is not told
+# by the log.
+ASTRAY, FAR = 3.0, 0.1
 BLOCK = 1.0  # [s], and five times the errors' correlation time
 
 
@@ -33,6 +38,7 @@ class Unseen:
         errors: per model the errors (M, n): the base model first, the whole extended model last, and between them the
             extended model less one effect each.
         counts: rows that count (M, n): not those whose direction of motion is unknown.
+        fitted: the errors on the same rows of fits that have seen them; None where no fit has.
     """
 
     how: str
@@ -41,10 +47,32 @@ class Unseen:
     measured: Array
     errors: tuple[Array, ...]
     counts: NDArray[np.bool_]
+    fitted: tuple[Array, ...] | None = None
 
     def nrmse(self, model: int) -> Array:
         """Residual RMS over torque RMS (n,) of one of the models."""
         return self._rms(self.errors[model]) / np.maximum(self._rms(self.measured), 1e-300)
+
+    def kept(self, model: int, joints: Sequence[int]) -> float:
+        """Share of the fall in NRMSE by a model's lacking effect, mean over joints, that is left on unseen data.
+
+        One where nothing is known of fits that have seen the rows, or where they hardly differ.
+        """
+        if self.fitted is None:
+            return 1.0
+        level = np.maximum(self._rms(self.measured), 1e-300)
+        before, after = (float((self._rms(self.fitted[k]) / level)[list(joints)].mean()) for k in (model, -1))
+        if before - after < WORTH * before:
+            return 1.0
+        fall = self.nrmse(model)[list(joints)].mean() - self.nrmse(len(self.errors) - 1)[list(joints)].mean()
+        return float(fall / (before - after))
+
+    def astray(self, joint: int) -> bool:
+        """Whether the extended model errs on unseen rows of a joint, from 0, far more than where it has seen them."""
+        if self.fitted is None:
+            return False
+        unseen, seen = (float(self._rms(errors[-1])[joint]) for errors in (self.errors, self.fitted))
+        return unseen > max(ASTRAY * seen, FAR * float(self._rms(self.measured)[joint]))
 
     def _rms(self, values: Array) -> Array:
         return np.sqrt((values**2 * self.counts).sum(axis=0) / np.maximum(self.counts.sum(axis=0), 1))
@@ -104,15 +132,21 @@ def cross_validated(problem: Problem, effects: Sequence[Array], pull: Pull) -> U
     full = np.concatenate([base, *effects], axis=2)
     weighted = full * weights[:, :, None]
     target = recording.tau * weights
-    grams = [_moments(weighted[fold], target[fold]) for fold in folds]
-    total = (sum(g for g, _ in grams), sum(c for _, c in grams))
-    errors = [np.empty_like(recording.tau) for _ in models(base.shape[2], effects)]
+    grams: list[tuple[Array, Array]] = [_moments(weighted[fold], target[fold]) for fold in folds]
+    total = (np.sum([g for g, _ in grams], axis=0), np.sum([c for _, c in grams], axis=0))
+    chosen_by = models(base.shape[2], effects)
+    errors = [np.empty_like(recording.tau) for _ in chosen_by]
+    fitted = [
+        recording.tau
+        - full[:, :, chosen] @ held(total[0][np.ix_(chosen, chosen)], total[1][chosen], pull.columns(chosen))
+        for chosen in chosen_by
+    ]
     for fold, (gram, cross) in zip(folds, grams, strict=True):
         rest = (total[0] - gram, total[1] - cross)
-        for error, chosen in zip(errors, models(base.shape[2], effects), strict=True):
+        for error, chosen in zip(errors, chosen_by, strict=True):
             values = held(rest[0][np.ix_(chosen, chosen)], rest[1][chosen], pull.columns(chosen))
             error[fold] = recording.tau[fold] - full[fold][:, :, chosen] @ values
-    return Unseen(how, recording.t, recording.step, recording.tau, tuple(errors), ~recording.unsure)
+    return Unseen(how, recording.t, recording.step, recording.tau, tuple(errors), ~recording.unsure, tuple(fitted))
 
 
 def on_held_out(

@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 # Error on unseen data that is worth a word: so many times that of the fit, and more than this share of the torque.
 STRANGE, ODD = 3.0, 0.2
 SHOWN = 4000  # rows of the curves kept for pictures
+LEFT = 0.2  # share of an effect's gain that stretches left out must show
 HARM = 1.05  # times the unseen error: an effect that makes it so much larger is left out, sure or not
 
 
@@ -61,7 +62,9 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     p_values = [*(found.p_value for found in founds), *judgement.p_values]
     seen = _seen(robot, told, members)
     dropped, spoiling = [], []
-    while harmful := [i for i, member in enumerate(members) if _harms(seen, i) and not _elsewhere(told, member)]:
+    while harmful := [
+        i for i, member in enumerate(members) if _harms(seen, i, member) and not _elsewhere(told, member)
+    ]:
         # What makes unseen errors larger is no cause, however well it fits: a few rows at the end of a log.
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         member, p_value = members.pop(worst), p_values.pop(worst)
@@ -98,7 +101,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         )
     unseen = seen.unseen
     twisted = _windups(told, seen)
-    if twisted and verdict == "none":
+    if twisted and not members and not spoiling:
         verdict = "named"
     findings += tuple(windup.finding for windup in twisted)
     known = {extension.joint for extension in fitted.model.extensions if extension.effect == ELASTICITY}
@@ -129,7 +132,7 @@ _SPOILING = (
     "On joint {} something is unexplained, but the free function that shows it errs on unseen data: it is no part of "
     "the extended model."
 )
-_DROPPED = "A fit of {} stood out of the noise, but makes the error on unseen data larger: left out."
+_DROPPED = "A fit of {} stood out of the noise, but does not help on unseen data: left out."
 
 
 def _left_out(dropped: Sequence[str], spoiling: Sequence[Member]) -> list[str]:
@@ -137,8 +140,17 @@ def _left_out(dropped: Sequence[str], spoiling: Sequence[Member]) -> list[str]:
     return [*(_DROPPED.format(name) for name in dropped), *(_SPOILING.format(joint) for joint in joints)]
 
 
-def _harms(seen: Measured, i: int) -> bool:
-    """Whether unseen errors are surely larger with a member, or larger by so much that it is no gain to have it."""
+def _harms(seen: Measured, i: int, member: Member) -> bool:
+    """Whether unseen errors are surely larger with a member, or larger by so much that it is no gain to have it.
+
+    A cause that acts at all times must also leave on stretches left out some of what it does where it was fitted, and
+    of a joint whose base model the logs do not tell nothing can be named.
+    """
+    effect, joint = member.hypothesis.effect, member.hypothesis.joint
+    if effect.depends_on == "state" and seen.kept[i] < LEFT:
+        return True
+    if joint is not None and seen.unseen.astray(joint - 1):
+        return True
     return seen.gains[i].ci95[1] < 0 or seen.rises[i] > HARM
 
 

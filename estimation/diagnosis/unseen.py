@@ -44,6 +44,7 @@ class Measured:
         unseen: of all models.
         gains: what each member brings there.
         rises: by what factor each member changes the error of all joints that it acts on.
+        kept: share of what each member does to the error of the fit that is left there.
         coordinates: on which each member shows there (M,).
         whole: the unseen data, after the logs of the fit where heat may last from them.
         first: row of `whole` at which the unseen data begin.
@@ -55,6 +56,7 @@ class Measured:
     unseen: Unseen
     gains: tuple[Gain, ...]
     rises: tuple[float, ...]
+    kept: tuple[float, ...]
     coordinates: tuple[Array, ...]
     whole: Recording
     first: int
@@ -91,6 +93,7 @@ def measure_unseen(
         unseen=unseen,
         gains=tuple(_gain(unseen, i, member, rng) for i, member in enumerate(members)),
         rises=tuple(_rise(unseen, i, member) for i, member in enumerate(members)),
+        kept=tuple(unseen.kept(i + 1, _joints(member)) for i, member in enumerate(members)),
         coordinates=tuple(m.hypothesis.effect.coordinate(now, m.hypothesis.joint, m.shape)[1][there] for m in members),
         whole=whole,
         first=first,
@@ -205,8 +208,7 @@ def _fits(problem: Problem, measured: Measured, left_out: slice | None) -> tuple
 
 def _gain(unseen: Unseen, i: int, member: Member, rng: np.random.Generator) -> Gain:
     """The fall of the error by one member, on its joint, or over all it acts on."""
-    own = member.hypothesis.joint
-    joints = [own - 1] if own is not None else list(member.group.joints)
+    joints = _joints(member)
     last = len(unseen.errors) - 1
     low, high = unseen.interval(i + 1, last, joints, rng)
     return Gain(
@@ -214,6 +216,12 @@ def _gain(unseen: Unseen, i: int, member: Member, rng: np.random.Generator) -> G
         nrmse_after=float(unseen.nrmse(last)[joints].mean()),
         ci95=(low, high),
     )
+
+
+def _joints(member: Member) -> list[int]:
+    """The joints, counted from 0, on which a member's gain is told."""
+    own = member.hypothesis.joint
+    return [own - 1] if own is not None else list(member.group.joints)
 
 
 def _rise(unseen: Unseen, i: int, member: Member) -> float:

@@ -53,3 +53,28 @@ def test_each_effect_is_left_out_once() -> None:
     """Models compared: the base alone, the whole less each effect, the whole."""
     chosen = models(3, [np.zeros((1, 1, 2)), np.zeros((1, 1, 1))])
     assert [c.tolist() for c in chosen] == [[0, 1, 2], [0, 1, 2, 5], [0, 1, 2, 3, 4], [0, 1, 2, 3, 4, 5]]
+
+
+def _of_sizes(errors: list[float], fitted: list[float] | None) -> Unseen:
+    """Errors of given RMS on one joint whose torque has an RMS of one."""
+    wave = np.sqrt(2) * np.sin(2 * np.pi * np.arange(1000) / 100)[:, None]
+    seen = None if fitted is None else tuple(size * wave for size in fitted)
+    counts = np.ones((1000, 1), dtype=bool)
+    return Unseen("", 0.01 * np.arange(1000), 0.01, wave, tuple(size * wave for size in errors), counts, seen)
+
+
+def test_what_is_kept_of_a_gain_is_its_share_of_the_fit_s() -> None:
+    """A fall of .02 where fits that have seen the rows fall by .05 keeps two fifths; without such fits, all."""
+    errors = [0.30, 0.30, 0.28]
+    assert _of_sizes(errors, [0.20, 0.20, 0.15]).kept(1, [0]) == pytest.approx(0.4)
+    assert _of_sizes(errors, None).kept(1, [0]) == 1.0
+    # A fit that hardly gains says nothing of what should be left.
+    assert _of_sizes(errors, [0.20, 0.20, 0.195]).kept(1, [0]) == 1.0
+
+
+def test_a_model_goes_astray_by_its_error_where_it_was_fitted() -> None:
+    """Four times the error of the fit, and a fifth of the torque, is astray; twice it, or a small error, is not."""
+    assert _of_sizes([0.3, 0.2], [0.06, 0.05]).astray(0)
+    assert not _of_sizes([0.3, 0.1], [0.06, 0.05]).astray(0)
+    assert not _of_sizes([0.3, 0.08], [0.06, 0.01]).astray(0)
+    assert not _of_sizes([0.3, 0.2], None).astray(0)
