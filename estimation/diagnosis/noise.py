@@ -109,15 +109,20 @@ def estimate_whitening(recording: Recording, residual: Array, parameters: int, i
     left = np.where(resting, np.nan, np.abs(plain.all(residual)))
     level = np.array([np.nanmedian(column) if np.isfinite(column).any() else 1.0 for column in left.T]) / 0.6745
     weights = np.minimum(1.0, HUBER * np.maximum(level, 0.1) / np.maximum(left, 1e-12))
-    weights[_pushed(weights < 1.0, recording, stride)] = 1.0
+    weights[_pushed(weights < 1.0, recording, stride, cutoffs)] = 1.0
     return replace(plain, weights=np.where(resting, 0.0, weights))
 
 
-def _pushed(outside: NDArray[np.bool_], recording: Recording, stride: int) -> NDArray[np.bool_]:
-    """Marks white rows (N, n) that stick out together, away from the joint's reversals: a push is an effect."""
-    step = recording.step * stride
-    width, reach = max(3, round(TOGETHER / step)), round(KICKED / recording.step)
-    crowded = uniform_filter1d(outside.astype(float), width, axis=0) >= 0.5
+def _pushed(outside: NDArray[np.bool_], recording: Recording, stride: int, cutoffs: Array) -> NDArray[np.bool_]:
+    """Marks white rows (N, n) that stick out together, away from the joint's reversals: a push is an effect.
+
+    For longer than a kick that the band spreads: three quarters of a wave of its cut-off (n,) [Hz] to either side.
+    """
+    step, reach = recording.step * stride, round(KICKED / recording.step)
+    crowded = np.empty_like(outside)
+    for j, cutoff in enumerate(cutoffs):
+        width = max(3, round(max(TOGETHER, 1.5 / cutoff) / step))
+        crowded[:, j] = uniform_filter1d(outside[:, j].astype(float), width) >= 0.5
     near = [
         maximum_filter1d(recording.unsure[run].astype(np.int8), 2 * reach + 1, axis=0)[::stride]
         for run in recording.runs
