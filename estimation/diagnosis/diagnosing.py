@@ -178,9 +178,14 @@ def _search(
             search = None
             give_back()
         rng = np.random.default_rng(seed)
-        problem = pose(recording, baseline, whitening, draws=DRAWS, rng=rng, extra=extra)
-        search = _searched(problem, hypotheses, false_alarm, rng, bar, share)
-        del problem
+        search = _searched(
+            pose(recording, baseline, whitening, draws=DRAWS, rng=rng, extra=extra),
+            hypotheses,
+            false_alarm,
+            rng,
+            bar,
+            share,
+        )
         if not search.selection.found:
             break
         residual, values, extra = _cleaned(search.problem, baseline, search.selection)

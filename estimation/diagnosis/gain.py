@@ -51,7 +51,7 @@ class Unseen:
 
     def nrmse(self, model: int) -> Array:
         """Residual RMS over torque RMS (n,) of one of the models."""
-        return self._rms(self.errors[model]) / np.maximum(self._rms(self.measured), 1e-300)
+        return self._shares(self.errors[model])
 
     def kept(self, model: int, joints: Sequence[int]) -> float:
         """Share of the fall in NRMSE by a model's lacking effect, mean over joints, that is left on unseen data.
@@ -60,19 +60,22 @@ class Unseen:
         """
         if self.fitted is None:
             return 1.0
-        level = np.maximum(self._rms(self.measured), 1e-300)
-        before, after = (float((self._rms(self.fitted[k]) / level)[list(joints)].mean()) for k in (model, -1))
-        if before - after < WORTH * before:
-            return 1.0
-        fall = self.nrmse(model)[list(joints)].mean() - self.nrmse(len(self.errors) - 1)[list(joints)].mean()
-        return float(fall / (before - after))
+        before, after, *unseen = (
+            float(self._shares(errors[k])[list(joints)].mean())
+            for errors in (self.fitted, self.errors)
+            for k in (model, -1)
+        )
+        return 1.0 if before - after < WORTH * before else (unseen[0] - unseen[1]) / (before - after)
 
     def astray(self, joint: int) -> bool:
         """Whether the extended model errs on unseen rows of a joint, from 0, far more than where it has seen them."""
         if self.fitted is None:
             return False
-        unseen, seen = (float(self._rms(errors[-1])[joint]) for errors in (self.errors, self.fitted))
-        return unseen > max(ASTRAY * seen, FAR * float(self._rms(self.measured)[joint]))
+        unseen, seen = (float(self._shares(errors[-1])[joint]) for errors in (self.errors, self.fitted))
+        return unseen > max(ASTRAY * seen, FAR)
+
+    def _shares(self, errors: Array) -> Array:
+        return self._rms(errors) / np.maximum(self._rms(self.measured), 1e-300)
 
     def _rms(self, values: Array) -> Array:
         return np.sqrt((values**2 * self.counts).sum(axis=0) / np.maximum(self.counts.sum(axis=0), 1))
