@@ -46,9 +46,20 @@ class Member:
     visible: float
 
     def bic(self, rows: int) -> float:
-        """Gain less what its parameters are worth: Schwarz's criterion, larger is better."""
+        """Gain less what its parameters are worth: Schwarz's criterion, larger is better.
+
+        What acts for a moment is told by the rows of that moment: the other ones are not data of its parameters.
+        """
         prior = RARE if self.hypothesis.effect.rare else 0.0
-        return self.gain - self.degrees * float(np.log(rows * len(self.group.joints))) - prior
+        told = self._acting() if self.hypothesis.effect.passing else np.inf
+        return self.gain - self.degrees * float(np.log(min(rows * len(self.group.joints), told))) - prior
+
+    def _acting(self) -> float:
+        """Rows that the columns act on: (sum x^2)^2 / sum x^4, mean over columns, two at least."""
+        whole = np.concatenate(self.group.columns).astype(float) ** 2
+        square, fourth = whole.sum(axis=0), (whole**2).sum(axis=0)
+        counts = square[fourth > 0] ** 2 / fourth[fourth > 0]
+        return max(float(counts.mean()), 2.0) if len(counts) else np.inf
 
     def gain_on(self, joints: Collection[int]) -> float:
         """What of the gain is on some joints, counted from 0, by its torque's energy there."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.borne_out import bear_out
 from estimation.diagnosis.carried import situation_on, unloaded
 from estimation.diagnosis.diagnosis import Diagnosis, Trace
 from estimation.diagnosis.extending import fit_extended
@@ -18,7 +19,6 @@ from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import cut
-from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found, Selection
 from estimation.diagnosis.unseen import Measured, measure_unseen, simulate_unseen
 from estimation.diagnosis.verdict import CLOSE, Judgement, is_open
@@ -35,8 +35,6 @@ Array = NDArray[np.float64]
 # Error on unseen data that is worth a word: so many times that of the fit, and more than this share of the torque.
 STRANGE, ODD = 3.0, 0.2
 SHOWN = 4000  # rows of the curves kept for pictures
-LEFT = 0.2  # share of an effect's gain that stretches left out must show
-HARM = 1.05  # times the unseen error: an effect that makes it so much larger is left out, sure or not
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,26 +55,14 @@ class Told:
 def assemble(robot: Robot, told: Told) -> Diagnosis:
     """Fits the extended model, measures it on unseen data, and puts the findings into words."""
     problem, judgement = told.problem, told.judgement
-    founds = list(judgement.kept)
-    members = [*(found.member for found in founds), *judgement.patterns]
-    p_values = [*(found.p_value for found in founds), *judgement.p_values]
-    seen = _seen(robot, told, members)
-    dropped, spoiling = [], []
-    while harmful := [
-        i for i, member in enumerate(members) if _harms(seen, i, member) and not _elsewhere(told, member)
-    ]:
-        # What makes unseen errors larger is no cause, however well it fits: a few rows at the end of a log.
-        worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
-        member, p_value = members.pop(worst), p_values.pop(worst)
-        if worst < len(founds):
-            founds.pop(worst)
-            dropped.append(member.hypothesis.label)
-        else:
-            # A free function that errs elsewhere is no model; that something is unexplained is as true as before.
-            spoiling.append((member, p_value, seen.gains[worst]))
-        seen = _seen(robot, told, members)
+    held = bear_out(
+        judgement,
+        lambda members: measure_unseen(robot, problem, members, told.held_out, told.seed + 3),
+        bool(told.held_out),
+    )
+    members, founds, seen, spoiling = held.members, held.founds, held.seen, held.spoiling
     verdict = judgement.verdict
-    if dropped and len(members) == len(founds) and not spoiling:
+    if held.notes and len(members) == len(founds) and not spoiling:
         # Something did stand out of the noise, if no name holds.
         verdict = "unexplained" if not members else "ambiguous" if any(map(is_open, founds)) else "named"
     fitted = fit_extended(problem, members, _provenance(told))
@@ -87,7 +73,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
             member,
             fitted,
             i,
-            p_values[i],
+            held.p_values[i],
             founds[i] if i < len(founds) else None,
             seen.gains[i],
         )
@@ -121,46 +107,13 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         next_experiment=_next(problem, founds) if verdict == "ambiguous" else None,
         model=replace(fitted.model, extensions=(*fitted.model.extensions, *added)),
         how_unseen=unseen.how,
-        notes=(*_notes(told, findings, before, after), *_left_out(dropped, [m for m, _, _ in spoiling]), *lost),
+        notes=(*_notes(told, findings, before, after), *held.notes, *lost),
         trace=_trace(unseen, seen.coordinates, twisted),
         simulation=simulation,
     )
 
 
 _LOST = "Simulated forward, the fitted robot ran away from the position loop: its fit suits no simulation."
-_SPOILING = (
-    "On joint {} something is unexplained, but the free function that shows it errs on unseen data: it is no part of "
-    "the extended model."
-)
-_DROPPED = "A fit of {} stood out of the noise, but does not help on unseen data: left out."
-
-
-def _left_out(dropped: Sequence[str], spoiling: Sequence[Member]) -> list[str]:
-    joints = sorted({member.hypothesis.joint or 0 for member in spoiling})
-    return [*(_DROPPED.format(name) for name in dropped), *(_SPOILING.format(joint) for joint in joints)]
-
-
-def _harms(seen: Measured, i: int, member: Member) -> bool:
-    """Whether unseen errors are surely larger with a member, or larger by so much that it is no gain to have it.
-
-    A cause that acts at all times must also leave on stretches left out some of what it does where it was fitted, and
-    of a joint whose base model the logs do not tell nothing can be named.
-    """
-    effect, joint = member.hypothesis.effect, member.hypothesis.joint
-    if effect.depends_on == "state" and seen.kept[i] < LEFT:
-        return True
-    if joint is not None and seen.unseen.astray(joint - 1):
-        return True
-    return seen.gains[i].ci95[1] < 0 or seen.rises[i] > HARM
-
-
-def _elsewhere(told: Told, member: Member) -> bool:
-    """Whether the unseen logs say nothing of an effect that belongs to the logs of the fit: a contact, a drift."""
-    return bool(told.held_out) and member.hypothesis.effect.passing
-
-
-def _seen(robot: Robot, told: Told, members: Sequence[Member]) -> Measured:
-    return measure_unseen(robot, told.problem, members, told.held_out, told.seed + 3)
 
 
 def _windups(told: Told, seen: Measured) -> tuple[Windup, ...]:

@@ -1,0 +1,114 @@
+"""Which of the names that were found unseen data bear out: others are left out, or give way to a rival that is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from estimation.diagnosis.findings import Gain
+from estimation.diagnosis.refinement import Member
+from estimation.diagnosis.selection import Found
+from estimation.diagnosis.unseen import Measured
+from estimation.diagnosis.verdict import CLOSE, Judgement
+
+LEFT = 0.2  # share of an effect's gain that stretches left out must show
+HARM = 1.05  # times the unseen error: an effect that makes it so much larger is left out, sure or not
+
+
+@dataclass(frozen=True, eq=False)
+class BorneOut:
+    """What is left of what was found.
+
+    Attributes:
+        founds: names that hold.
+        members: theirs, and free functions after them.
+        p_values: of the members.
+        seen: what the members bring on unseen data.
+        spoiling: free functions that err on unseen data, with p-value and gain.
+        notes: what was left out, in words.
+    """
+
+    founds: tuple[Found, ...]
+    members: tuple[Member, ...]
+    p_values: tuple[float, ...]
+    seen: Measured
+    spoiling: tuple[tuple[Member, float, Gain], ...]
+    notes: tuple[str, ...]
+
+
+def bear_out(judgement: Judgement, measure: Callable[[Sequence[Member]], Measured], held_out: bool) -> BorneOut:
+    """Leaves out what makes unseen errors larger, one after the other, the surest first.
+
+    However well it fits, it is no cause: a few rows at the end of a log. Where a rival that fits about as well is borne
+    out, the rival takes its place.
+
+    Args:
+        judgement: what was found.
+        measure: measures members on unseen data.
+        held_out: whether those are logs of their own.
+    """
+    founds = list(judgement.kept)
+    members = [*(found.member for found in founds), *judgement.patterns]
+    p_values = [*(found.p_value for found in founds), *judgement.p_values]
+    spoiling: list[tuple[Member, float, Gain]] = []
+    notes: list[str] = []
+    seen = measure(members)
+    while harmful := [i for i, member in enumerate(members) if _harms(seen, i, member, held_out)]:
+        worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
+        label = members[worst].hypothesis.label
+        if worst >= len(founds):
+            # A free function that errs elsewhere is no model; that something is unexplained is as true as before.
+            spoiling.append((members.pop(worst), p_values.pop(worst), seen.gains[worst]))
+        elif instead := _instead(founds[worst], worst, members, measure, held_out):
+            founds[worst] = instead
+            members[worst] = instead.member
+            notes.append(_REPLACED.format(label, instead.member.hypothesis.label))
+        else:
+            for items in (founds, members, p_values):
+                items.pop(worst)
+            notes.append(_DROPPED.format(label))
+        seen = measure(members)
+    joints = sorted({member.hypothesis.joint or 0 for member, _, _ in spoiling})
+    notes += [_SPOILING.format(joint) for joint in joints]
+    return BorneOut(tuple(founds), tuple(members), tuple(p_values), seen, tuple(spoiling), tuple(notes))
+
+
+_DROPPED = "A fit of {} stood out of the noise, but does not help on unseen data: left out."
+_REPLACED = "A fit of {} stood out of the noise, but does not help on unseen data; {}, which fits about as well, does."
+_SPOILING = (
+    "On joint {} something is unexplained, but the free function that shows it errs on unseen data: it is no part of "
+    "the extended model."
+)
+
+
+def _instead(
+    found: Found,
+    place: int,
+    members: Sequence[Member],
+    measure: Callable[[Sequence[Member]], Measured],
+    held_out: bool,
+) -> Found | None:
+    """Finds the closest rival of a name that unseen data bear out where the name was."""
+    close = [(rival, worse) for rival, worse in found.rivals if worse < CLOSE]
+    for k, (rival, worse) in enumerate(close):
+        seen = measure([*members[:place], rival, *members[place + 1 :]])
+        if not _harms(seen, place, rival, held_out) and seen.gains[place].ci95[0] > 0:
+            return Found(rival, found.p_value, tuple((other, more - worse) for other, more in close[k + 1 :]))
+    return None
+
+
+def _harms(seen: Measured, i: int, member: Member, held_out: bool) -> bool:
+    """Whether unseen errors are surely larger with a member, or larger by so much that it is no gain to have it.
+
+    A cause that acts at all times must also leave on stretches left out some of what it does where it was fitted, and
+    of a joint whose base model the logs do not tell nothing can be named. Logs of their own say nothing of an effect
+    that belongs to the logs of the fit: a contact, a drift.
+    """
+    effect, joint = member.hypothesis.effect, member.hypothesis.joint
+    if held_out and effect.passing:
+        return False
+    if effect.depends_on == "state" and seen.kept[i] < LEFT:
+        return True
+    if joint is not None and seen.unseen.astray(joint - 1):
+        return True
+    return seen.gains[i].ci95[1] < 0 or seen.rises[i] > HARM
