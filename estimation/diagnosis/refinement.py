@@ -107,7 +107,7 @@ def refine(
         _search(along, tuple(start[k] for k in free), tuple(bounds[k] for k in free), [scales[k] for k in free], effort)
         refined = best[0].shape
         for shape in hypothesis.effect.likely(situation, hypothesis.joint, refined):
-            evaluate(shape, sum(shape[k] == refined[k] for k in free))
+            evaluate(shape, 0)
     return best[0]
 
 

@@ -99,8 +99,8 @@ def plant_effect(robot: Robot, effect: str, joint: int | None, values: Mapping[s
         robot: the robot.
         effect: a name of `EFFECTS`.
         joint: counted from 1; None for an effect of the whole robot.
-        values: coefficients and shape parameters by name. All shape parameters must be there; a coefficient that is
-            not is zero.
+        values: coefficients and shape parameters by name. All shape parameters without a default must be there; a
+            coefficient that is not is zero.
 
     Raises:
         InputError: an unknown effect or parameter, a joint where the effect cannot act, a value out of range, a
@@ -132,12 +132,12 @@ def plant_effect(robot: Robot, effect: str, joint: int | None, values: Mapping[s
             raise InputError(
                 f"{effect}: {name} is {values[name]} {unit}", column="effects", allowed=f"{lower:g} to {upper:g}"
             )
-    missing = [shape.name for shape in term.shapes if shape.name not in values]
+    missing = [shape.name for shape in term.shapes if shape.name not in values and shape.default is None]
     if missing:
         raise InputError(f"{effect} lacks {missing[0]}", column="effects", remedy=f"state {', '.join(missing)}")
     return PlantEffect(
         effect=effect,
         joint=joint,
         coefficients=tuple(float(values.get(c.name, 0.0)) for c in coefficients),
-        shape=tuple(float(values[s.name]) for s in term.shapes),
+        shape=tuple(float(values.get(s.name, s.default or 0.0)) for s in term.shapes),
     )

@@ -37,6 +37,7 @@ class Shape:
         grid: the values that a scan tries where the data give none (see `Effect.grid`).
         inexact: standard error that the formula itself has, beside that of the data: no change is quite sudden, no push
             has quite that form. In the parameter's unit; a share of the value on a logarithmic scale.
+        default: what it is where a description does not say; None where it must be said.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Shape:
     scale: Literal["log", "linear"] = "log"
     grid: tuple[float, ...] = ()
     inexact: float = 0.0
+    default: float | None = None
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,7 @@ class Effect(ABC):
     def likely(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
         """Lists shapes near a refined one that machines are built with, such as whole numbers of waves a turn.
 
-        A shape parameter that takes such a value instead of its own is not counted as fitted.
+        None of their parameters is counted as fitted.
         """
         return ()
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.base import Coefficient, Place, Situation
+from robots.terms.effects.base import Coefficient, Place, Shape, Situation
 from robots.terms.effects.static import Instant, StaticJointEffect
 
 if TYPE_CHECKING:
@@ -17,34 +17,71 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+PLAIN = (0.0, 0.0)
+
+
+# Lever ratios and dead centres of the scan; a joint that moves less than this [rad] tells none of them.
+RATIOS, CENTRES, TOLD = (0.2, 0.5), tuple(float(x) for x in np.arange(-np.pi, np.pi, np.pi / 4)), 1.0
+LEVER = Shape("lever_ratio", "", 0.0, 0.95, "linear", inexact=0.1, default=0.0)
+CENTRE = Shape("dead_centre", "rad", -1.5 * np.pi, 1.5 * np.pi, "linear", inexact=0.1, default=0.0)
+
 
 class Spring(StaticJointEffect):
-    """tau = c1 x + c2 x^2 + c3 x^3, x the joint's position from the middle of its range.
+    """tau = (p + c1 s + c2 s^2 + c3 s^3) ds/dq, s how far the joint's position q winds the spring up.
 
-    Any lever and any spring make a smooth function of one position; what sin(q) and cos(q) of it resemble gravity is
-    the base model's, and cannot be told from it on a level base.
+    A cable or a torsion spring has s = q - the middle of the joint's range, and p is the offset of the base model. A
+    balancer is fixed to both links, at r a and at a from the joint: s = (L - 1) / r with L = sqrt(1 + r^2 - 2 r cos
+    (q - q0)) the distance of its ends over a, and q0 where they are nearest; its c3 is zero: with the lever's own curve,
+    two orders follow a gas spring. What sin(q) and cos(q) of it resemble gravity is the base model's, and cannot be
+    told from it on a level base.
     """
 
     name: ClassVar[str] = "spring"
     title: ClassVar[str] = "a spring or cable on the joint"
+    shapes: ClassVar[tuple[Shape, ...]] = (LEVER, CENTRE)
     rivals: ClassVar[tuple[str, ...]] = ("base_tilt", "torque_ripple", "asymmetric_friction", "encoder_offset")
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "second_base_pose", "payload")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes stiffness and its two next orders."""
+        """Describes stiffness, its two next orders, and what pulls where s is zero."""
         assert joint is not None
         force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
         return (
             Coefficient("stiffness", f"{force}/{length}"),
             Coefficient("stiffness_2", f"{force}/{length}2"),
             Coefficient("stiffness_3", f"{force}/{length}3"),
+            Coefficient("preload", force),
         )
 
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists a spring without levers, and levers where a joint turns far enough to tell them."""
+        assert joint is not None
+        turns = situation.robot.chain.joints[joint - 1].kind == "revolute"
+        if not turns or np.ptp(situation.q[:, joint - 1]) < TOLD:
+            return (PLAIN,)
+        return (PLAIN, *((ratio, centre) for ratio in RATIOS for centre in CENTRES))
+
+    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
+        """Keeps a spring plain where no lever could be told."""
+        if len(self.grid(situation, joint)) == 1:
+            return ((0.0, 0.0), (0.0, 0.0))
+        return super().bounds(situation, joint)
+
+    def likely(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+        """Gives the spring without levers."""
+        return (PLAIN,)
+
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
-        """Builds x, x^2 and x^3."""
+        """Builds s s', s^2 s', s^3 s' (zero for a lever) and s'."""
         # The offset and the lower orders belong together: any middle spans the same torques, this one conditions well.
         x = at.q - _middle(robot, joint)
-        return casadi.horzcat(x, x**2, x**3)
+        plain = casadi.horzcat(x, x**2, x**3, 1.0)
+        ratio, angle = at.shape[0], at.q - at.shape[1]
+        length = casadi.sqrt(1.0 + ratio**2 - 2.0 * ratio * casadi.cos(angle))
+        s, rate = (ratio - 2.0 * casadi.cos(angle)) / (length + 1.0), casadi.sin(angle) / length
+        lever = casadi.horzcat(s, s**2, 0.0, 1.0) * rate
+        has_lever = casadi.sign(ratio)
+        return has_lever * lever + (1.0 - has_lever) * plain
 
     def describe(
         self,
@@ -56,6 +93,11 @@ class Spring(StaticJointEffect):
         length: str = "rad",
     ) -> str:
         """Says what the values mean."""
+        if shape and shape[0] > 0:
+            return (
+                f"A spring between two levers of ratio {shape[0]:.2g} acts on joint {joint}; its ends are nearest at "
+                f"{np.remainder(shape[1] + np.pi, 2 * np.pi) - np.pi:.3g} {length}."
+            )
         return (
             f"A spring or cable acts on joint {joint}: {coefficients[0]:.3g} {force}/{length} at the middle of its "
             f"range, and not linear ({coefficients[1]:.3g} {force}/{length}2, {coefficients[2]:.3g} {force}/{length}3)."

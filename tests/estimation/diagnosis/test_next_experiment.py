@@ -149,7 +149,7 @@ def test_the_experiment_starts_from_the_arm_itself(problem):
 
 def test_a_tilted_base_counts_with_the_parameters_that_it_shows(problem):
     """The first joint's first moments, which level logs leave open, take what they can of a cause."""
-    causes = [_guess(problem, "spring", 1, (), 0.02), _guess(problem, "torque_constant_error", 1, (), 0.02)]
+    causes = [_guess(problem, "spring", 1, (0.0, 0.0), 0.02), _guess(problem, "torque_constant_error", 1, (), 0.02)]
     grams = Grams(problem, causes)
     names = {column.name for column in grams.base.columns} - {c.name for c in problem.baseline.base.columns}
     assert names == {"mPx_1", "mPy_1"}
@@ -164,7 +164,7 @@ def test_a_base_that_stands_otherwise_stays_there(problem):
     """Without a pose of its own an experiment is made where the last log was; a second pose tilts from there."""
     wall = np.array([-9.81, 0.0, 0.0])
     stands = replace(problem, recording=replace(problem.recording, fields=(wall,)))
-    causes = [_guess(problem, "stribeck", 4, (0.05, 1.0), 0.02), _guess(problem, "spring", 4, (), 0.02)]
+    causes = [_guess(problem, "stribeck", 4, (0.05, 1.0), 0.02), _guess(problem, "spring", 4, (0.0, 0.0), 0.02)]
     room = room_of(problem.situation.robot, problem.recording)
     (stage,) = MAKERS["repeat"](room, 3, 0)
     grams = Grams(stands, causes)

@@ -20,7 +20,7 @@ from robots.regressor import default_model
 from robots.robot import Robot
 
 WIDTH = 0.02
-SPRING = PlantEffect(effect="spring", joint=2, coefficients=(40.0, 15.0, -8.0), shape=())
+SPRING = PlantEffect(effect="spring", joint=2, coefficients=(40.0, 15.0, -8.0, 0.0), shape=(0.0, 0.0))
 STRIBECK = PlantEffect(effect="stribeck", joint=2, coefficients=(12.0,), shape=(0.2, 2.0))
 LOADED = PlantEffect(effect="load_dependent_friction", joint=3, coefficients=(0.1, 0.05), shape=())
 HEAT = PlantEffect(effect="thermal_friction", joint=1, coefficients=(5.0, 1.0), shape=(100.0,))
@@ -123,7 +123,7 @@ def test_the_motion_keeps_the_limit_with_the_spring(tight: Robot, tmp_path) -> N
 
 def test_without_limits_nothing_is_claimed_to_count(make_robot) -> None:
     """A robot without torque limits or dynamics: the summary says that the spring could not be counted."""
-    spring = PlantEffect(effect="spring", joint=1, coefficients=(1.0, 0.0, 0.0), shape=())
+    spring = PlantEffect(effect="spring", joint=1, coefficients=(1.0, 0.0, 0.0, 0.0), shape=(0.0, 0.0))
     result = made_plain(make_robot("RR", "plain"), spring)
     assert "NOT counted within the torque limits, for torque limits or dynamics are not described" in result.summary()
 

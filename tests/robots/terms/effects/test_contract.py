@@ -85,8 +85,11 @@ def test_columns_fit_the_parameters(effect, seen):
         X = effect.columns(now, joint, point)
         assert X.shape == (len(now), now.robot.n, len(parameters))
         assert np.isfinite(X).all()
+        size = np.abs(X).max(axis=(0, 1))
+        if effect.name == "spring" and point[0] > 0:  # with a lever, its third order is no column
+            size = np.delete(size, 2)
         if effect.name != "torque_sensor_drift":  # of which a straight line is one column of eight
-            assert np.abs(X).max(axis=(0, 1)).min() > 0
+            assert size.min() > 0
         others = sorted(set(range(now.robot.n)) - set(effect.acts_on(now.robot, joint)))
         assert not X[:, others].any()
         assert len({p.name for p in parameters} | {s.name for s in effect.shapes}) == len(point) + len(parameters)

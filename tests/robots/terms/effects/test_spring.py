@@ -1,0 +1,60 @@
+"""A spring between two pivots: its torque is the slope of its energy, whatever the formula says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from robots.terms.effects import EFFECTS, situation
+
+SPRING = EFFECTS["spring"]
+
+
+def _distance(q, near, far, centre):
+    """Distance of two pivots at `near` and `far` [m] from the joint, by their places in the plane."""
+    moving = near * np.column_stack([np.cos(q - centre), np.sin(q - centre)])
+    return np.linalg.norm(moving - [far, 0.0], axis=1)
+
+
+@pytest.mark.parametrize(("near", "far", "centre"), [(0.1, 0.4, 0.5), (0.25, 0.3, -2.0)])
+def test_a_lever_spring_pushes_as_its_energy_falls(seen, near, far, centre):
+    """A linear spring with slack between two pivots is `preload` and `stiffness` at their ratio: by differences."""
+    now = seen(2, seed=2)
+    joint, stiffness, slack = 1, 900.0, 0.7 * (far - near)
+    q = now.q[:, joint - 1]
+
+    def energy(x):
+        return 0.5 * stiffness * (_distance(x, near, far, centre) - slack) ** 2
+
+    h = 1e-5
+    expected = (energy(q + h) - energy(q - h)) / (2 * h)
+    ratio = near / far
+    X = SPRING.columns(now, joint, (ratio, centre))[:, joint - 1]
+    # s = (L - 1) / r with L the distance over `far`: k (far L - slack) far dL/dq = k far^2 r (r s + 1 - slack / far) s'.
+    scale = stiffness * far**2 * ratio
+    got = X @ [scale * ratio, 0.0, 0.0, scale * (1 - slack / far)]
+    assert got == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
+
+
+def test_a_spring_without_levers_is_a_polynomial(seen):
+    """Its columns are powers of the position from the middle of the joint's range, and the offset."""
+    now = seen(2, seed=2)
+    limits = now.robot.limits
+    x = now.q[:, 1] - (limits.lower[1] + limits.upper[1]) / 2
+    X = SPRING.columns(now, 2, (0.0, 0.0))[:, 1]
+    assert X == pytest.approx(np.column_stack([x, x**2, x**3, np.ones(len(x))]))
+
+
+def test_a_joint_that_hardly_turns_tells_no_lever(seen):
+    """Over less than a radian a plain spring is all that is tried; over more, levers too."""
+    now = seen(2, seed=2)
+    joint = 1
+
+    def over(reach):
+        factor = reach / np.ptp(now.q[:, joint - 1])
+        motion = (factor * now.q, factor * now.dq, factor * now.ddq)
+        return situation(now.model, now.model.nominal, now.t, *motion)
+
+    assert len(SPRING.grid(over(2.0), joint)) > 1
+    assert SPRING.grid(over(0.8), joint) == ((0.0, 0.0),)
+    assert SPRING.bounds(over(0.8), joint) == ((0.0, 0.0), (0.0, 0.0))
