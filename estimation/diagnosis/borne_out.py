@@ -69,15 +69,15 @@ def bear_out(judgement: Judgement, measure: Callable[[Sequence[Member]], Measure
             notes.append(_DROPPED.format(label))
         seen = measure(members)
     joints = sorted({member.hypothesis.joint or 0 for member, _, _ in spoiling})
-    notes += [_SPOILING.format(joint) for joint in joints]
+    notes += [_SPOILING.format(f"joint {joint}" if joint else "the robot as a whole") for joint in joints]
     return BorneOut(tuple(founds), tuple(members), tuple(p_values), seen, tuple(spoiling), tuple(notes))
 
 
 _DROPPED = "A fit of {} stood out of the noise, but does not help on unseen data: left out."
 _REPLACED = "A fit of {} stood out of the noise, but does not help on unseen data; {}, which fits about as well, does."
 _SPOILING = (
-    "On joint {} something is unexplained, but the free function that shows it errs on unseen data: it is no part of "
-    "the extended model."
+    "On {} something is unexplained, but the free function that shows it errs on unseen data: it is no part of the "
+    "extended model."
 )
 
 

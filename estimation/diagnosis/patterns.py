@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from estimation.diagnosis.swinging import Swinging
 from robots.robot import Robot
 from robots.terms.effects import Coefficient, JointEffect, Shape, Situation
 
@@ -122,16 +123,18 @@ class Pattern(JointEffect):
         return f"The residual torque {where} {text}{turn}."
 
 
-def build_pattern(text: str) -> Pattern | None:
+def build_pattern(text: str) -> Pattern | Swinging | None:
     """Reads the name of a pattern; None for anything else."""
+    if text == Swinging.name:
+        return Swinging()
     parts = text.removeprefix(PREFIX).split(":")
     if not text.startswith(PREFIX) or len(parts) != 3 or parts[0] not in _FAMILIES or not parts[1].isdigit():
         return None
     return Pattern(parts[0], int(parts[1]), parts[2] == "odd")
 
 
-def all_patterns(robot: Robot) -> tuple[Pattern, ...]:
-    """Lists the patterns to look for on every joint."""
+def all_patterns(robot: Robot) -> tuple[Pattern | Swinging, ...]:
+    """Lists the patterns to look for on every joint, and on the robot as a whole."""
     joints = range(1, robot.n + 1)
     own = [Pattern("speed"), Pattern("speed", odd=True), Pattern("load"), Pattern("load", odd=True)]
     own += [Pattern("memory"), Pattern("time"), Pattern("time", odd=True)]
@@ -139,7 +142,7 @@ def all_patterns(robot: Robot) -> tuple[Pattern, ...]:
     each = [Pattern("angle", k, odd) for k in joints for odd in (False, True)]
     each += [Pattern("angles", k) for k in joints] if robot.n > 1 else []
     each += [Pattern("motion", k) for k in joints] if robot.n > 1 else []
-    return (*own, *each)
+    return (*own, *each, Swinging())
 
 
 def _angle(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:

@@ -20,8 +20,10 @@ Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
 # A column must have this share of its energy in rows whose direction of motion is known: what leaks from the others is
-# mostly the error of the motion there.
-COUNTED = 0.02
+# mostly the error of the motion there. One that is far larger in those (a late torque, at reversals) must owe this
+# share of what counts to the known ones.
+COUNTED, KNOWN = 0.02, 0.5
+FAINT = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +116,10 @@ class Problem:
         P = self.whitening.precision
         power = [sum(P[j, j] * _squares(part) for j, part in zip(joints, kind, strict=True)) for kind in (white, whole)]
         raw = np.where(power[0] > COUNTED * power[1], power[0], np.inf)
+        doubtful = np.flatnonzero(np.isinf(raw) & (power[0] > FAINT * power[1]))
+        if len(doubtful):
+            known = self._known(joints, [part[:, doubtful] for part in columns])
+            raw[doubtful] = np.where(known > KNOWN * power[0][doubtful], power[0][doubtful], np.inf)
         against, cross = np.zeros((total, self.mixed.shape[2])), np.zeros(total)
         gram = np.zeros((count, k, k))
         split = [part.T.reshape(count, k, -1) for part in white]
@@ -136,6 +142,14 @@ class Problem:
             )
             for i, own in enumerate(slice(i * k, (i + 1) * k) for i in range(count))
         ]
+
+    def _known(self, joints: tuple[int, ...], columns: Sequence[Array]) -> Array:
+        """Energy (k,) of whitened columns (N, k) of some joints that is not from rows of unknown direction."""
+        unsure = self.recording.unsure
+        apart = [self.whitening.apply(X * ~unsure[:, j, None], j) for j, X in zip(joints, columns, strict=True)]
+        return np.asarray(
+            sum(self.whitening.precision[j, j] * _squares(part) for j, part in zip(joints, apart, strict=True))
+        )
 
     def null_cross(self, group: Group) -> Array:
         """Products (k, draws) of a group with noise that the base model was fitted to."""

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 EFFORT = 20
 # First step of the search: a factor of a logarithmic parameter, a share of the range of another.
 FACTOR, SHARE = 1.5, 0.04
+# An effect acts where its torque is more than this share of its largest.
+ACTS = 0.02
 # Twice the log of the odds against an effect that robots seldom have.
 RARE = 6.0
 
@@ -66,6 +68,14 @@ class Member:
         energies = [float(np.sum((X @ self.coefficients) ** 2)) for X in self.group.columns]
         there = sum(e for j, e in zip(self.group.joints, energies, strict=True) if j in joints)
         return self.gain * there / max(sum(energies), 1e-300)
+
+    def share_beside(self, other: Member, joint: int) -> float:
+        """Share of this torque's energy on a joint, from 0, in the rows in which another's acts there."""
+        if joint not in self.group.joints or joint not in other.group.joints:
+            return 0.0
+        own, size = (np.abs(m.group.columns[m.group.joints.index(joint)] @ m.coefficients) for m in (self, other))
+        acts = size > ACTS * size.max(initial=0.0)
+        return float(np.sum(own[acts] ** 2) / max(np.sum(own**2), 1e-300))
 
 
 def refine(

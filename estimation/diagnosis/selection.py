@@ -127,7 +127,8 @@ def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> b
     able = [
         j
         for j in candidate.group.joints
-        if candidate.gain_on([j]) >= BEYOND * max((m.gain_on([j]) for m in members), default=0.0)
+        if candidate.gain_on([j])
+        >= BEYOND * max((m.gain_on([j]) * candidate.share_beside(m, j) for m in members), default=0.0)
     ]
     lost = candidate.gain - candidate.gain_on(able)
     return not members or candidate.bic(problem.rows) - lost > LEAST

@@ -67,7 +67,9 @@ def judge(
         kept = tuple(found for found in kept if found.member.hypothesis.joint is not None)
     joints = {found.member.hypothesis.joint for found in kept} - {None}
     lost = {j for j in joints if not _holds(problem, j, named, patterns, left, false_alarm, rng)}
-    kept = tuple(found for found in kept if found.member.hypothesis.joint not in lost)
+    # What acts on all joints at once goes before names of single joints that explain less than it does.
+    wide = max((_worth(m) for m in left if m.hypothesis.joint is None), default=0.0) if share < ENOUGH else 0.0
+    kept = tuple(f for f in kept if f.member.hypothesis.joint not in lost and f.member.gain > wide)
     members = left if share < ENOUGH else []
     while len(kept) < len(named):
         # Names that do not fit would only distort the patterns: those start anew, beside the names that hold.

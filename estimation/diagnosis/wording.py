@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.extending import Fitted
 from estimation.diagnosis.findings import Finding, Gain, Parameter
-from estimation.diagnosis.patterns import Pattern
+from estimation.diagnosis.patterns import PREFIX
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found
@@ -44,7 +44,7 @@ def word_finding(
     if joint is not None:
         units = {"force": force_unit(robot, joint - 1), "length": length_unit(robot, joint - 1)}
     sentence = hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units)
-    pattern = hypothesis.name if isinstance(hypothesis.effect, Pattern) else ""
+    pattern = hypothesis.name if hypothesis.name.startswith(PREFIX) else ""
     rivals = [] if found is None else [(rival.hypothesis, worse) for rival, worse in found.rivals]
     return Finding(
         effect="unexplained" if pattern else hypothesis.name,

@@ -37,6 +37,7 @@ class Hide:
     joint: int | None = None
     periodic: bool = True
     ratio: float = 0.7  # of the true effect's gain
+    duration: float = 40.0  # [s]
 
     @property
     def name(self) -> str:
@@ -44,7 +45,7 @@ class Hide:
         return "+".join(effect.__name__ for effect in self.effects) or "nothing"
 
     def draw(self) -> Case:
-        """Draws its logs: 40 s, and 20 s of another motion where something is hidden."""
+        """Draws its logs: one of the duration, and half of it of another motion where something is hidden."""
         return draw_case(
             self.seed,
             hide=self.effects,
@@ -52,8 +53,8 @@ class Hide:
             kind=self.kind,
             joint=self.joint,
             periodic=self.periodic,
-            duration=40.0,
-            unseen=20.0 if self.effects else 0.0,
+            duration=self.duration,
+            unseen=self.duration / 2 if self.effects else 0.0,
         )
 
 
@@ -65,6 +66,7 @@ SINGLE = (
 )
 PAIRS = (Hide(seed=7011, effects=(friction.PositionDependent, surroundings.Payload), joint=1),)
 STRANGE = (Hide(seed=7021, effects=(strangers.CrossWave,), joint=2, size=0.05),)
+SWINGING = Hide(seed=7041, effects=(strangers.Slosh,), size=0.01, duration=60.0)
 MORE = (
     Hide(seed=7004, effects=(surroundings.Payload,), kind="heavy"),
     Hide(seed=7033, kind="ur10"),
@@ -141,6 +143,22 @@ def test_what_no_catalogue_has_is_not_named(hide: Hide) -> None:
     """An effect outside the catalogue is ``unexplained``, and its extension brings half of the possible gain."""
     truth, said = examined(hide)
     assert complaints(truth, said, ratio=0.5) == []
+
+
+def test_what_swings_at_the_flange_is_told_with_its_frequency() -> None:
+    """Liquid in a tank is ``unexplained`` on the whole robot, told by its frequency, and mends unseen data."""
+    truth, said = examined(SWINGING)
+    (hidden,) = truth.effects
+    assert isinstance(hidden, strangers.Slosh)
+    assert said["verdict"] == "unexplained"
+    (finding,) = said["findings"]
+    assert (finding["effect"], finding["joint"]) == ("unexplained", None)
+    assert finding["pattern"] == "pattern:swinging:0:even"
+    told = {parameter["name"]: parameter["value"] for parameter in finding["parameters"]}
+    assert told["frequency"] == pytest.approx(hidden.frequency, rel=0.1)
+    assert told["mass_level"] > 0
+    assert finding["gain"]["ci95"][0] > 0
+    assert "swings at" in finding["sentence"]
 
 
 def test_swapped_labels_break_the_score() -> None:

@@ -27,8 +27,8 @@ class CurrentLag(JointEffect):
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "micro_reversals")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the lag; more than 50 ms is no drive's."""
-        return (Coefficient("lag", "s", -0.05, 0.05),)
+        """Describes the lag: a filter has no other sign, and more than 50 ms is no drive's."""
+        return (Coefficient("lag", "s", 0.0, 0.05),)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the change of the joint's torque per delay."""

@@ -31,7 +31,7 @@ class Spring(StaticJointEffect):
 
     A cable or a torsion spring has s = q - the middle of the joint's range, and p is the offset of the base model. A
     balancer is fixed to both links, at r a and at a from the joint: s = (L - 1) / r with L = sqrt(1 + r^2 - 2 r cos
-    (q - q0)) the distance of its ends over a, and q0 where they are nearest; its c3 is zero: with the lever's own curve,
+    (q - q0)) the distance of its ends over a, and q0 where they are nearest; its c3 is zero: the lever's own curve and
     two orders follow a gas spring. What sin(q) and cos(q) of it resemble gravity is the base model's, and cannot be
     told from it on a level base.
     """

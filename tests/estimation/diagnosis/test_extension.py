@@ -7,6 +7,7 @@ import pytest
 
 from estimation.diagnosis.extension import Extension, find_effect, read_extension
 from estimation.diagnosis.patterns import all_patterns, build_pattern
+from estimation.diagnosis.swinging import Swinging
 from robots.common.errors import InputError
 from robots.regressor import default_model
 from robots.robot import Robot
@@ -25,7 +26,8 @@ def state(arm: Robot) -> Situation:
 
 def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(arm: Robot, state: Situation) -> None:
     """A pattern in a model file is the pattern that was found; all its values are finite."""
-    for pattern in all_patterns(arm):
+    *own, swinging = all_patterns(arm)
+    for pattern in own:
         assert build_pattern(pattern.name) == pattern
         for shape in pattern.grid(state, 1)[:2]:
             X = pattern.columns(state, 1, shape)
@@ -33,6 +35,17 @@ def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(
             assert np.isfinite(X).all()
             assert not X[:, 1].any()
         assert pattern.describe(1, np.zeros(1), pattern.grid(state, 1)[0]).startswith("The residual torque of joint 1")
+    assert type(build_pattern(swinging.name)) is type(swinging) is Swinging
+    assert swinging.joints(arm) == (None,)
+    for shape in swinging.grid(state, None)[:2]:
+        X = swinging.columns(state, None, shape)
+        assert X.shape == (300, 2, len(swinging.parameters(arm, None)))
+        assert np.isfinite(X).all()
+        # The flange is on the elbow's axis: it moves, but no force on it turns the elbow.
+        assert X[:, 0].any(axis=0).all()
+        assert not X[:, 1].any()
+    text = swinging.describe(None, np.zeros(4), swinging.grid(state, None)[0])
+    assert text.startswith("The residual torque of all joints")
 
 
 def test_an_odd_pattern_turns_round_with_the_motion(arm: Robot, state: Situation) -> None:

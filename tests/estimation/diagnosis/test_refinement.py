@@ -1,0 +1,70 @@
+"""Specification of what parameters cost: Schwarz's criterion, by the rows that tell them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.problem import Group
+from estimation.diagnosis.refinement import RARE, Member
+from robots.terms.effects import EFFECTS
+
+ROWS, ACTING = 5000, 40
+GAIN, DEGREES = 300.0, 3
+
+
+def _member(name: str, joint: int | None, columns: tuple[np.ndarray, ...]) -> Member:
+    k = columns[0].shape[1]
+    small = tuple(part.astype(np.float32) for part in columns)
+    group = Group(tuple(range(len(columns))), small, np.zeros((k, 1)), np.eye(k), np.ones(k), np.ones(k))
+    return Member(Hypothesis(EFFECTS[name], joint), (), group, GAIN, np.ones(k), DEGREES, 1.0)
+
+
+def _boxes(size: float = 1.0) -> tuple[np.ndarray, ...]:
+    """A column of `ACTING` equal rows on each of two joints, as a push of both has."""
+    columns = np.zeros((2, ROWS, 2))
+    for j in range(2):
+        columns[j, 100 : 100 + ACTING, j] = size
+    return tuple(columns)
+
+
+def _price(member: Member) -> float:
+    """What a degree of freedom costs."""
+    return (GAIN - member.bic(ROWS)) / DEGREES
+
+
+@pytest.mark.parametrize("size", [1.0, 0.02, 300.0])
+def test_a_contact_is_paid_for_by_the_rows_it_acts_on(size: float) -> None:
+    """A box of m rows among N costs log m a degree, whatever its height."""
+    assert _price(_member("external_contact", None, _boxes(size))) == pytest.approx(np.log(ACTING), rel=1e-6)
+
+
+def test_a_lasting_effect_is_paid_for_by_all_rows_of_its_joints() -> None:
+    """The same box as a function of the state costs log(N joints): where it is zero the data say so."""
+    assert _price(_member("base_tilt", None, _boxes())) == pytest.approx(np.log(2 * ROWS))
+    assert _price(_member("spring", 1, _boxes()[:1])) == pytest.approx(np.log(ROWS))
+
+
+def test_a_passing_effect_that_acts_at_all_times_costs_no_more_than_a_lasting_one() -> None:
+    """Columns of one size throughout, on both joints, count each row of each joint once; columns of zeros as well."""
+    for value in (1.0, 0.0):
+        columns = np.full((2, ROWS, 1), value)
+        assert _price(_member("external_contact", None, tuple(columns))) == pytest.approx(np.log(2 * ROWS))
+
+
+def test_columns_of_different_length_cost_their_mean_and_two_rows_at_least() -> None:
+    """Of 20 and 60 rows the mean is 40; a spike is two rows, for what one row tells would cost nothing."""
+    columns = np.zeros((1, ROWS, 2))
+    columns[0, :20, 0] = columns[0, 200:260, 1] = 1.0
+    assert _price(_member("external_contact", None, tuple(columns))) == pytest.approx(np.log(40))
+    spike = np.zeros((1, ROWS, 1))
+    spike[0, 7] = 1.0
+    assert _price(_member("external_contact", None, tuple(spike))) == pytest.approx(np.log(2))
+
+
+def test_a_rare_effect_has_to_explain_more() -> None:
+    """Its odds are paid for beside its parameters."""
+    columns = _boxes()[:1]
+    difference = _member("stribeck", 1, columns).bic(ROWS) - _member("load_stribeck", 1, columns).bic(ROWS)
+    assert difference == pytest.approx(RARE)
