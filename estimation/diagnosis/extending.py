@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.regularisation import held, row_weight
-from estimation.diagnosis.scoring import accept, score
+from estimation.diagnosis.scoring import Accepted, accept, score
 from estimation.diagnosis.shrinkage import pull_on
 from estimation.identification import NEGLIGIBLE, RELATIVE
 from estimation.model import Model
@@ -25,6 +26,10 @@ Array = NDArray[np.float64]
 DROP = 2.0
 # A drop that stays below this all the way to the bound leaves the parameter open.
 OPEN = 3.84
+# Moments are tried at so many standard errors, and may be where the profile drops by less than this: the largest
+# drop at the true moment of a change is sup of a Brownian motion with drift on both sides, (1 - exp(-x / 2))^2 = .95.
+FAR = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 13.0, 20.0)
+CHANGED = 7.4
 FAINT = 1e-7
 
 
@@ -133,7 +138,7 @@ def dense(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) ->
     return X
 
 
-def _steps(problem: Problem, member: Member, others: object) -> list[float]:
+def _steps(problem: Problem, member: Member, others: Accepted) -> list[float]:
     """Finds each shape parameter's standard error by its profile; infinite where the likelihood hardly drops."""
     situation = problem.situation
     bounds = member.hypothesis.effect.bounds(situation, member.hypothesis.joint)
@@ -163,8 +168,25 @@ def _steps(problem: Problem, member: Member, others: object) -> list[float]:
                 break
             else:
                 step *= 2.0
+        if shape.unit == "s" and shape.scale == "linear" and np.isfinite(found):
+            profile = partial(_drop, problem, member, k, others, best)
+            found = max(found, _reach(profile, value, found, (low, high)) / 1.96)
         steps.append(found if found <= (abs(value) if shape.scale == "log" else 0.3 * room) else np.inf)
     return steps
+
+
+def _drop(problem: Problem, member: Member, k: int, others: Accepted, best: float, value: float) -> float:
+    """How much less is explained with another value of a shape parameter."""
+    return best - _gain(problem, member, _moved(member.shape, k, value), others)
+
+
+def _reach(drop: Callable[[float], float], value: float, step: float, bounds: tuple[float, float]) -> float:
+    """The farthest of some points at which the moment of a change may be, by the likelihood; zero for none.
+
+    Its profile is a random walk with a drift, not a parabola, and may have a second summit.
+    """
+    near = [x for m in FAR for x in (value - m * step, value + m * step) if bounds[0] <= x <= bounds[1]]
+    return max((abs(x - value) for x in near if drop(x) < CHANGED), default=0.0)
 
 
 def _inexact(member: Member) -> Array:
@@ -173,9 +195,9 @@ def _inexact(member: Member) -> Array:
     return np.array([s.inexact * (abs(value) if s.scale == "log" else 1.0) for s, value in described])
 
 
-def _gain(problem: Problem, member: Member, shape: tuple[float, ...], others: object) -> float:
+def _gain(problem: Problem, member: Member, shape: tuple[float, ...], others: Accepted) -> float:
     joints, columns = problem.columns_of(member.hypothesis, shape)
-    return score(problem, problem.group(joints, columns), others).gain  # type: ignore[arg-type]
+    return score(problem, problem.group(joints, columns), others).gain
 
 
 def _moved(shape: tuple[float, ...], k: int, value: float) -> tuple[float, ...]:

@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 # Evaluations a shape parameter.
 EFFORT = 20
+# Points of each look for a moment; and a step of the search from there, as a share of the first.
+ZOOMS, AGAIN = (21, 11, 11), 0.1
 # First step of the search: a factor of a logarithmic parameter, a share of the range of another.
 FACTOR, SHARE = 1.5, 0.04
 # An effect acts where its torque is more than this share of its largest.
@@ -92,6 +94,7 @@ def refine(
     bounds = hypothesis.effect.bounds(situation, hypothesis.joint)
     scales = [shape.scale for shape in hypothesis.effect.shapes]
     free = [k for k, (low, high) in enumerate(bounds) if high > low]
+    moments = [shape.unit == "s" and shape.lower == -np.inf for shape in hypothesis.effect.shapes]
     best: list[Member] = []
 
     def evaluate(shape: tuple[float, ...], fitted: int = len(free)) -> float:
@@ -107,18 +110,45 @@ def refine(
 
     evaluate(start)
     if free and effort:
+        at = list(start)
+        steps = {k: _spacing(hypothesis.effect.grid(situation, hypothesis.joint), k, start) for k in free if moments[k]}
 
         def along(values: tuple[float, ...]) -> float:
-            shape = list(start)
             for k, value in zip(free, values, strict=True):
-                shape[k] = value
-            return evaluate(tuple(shape))
+                at[k] = value
+            return evaluate(tuple(at))
 
-        _search(along, tuple(start[k] for k in free), tuple(bounds[k] for k in free), [scales[k] for k in free], effort)
+        for k, step in steps.items():
+            _zoom(lambda value, k=k: evaluate((*at[:k], value, *at[k + 1 :])), at[k], step, bounds[k])  # type: ignore[misc]
+            at[:] = best[0].shape
+        if len(steps) < len(free):
+            _search(
+                along,
+                tuple(at[k] for k in free),
+                tuple(bounds[k] for k in free),
+                [scales[k] for k in free],
+                effort,
+                [AGAIN * steps[k] if k in steps else None for k in free],
+            )
         refined = best[0].shape
         for shape in hypothesis.effect.likely(situation, hypothesis.joint, refined):
             evaluate(shape, 0)
     return best[0]
+
+
+def _spacing(grid: Sequence[tuple[float, ...]], k: int, start: tuple[float, ...]) -> float:
+    """Gives the larger distance of a point's moment to its neighbours on the grid, others alike."""
+    near = [abs(point[k] - start[k]) for point in grid if point[:k] + point[k + 1 :] == start[:k] + start[k + 1 :]]
+    near = sorted(distance for distance in near if distance > 0)
+    return near[min(1, len(near) - 1)] if near else 1.0
+
+
+def _zoom(evaluate: Callable[[float], float], start: float, width: float, bounds: tuple[float, float]) -> None:
+    """Looks for a moment on points that get closer and closer: no method that climbs finds the top of a random walk."""
+    for count in ZOOMS:
+        points = np.clip(start + width * np.linspace(-1.2, 1.2, count), *bounds)
+        worth = [evaluate(float(point)) for point in points]
+        start, width = float(points[int(np.argmax(worth))]), 2.4 * width / (count - 1)
 
 
 def _search(
@@ -127,8 +157,9 @@ def _search(
     bounds: tuple[tuple[float, float], ...],
     scales: Sequence[str],
     effort: int,
+    first: Sequence[float | None],
 ) -> None:
-    """Nelder and Mead's simplex on logarithms where the scale is one: change times make the objective rough."""
+    """Nelder and Mead's simplex on logarithms where the scale is one, with first steps where they are given."""
     logs = [scale == "log" and low > 0 for scale, (low, _) in zip(scales, bounds, strict=True)]
 
     def forward(values: tuple[float, ...]) -> Array:
@@ -138,6 +169,7 @@ def _search(
     x0 = np.clip(forward(start), low, high)
     span = np.where(np.isfinite(high - low), high - low, 1.0)
     step = np.where(logs, np.minimum(np.log(FACTOR), 0.2 * span), SHARE * span)
+    step = np.array([own if given is None else given for own, given in zip(step, first, strict=True)])
     simplex = np.vstack(
         [x0, *(x0 + np.where(x0[i] + step[i] > high[i], -1, 1) * step * unit for i, unit in enumerate(np.eye(len(x0))))]
     )

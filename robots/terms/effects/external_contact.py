@@ -16,11 +16,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+BETWEEN = 0.6  # hardness of a push that is neither a half sine nor a hold
+
+
 class ExternalContact(Effect):
-    """tau_j = c_j p(t): a pulse of each joint's torque from the time t_0 for the duration d, p = sin(pi s)^0.6.
+    """tau_j = c_j p(t): a pulse of each joint's torque from the time t_0 for the duration d, p = sin(pi s)^h.
 
     A force anywhere on the arm: during so short a time the pose, and with it what each joint feels, stays nearly the
-    same. The pulse lies between a half sine and a hold.
+    same. The hardness h makes it a half sine (1), a hold (near 0), or what lies between.
     """
 
     name: ClassVar[str] = "external_contact"
@@ -29,8 +32,9 @@ class ExternalContact(Effect):
     depends_on: ClassVar[Literal["state", "time"]] = "time"
     passing: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
-        Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.02),
+        Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.03),
         Shape("duration", "s", 0.03, 60.0, "log", (0.2, 0.5, 1.25, 3.2), 0.05),
+        Shape("hardness", "", 0.05, 2.0, "log", (BETWEEN,), 0.1, BETWEEN),
     )
     rivals: ClassVar[tuple[str, ...]] = ("payload_change", "hand_guiding", "friction_step", "torque_sensor_drift")
     experiments: ClassVar[tuple[str, ...]] = ("repeat",)
@@ -42,7 +46,7 @@ class ExternalContact(Effect):
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists durations, each starting every half of it."""
         return tuple(
-            (float(start), duration)
+            (float(start), duration, BETWEEN)
             for duration in self.shapes[1].grid
             for run in situation.runs
             for start in np.arange(situation.t[run.start], situation.t[run.stop - 1] - duration / 2, duration / 2)
@@ -51,7 +55,8 @@ class ExternalContact(Effect):
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Keeps the contact within the data."""
         first, last = float(situation.t[0]), float(situation.t[-1])
-        return (first, last), (self.shapes[1].lower, min(self.shapes[1].upper, max(last - first, 0.1)))
+        longest = min(self.shapes[1].upper, max(last - first, 0.1))
+        return (first, last), (self.shapes[1].lower, longest), (self.shapes[2].lower, self.shapes[2].upper)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates a pulse on each joint."""
@@ -70,7 +75,7 @@ class ExternalContact(Effect):
         level = np.sqrt(np.mean(residual**2, axis=0))
         scaled = residual * np.divide(1.0, level, out=np.zeros_like(level), where=level > 0)
         sums = np.concatenate([np.zeros((1, scaled.shape[1])), np.cumsum(scaled, axis=0)])
-        starts, durations = np.array(grid).T
+        starts, durations, _ = np.array(grid).T
         first = np.searchsorted(situation.t, starts + 0.1 * durations)
         last = np.searchsorted(situation.t, starts + 0.9 * durations)
         scores = ((sums[last] - sums[first]) ** 2).sum(axis=1) / np.maximum(last - first, 1)
@@ -95,12 +100,13 @@ class ExternalContact(Effect):
 
 
 def pulse(t: Array, shape: tuple[float, ...]) -> Array:
-    """Evaluates sin(pi s)^0.6 (N,) with s from 0 to 1 during the contact, and zero elsewhere.
+    """Evaluates sin(pi s)^h (N,) with s from 0 to 1 during the contact, and zero elsewhere.
 
     Args:
         t: time (N,) [s].
-        shape: start and duration [s].
+        shape: start and duration [s], and the hardness h, `BETWEEN` where it is not given.
     """
+    hardness = shape[2] if len(shape) > 2 else BETWEEN
     s = (t - shape[0]) / shape[1]
     during = (s > 0.0) & (s < 1.0)
-    return np.where(during, np.sin(np.pi * np.where(during, s, 0.5)) ** 0.6, 0.0)
+    return np.where(during, np.sin(np.pi * np.where(during, s, 0.5)) ** hardness, 0.0)

@@ -26,7 +26,7 @@ class PayloadChange(Effect):
     title: ClassVar[str] = "a payload that changed at one moment"
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("change_time", "s", -np.inf, np.inf, "linear", inexact=0.02),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("change_time", "s", -np.inf, np.inf, "linear", inexact=0.03),)
     rivals: ClassVar[tuple[str, ...]] = ("torque_sensor_drift", "external_contact", "friction_step", "base_tilt")
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "repeat")
 

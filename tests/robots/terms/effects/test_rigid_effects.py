@@ -133,7 +133,7 @@ def test_a_search_for_pushes_finds_the_moment(now):
     X = EFFECTS["external_contact"].columns(now, None, (3.1, 0.8))
     torque = X @ np.array([20.0, 30.0, -10.0, 5.0, 5.0])
     noise = np.random.default_rng(1).normal(size=torque.shape) * 2 * np.sqrt(np.mean(torque**2, axis=0))
-    start, duration = EFFECTS["external_contact"].propose(now, None, torque + noise, 3)[0]
+    start, duration, _ = EFFECTS["external_contact"].propose(now, None, torque + noise, 3)[0]
     assert abs(start + duration / 2 - 3.5) < 0.4
 
 
