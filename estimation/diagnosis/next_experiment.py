@@ -190,8 +190,8 @@ class Grams:
             model = self.model.under(self.problem.recording.gravities[-1] if part.gravity is None else part.gravity)
             motion = (part.motion.q, part.motion.dq, part.motion.ddq)
             carried = self._parameters(part.payload)
-            own = situation(model, carried, t0 + part.motion.t, *motion, starts=part.starts)
-            now = joined([own], self.model)
+            played = situation(model, carried, t0 + part.motion.t, *motion, starts=part.starts)
+            now = joined([played], self.model)
             bases.append(model.regressor(now.q, now.dq, now.ddq, columns=self.columns))
             for columns, cause in zip(effects, self.causes, strict=True):
                 columns.append(cause.hypothesis.effect.columns(now, cause.hypothesis.joint, cause.shape))
@@ -199,8 +199,9 @@ class Grams:
             rows += len(part.motion)
             t0 = float(now.t[-1]) + 60.0
         base = np.concatenate(bases)
-        whitening = replace(self.problem.whitening, starts=tuple(starts), gaps=no_gaps(base.shape[1]), weights=None)
-        return self._gram(base, [np.concatenate(own) for own in effects], whitening)
+        plain = replace(self.problem.whitening, gaps=no_gaps(base.shape[1]), weights=None, levels=None)
+        whitening = replace(plain, starts=tuple(starts))
+        return self._gram(base, [np.concatenate(parts) for parts in effects], whitening)
 
     def block(self, gram: Array, cause: int) -> Array:
         """The energy of a cause's columns (k, k), nothing projected out."""

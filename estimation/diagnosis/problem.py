@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.baseline import Baseline
 from estimation.diagnosis.hypotheses import Hypothesis
@@ -21,8 +22,8 @@ Small = NDArray[np.float32]
 
 # A column must have this share of its energy in rows whose direction of motion is known: what leaks from the others is
 # mostly the error of the motion there. One that is far larger in those (a late torque, at reversals) must owe this
-# share of what counts to the known ones.
-COUNTED, KNOWN = 0.02, 0.5
+# share of what counts to rows farther than this [s] from them.
+COUNTED, KNOWN, BESIDE = 0.02, 0.5, 0.05
 FAINT = 1e-5
 
 
@@ -144,12 +145,19 @@ class Problem:
         ]
 
     def _known(self, joints: tuple[int, ...], columns: Sequence[Array]) -> Array:
-        """Energy (k,) of whitened columns (N, k) of some joints that is not from rows of unknown direction."""
-        unsure = self.recording.unsure
-        apart = [self.whitening.apply(X * ~unsure[:, j, None], j) for j, X in zip(joints, columns, strict=True)]
-        return np.asarray(
-            sum(self.whitening.precision[j, j] * _squares(part) for j, part in zip(joints, apart, strict=True))
-        )
+        """Energy (k,) of whitened columns (N, k) of some joints that is not from beside rows of unknown direction."""
+        total = np.zeros(columns[0].shape[1])
+        for j, X in zip(joints, columns, strict=True):
+            apart = self.whitening.apply(X * self._away[:, j, None], j)
+            total += self.whitening.precision[j, j] * _squares(apart)
+        return total
+
+    @cached_property
+    def _away(self) -> NDArray[np.bool_]:
+        """Marks rows (N, n) farther than `BESIDE` from those of unknown direction."""
+        reach = 2 * round(BESIDE / self.recording.step) + 1
+        runs = (self.recording.unsure[run].astype(np.int8) for run in self.recording.runs)
+        return np.asarray(np.concatenate([maximum_filter1d(flags, reach, axis=0) for flags in runs]) == 0)
 
     def null_cross(self, group: Group) -> Array:
         """Products (k, draws) of a group with noise that the base model was fitted to."""

@@ -50,13 +50,20 @@ class Member:
     visible: float
 
     def bic(self, rows: int) -> float:
-        """Gain less what its parameters are worth: Schwarz's criterion, larger is better.
+        """Gain less what its parameters are worth: Schwarz's criterion, larger is better."""
+        return self._less(rows * len(self.group.joints))
+
+    def worth(self, rows: int) -> float:
+        """Does what `bic` does, to say whether it is there at all, not whether another is there instead.
 
         What acts for a moment is told by the rows of that moment: the other ones are not data of its parameters.
         """
-        prior = RARE if self.hypothesis.effect.rare else 0.0
         told = self._acting() if self.hypothesis.effect.passing else np.inf
-        return self.gain - self.degrees * float(np.log(min(rows * len(self.group.joints), told))) - prior
+        return self._less(min(rows * len(self.group.joints), told))
+
+    def _less(self, rows: float) -> float:
+        prior = RARE if self.hypothesis.effect.rare else 0.0
+        return self.gain - self.degrees * float(np.log(rows)) - prior
 
     def _acting(self) -> float:
         """Rows that the columns act on: (sum x^2)^2 / sum x^4, mean over columns, two at least."""

@@ -81,8 +81,9 @@ def select(
         if not p <= false_alarm:
             break
         advance(f"{result.outcomes[0].hypothesis.label}")
-        best = _best(problem, contenders(problem, result, members), accepted)
-        if not best or not _beyond(problem, best[0], members) or not _worth_it(problem, best[0], members):
+        refined = _best(problem, contenders(problem, result, members), accepted)
+        best = [member for member in refined if _worth_it(problem, member, members)]
+        if not best or not _beyond(problem, best[0], members):
             break
         members.append(best[0])
         p_values.append(p)
@@ -116,7 +117,7 @@ def _best(problem: Problem, outcomes: Sequence[Outcome], accepted: Accepted) -> 
 
 
 def _worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
-    worth = candidate.bic(problem.rows)
+    worth = candidate.bic(problem.rows) if members else candidate.worth(problem.rows)
     if worth <= LEAST and not members and len(problem.recording.runs) > 1:
         worth += profile_gain(problem, candidate) - candidate.gain
     return worth > LEAST
@@ -155,7 +156,7 @@ def _polished(
             members[i] = best
         if not changed:
             break
-    keep = [i for i, m in enumerate(members) if m.bic(problem.rows) > LEAST]
+    keep = [i for i, m in enumerate(members) if m.worth(problem.rows) > LEAST]
     return [members[i] for i in keep], [p_values[i] for i in keep]
 
 
@@ -178,6 +179,7 @@ def _found(
         gain, coefficients = own.bounded(lower, upper)
         measured = replace(member, gain=gain, coefficients=coefficients, visible=own.visible)
         reference = measured.bic(problem.rows)
-        rivals = [(rival, reference - rival.bic(problem.rows)) for rival in _best(problem, rest, beside)]
+        able = [rival for rival in _best(problem, rest, beside) if rival.gain >= NEAR * gain]
+        rivals = [(rival, reference - rival.bic(problem.rows)) for rival in able]
         found.append(Found(measured, p_values[i], tuple(rivals)))
     return found

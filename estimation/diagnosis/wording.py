@@ -51,7 +51,7 @@ def word_finding(
         joint=joint,
         parameters=_parameters(robot, member, fitted, i, known),
         p_value=p_value,
-        delta_bic=member.bic(problem.rows),
+        delta_bic=member.worth(problem.rows),
         gain=gain,
         rivals=tuple(
             (h.name if h.joint in (joint, None) else f"{h.name} of joint {h.joint}", float(worse))

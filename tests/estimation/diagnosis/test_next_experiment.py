@@ -93,6 +93,18 @@ def test_a_payload_tells_a_torque_constant(problem):
     assert max(p.resolves for p in plan.ranking if p.kind not in ("payload", "second_base_pose")) < 0.5
 
 
+def test_levels_of_the_logs_are_not_those_of_experiments_to_come(problem):
+    """Logs with noise levels of their own say nothing of how noisy an experiment of more parts will be."""
+    louder = replace(problem, whitening=replace(problem.whitening, levels=np.full((1, problem.n), 0.5)))
+    causes = [
+        _guess(problem, "torque_constant_error", 4, (), 0.02),
+        _guess(problem, "encoder_offset", 4, (), 0.02),
+    ]
+    plan = plan_next(louder, causes)
+    assert plan.kind == "payload"
+    assert plan.resolves > 0.9
+
+
 def test_the_least_trouble_is_proposed_where_several_would_do(problem):
     """Causes that any motion tells apart need only be repeated, not a payload or a tilted base."""
     causes = [

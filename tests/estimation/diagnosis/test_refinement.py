@@ -31,7 +31,7 @@ def _boxes(size: float = 1.0) -> tuple[np.ndarray, ...]:
 
 def _price(member: Member) -> float:
     """What a degree of freedom costs."""
-    return (GAIN - member.bic(ROWS)) / DEGREES
+    return (GAIN - member.worth(ROWS)) / DEGREES
 
 
 @pytest.mark.parametrize("size", [1.0, 0.02, 300.0])
@@ -66,5 +66,5 @@ def test_columns_of_different_length_cost_their_mean_and_two_rows_at_least() -> 
 def test_a_rare_effect_has_to_explain_more() -> None:
     """Its odds are paid for beside its parameters."""
     columns = _boxes()[:1]
-    difference = _member("stribeck", 1, columns).bic(ROWS) - _member("load_stribeck", 1, columns).bic(ROWS)
+    difference = _member("stribeck", 1, columns).worth(ROWS) - _member("load_stribeck", 1, columns).worth(ROWS)
     assert difference == pytest.approx(RARE)
