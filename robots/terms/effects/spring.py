@@ -21,7 +21,7 @@ PLAIN = (0.0, 0.0)
 
 
 # Lever ratios and dead centres of the scan; a joint that moves less than this [rad] tells none of them.
-RATIOS, CENTRES, TOLD = (0.2, 0.5), tuple(float(x) for x in np.arange(-np.pi, np.pi, np.pi / 4)), 1.0
+RATIOS, CENTRES, TOLD = (0.35,), tuple(float(x) for x in np.arange(-np.pi, np.pi, np.pi / 4)), 1.0
 LEVER = Shape("lever_ratio", "", 0.0, 0.95, "linear", inexact=0.1, default=0.0)
 CENTRE = Shape("dead_centre", "rad", -1.5 * np.pi, 1.5 * np.pi, "linear", inexact=0.1, default=0.0)
 
