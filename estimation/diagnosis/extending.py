@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 DROP = 2.0
 # A drop that stays below this all the way to the bound leaves the parameter open.
 OPEN = 3.84
-# Moments are tried at so many standard errors, and may be where the profile drops by less than this: (1 - exp(-x / 2))^2
+# Moments are tried at so many standard errors, and may be where the profile drops by less than this: (1 - e^(-x / 2))^2
 # is .95, the distribution of the likelihood ratio of a moment of change (Hansen, Econometrica 2000).
 FAR = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 13.0, 20.0)
 CHANGED = 7.35
