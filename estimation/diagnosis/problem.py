@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.baseline import Baseline
 from estimation.diagnosis.hypotheses import Hypothesis
@@ -21,10 +20,8 @@ Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
 # A column must have this share of its energy in rows whose direction of motion is known: what leaks from the others is
-# mostly the error of the motion there. One that is far larger in those (a late torque, at reversals) must owe this
-# share of what counts to rows farther than this [s] from them.
-COUNTED, KNOWN, BESIDE = 0.02, 0.5, 0.05
-FAINT = 1e-5
+# mostly the error of the motion there.
+COUNTED = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +114,6 @@ class Problem:
         P = self.whitening.precision
         power = [sum(P[j, j] * _squares(part) for j, part in zip(joints, kind, strict=True)) for kind in (white, whole)]
         raw = np.where(power[0] > COUNTED * power[1], power[0], np.inf)
-        doubtful = np.flatnonzero(np.isinf(raw) & (power[0] > FAINT * power[1]))
-        if len(doubtful):
-            known = self._known(joints, [part[:, doubtful] for part in columns])
-            raw[doubtful] = np.where(known > KNOWN * power[0][doubtful], power[0][doubtful], np.inf)
         against, cross = np.zeros((total, self.mixed.shape[2])), np.zeros(total)
         gram = np.zeros((count, k, k))
         split = [part.T.reshape(count, k, -1) for part in white]
@@ -143,21 +136,6 @@ class Problem:
             )
             for i, own in enumerate(slice(i * k, (i + 1) * k) for i in range(count))
         ]
-
-    def _known(self, joints: tuple[int, ...], columns: Sequence[Array]) -> Array:
-        """Energy (k,) of whitened columns (N, k) of some joints that is not from beside rows of unknown direction."""
-        total = np.zeros(columns[0].shape[1])
-        for j, X in zip(joints, columns, strict=True):
-            apart = self.whitening.apply(X * self._away[:, j, None], j)
-            total += self.whitening.precision[j, j] * _squares(apart)
-        return total
-
-    @cached_property
-    def _away(self) -> NDArray[np.bool_]:
-        """Marks rows (N, n) farther than `BESIDE` from those of unknown direction."""
-        reach = 2 * round(BESIDE / self.recording.step) + 1
-        runs = (self.recording.unsure[run].astype(np.int8) for run in self.recording.runs)
-        return np.asarray(np.concatenate([maximum_filter1d(flags, reach, axis=0) for flags in runs]) == 0)
 
     def null_cross(self, group: Group) -> Array:
         """Products (k, draws) of a group with noise that the base model was fitted to."""

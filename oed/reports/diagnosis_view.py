@@ -145,10 +145,11 @@ def view_of(diagnosis: Diagnosis) -> DiagnosisView:
 
 
 def _findings(diagnosis: Diagnosis, trace: Trace) -> tuple[FindingView, ...]:
-    """Tells findings in the torque, then those by encoders behind the gears, with curves of their own."""
-    count = len(trace.coordinate)
+    """Tells findings in the torque, those that are no part of the model, and those by encoders, with their curves."""
+    count, last = len(trace.coordinate), len(diagnosis.findings) - len(trace.windups)
     told = [_finding(f, trace, x) for f, x in zip(diagnosis.findings[:count], trace.coordinate, strict=True)]
-    for finding, (load, before, after) in zip(diagnosis.findings[count:], trace.windups, strict=True):
+    told += [_finding(f, trace, trace.t) for f in diagnosis.findings[count:last]]
+    for finding, (load, before, after) in zip(diagnosis.findings[last:], trace.windups, strict=True):
         assert finding.joint is not None
         view = _finding(finding, trace, trace.t)
         length = length_unit(diagnosis.model.robot, finding.joint - 1)

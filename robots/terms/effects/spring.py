@@ -22,6 +22,7 @@ PLAIN = (0.0, 0.0)
 
 # Lever ratios and dead centres of the scan; a joint that moves less than this [rad] tells none of them.
 RATIOS, CENTRES, TOLD = (0.35,), tuple(float(x) for x in np.arange(-np.pi, np.pi, np.pi / 4)), 1.0
+SHORTEST = 0.1
 LEVER = Shape("lever_ratio", "", 0.0, 0.95, "linear", inexact=0.1, default=0.0)
 CENTRE = Shape("dead_centre", "rad", -1.5 * np.pi, 1.5 * np.pi, "linear", inexact=0.1, default=0.0)
 
@@ -62,10 +63,10 @@ class Spring(StaticJointEffect):
         return (PLAIN, *((ratio, centre) for ratio in RATIOS for centre in CENTRES))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps a spring plain where no lever could be told."""
+        """Keeps a spring plain where no lever could be told, and else its lever long enough to be one."""
         if len(self.grid(situation, joint)) == 1:
             return ((0.0, 0.0), (0.0, 0.0))
-        return super().bounds(situation, joint)
+        return (SHORTEST, LEVER.upper), (CENTRE.lower, CENTRE.upper)
 
     def likely(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
         """Gives the spring without levers."""
