@@ -147,7 +147,14 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
             f"Joint{'s' if len(still) > 1 else ''} {names} hardly moved: their friction, gears and rotors cannot be "
             "judged; what gravity and the other joints ask of them can."
         )
-    notes += _strange(told.problem, before)
+    strange = _strange(told.problem, before)
+    notes += strange.values()
+    notes += [
+        f"Joint {j + 1}: {100 * after[j]:.0f} % of the torque that no fit has seen is left. What cannot be told from "
+        "noise counts as noise, and an effect has to stand out of it: look at the logs one by one."
+        for j in np.flatnonzero(after > ODD)
+        if j not in strange
+    ]
     for finding in findings:
         lost = [p for p in finding.parameters if not p.determined and p.unit == "s" and np.isnan(p.standard_error)]
         for parameter in lost:
@@ -170,18 +177,18 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
     return tuple(notes)
 
 
-def _strange(problem: Problem, before: Array) -> list[str]:
+def _strange(problem: Problem, before: Array) -> dict[int, str]:
     """Says where the base model predicts logs far worse than it fits them: a verdict of none is then worth little."""
     counts = ~problem.recording.unsure
     number = np.maximum(counts.sum(axis=0), 1)
     torque = np.sqrt((problem.recording.tau**2 * counts).sum(axis=0) / number)
     fitted = np.sqrt((problem.remainder**2 * counts).sum(axis=0) / number) / np.maximum(torque, 1e-12)
-    return [
-        f"Joint {j + 1}: the base model leaves {100 * fitted[j]:.0f} % of the torque that it was fitted to and "
+    return {
+        int(j): f"Joint {j + 1}: the base model leaves {100 * fitted[j]:.0f} % of the torque that it was fitted to and "
         f"{100 * before[j]:.0f} % of the torque that it was not. The logs differ in something that was not found, or "
         "some of them do not tell its parameters."
         for j in np.flatnonzero(before > np.maximum(STRANGE * fitted, ODD))
-    ]
+    }
 
 
 def _trace(unseen: Unseen, seen_as: Sequence[Array], windups: Sequence[Windup]) -> Trace:

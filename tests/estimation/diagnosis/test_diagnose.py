@@ -12,6 +12,7 @@ import pytest
 
 from estimation import load_model, predict
 from estimation.diagnosis import Diagnosis, diagnose
+from oed.reports.diagnosis_view import view_of
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.plants import simulate
 from robots.plants.effects import plant_effect
@@ -121,6 +122,27 @@ def test_a_cause_outside_the_candidates_is_not_forced_into_a_name(
     assert (finding.effect, finding.joint) == ("unexplained", 1)
     assert "position" in finding.sentence
     assert result.extended[0] < result.baseline[0]
+
+
+def test_noise_that_is_a_third_of_the_torque_is_said(arm: Robot, fourier_motion: Callable, arm_plant: Callable) -> None:
+    """Nothing is found in it, and a note says how much is left, joint by joint; quiet joints have none."""
+    log = simulate(arm_plant(torque_noise=0.02), fourier_motion(arm, 0), seed=0)
+    loud = replace(
+        log, tau=log.tau + np.random.default_rng(1).normal(size=log.tau.shape) * [0.0, 0.35 * log.tau[:, 1].std()]
+    )
+    result = diagnose(arm, loud, candidates=("payload_change",), friction=SIMPLE)
+    assert result.verdict == "none"
+    (note,) = (note for note in result.notes if "counts as noise" in note)
+    assert note.startswith("Joint 2: ")
+
+
+def test_a_finding_that_is_no_part_of_the_model_is_shown(stepped: tuple[Diagnosis, Log]) -> None:
+    """A page shows a free function that errs on unseen data too, though it has no coordinate of its own."""
+    result, _ = stepped
+    left = replace(result.findings[0], effect="unexplained", pattern="pattern:time:0:even")
+    view = view_of(replace(result, findings=(*result.findings, left)))
+    assert len(view.findings) == len(result.findings) + 1
+    assert view.findings[-1].title == "a pattern without a known cause"
 
 
 def test_bad_input_is_named(arm: Robot, hidden: Callable[..., tuple[Log, Log]]) -> None:
