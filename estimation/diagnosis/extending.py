@@ -87,7 +87,8 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         members, slices, deviations, lower_upper, strict=True
     ):
         rows = slice(start, start + size + shapes)
-        own = covariance[rows, rows].copy()
+        # Joints that differ in what they should agree on know it so much worse.
+        own = covariance[rows, rows] * member.scatter
         scale = np.concatenate([np.ones(size), np.abs(steps)])
         # What is not known at all stays so, whatever its slope's covariance.
         open_ = ~np.isfinite(scale)
@@ -197,7 +198,8 @@ def _inexact(member: Member) -> Array:
 
 def _gain(problem: Problem, member: Member, shape: tuple[float, ...], others: Accepted) -> float:
     joints, columns = problem.columns_of(member.hypothesis, shape)
-    return score(problem, problem.group(joints, columns), others).gain
+    group = problem.group(joints, columns, agreed=member.hypothesis.effect.alike)
+    return score(problem, group, others).gain
 
 
 def _moved(shape: tuple[float, ...], k: int, value: float) -> tuple[float, ...]:

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.baseline import Baseline
 from estimation.diagnosis.hypotheses import Hypothesis
@@ -20,8 +21,10 @@ Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
 # A column must have this share of its energy in rows whose direction of motion is known: what leaks from the others is
-# mostly the error of the motion there.
-COUNTED = 0.02
+# mostly the error of the motion there. One that is far larger in those, and on which all joints must agree (a late
+# torque, at reversals), must owe this share of what counts to rows farther than this [s] from them.
+COUNTED, KNOWN, BESIDE = 0.02, 0.5, 0.05
+FAINT = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,11 +104,17 @@ class Problem:
         """Evaluates a hypothesis: the joints it acts on, and its columns (N, k) on each."""
         return hypothesis.columns(self.situation, shape)
 
-    def group(self, joints: tuple[int, ...], columns: tuple[Array, ...]) -> Group:
-        """Whitens columns (N, k) of some joints and projects the base model out of them."""
-        return self.groups(joints, columns, 1)[0]
+    def group(self, joints: tuple[int, ...], columns: tuple[Array, ...], *, agreed: bool = False) -> Group:
+        """Whitens columns (N, k) of some joints and projects the base model out of them.
 
-    def groups(self, joints: tuple[int, ...], columns: tuple[Array, ...], count: int) -> list[Group]:
+        Where joints must have `agreed` on what they tell, columns count that are largest where motion is not known, if
+        most of what counts is from elsewhere.
+        """
+        return self.groups(joints, columns, 1, agreed=agreed)[0]
+
+    def groups(
+        self, joints: tuple[int, ...], columns: tuple[Array, ...], count: int, *, agreed: bool = False
+    ) -> list[Group]:
         """Does what `group` does for several groups on the same joints at once: columns (N, count k), k of each."""
         whole = [self.whitening.filtered(part, j) for j, part in zip(joints, columns, strict=True)]
         white = [self.whitening.counted(part, j) for j, part in zip(joints, whole, strict=True)]
@@ -114,6 +123,10 @@ class Problem:
         P = self.whitening.precision
         power = [sum(P[j, j] * _squares(part) for j, part in zip(joints, kind, strict=True)) for kind in (white, whole)]
         raw = np.where(power[0] > COUNTED * power[1], power[0], np.inf)
+        doubtful = np.flatnonzero(np.isinf(raw) & (power[0] > FAINT * power[1]))
+        if agreed and len(doubtful):
+            known = self._known(joints, [part[:, doubtful] for part in columns])
+            raw[doubtful] = np.where(known > KNOWN * power[0][doubtful], power[0][doubtful], np.inf)
         against, cross = np.zeros((total, self.mixed.shape[2])), np.zeros(total)
         gram = np.zeros((count, k, k))
         split = [part.T.reshape(count, k, -1) for part in white]
@@ -136,6 +149,21 @@ class Problem:
             )
             for i, own in enumerate(slice(i * k, (i + 1) * k) for i in range(count))
         ]
+
+    def _known(self, joints: tuple[int, ...], columns: Sequence[Array]) -> Array:
+        """Energy (k,) of whitened columns (N, k) of some joints that is not from beside rows of unknown direction."""
+        total = np.zeros(columns[0].shape[1])
+        for j, X in zip(joints, columns, strict=True):
+            apart = self.whitening.apply(X * self._away[:, j, None], j)
+            total += self.whitening.precision[j, j] * _squares(apart)
+        return total
+
+    @cached_property
+    def _away(self) -> NDArray[np.bool_]:
+        """Marks rows (N, n) farther than `BESIDE` from those of unknown direction."""
+        reach = 2 * round(BESIDE / self.recording.step) + 1
+        runs = (self.recording.unsure[run].astype(np.int8) for run in self.recording.runs)
+        return np.asarray(np.concatenate([maximum_filter1d(flags, reach, axis=0) for flags in runs]) == 0)
 
     def null_cross(self, group: Group) -> Array:
         """Products (k, draws) of a group with noise that the base model was fitted to."""

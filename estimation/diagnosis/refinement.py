@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,8 @@ class Member:
         coefficients: (k,) beside the others.
         degrees: coefficients that show, and shape parameters that are free: one whose bounds are equal is known.
         visible: largest share of a column's energy that the model before leaves.
+        scatter: of what each joint says of a coefficient that all have alike, as a variance over that of the noise
+            (Birge ratio, one at least): the gain counts for so much less.
     """
 
     hypothesis: Hypothesis
@@ -48,6 +50,7 @@ class Member:
     coefficients: Array
     degrees: int
     visible: float
+    scatter: float = 1.0
 
     def bic(self, rows: int) -> float:
         """Gain less what its parameters are worth: Schwarz's criterion, larger is better."""
@@ -63,7 +66,7 @@ class Member:
 
     def _less(self, rows: float) -> float:
         prior = RARE if self.hypothesis.effect.rare else 0.0
-        return self.gain - self.degrees * float(np.log(rows)) - prior
+        return self.gain / self.scatter - self.degrees * float(np.log(rows)) - prior
 
     def _acting(self) -> float:
         """Rows that the columns act on: (sum x^2)^2 / sum x^4, mean over columns, two at least."""
@@ -106,7 +109,7 @@ def refine(
 
     def evaluate(shape: tuple[float, ...], fitted: int = len(free)) -> float:
         joints, columns = problem.columns_of(hypothesis, shape)
-        group = problem.group(joints, columns)
+        group = problem.group(joints, columns, agreed=hypothesis.effect.alike)
         result = score(problem, group, accepted)
         gain, coefficients = result.bounded(lower, upper)
         member = Member(hypothesis, shape, group, gain, coefficients, result.degrees + fitted, result.visible)
@@ -140,7 +143,26 @@ def refine(
         refined = best[0].shape
         for shape in hypothesis.effect.likely(situation, hypothesis.joint, refined):
             evaluate(shape, 0)
-    return best[0]
+    found = best[0]
+    return replace(found, scatter=_scatter(problem, found, accepted)) if hypothesis.effect.alike else found
+
+
+def _scatter(problem: Problem, member: Member, accepted: Accepted) -> float:
+    """How much more the joints differ in the one coefficient that they share than noise makes them (Birge 1932)."""
+    joints, columns = problem.columns_of(member.hypothesis, member.shape)
+    scores = [
+        score(problem, problem.group((j,), (X,), agreed=True), accepted) for j, X in zip(joints, columns, strict=True)
+    ]
+    gram, cross = (
+        np.array([float(np.ravel(part)[0]) for part in parts])
+        for parts in zip(*((s.gram, s.cross) for s in scores), strict=True)
+    )
+    told = gram > 0
+    if told.sum() < 2:
+        return 1.0
+    mean = cross[told].sum() / gram[told].sum()
+    squares = np.sum((cross[told] / gram[told] - mean) ** 2 * gram[told])
+    return max(1.0, float(squares / (told.sum() - 1)))
 
 
 def _spacing(grid: Sequence[tuple[float, ...]], k: int, start: tuple[float, ...]) -> float:

@@ -143,7 +143,13 @@ def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
             together = tuple(
                 np.concatenate([p.T for p in parts]).T for parts in zip(*(c for _, c in chunk), strict=True)
             )
-            groups.update(zip((at for at, _ in chunk), problem.groups(joints, together, len(chunk)), strict=True))
+            groups.update(
+                zip(
+                    (at for at, _ in chunk),
+                    problem.groups(joints, together, len(chunk), agreed=hypothesis.effect.alike),
+                    strict=True,
+                )
+            )
         sizes.update((at, _size(problem, joints, columns)) for at, columns in members)
     ordered = tuple(groups[at] for at in range(len(kept)))
     nulls = np.zeros((0, 0, 0), np.float32)

@@ -25,6 +25,9 @@ BEYOND = 0.08
 MOST = 4  # effects at once
 # What is reported must be worth its parameters by so much (Schwarz): strong evidence, beside a small p-value.
 LEAST = 10.0
+# But for a single effect of so small a p-value: of many parameters (a payload), not all are needed.
+SURE = 1e-8
+SHOWN = 40  # outcomes whose p-values are computed
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,22 +80,25 @@ def select(
         first = first or result
         if len(members) == MOST or not result.outcomes:
             break
-        p = result.p_value(result.outcomes[0].evidence)
-        if not p <= false_alarm:
+        chances = {o.hypothesis: result.p_value(o.evidence) for o in result.outcomes[:SHOWN]}
+        if not chances[result.outcomes[0].hypothesis] <= false_alarm:
             break
         advance(f"{result.outcomes[0].hypothesis.label}")
         refined = _best(problem, contenders(problem, result, members), accepted)
-        best = [member for member in refined if _worth_it(problem, member, members)]
+        chance = {member.hypothesis: chances.get(member.hypothesis, 1.0) for member in refined}
+        able = [member for member in refined if chance[member.hypothesis] <= false_alarm]
+        best = [m for m in able if _worth_it(problem, m, members) or (not members and chance[m.hypothesis] <= SURE)]
         if not best or not _beyond(problem, best[0], members):
             break
         members.append(best[0])
-        p_values.append(p)
+        p_values.append(chance[best[0].hypothesis])
         if len(members) > 1:
             members, p_values = _polished(problem, entries, members, p_values, rng)
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
     found = _found(problem, entries, members, p_values, rng)
-    sure = [f for f in found if _worth_it(problem, f.member, members[1:])]
+    alone = len(members) == 1
+    sure = [f for f in found if _worth_it(problem, f.member, members[1:]) or (alone and f.p_value <= SURE)]
     order = sorted(sure, key=lambda f: -f.member.gain)
     last = result if members else first
     return Selection(tuple(order), first, last, accept(problem, tuple(f.member.group for f in order)))

@@ -77,6 +77,7 @@ class Effect(ABC):
         rare: whether it is to be thought of last: it resembles a common effect, and robots seldom have it.
         depends_on: ``state`` where one and the same motion always meets it, ``time`` where it comes, goes or builds up.
         passing: whether it belongs to the logs it is found in, and may be gone or different in others.
+        alike: whether it has one coefficient, that all joints share: each joint tells it, and they must agree.
         shapes: the parameters that the columns are not linear in.
         rivals: effects that resemble it, the closest first.
         experiments: kinds of experiment that separate it from them, the best first.
@@ -88,6 +89,7 @@ class Effect(ABC):
     rare: ClassVar[bool] = False
     depends_on: ClassVar[Literal["state", "time"]] = "state"
     passing: ClassVar[bool] = False
+    alike: ClassVar[bool] = False
     shapes: ClassVar[tuple[Shape, ...]] = ()
     rivals: ClassVar[tuple[str, ...]] = ()
     experiments: ClassVar[tuple[str, ...]] = ()

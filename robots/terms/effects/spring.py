@@ -22,6 +22,7 @@ PLAIN = (0.0, 0.0)
 
 # Lever ratios and dead centres of the scan; a joint that moves less than this [rad] tells none of them.
 RATIOS, CENTRES, TOLD = (0.35,), tuple(float(x) for x in np.arange(-np.pi, np.pi, np.pi / 4)), 1.0
+# A shorter lever (as a share of the other) is none.
 SHORTEST = 0.1
 LEVER = Shape("lever_ratio", "", 0.0, 0.95, "linear", inexact=0.1, default=0.0)
 CENTRE = Shape("dead_centre", "rad", -1.5 * np.pi, 1.5 * np.pi, "linear", inexact=0.1, default=0.0)
@@ -63,10 +64,10 @@ class Spring(StaticJointEffect):
         return (PLAIN, *((ratio, centre) for ratio in RATIOS for centre in CENTRES))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps a spring plain where no lever could be told, and else its lever long enough to be one."""
+        """Keeps a spring plain where no lever could be told."""
         if len(self.grid(situation, joint)) == 1:
             return ((0.0, 0.0), (0.0, 0.0))
-        return (SHORTEST, LEVER.upper), (CENTRE.lower, CENTRE.upper)
+        return super().bounds(situation, joint)
 
     def likely(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
         """Gives the spring without levers."""
@@ -81,7 +82,7 @@ class Spring(StaticJointEffect):
         length = casadi.sqrt(1.0 + ratio**2 - 2.0 * ratio * casadi.cos(angle))
         s, rate = (ratio - 2.0 * casadi.cos(angle)) / (length + 1.0), casadi.sin(angle) / length
         lever = casadi.horzcat(s, s**2, 0.0, 1.0) * rate
-        has_lever = casadi.sign(ratio)
+        has_lever = ratio >= SHORTEST
         return has_lever * lever + (1.0 - has_lever) * plain
 
     def describe(
@@ -94,7 +95,7 @@ class Spring(StaticJointEffect):
         length: str = "rad",
     ) -> str:
         """Says what the values mean."""
-        if shape and shape[0] > 0:
+        if shape and shape[0] >= SHORTEST:
             return (
                 f"A spring between two levers of ratio {shape[0]:.2g} acts on joint {joint}; its ends are nearest at "
                 f"{np.remainder(shape[1] + np.pi, 2 * np.pi) - np.pi:.3g} {length}."

@@ -27,6 +27,7 @@ class TimeDelay(Effect):
     name: ClassVar[str] = "time_delay"
     title: ClassVar[str] = "torque that is logged later than position"
     whole_robot: ClassVar[bool] = True
+    alike: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (SHIFT,)
     rivals: ClassVar[tuple[str, ...]] = ("current_lag", "presliding_hysteresis", "joint_elasticity")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "micro_reversals")
