@@ -68,3 +68,13 @@ def test_a_rare_effect_has_to_explain_more() -> None:
     columns = _boxes()[:1]
     difference = _member("stribeck", 1, columns).worth(ROWS) - _member("load_stribeck", 1, columns).worth(ROWS)
     assert difference == pytest.approx(RARE)
+
+
+def test_a_push_leaves_other_rows_alone() -> None:
+    """Of a torque at all times, a contact has next to nothing beside it; of itself all; on other joints nothing."""
+    push = _member("external_contact", None, _boxes())
+    always = _member("base_tilt", None, tuple(np.ones((2, ROWS, 1))))
+    assert always.share_beside(push, 0) == pytest.approx(ACTING / ROWS)
+    assert push.share_beside(always, 0) == pytest.approx(1.0)
+    assert push.share_beside(push, 1) == pytest.approx(1.0)
+    assert push.share_beside(_member("spring", 1, _boxes()[:1]), 1) == 0.0
