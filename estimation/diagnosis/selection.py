@@ -87,7 +87,7 @@ def select(
         refined = _best(problem, contenders(problem, result, members), accepted)
         chance = {member.hypothesis: chances.get(member.hypothesis, 1.0) for member in refined}
         able = [member for member in refined if chance[member.hypothesis] <= false_alarm]
-        best = [m for m in able if _worth_it(problem, m, members) or (not members and chance[m.hypothesis] <= SURE)]
+        best = [m for m in able if _worth_it(problem, m, members) or _sure(problem, m, chance[m.hypothesis], members)]
         if not best or not _beyond(problem, best[0], members):
             break
         members.append(best[0])
@@ -97,8 +97,8 @@ def select(
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
     found = _found(problem, entries, members, p_values, rng)
-    alone = len(members) == 1
-    sure = [f for f in found if _worth_it(problem, f.member, members[1:]) or (alone and f.p_value <= SURE)]
+    others = members[1:]
+    sure = [f for f in found if _worth_it(problem, f.member, others) or _sure(problem, f.member, f.p_value, others)]
     order = sorted(sure, key=lambda f: -f.member.gain)
     last = result if members else first
     return Selection(tuple(order), first, last, accept(problem, tuple(f.member.group for f in order)))
@@ -127,6 +127,11 @@ def _worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) ->
     if worth <= LEAST and not members and len(problem.recording.runs) > 1:
         worth += profile_gain(problem, candidate) - candidate.gain
     return worth > LEAST
+
+
+def _sure(problem: Problem, candidate: Member, p_value: float, members: Sequence[Member]) -> bool:
+    """Whether a single effect of many parameters is beyond doubt, and worth them at all."""
+    return not members and p_value <= SURE and candidate.bic(problem.rows) > 0
 
 
 def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
