@@ -60,9 +60,10 @@ def bear_out(judgement: Judgement, measure: Callable[[Sequence[Member]], Measure
             # A free function that errs elsewhere is no model; that something is unexplained is as true as before.
             spoiling.append((members.pop(worst), p_values.pop(worst), seen.gains[worst]))
         elif instead := _instead(founds[worst], worst, members, measure, held_out):
-            founds[worst] = instead
-            members[worst] = instead.member
-            notes.append(_REPLACED.format(label, instead.member.hypothesis.label))
+            founds[worst], seen = instead
+            members[worst] = founds[worst].member
+            notes.append(_REPLACED.format(label, members[worst].hypothesis.label))
+            continue
         else:
             for items in (founds, members, p_values):
                 items.pop(worst)
@@ -87,13 +88,14 @@ def _instead(
     members: Sequence[Member],
     measure: Callable[[Sequence[Member]], Measured],
     held_out: bool,
-) -> Found | None:
-    """Finds the closest rival of a name that unseen data bear out where the name was."""
+) -> tuple[Found, Measured] | None:
+    """Finds the closest rival of a name that unseen data bear out where the name was, and what all bring with it."""
     close = [(rival, worse) for rival, worse in found.rivals if worse < CLOSE]
     for k, (rival, worse) in enumerate(close):
         seen = measure([*members[:place], rival, *members[place + 1 :]])
         if not _harms(seen, place, rival, held_out) and seen.gains[place].ci95[0] > 0:
-            return Found(rival, found.p_value, tuple((other, more - worse) for other, more in close[k + 1 :]))
+            rest = tuple((other, more - worse) for other, more in close[k + 1 :])
+            return Found(rival, found.p_value, rest), seen
     return None
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from estimation.diagnosis.resonance import resonance
 from estimation.diagnosis.swinging import Swinging
 from robots.robot import Robot
 from robots.terms.effects import Coefficient, JointEffect, Shape, Situation
@@ -19,7 +20,6 @@ PREFIX = "pattern:"
 HARMONICS = (1, 2, 3, 4)
 MEMORIES = (0.1, 0.3, 1.0, 3.0)  # [s]
 KNOTS = 8
-DAMPING = 0.05
 # Frequencies of a ringing load and of a vibration [Hz].
 RINGING = tuple(float(f) for f in np.geomspace(0.5, 8.0, 13))
 TURNS = tuple(float(h) for h in (*range(5, 33), 40, 48, 64))
@@ -198,19 +198,11 @@ def _time(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Arr
 
 
 def _ringing(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
-    omega = 2 * np.pi * shape[0]
-    k = 2 / max(s.period, 1e-9)
-    # x'' + 2 d w x' + w^2 x = u by the bilinear rule, and its velocity.
-    den = np.array([k**2 + 2 * DAMPING * omega * k + omega**2, 2 * (omega**2 - k**2), 0.0])
-    den[2] = k**2 - 2 * DAMPING * omega * k + omega**2
-    columns = []
-    for source in (s.rigid[:, joint - 1], s.ddq[:, joint - 1]):
-        for numerator in (omega**2 * np.array([1.0, 2.0, 1.0]), omega * k * np.array([1.0, 0.0, -1.0])):
-            column = np.zeros(len(s))
-            for run in s.runs:
-                column[run] = lfilter(numerator, den, source[run] - source[run].mean())
-            columns.append(column)
-    return np.column_stack(columns)
+    sources = np.column_stack([s.rigid[:, joint - 1], s.ddq[:, joint - 1]])
+    for run in s.runs:
+        sources[run] -= sources[run].mean(axis=0)
+    place, rate = resonance(s, sources, shape[0])
+    return np.column_stack([place[:, 0], rate[:, 0], place[:, 1], rate[:, 1]])
 
 
 def _vibration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:

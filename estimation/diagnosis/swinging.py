@@ -6,16 +6,14 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
+from estimation.diagnosis.resonance import resonance
 from robots.robot import Robot
 from robots.terms.effects import Coefficient, Effect, Shape, Situation
 
 Array = NDArray[np.float64]
 
 FREQUENCIES = tuple(float(f) for f in np.geomspace(0.4, 5.0, 24))
-# Half the resonance's share of the critical damping is hardly told from twice: both of its phases have a column.
-DAMPING = 0.05
 _WAYS = ("level", "upright")
 
 
@@ -41,8 +39,9 @@ class Swinging(Effect):
         pulls = situation.cached("flange acceleration", lambda: _accelerations(situation))
         X = np.empty((len(situation), situation.robot.n, 4))
         for k, pull in enumerate(np.moveaxis(pulls, 1, 0)):
-            for phase, force in enumerate(_resonance(situation, pull, shape[0])):
-                X[:, :, 2 * k + phase] = -np.einsum("tin,ti->tn", jacobian, force)
+            # The mass is driven by -p'' and the drives hold against its pull: the signs cancel.
+            for phase, force in enumerate(resonance(situation, pull, shape[0])):
+                X[:, :, 2 * k + phase] = np.einsum("tin,ti->tn", jacobian, force)
         return X
 
     def describe(
@@ -70,16 +69,3 @@ def _accelerations(situation: Situation) -> Array:
     up = np.where(size > 0, gravity / np.where(size > 0, size, 1.0), [0.0, 0.0, 1.0])
     upright = up * np.sum(up * acceleration, axis=1, keepdims=True)
     return np.stack([acceleration - upright, upright], axis=1)
-
-
-def _resonance(situation: Situation, pull: Array, frequency: float) -> tuple[Array, Array]:
-    """w^2 x and w x' (N, 3) of a unit mass that an acceleration (N, 3) drives, by the bilinear rule; at rest before."""
-    omega = 2 * np.pi * frequency
-    k = 2 / max(situation.period, 1e-9)
-    den = np.array([k**2, -2 * k**2, k**2]) + omega**2 * np.array([1.0, 2.0, 1.0])
-    den += 2 * DAMPING * omega * k * np.array([1.0, 0.0, -1.0])
-    place, rate = np.zeros_like(pull), np.zeros_like(pull)
-    for run in situation.runs:
-        place[run] = lfilter(omega**2 * np.array([1.0, 2.0, 1.0]), den, -pull[run], axis=0)
-        rate[run] = lfilter(omega * k * np.array([1.0, 0.0, -1.0]), den, -pull[run], axis=0)
-    return place, rate

@@ -10,7 +10,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from estimation.diagnosis.extension import find_effect
-from estimation.diagnosis.swinging import DAMPING, Swinging
+from estimation.diagnosis.resonance import DAMPING
+from estimation.diagnosis.swinging import Swinging
 from robots import load_robot
 from robots.regressor import default_model
 from robots.robot import Robot
