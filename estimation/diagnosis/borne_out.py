@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from estimation.diagnosis.findings import Gain
+from estimation.diagnosis.patterns import PREFIX
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found
 from estimation.diagnosis.unseen import Measured
@@ -113,4 +114,6 @@ def _harms(seen: Measured, i: int, member: Member, held_out: bool) -> bool:
         return True
     if joint is not None and seen.unseen.astray(joint - 1):
         return True
-    return seen.gains[i].ci95[1] < 0 or seen.rises[i] > HARM
+    # A free function claims no cause: what it brings elsewhere is all that it is good for.
+    idle = effect.name.startswith(PREFIX) and seen.gains[i].ci95[1] < 0
+    return seen.worse[i] or idle or seen.rises[i] > HARM

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.regularisation import held
+from estimation.diagnosis.regularisation import explained, held, row_weight
 from estimation.diagnosis.states import Recording
 from estimation.pulls import Pull
 
@@ -23,6 +23,7 @@ WORTH = 0.05
 # A model that errs on unseen rows by so many times its error on seen ones, and by this share of the torque, is not told
 # by the log.
 ASTRAY, FAR = 3.0, 0.1
+SURELY = 1.96  # standard errors
 BLOCK = 1.0  # [s], and five times the errors' correlation time
 
 
@@ -39,6 +40,8 @@ class Unseen:
             extended model less one effect each.
         counts: rows that count (M, n): not those whose direction of motion is unknown.
         fitted: the errors on the same rows of fits that have seen them; None where no fit has.
+        growth: per model, by how much the squared torque that the effect which it lacks explains grows when the unseen
+            rows are fitted besides, over the variance that noise gives it (models,).
     """
 
     how: str
@@ -48,6 +51,7 @@ class Unseen:
     errors: tuple[Array, ...]
     counts: NDArray[np.bool_]
     fitted: tuple[Array, ...] | None = None
+    growth: tuple[float, ...] = ()
 
     def nrmse(self, model: int) -> Array:
         """Residual RMS over torque RMS (n,) of one of the models."""
@@ -98,6 +102,15 @@ class Unseen:
         low, high = np.quantile(falls, [0.025, 0.975])
         return float(low), float(high)
 
+    def surely_worse(self, model: int) -> bool:
+        """Whether unseen rows speak against the effect that a model lacks.
+
+        What a cause explains of some rows grows by g'g + 2 g'e with others, g its torque there beside the base model,
+        as far as that is known, and e the noise. Below -1.96^2 times the noise's variance that falls by chance once in
+        40 times at most, whatever g is.
+        """
+        return self.growth[model] < -(SURELY**2)
+
     def _block(self) -> float:
         """Length of a block [s]."""
         times = []
@@ -131,7 +144,8 @@ def cross_validated(problem: Problem, effects: Sequence[Array], pull: Pull) -> U
             "so that the gain on another motion may differ"
         )
     base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
-    weights = ~recording.unsure / problem.whitening.scales(len(recording))
+    counts = ~recording.unsure
+    weights = counts / problem.whitening.scales(len(recording))
     full = np.concatenate([base, *effects], axis=2)
     weighted = full * weights[:, :, None]
     target = recording.tau * weights
@@ -144,12 +158,14 @@ def cross_validated(problem: Problem, effects: Sequence[Array], pull: Pull) -> U
         - full[:, :, chosen] @ held(total[0][np.ix_(chosen, chosen)], total[1][chosen], pull.columns(chosen))
         for chosen in chosen_by
     ]
+    growth = np.zeros(len(chosen_by))
     for fold, (gram, cross) in zip(folds, grams, strict=True):
         rest = (total[0] - gram, total[1] - cross)
+        growth += _growth(problem, rest, (gram, cross), float(np.sum(target[fold] ** 2)), counts[fold], pull, chosen_by)
         for error, chosen in zip(errors, chosen_by, strict=True):
             values = held(rest[0][np.ix_(chosen, chosen)], rest[1][chosen], pull.columns(chosen))
             error[fold] = recording.tau[fold] - full[fold][:, :, chosen] @ values
-    return Unseen(how, recording.t, recording.step, recording.tau, tuple(errors), ~recording.unsure, tuple(fitted))
+    return Unseen(how, recording.t, recording.step, recording.tau, tuple(errors), counts, tuple(fitted), tuple(growth))
 
 
 def on_held_out(
@@ -181,7 +197,34 @@ def on_held_out(
         values = held(gram[np.ix_(chosen, chosen)], cross[chosen], pull.columns(chosen))
         errors.append(unseen.tau - other[:, :, chosen] @ values)
     how = f"{len(unseen.runs)} log{'s' if len(unseen.runs) > 1 else ''} that the fit has not seen"
-    return Unseen(how, unseen.t, unseen.step, unseen.tau, tuple(errors), ~unseen.unsure)
+    weights = ~unseen.unsure / problem.whitening.scale
+    target = unseen.tau * weights
+    more, square = _moments(other * weights[:, :, None], target), float(np.sum(target**2))
+    chosen_by = models(base.shape[2], effects)
+    growth = _growth(problem, (gram, cross), more, square, ~unseen.unsure, pull, chosen_by)
+    return Unseen(how, unseen.t, unseen.step, unseen.tau, tuple(errors), ~unseen.unsure, growth=tuple(growth))
+
+
+def _growth(
+    problem: Problem,
+    fit: tuple[Array, Array],
+    more: tuple[Array, Array],
+    square: float,
+    counts: NDArray[np.bool_],
+    pull: Pull,
+    chosen_by: Sequence[NDArray[np.intp]],
+) -> Array:
+    """See `Unseen.growth`: moments of the fit and of the unseen rows, whose squared torque and number are known.
+
+    Errors beyond those of the noise, which a base model that is wrong makes, count as noise.
+    """
+    told = []
+    for chosen in chosen_by:
+        own, place = pull.columns(chosen), np.ix_(chosen, chosen)
+        both = fit[0][place] + more[0][place], fit[1][chosen] + more[1][chosen]
+        told.append(explained(*both, own) - explained(fit[0][place], fit[1][chosen], own))
+    noise = row_weight(problem.whitening) * max(1.0, (square - told[-1]) / max(int(counts.sum()), 1))
+    return (told[-1] - np.array(told)) / noise
 
 
 def models(base: int, effects: Sequence[Array]) -> list[NDArray[np.intp]]:

@@ -73,13 +73,29 @@ def held(gram: Array, cross: Array, pull: Pull) -> Array:
 
     Directions that neither determines stay at zero: the fit is that of least norm.
     """
+    root, aim = _root(gram, pull), _aim(cross, pull)
+    return np.asarray(root @ (root.T @ aim))
+
+
+def explained(gram: Array, cross: Array, pull: Pull) -> float:
+    """Squared torque that such a fit explains, less what the pull costs it."""
+    told = _root(gram, pull).T @ _aim(cross, pull)
+    return float(told @ told - pull.target @ pull.precision @ pull.target)
+
+
+def _aim(cross: Array, pull: Pull) -> Array:
+    aim = cross.copy()
+    aim[: len(pull.target)] += pull.precision @ pull.target
+    return aim
+
+
+def _root(gram: Array, pull: Pull) -> Array:
+    """Gives R (p, r) with R R' the inverse of a Gram matrix (p, p) and a pull, in directions that these determine."""
     b = len(pull.target)
-    gram, cross = gram.copy(), cross.copy()
+    gram = gram.copy()
     gram[:b, :b] += pull.precision
-    cross[:b] += pull.precision @ pull.target
     scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
     scale[scale == 0] = 1.0
     values, vectors = np.linalg.eigh(gram / scale[:, None] / scale)
     kept = values > FAINT * values[-1]
-    result: Array = vectors[:, kept] @ ((vectors[:, kept].T @ (cross / scale)) / values[kept]) / scale
-    return result
+    return np.asarray(vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None])

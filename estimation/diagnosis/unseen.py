@@ -44,6 +44,7 @@ class Measured:
         unseen: of all models.
         gains: what each member brings there.
         rises: by what factor each member changes the error of all joints that it acts on.
+        worse: whether unseen rows speak against each member.
         kept: share of what each member does to the error of the fit that is left there.
         coordinates: on which each member shows there (M,).
         whole: the unseen data, after the logs of the fit where heat may last from them.
@@ -56,6 +57,7 @@ class Measured:
     unseen: Unseen
     gains: tuple[Gain, ...]
     rises: tuple[float, ...]
+    worse: tuple[bool, ...]
     kept: tuple[float, ...]
     coordinates: tuple[Array, ...]
     whole: Recording
@@ -93,6 +95,7 @@ def measure_unseen(
         unseen=unseen,
         gains=tuple(_gain(unseen, i, member, rng) for i, member in enumerate(members)),
         rises=tuple(_rise(unseen, i, member) for i, member in enumerate(members)),
+        worse=tuple(unseen.surely_worse(i + 1) for i in range(len(members))),
         kept=tuple(unseen.kept(i + 1, _joints(member)) for i, member in enumerate(members)),
         coordinates=tuple(m.hypothesis.effect.coordinate(now, m.hypothesis.joint, m.shape)[1][there] for m in members),
         whole=whole,

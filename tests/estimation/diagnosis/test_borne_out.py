@@ -53,6 +53,7 @@ class Bench:
             unseen=SimpleNamespace(astray=lambda joint: joint in lost),
             gains=tuple(Gain(nrmse_before=0.03, nrmse_after=0.03, ci95=(s.low, s.high)) for s in shown),
             rises=tuple(s.rise for s in shown),
+            worse=tuple(s.high < 0 for s in shown),
             kept=tuple(s.kept for s in shown),
         )
 
