@@ -14,6 +14,7 @@ from estimation.diagnosis.carried import lightened, unloaded
 from estimation.diagnosis.diagnosis import Diagnosis
 from estimation.diagnosis.excess import residual_shares
 from estimation.diagnosis.extending import dense
+from estimation.diagnosis.hopeless_logs import hopeless_logs
 from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.limits import find_limits
 from estimation.diagnosis.noise import estimate_whitening
@@ -102,12 +103,18 @@ def diagnose(
     bar = progress or SILENT
     bar.start("diagnosing", 1.0)
     try:
+        data.sort(key=lambda log: float(log.t[0]))
         recording = lightened(robot, record(robot, data))
         if not (np.ptp(recording.q, axis=0) > 0).any():
             raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
         # Unseen logs count too: what only they show is told by the description at least.
         gravities = [log.gravity for log in (*data, *other) if log.gravity is not None]
         base = base_parameters(robot, friction, (0.001,) * robot.n, gravities)
+        hopeless = hopeless_logs(base, recording)
+        notes = tuple(_HOPELESS.format(k + 1, _named(recording.names[k]), 100 * s) for k, s in hopeless.items())
+        if hopeless:
+            data = [log for k, log in enumerate(data) if k not in hopeless]
+            recording = lightened(robot, record(robot, data))
         search = _search(base, recording, effects, false_alarm, seed, bar)
         bar.update(0.75, "what is left")
         patterns = measure(search.problem, all_hypotheses(robot, list(all_patterns(robot))))
@@ -129,10 +136,21 @@ def diagnose(
             held_out=tuple(other),
             false_alarm=false_alarm,
             seed=seed,
+            notes=notes,
         )
         return assemble(robot, told)
     finally:
         bar.finish()
+
+
+_HOPELESS = (
+    "Log {}{} is left out: fitted to it alone, the base model still leaves {:.0f} % of the torque on every joint. It "
+    "says nothing of what the arm is like; look at its torque."
+)
+
+
+def _named(name: str) -> str:
+    return f" ({name})" if name else ""
 
 
 def _effects(candidates: Sequence[str | Effect] | None) -> list[Effect]:

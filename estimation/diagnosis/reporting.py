@@ -50,6 +50,7 @@ class Told:
     held_out: tuple[Log, ...]
     false_alarm: float
     seed: int
+    notes: tuple[str, ...] = ()
 
 
 def assemble(robot: Robot, told: Told) -> Diagnosis:
@@ -107,7 +108,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         next_experiment=_next(problem, founds) if verdict == "ambiguous" else None,
         model=replace(fitted.model, extensions=(*fitted.model.extensions, *added)),
         how_unseen=unseen.how,
-        notes=(*_notes(told, findings, before, after), *held.notes, *lost),
+        notes=(*told.notes, *_notes(told, findings, before, after), *held.notes, *lost),
         trace=_trace(unseen, seen.coordinates, twisted),
         simulation=simulation,
     )
@@ -163,7 +164,7 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
                 f"value {parameter.value:.3g} s is one of many that fit."
             )
         if finding.gain.ci95[0] <= 0:
-            notes.append(f"The gain of {finding.effect} on unseen data is not sure: its interval holds zero.")
+            notes.append(f"The gain of {finding.effect} on unseen data is not sure: its interval begins below zero.")
     open_ = sorted({member.hypothesis.joint for member in told.judgement.patterns if member.hypothesis.joint})
     if open_:
         names = ", ".join(map(str, open_))
