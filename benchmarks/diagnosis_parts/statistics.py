@@ -25,6 +25,7 @@ SHAPES = {
     "order": ("order",),
     "delay": ("delay",),
     "limit": ("level",),
+    "driven_back": ("driven_back",),
 }
 
 

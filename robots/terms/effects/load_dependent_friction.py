@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import length_unit
-from robots.terms.effects.base import Coefficient, Place, Situation
+from robots.terms.effects.base import Coefficient, Place, Shape, Situation
 from robots.terms.effects.static import Instant, StaticJointEffect
 
 if TYPE_CHECKING:
@@ -18,14 +18,20 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class LoadDependentFriction(StaticJointEffect):
-    """tau = |tau_L| (a sign(dq) + b dq), tau_L the torque that passes the gear (Hamon et al. 2010).
+# A gear that loses as much when its load drives it as when it drives the load.
+ALIKE = (1.0,)
 
-    The first column is also a gear's efficiency, better when driving than when driven.
+
+class LoadDependentFriction(StaticJointEffect):
+    """tau = w |tau_L| (a sign(dq) + b dq), tau_L the torque that passes the gear (Hamon et al. 2010).
+
+    w is 1 where the joint drives its load, and `driven_back` where the load drives it: a gear's two efficiencies. What
+    they differ in is a share of tau_L itself, as an error of the torque constant is.
     """
 
     name: ClassVar[str] = "load_dependent_friction"
     title: ClassVar[str] = "friction that grows with the load"
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("driven_back", "1", 0.0, 1.0, "linear", ALIKE, 0.05, default=1.0),)
     rivals: ClassVar[tuple[str, ...]] = (
         "position_dependent_friction",
         "torque_constant_saturation",
@@ -41,9 +47,14 @@ class LoadDependentFriction(StaticJointEffect):
             "viscous_per_load", f"s/{length_unit(robot, joint - 1)}"
         )
 
+    def likely(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+        """Gives the gear that loses alike both ways."""
+        return (ALIKE,)
+
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
-        """Builds |tau_L| sign(dq) and |tau_L| dq."""
-        load = casadi.fabs(at.load)
+        """Builds w |tau_L| sign(dq) and w |tau_L| dq."""
+        drives = at.load * at.dq > 0
+        load = (drives + (1.0 - drives) * at.shape[0]) * casadi.fabs(at.load)
         return casadi.horzcat(load * at.sign, load * at.dq)
 
     def describe(
@@ -56,14 +67,17 @@ class LoadDependentFriction(StaticJointEffect):
         length: str = "rad",
     ) -> str:
         """Says what the values mean."""
+        back = "" if not shape or shape == ALIKE else f" Driven back by its load it loses {shape[0]:.2g} times as much."
         return (
             f"The friction of joint {joint} grows with its load: {100 * coefficients[0]:.3g} % of it in Coulomb "
-            f"friction, and {100 * coefficients[1]:.3g} % per {length}/s."
+            f"friction, and {100 * coefficients[1]:.3g} % per {length}/s.{back}"
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the load times the direction of motion."""
         assert joint is not None
         j = joint - 1
-        signed = np.abs(situation.load[:, j]) * situation.sign[:, j]
+        load = situation.load[:, j]
+        back = shape[0] if shape else 1.0
+        signed = np.where(load * situation.dq[:, j] > 0, 1.0, back) * np.abs(load) * situation.sign[:, j]
         return f"load of joint {joint}, signed by its direction [N m]", signed

@@ -121,6 +121,9 @@ class LoadDependent(Effect):
         loss = np.where(driving, self.amount, self.amount * self.back) * np.abs(load)
         return self.on_joint(ride, loss * ride.sign[:, self.j])
 
+    def truths(self) -> dict[str, float]:
+        return {"driven_back": self.back}
+
 
 @dataclass(frozen=True, kw_only=True)
 class PositionDependent(Effect):
