@@ -23,6 +23,8 @@ ZOOMS, AGAIN = (21, 11, 11), 0.1
 FACTOR, SHARE = 1.5, 0.04
 # An effect acts where its torque is more than this share of its largest.
 ACTS = 0.02
+# Share of a coefficient that all joints have alike by which each may differ: so far its formula is true.
+ROUGH = 0.25
 # Twice the log of the odds against an effect that robots seldom have.
 RARE = 6.0
 
@@ -39,8 +41,8 @@ class Member:
         coefficients: (k,) beside the others.
         degrees: coefficients that show, and shape parameters that are free: one whose bounds are equal is known.
         visible: largest share of a column's energy that the model before leaves.
-        scatter: of what each joint says of a coefficient that all have alike, as a variance over that of the noise
-            (Birge ratio, one at least): the gain counts for so much less.
+        scatter: of what each joint says of a coefficient that all have alike, as a variance over that of the noise and
+            of the formula (Birge ratio, one at least): the gain counts for so much less.
     """
 
     hypothesis: Hypothesis
@@ -148,7 +150,7 @@ def refine(
 
 
 def _scatter(problem: Problem, member: Member, accepted: Accepted) -> float:
-    """How much more the joints differ in the one coefficient that they share than noise makes them (Birge 1932)."""
+    """How much more the joints differ in the one coefficient that they share than they may (Birge 1932)."""
     joints, columns = problem.columns_of(member.hypothesis, member.shape)
     scores = [
         score(problem, problem.group((j,), (X,), agreed=True), accepted) for j, X in zip(joints, columns, strict=True)
@@ -157,12 +159,28 @@ def _scatter(problem: Problem, member: Member, accepted: Accepted) -> float:
         np.array([float(np.ravel(part)[0]) for part in parts])
         for parts in zip(*((s.gram, s.cross) for s in scores), strict=True)
     )
-    told = gram > 0
-    if told.sum() < 2:
-        return 1.0
-    mean = cross[told].sum() / gram[told].sum()
-    squares = np.sum((cross[told] / gram[told] - mean) ** 2 * gram[told])
-    return max(1.0, float(squares / (told.sum() - 1)))
+    gram, cross = gram[gram > 0], cross[gram > 0]
+    return max(1.0, float(cross.sum() ** 2 / gram.sum()) / agreed_gain(gram, cross)) if len(gram) > 1 else 1.0
+
+
+def agreed_gain(gram: Array, cross: Array) -> float:
+    """What one coefficient of all joints explains, over their Birge ratio.
+
+    One joint may be at odds with the rest, where something else is left on it: it then counts for nothing.
+
+    Args:
+        gram: squares of each joint's column (m,), two or more, of noise one.
+        cross: each one's product with the residual (m,).
+    """
+    everyone = np.ones((1, len(gram)), dtype=bool)
+    sets = np.vstack([everyone, ~np.eye(len(gram), dtype=bool)]) if len(gram) > 2 else everyone
+    return max(_over_scatter(gram[chosen], cross[chosen]) for chosen in sets)
+
+
+def _over_scatter(gram: Array, cross: Array) -> float:
+    mean = cross.sum() / gram.sum()
+    squares = np.sum((cross / gram - mean) ** 2 / (1.0 / gram + (ROUGH * mean) ** 2))
+    return max(float(cross.sum() ** 2 / gram.sum() / max(1.0, squares / (len(gram) - 1))), 1e-300)
 
 
 def _spacing(grid: Sequence[tuple[float, ...]], k: int, start: tuple[float, ...]) -> float:

@@ -7,7 +7,7 @@ import pytest
 
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Group
-from estimation.diagnosis.refinement import RARE, Member
+from estimation.diagnosis.refinement import RARE, Member, agreed_gain
 from robots.terms.effects import EFFECTS
 
 ROWS, ACTING = 5000, 40
@@ -78,3 +78,33 @@ def test_a_push_leaves_other_rows_alone() -> None:
     assert push.share_beside(always, 0) == pytest.approx(1.0)
     assert push.share_beside(push, 1) == pytest.approx(1.0)
     assert push.share_beside(_member("spring", 1, _boxes()[:1]), 1) == 0.0
+
+
+def _shared(*coefficients: float, error: float = 0.01) -> tuple[float, float]:
+    """What a shared coefficient explains, and what of it counts, where joints tell these values to an error."""
+    gram = np.full(len(coefficients), error**-2)
+    cross = gram * coefficients
+    return float(cross.sum() ** 2 / gram.sum()), agreed_gain(gram, cross)
+
+
+def test_joints_that_agree_within_the_formula_count_in_full() -> None:
+    """Values a fifth apart, each known to a hundredth, are one: no delay is so exact as the noise is low."""
+    gain, agreed = _shared(0.9, 1.0, 1.1, 1.05)
+    assert agreed == pytest.approx(gain)
+    few, count = _shared(0.9, 1.1)
+    assert count == pytest.approx(few)
+
+
+def test_one_joint_at_odds_counts_for_nothing_and_the_rest_in_full() -> None:
+    """Where another effect is left on one of four joints, three still tell the coefficient."""
+    _, agreed = _shared(1.0, 1.0, 1.0, -4.0)
+    rest, _ = _shared(1.0, 1.0, 1.0)
+    assert agreed == pytest.approx(rest)
+
+
+def test_what_one_joint_alone_tells_is_no_common_coefficient() -> None:
+    """A value on one joint, and none on the others that would have told it, hardly counts."""
+    gain, agreed = _shared(1.0, 0.0, 0.0, 0.0)
+    assert agreed < 0.1 * gain
+    _, agreed = _shared(1.0, -1.0, 1.0, -1.0)
+    assert agreed < 0.01 * _shared(1.0, 1.0, 1.0, 1.0)[0]
