@@ -25,8 +25,8 @@ BEYOND = 0.08
 MOST = 4  # effects at once
 # What is reported must be worth its parameters by so much (Schwarz): strong evidence, beside a small p-value.
 LEAST = 10.0
-# But for a single effect of so small a p-value: of many parameters (a payload), not all are needed.
-SURE = 1e-8
+# But for a single effect whose p-value is below this share of the false-alarm chance: it must be worth them at all.
+SURE = 0.2
 SHOWN = 40  # outcomes whose p-values are computed
 
 
@@ -87,7 +87,8 @@ def select(
         refined = _best(problem, contenders(problem, result, members), accepted)
         chance = {member.hypothesis: chances.get(member.hypothesis, 1.0) for member in refined}
         able = [member for member in refined if chance[member.hypothesis] <= false_alarm]
-        best = [m for m in able if _worth_it(problem, m, members) or _sure(problem, m, chance[m.hypothesis], members)]
+        sure = {m for m, p in chance.items() if not members and p <= SURE * false_alarm}
+        best = [m for m in able if _worth_it(problem, m, members) or (m.hypothesis in sure and m.bic(problem.rows) > 0)]
         if not best or not _beyond(problem, best[0], members):
             break
         members.append(best[0])
@@ -97,9 +98,9 @@ def select(
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
     found = _found(problem, entries, members, p_values, rng)
-    others = members[1:]
-    sure = [f for f in found if _worth_it(problem, f.member, others) or _sure(problem, f.member, f.p_value, others)]
-    order = sorted(sure, key=lambda f: -f.member.gain)
+    alone = len(found) == 1 and found[0].p_value <= SURE * false_alarm and found[0].member.bic(problem.rows) > 0
+    kept = found if alone else [f for f in found if _worth_it(problem, f.member, members[1:])]
+    order = sorted(kept, key=lambda f: -f.member.gain)
     last = result if members else first
     return Selection(tuple(order), first, last, accept(problem, tuple(f.member.group for f in order)))
 
@@ -127,11 +128,6 @@ def _worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) ->
     if worth <= LEAST and not members and len(problem.recording.runs) > 1:
         worth += profile_gain(problem, candidate) - candidate.gain
     return worth > LEAST
-
-
-def _sure(problem: Problem, candidate: Member, p_value: float, members: Sequence[Member]) -> bool:
-    """Whether a single effect of many parameters is beyond doubt, and worth them at all."""
-    return not members and p_value <= SURE and candidate.bic(problem.rows) > 0
 
 
 def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.base import length_unit
 from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effects.joint_elasticity import link_inertia, windup
 
@@ -18,39 +17,42 @@ Array = NDArray[np.float64]
 
 QUICKEST, SLOWEST = 0.004, 0.1
 """Times [s] between which a crossing of the gap takes; a log shows nothing quicker than a sample."""
+SCANNED = (0.006, 0.0085, 0.012, 0.017, 0.025, 0.035, 0.05)
+"""Times [s] of a scan: the size of the torque tells the gap within `LEAST` and `MOST` of what each says."""
+LEAST, MOST = 0.5, 2.0
 
 
 class Backlash(Effect):
     """The link lags its encoder by (b / 2) side: the side changes from where the load changes sign, over a time T.
 
     A load that grows by r per second carries the link's inertia M over the gap b in T = (6 b M / r)^(1/3). The torque
-    follows from the lag as for an elastic gear: bursts at zero crossings of the load, not of the velocity.
+    follows from the lag as for an elastic gear: bursts at zero crossings of the load, not of the velocity. Their size
+    and their time tell one and the same gap, but for a factor: no flank is hit without bouncing or sliding.
     """
 
     name: ClassVar[str] = "backlash"
     title: ClassVar[str] = "play in the gear (backlash)"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("gap_crossed", "rad", 1e-7, 0.2, "log"),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("play", "rad", 1e-7, 0.1, "log"),)
     rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "presliding_hysteresis", "load_dependent_friction")
     experiments: ClassVar[tuple[str, ...]] = ("payload", "micro_reversals")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes half the play."""
-        assert joint is not None
-        return (Coefficient("half_play", length_unit(robot, joint - 1), 0.0, 0.05),)
+        """Describes by how much the torque is that of another play than its time says."""
+        return (Coefficient("size", "1", LEAST, MOST),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists gaps that take 6, 12, 25 and 50 ms; none for a load that hardly ever changes sign."""
+        """Lists gaps that take 6 to 50 ms; none for a load that hardly ever changes sign."""
         assert joint is not None
         crossings = _crossings(situation, joint)
         if len(crossings[0]) < 2:
             return ()
         _, _, quickness = crossings
         middle = float(np.median(quickness))
-        gaps = [time**3 * middle / 6.0 for time in (0.006, 0.012, 0.025, 0.05)]
+        gaps = [time**3 * middle / 6.0 for time in SCANNED]
         return tuple((gap,) for gap in gaps if self.shapes[0].lower <= gap <= self.shapes[0].upper)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of all joints per half play of one."""
+        """Evaluates the torque of all joints by the play of one."""
         assert joint is not None
         times, ways, quickness = _crossings(situation, joint)
         durations = np.clip((6.0 * shape[0] / quickness) ** (1 / 3), max(QUICKEST, situation.period), SLOWEST)
@@ -68,7 +70,7 @@ class Backlash(Effect):
                 rate[during] += 2 * way * (30 * s**2 - 60 * s**3 + 30 * s**4) / duration
                 curve[during] += 2 * way * (60 * s - 180 * s**2 + 120 * s**3) / duration**2
                 side[run.start + last : run.stop] += 2 * way
-        return windup(situation, joint, side, rate, curve)[:, :, None]
+        return shape[0] / 2 * windup(situation, joint, side, rate, curve)[:, :, None]
 
     def describe(
         self,
@@ -81,8 +83,8 @@ class Backlash(Effect):
     ) -> str:
         """Says what the values mean."""
         return (
-            f"The gear of joint {joint} has a play of {2 * coefficients[0]:.3g} {length}: its link changes sides when "
-            f"the load changes sign."
+            f"The gear of joint {joint} has a play of {coefficients[0] * shape[0]:.3g} {length}: its link changes "
+            f"sides when the load changes sign."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
