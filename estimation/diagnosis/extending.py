@@ -81,7 +81,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
     pull = Pull(pull.precision / row_weight(white), pull.target)
     values[linear] = held(free.T @ free, free.T @ tau, pull)
     covariance = _covariance(flat)
-    lower_upper = [m.hypothesis.coefficient_bounds(problem.situation.robot) for m in members]
+    lower_upper = [m.hypothesis.coefficient_bounds(problem.situation.robot, m.shape) for m in members]
     extensions, known = [], []
     for member, (start, size, shapes), steps, (lower, upper) in zip(
         members, slices, deviations, lower_upper, strict=True

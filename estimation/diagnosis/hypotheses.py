@@ -44,10 +44,10 @@ class Hypothesis:
         joints = tuple(int(j) for j in np.flatnonzero(X.any(axis=(0, 2)))) or (0,)
         return joints, tuple(np.ascontiguousarray(X[:, j]) for j in joints)
 
-    def coefficient_bounds(self, robot: Robot) -> tuple[Array, Array]:
-        """Least and largest physically possible coefficients (k,)."""
-        described = self.effect.parameters(robot, self.joint)
-        return np.array([c.lower for c in described]), np.array([c.upper for c in described])
+    def coefficient_bounds(self, robot: Robot, shape: tuple[float, ...]) -> tuple[Array, Array]:
+        """Least and largest physically possible coefficients (k,) at some shape values."""
+        ranges = self.effect.ranges(robot, self.joint, shape)
+        return np.array([lower for lower, _ in ranges]), np.array([upper for _, upper in ranges])
 
 
 def all_hypotheses(robot: Robot, effects: Sequence[Effect]) -> tuple[Hypothesis, ...]:

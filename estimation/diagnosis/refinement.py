@@ -102,7 +102,6 @@ def refine(
     with are then tried, without a parameter to pay for.
     """
     situation = problem.situation
-    lower, upper = hypothesis.coefficient_bounds(situation.robot)
     bounds = hypothesis.effect.bounds(situation, hypothesis.joint)
     scales = [shape.scale for shape in hypothesis.effect.shapes]
     free = [k for k, (low, high) in enumerate(bounds) if high > low]
@@ -113,7 +112,7 @@ def refine(
         joints, columns = problem.columns_of(hypothesis, shape)
         group = problem.group(joints, columns, agreed=hypothesis.effect.alike)
         result = score(problem, group, accepted)
-        gain, coefficients = result.bounded(lower, upper)
+        gain, coefficients = result.bounded(*hypothesis.coefficient_bounds(situation.robot, shape))
         member = Member(hypothesis, shape, group, gain, coefficients, result.degrees + fitted, result.visible)
         worth = member.bic(problem.rows)
         if not best or worth > best[0].bic(problem.rows):

@@ -208,7 +208,7 @@ def scan(
 
 
 def _outcome(problem: Problem, entry: Entry, accepted: Accepted, draws: int) -> tuple[Outcome, Array]:
-    lower, upper = entry.hypothesis.coefficient_bounds(problem.situation.robot)
+    robot = problem.situation.robot
     best: tuple[float, float, tuple[float, ...], float, int] = (-1.0, 0.0, (), 0.0, 0)
     highest: dict[int, Array] = {}
     for at, (shape, group) in enumerate(zip(entry.shapes, entry.groups, strict=True)):
@@ -216,7 +216,7 @@ def _outcome(problem: Problem, entry: Entry, accepted: Accepted, draws: int) -> 
         if not result.degrees:
             continue
         # Within physical bounds: a gear of negative stiffness is no alarm.
-        gain = result.bounded(lower, upper)[0]
+        gain = result.bounded(*entry.hypothesis.coefficient_bounds(robot, shape))[0]
         evidence = float(surprise(np.array(gain), result.degrees))
         if draws and entry.tries <= LONG:
             cross = entry.nulls[at] - result.onto.T @ accepted.nulls

@@ -181,7 +181,7 @@ def _found(
         beside = accept(problem, tuple(m.group for m in others))
         result = scan(problem, entries, beside, rng, nulls=False)
         rest = [o for o in contenders(problem, result, others) if o.hypothesis != member.hypothesis]
-        lower, upper = member.hypothesis.coefficient_bounds(problem.situation.robot)
+        lower, upper = member.hypothesis.coefficient_bounds(problem.situation.robot, member.shape)
         own = score(problem, member.group, beside)
         gain, coefficients = own.bounded(lower, upper)
         measured = replace(member, gain=gain, coefficients=coefficients, visible=own.visible)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.terms.base import length_unit
 from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effects.joint_elasticity import link_inertia, windup
 
@@ -32,13 +33,18 @@ class Backlash(Effect):
 
     name: ClassVar[str] = "backlash"
     title: ClassVar[str] = "play in the gear (backlash)"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("play", "rad", 1e-7, 0.1, "log"),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("gap_crossed", "rad", 1e-7, 0.2, "log"),)
     rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "presliding_hysteresis", "load_dependent_friction")
     experiments: ClassVar[tuple[str, ...]] = ("payload", "micro_reversals")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes by how much the torque is that of another play than its time says."""
-        return (Coefficient("size", "1", LEAST, MOST),)
+        """Describes half the play."""
+        assert joint is not None
+        return (Coefficient("half_play", length_unit(robot, joint - 1), 0.0, 0.05),)
+
+    def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
+        """Ties the play that the torque's size tells to the gap that the crossings' time tells."""
+        return ((LEAST * shape[0] / 2, MOST * shape[0] / 2),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists gaps that take 6 to 50 ms; none for a load that hardly ever changes sign."""
@@ -52,7 +58,7 @@ class Backlash(Effect):
         return tuple((gap,) for gap in gaps if self.shapes[0].lower <= gap <= self.shapes[0].upper)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of all joints by the play of one."""
+        """Evaluates the torque of all joints per half play of one."""
         assert joint is not None
         times, ways, quickness = _crossings(situation, joint)
         durations = np.clip((6.0 * shape[0] / quickness) ** (1 / 3), max(QUICKEST, situation.period), SLOWEST)
@@ -70,7 +76,7 @@ class Backlash(Effect):
                 rate[during] += 2 * way * (30 * s**2 - 60 * s**3 + 30 * s**4) / duration
                 curve[during] += 2 * way * (60 * s - 180 * s**2 + 120 * s**3) / duration**2
                 side[run.start + last : run.stop] += 2 * way
-        return shape[0] / 2 * windup(situation, joint, side, rate, curve)[:, :, None]
+        return windup(situation, joint, side, rate, curve)[:, :, None]
 
     def describe(
         self,
@@ -83,8 +89,8 @@ class Backlash(Effect):
     ) -> str:
         """Says what the values mean."""
         return (
-            f"The gear of joint {joint} has a play of {coefficients[0] * shape[0]:.3g} {length}: its link changes "
-            f"sides when the load changes sign."
+            f"The gear of joint {joint} has a play of {2 * coefficients[0]:.3g} {length}: its link changes sides when "
+            f"the load changes sign."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

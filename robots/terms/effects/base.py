@@ -98,6 +98,10 @@ class Effect(ABC):
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the k linear coefficients, in the order of the columns."""
 
+    def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
+        """Gives the range of each coefficient at some shape values: as described, where shapes do not narrow it."""
+        return tuple((coefficient.lower, coefficient.upper) for coefficient in self.parameters(robot, joint))
+
     @abstractmethod
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque per unit of each coefficient.
