@@ -19,8 +19,9 @@ Array = NDArray[np.float64]
 QUICKEST, SLOWEST = 0.004, 0.1
 """Times [s] between which a crossing of the gap takes; a log shows nothing quicker than a sample."""
 SCANNED = (0.006, 0.0085, 0.012, 0.017, 0.025, 0.035, 0.05)
-"""Times [s] of a scan: the size of the torque tells the gap within `LEAST` and `MOST` of what each says."""
-LEAST, MOST = 0.5, 2.0
+"""Times [s] of a scan."""
+LEAST, MOST = 1 / 8, 8.0
+"""Shares of the gap that the time of its crossing tells: the time, whose cube that is, is true to a factor of two."""
 
 
 class Backlash(Effect):
@@ -28,7 +29,7 @@ class Backlash(Effect):
 
     A load that grows by r per second carries the link's inertia M over the gap b in T = (6 b M / r)^(1/3). The torque
     follows from the lag as for an elastic gear: bursts at zero crossings of the load, not of the velocity. Their size
-    and their time tell one and the same gap, but for a factor: no flank is hit without bouncing or sliding.
+    and their time tell the same gap, the time but roughly: nothing flies quite freely from flank to flank.
     """
 
     name: ClassVar[str] = "backlash"
