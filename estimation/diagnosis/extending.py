@@ -24,12 +24,14 @@ Array = NDArray[np.float64]
 
 # Steps of a shape parameter along which its likelihood is followed: up to where it drops by this much.
 DROP = 2.0
-# A drop that stays below this all the way to the bound leaves the parameter open.
+# A value at which the likelihood is less than this below its top may be the true one.
 OPEN = 3.84
 # Moments are tried at so many standard errors, and may be where the profile drops by less than this: (1 - e^(-x / 2))^2
 # is .95, the distribution of the likelihood ratio of a moment of change (Hansen, Econometrica 2000).
 FAR = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 13.0, 20.0)
 CHANGED = 7.35
+# Values of a shape that is left as assumed at which the likelihood is asked.
+POINTS = 21
 FAINT = 1e-7
 
 
@@ -172,8 +174,19 @@ def _steps(problem: Problem, member: Member, others: Accepted) -> list[float]:
         if shape.unit == "s" and shape.scale == "linear" and np.isfinite(found):
             profile = partial(_drop, problem, member, k, others, best)
             found = max(found, _reach(profile, value, found, (low, high)) / 1.96)
+        if value == shape.default and len(member.shape) == 1:
+            found = _assumed(problem, member, others, best, (low, high)) / 1.96
         steps.append(found if found <= (abs(value) if shape.scale == "log" else 0.3 * room) else np.inf)
     return steps
+
+
+def _assumed(problem: Problem, member: Member, others: Accepted, best: float, bounds: tuple[float, float]) -> float:
+    """How far a shape may be from what is assumed of it, by the likelihood's own top, which was not worth its price."""
+    points = np.linspace(*bounds, POINTS)
+    gains = [_gain(problem, member, (float(x),), others) for x in points]
+    top = max(best, *gains)
+    near = [abs(float(x) - member.shape[0]) for x, gain in zip(points, gains, strict=True) if top - gain < OPEN]
+    return max(near, default=0.0)
 
 
 def _drop(problem: Problem, member: Member, k: int, others: Accepted, best: float, value: float) -> float:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from estimation.diagnosis import extending
 from estimation.diagnosis.baseline import base_parameters, build_baseline, inertia_of
 from estimation.diagnosis.extending import fit_extended
 from estimation.diagnosis.hypotheses import Hypothesis
@@ -100,3 +102,18 @@ def test_joints_must_agree_on_a_delay(recording: Recording, posed: Callable) -> 
     assert same.bic(both.rows) > 10
     assert apart.scatter > 10
     assert apart.bic(one.rows) < 0
+
+
+@pytest.mark.parametrize(("top", "farthest"), [(0.6, 0.55), (1.0, 0.15), (0.0, 1.0)])
+def test_a_shape_left_as_assumed_may_be_where_the_likelihood_has_its_top(
+    top: float, farthest: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Assumed to be 1: every value counts whose gain is within 3.84 of the best, on a grid of a twentieth."""
+
+    def gain(problem: object, member: object, shape: tuple[float, ...], others: object) -> float:
+        return 30.0 - ((shape[0] - top) / 0.1) ** 2
+
+    monkeypatch.setattr(extending, "_gain", gain)
+    assumed = SimpleNamespace(shape=(1.0,))
+    found = extending._assumed(None, assumed, None, gain(None, None, (1.0,), None), (0.0, 1.0))  # type: ignore[arg-type]
+    assert found == pytest.approx(farthest)
