@@ -9,7 +9,7 @@ from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.patterns import PREFIX
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found
-from estimation.diagnosis.unseen import Measured, acts_on
+from estimation.diagnosis.unseen import Measured
 from estimation.diagnosis.verdict import CLOSE, Judgement
 
 LEFT = 0.2  # share of an effect's gain that stretches left out must show
@@ -108,7 +108,7 @@ def _harms(seen: Measured, i: int, member: Member, held_out: bool) -> bool:
     that belongs to the logs of the fit: a contact, a drift.
     """
     effect, joint = member.hypothesis.effect, member.hypothesis.joint
-    if not acts_on(member, held_out):
+    if held_out and effect.passing:
         return False
     if effect.depends_on == "state" and seen.kept[i] < LEFT:
         return True

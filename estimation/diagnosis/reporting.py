@@ -20,7 +20,7 @@ from estimation.diagnosis.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import cut
 from estimation.diagnosis.selection import Found, Selection
-from estimation.diagnosis.unseen import Measured, acts_on, measure_unseen, simulate_unseen
+from estimation.diagnosis.unseen import Measured, measure_unseen, simulate_unseen
 from estimation.diagnosis.verdict import CLOSE, Judgement, is_open
 from estimation.diagnosis.windup import EFFECT as ELASTICITY
 from estimation.diagnosis.windup import Windup, measure_windups
@@ -28,7 +28,6 @@ from estimation.diagnosis.wording import word_finding
 from estimation.provenance import describe_logs
 from robots.robot import Robot
 from robots.signals import Log
-from robots.terms.effects import EFFECTS
 from robots.version import VERSION
 
 Array = NDArray[np.float64]
@@ -94,9 +93,8 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     findings += tuple(windup.finding for windup in twisted)
     known = {extension.joint for extension in fitted.model.extensions if extension.effect == ELASTICITY}
     added = [windup.extension for windup in twisted if windup.extension.joint not in known]
-    acting = any(acts_on(member, bool(told.held_out)) for member in members)
-    simulation = simulate_unseen(problem, members, seen, bool(told.held_out)) if acting else None
-    lost = (_LOST,) if acting and simulation is None else ()
+    simulation = simulate_unseen(problem, members, seen, bool(told.held_out)) if members else None
+    lost = (_LOST,) if members and simulation is None else ()
     before = unseen.nrmse(0)
     after = unseen.nrmse(len(unseen.errors) - 1)
     return Diagnosis(
@@ -165,9 +163,7 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
                 f"{parameter.name} of {finding.effect} is not determined by {recording.duration:.0f} s of logs: the "
                 f"value {parameter.value:.3g} s is one of many that fit."
             )
-        if told.held_out and finding.effect in EFFECTS and EFFECTS[finding.effect].passing:
-            notes.append(f"{finding.effect} belongs to the logs it was found in: held-out logs say nothing of it.")
-        elif finding.gain.ci95[0] <= 0:
+        if finding.gain.ci95[0] <= 0:
             notes.append(f"The gain of {finding.effect} on unseen data is not sure: its interval begins below zero.")
     open_ = sorted({member.hypothesis.joint for member in told.judgement.patterns if member.hypothesis.joint})
     if open_:

@@ -161,22 +161,13 @@ def simulate_unseen(
     b = known.size
     before = Plant(model=known.model, columns=known.independent, values=base[:b])
     edges = np.cumsum([b + problem.baseline.nuisance.shape[2], *(X.shape[2] for X in measured.effects)])
-    there = [(m, extended[a:z]) for m, (a, z) in zip(members, pairwise(edges), strict=True) if acts_on(m, held_out)]
     after = replace(
         before,
         values=extended[:b],
-        members=tuple(member for member, _ in there),
-        coefficients=tuple(values for _, values in there),
+        members=tuple(members),
+        coefficients=tuple(extended[start:stop] for start, stop in pairwise(edges)),
     )
     return compare(before, after, whole, rows)
-
-
-def acts_on(member: Member, held_out: bool) -> bool:
-    """Whether a member is part of what happens on the unseen data.
-
-    What passes belongs to the logs of the fit: on others a push is over, and a drift has gone where nobody knows.
-    """
-    return not (held_out and member.hypothesis.effect.passing)
 
 
 def _strongest(parts: Sequence[slice], strength: Array, length: int) -> tuple[slice, slice]:
@@ -260,10 +251,9 @@ def _on_logs(
     columns = []
     for member in members:
         X = np.zeros((len(whole), robot.n, len(member.coefficients)))
-        if acts_on(member, held_out=True):
-            joints, parts = member.hypothesis.columns(now, member.shape)
-            for j, part in zip(joints, parts, strict=True):
-                X[:, j] = part
+        joints, parts = member.hypothesis.columns(now, member.shape)
+        for j, part in zip(joints, parts, strict=True):
+            X[:, j] = part
         columns.append(X[first:])
     baseline = problem.baseline
     base = regressor_on(baseline.base, other)

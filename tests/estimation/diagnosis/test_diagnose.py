@@ -124,18 +124,6 @@ def test_a_cause_outside_the_candidates_is_not_forced_into_a_name(
     assert result.extended[0] < result.baseline[0]
 
 
-def test_a_push_is_no_part_of_other_logs(arm: Robot, hidden: Callable[..., tuple[Log, Log]]) -> None:
-    """Found in its log, it is not played on one that a clock of its own puts at the same time; a note says so."""
-    log, unseen = hidden("external_contact", None, peak_on_joint_1=4.0, peak_on_joint_2=2.0, start=8.0, duration=1.0)
-    same = replace(unseen, t=unseen.t - unseen.t[0] + log.t[0])
-    result = diagnose(arm, log, held_out=same, candidates=("external_contact", "friction_step"), friction=SIMPLE)
-    assert [finding.effect for finding in result.findings] == ["external_contact"]
-    # Played there, it would add its own size; left out, it no longer bends the base model.
-    assert np.all(result.extended < np.minimum(result.baseline, 0.03))
-    assert any("belongs to the logs" in note for note in result.notes)
-    assert result.simulation is None
-
-
 def test_noise_that_is_a_third_of_the_torque_is_said(arm: Robot, fourier_motion: Callable, arm_plant: Callable) -> None:
     """Nothing is found in it, and a note says how much is left, joint by joint; quiet joints have none."""
     log = simulate(arm_plant(torque_noise=0.02), fourier_motion(arm, 0), seed=0)
