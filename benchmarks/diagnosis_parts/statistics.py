@@ -129,6 +129,7 @@ def parameter_errors(rows: Iterable[Row], wanted: dict[str, tuple[str, ...]]) ->
                             "absolute": absolute,
                             "relative": absolute / max(abs(value), 1e-12),
                             "energy": float(finding.get("delta_bic") or 0.0),
+                            "stated": low is not None and high is not None,
                             "inside": low is not None and high is not None and low <= value <= high,
                             # An open or wide interval is how a diagnosis marks what it cannot tell.
                             "marked": low is None or high is None or (high - low) > abs(value),
