@@ -87,8 +87,8 @@ def select(
         refined = _best(problem, contenders(problem, result, members), accepted)
         chance = {member.hypothesis: chances.get(member.hypothesis, 1.0) for member in refined}
         able = [member for member in refined if chance[member.hypothesis] <= false_alarm]
-        sure = {m for m, p in chance.items() if not members and p <= SURE * false_alarm}
-        best = [m for m in able if _worth_it(problem, m, members) or (m.hypothesis in sure and m.bic(problem.rows) > 0)]
+        alone = SURE * false_alarm if not members else 0.0
+        best = [m for m in able if _worth_it(problem, m, members) or _sure(problem, m, chance[m.hypothesis], alone)]
         if not best or not _beyond(problem, best[0], members):
             break
         members.append(best[0])
@@ -98,8 +98,8 @@ def select(
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
     found = _found(problem, entries, members, p_values, rng)
-    alone = len(found) == 1 and found[0].p_value <= SURE * false_alarm and found[0].member.bic(problem.rows) > 0
-    kept = found if alone else [f for f in found if _worth_it(problem, f.member, members[1:])]
+    others, alone = members[1:], SURE * false_alarm if len(members) == 1 else 0.0
+    kept = [f for f in found if _worth_it(problem, f.member, others) or _sure(problem, f.member, f.p_value, alone)]
     order = sorted(kept, key=lambda f: -f.member.gain)
     last = result if members else first
     return Selection(tuple(order), first, last, accept(problem, tuple(f.member.group for f in order)))
@@ -128,6 +128,11 @@ def _worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) ->
     if worth <= LEAST and not members and len(problem.recording.runs) > 1:
         worth += profile_gain(problem, candidate) - candidate.gain
     return worth > LEAST
+
+
+def _sure(problem: Problem, candidate: Member, p_value: float, chance: float) -> bool:
+    """Whether an effect has a p-value below a chance, and is worth its parameters at all."""
+    return p_value < chance and candidate.bic(problem.rows) > 0
 
 
 def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:

@@ -45,7 +45,8 @@ class Backlash(Effect):
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
         """Ties the play that the torque's size tells to the gap that the crossings' time tells."""
-        return ((LEAST * shape[0] / 2, MOST * shape[0] / 2),)
+        ((lower, upper),) = super().ranges(robot, joint, shape)
+        return ((max(lower, LEAST * shape[0] / 2), min(upper, MOST * shape[0] / 2)),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists gaps that take 6 to 50 ms; none for a load that hardly ever changes sign."""

@@ -215,5 +215,7 @@ def test_size_and_time_of_a_crossing_tell_one_play(seen):
     """Half the play lies within a factor of eight of what the crossing's time says; other effects are as described."""
     robot = seen(5, seed=1).robot
     assert EFFECTS["backlash"].ranges(robot, 1, (2e-3,)) == ((0.125e-3, 8e-3),)
+    # No play is larger than a twentieth of a radian each way, whatever its time.
+    assert EFFECTS["backlash"].ranges(robot, 1, (0.2,)) == ((0.0125, 0.05),)
     described = EFFECTS["joint_elasticity"].parameters(robot, 1)
     assert EFFECTS["joint_elasticity"].ranges(robot, 1, (10.0,)) == tuple((c.lower, c.upper) for c in described)
