@@ -209,11 +209,13 @@ def _limit(
         root = visible_root(group.gram, group.raw)
         mixtures = unit_mixtures(entry.sizes[at])
         shares.append(float(np.max(np.diag(group.gram) / np.maximum(group.raw, 1e-300))))
-        if not len(root):
+        if not len(root) or not len(mixtures):
             found.append(np.inf)
             named.append((np.inf, None))
             continue
-        penalty = (len(root) + len(shape)) * float(np.log(problem.rows * len(group.joints)))
+        assumed = hypothesis.effect.likely(problem.situation, hypothesis.joint, shape, np.abs(mixtures[0]))
+        fitted = 0 if assumed else len(shape)
+        penalty = (len(root) + fitted) * float(np.log(problem.rows * len(group.joints)))
         needed = detectable_energy(len(root), tries, false_alarm=false_alarm, penalty=penalty)
         smallest = size_per_energy(mixtures, group.gram) * np.sqrt(needed)
         found.append(smallest)

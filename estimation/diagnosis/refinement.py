@@ -141,8 +141,8 @@ def refine(
                 effort,
                 [AGAIN * steps[k] if k in steps else None for k in free],
             )
-        refined = best[0].shape
-        for shape in hypothesis.effect.likely(situation, hypothesis.joint, refined):
+        refined = best[0]
+        for shape in hypothesis.effect.likely(situation, hypothesis.joint, refined.shape, refined.coefficients):
             evaluate(shape, 0)
     found = best[0]
     return replace(found, scatter=_scatter(problem, found, accepted)) if hypothesis.effect.alike else found

@@ -136,7 +136,15 @@ def _sure(problem: Problem, candidate: Member, p_value: float, chance: float) ->
 
 
 def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
-    """Whether a candidate is worth it by the joints alone on which it is more than what others may leave."""
+    """Whether a candidate is worth it by the joints alone on which it is more than what others may leave.
+
+    What the torque as logged shows by itself, such as flat tops, no other formula leaves; nor does one leave the same
+    coefficient on joints that must agree on it.
+    """
+    hypothesis = candidate.hypothesis
+    flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
+    if hypothesis.effect.alike or (flags is not None and flags.any()):
+        return True
     able = [
         j
         for j in candidate.group.joints

@@ -59,6 +59,13 @@ class Backlash(Effect):
         gaps = [time**3 * middle / 6.0 for time in SCANNED]
         return tuple((gap,) for gap in gaps if self.shapes[0].lower <= gap <= self.shapes[0].upper)
 
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float, ...], ...]:
+        """Gives the gap that the size of the torque tells."""
+        shortest, longest = self.shapes[0].lower, self.shapes[0].upper
+        return ((float(np.clip(2.0 * coefficients[0], shortest, longest)),),)
+
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per half play of one."""
         assert joint is not None

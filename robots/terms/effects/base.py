@@ -150,10 +150,12 @@ class Effect(ABC):
         """Gives the range of each shape parameter in which this data allow it to be refined."""
         return tuple((shape.lower, shape.upper) for shape in self.shapes)
 
-    def likely(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float, ...], ...]:
         """Lists shapes near a refined one that machines are built with, such as whole numbers of waves a turn.
 
-        None of their parameters is counted as fitted.
+        None of their parameters is counted as fitted; nor is what follows from the coefficients (k,) found there.
         """
         return ()
 

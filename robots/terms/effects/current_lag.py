@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
-from robots.terms.effects.time_delay import SHIFT, lateness
+from robots.terms.effects.time_delay import SHIFT, as_late, lateness
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -33,6 +33,12 @@ class CurrentLag(JointEffect):
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the change of the joint's torque per delay."""
         return lateness(situation, shape[0])[:, joint - 1 : joint]
+
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float, ...], ...]:
+        """Gives the reversals that are as late as all else."""
+        return as_late(coefficients)
 
     def describe(
         self,

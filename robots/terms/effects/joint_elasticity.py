@@ -47,6 +47,18 @@ class JointElasticity(Effect):
         load = followed(situation, situation.load[:, joint - 1], shape[0])
         return windup(situation, joint, load, *situation.derivatives(load))[:, :, None]
 
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float, ...], ...]:
+        """Gives the resonance of the link that the base model describes on a gear of this compliance."""
+        assert joint is not None
+        inertia = float(np.mean(link_inertia(situation, joint)[:, joint - 1]))
+        square = inertia * float(coefficients[0])
+        if square <= 0:
+            return ()
+        lowest, highest = self.shapes[0].lower, self.shapes[0].upper
+        return ((float(np.clip(1 / (2 * np.pi * np.sqrt(square)), lowest, highest)),),)
+
     def describe(
         self,
         joint: Place,

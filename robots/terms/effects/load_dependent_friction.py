@@ -47,7 +47,9 @@ class LoadDependentFriction(StaticJointEffect):
             "viscous_per_load", f"s/{length_unit(robot, joint - 1)}"
         )
 
-    def likely(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float, ...], ...]:
         """Gives the gear that loses alike both ways."""
         return (ALIKE,)
 

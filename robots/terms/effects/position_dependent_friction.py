@@ -41,7 +41,9 @@ class PositionDependentFriction(StaticJointEffect):
         reach = float(np.ptp(situation.q[:, joint - 1]))
         return tuple((order,) for order in self.shapes[0].grid if order * reach > 1.0)
 
-    def likely(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float, ...], ...]:
         """Gives the nearest whole order, where the joint's range does not tell it from the one found."""
         assert joint is not None
         order = max(float(round(shape[0])), 1.0)

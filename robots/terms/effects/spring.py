@@ -69,7 +69,9 @@ class Spring(StaticJointEffect):
             return ((0.0, 0.0), (0.0, 0.0))
         return super().bounds(situation, joint)
 
-    def likely(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float, ...], ...]:
         """Gives the spring without levers."""
         return (PLAIN,)
 

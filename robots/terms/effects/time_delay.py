@@ -40,6 +40,12 @@ class TimeDelay(Effect):
         """Evaluates the change of torque per delay."""
         return lateness(situation, shape[0])[:, :, None]
 
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float, ...], ...]:
+        """Gives the reversals that are as late as all else."""
+        return as_late(coefficients)
+
     def describe(
         self,
         joint: Place,
@@ -74,3 +80,8 @@ def lateness(situation: Situation, shift: float) -> Array:
 
     # Joints share the points of the grid; those of a search are as many as they are brief.
     return situation.cached(("lateness", shift), evaluate) if shift in SHIFT.grid else evaluate()
+
+
+def as_late(coefficients: Array) -> tuple[tuple[float, ...], ...]:
+    """Gives the shape that a delay (1,) [s] has where reversals are no exception."""
+    return ((float(np.clip(coefficients[0], SHIFT.lower, SHIFT.upper)),),)

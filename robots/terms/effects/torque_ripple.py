@@ -79,7 +79,9 @@ class TorqueRipple(StaticJointEffect):
         reach = float(np.ptp(situation.q[:, joint - 1]))
         return float(np.clip(2 * np.pi * WAVES / max(reach, 1e-9), self.shapes[0].lower, 0.5 * self.shapes[0].upper))
 
-    def likely(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float, ...], ...]:
         """Lists whole orders up to 12, and those of a known gear, within the resolution of an order."""
         assert joint is not None
         spacing = self._resolution(situation, joint)[0]

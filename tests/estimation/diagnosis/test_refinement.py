@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Group
 from estimation.diagnosis.refinement import RARE, Member, agreed_gain
+from estimation.diagnosis.selection import _beyond
 from robots.terms.effects import EFFECTS
 
 ROWS, ACTING = 5000, 40
@@ -108,3 +112,22 @@ def test_what_one_joint_alone_tells_is_no_common_coefficient() -> None:
     assert agreed < 0.1 * gain
     _, agreed = _shared(1.0, -1.0, 1.0, -1.0)
     assert agreed < 0.01 * _shared(1.0, 1.0, 1.0, 1.0)[0]
+
+
+def test_what_a_log_shows_by_itself_is_no_leftover() -> None:
+    """Beside an effect of a hundred times its gain, a further one counts where tops are flat, and nowhere else."""
+    rng = np.random.default_rng(5)
+    tau = rng.normal(size=(ROWS, 2))
+    flat = np.clip(tau, -1.0, 1.0)
+    large = replace(_member("asymmetric_friction", 1, (tau[:, :1],)), gain=1e4)
+    small = _member("current_clipping", 1, ((flat - tau)[:, :1],))
+    other = _member("stribeck", 1, ((flat - tau)[:, :1],))
+
+    def beyond(candidate: Member, measured: np.ndarray) -> bool:
+        situation = SimpleNamespace(runs=(slice(0, ROWS),))
+        problem = SimpleNamespace(situation=situation, recording=SimpleNamespace(tau=measured), rows=ROWS)
+        return _beyond(problem, replace(candidate, gain=200.0), [large])  # type: ignore[arg-type]
+
+    assert beyond(small, flat)
+    assert not beyond(small, tau)
+    assert not beyond(other, flat)

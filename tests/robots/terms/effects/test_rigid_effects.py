@@ -219,3 +219,26 @@ def test_size_and_time_of_a_crossing_tell_one_play(seen):
     assert EFFECTS["backlash"].ranges(robot, 1, (0.2,)) == ((0.0125, 0.05),)
     described = EFFECTS["joint_elasticity"].parameters(robot, 1)
     assert EFFECTS["joint_elasticity"].ranges(robot, 1, (10.0,)) == tuple((c.lower, c.upper) for c in described)
+
+
+def test_size_of_an_effect_tells_its_time(seen):
+    """What follows from a coefficient is offered: the gap that is crossed, a delay's own reversals, a resonance."""
+    now = seen(5, seed=1)
+    assert EFFECTS["backlash"].likely(now, 2, (1e-3,), np.array([2e-4])) == ((4e-4,),)
+    for name, joint in (("time_delay", None), ("current_lag", 2)):
+        assert EFFECTS[name].likely(now, joint, (1e-3,), np.array([-3e-3])) == ((-3e-3,),)
+        assert EFFECTS[name].likely(now, joint, (1e-3,), np.array([0.04])) == ((0.02,),)
+
+
+def test_a_gear_of_known_compliance_has_a_resonance(now, twin):
+    """A link of inertia M on a gear of compliance c swings at 1 / (2 pi sqrt(c M)), M by pinocchio's torques."""
+    compliance = 1e-4
+    for joint in (1, 3, 5):
+        faster = now.ddq + np.eye(5)[joint - 1]
+        more, less = (twin(now.robot).torque(now.q, now.dq, ddq, now.robot.inertia) for ddq in (faster, now.ddq))
+        inertia = float((more - less)[:, joint - 1].mean())
+        ((resonance,),) = EFFECTS["joint_elasticity"].likely(now, joint, (60.0,), np.array([compliance]))
+        assert resonance == pytest.approx(
+            np.clip(1 / (2 * np.pi * np.sqrt(compliance * inertia)), 3.0, 1000.0), rel=1e-4
+        )
+    assert EFFECTS["joint_elasticity"].likely(now, 1, (60.0,), np.zeros(1)) == ()
