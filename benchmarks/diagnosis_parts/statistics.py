@@ -89,20 +89,20 @@ def spurious(row: Row) -> bool:
 def gain_ratios(rows: Iterable[Row]) -> np.ndarray:
     """Gain over the gain of the true effects' own model, where that is more than noise and the effect lasts.
 
-    The diagnosis' gain counts from its own base model, the true effects' from least squares with the motion as it was.
-    Where these two differ by more than a tenth on the unseen log, both count from the better one: a base model that
-    extrapolates badly must not make a gain.
+    The diagnosis' gain counts from its own base model, with the motion as measured; the true effects' from least
+    squares with the motion as it was, or from the diagnosis' base model where that is better. A base model that errs
+    by a tenth more than least squares, before and after, keeps its gain but must make none: one is the most then.
     """
     ratios = []
     for row in rows:
         if not detected(row) or row.get("oracle_after") is None or not all(e["lasting"] for e in row["truth"]):
             continue
         told, true = row["before"], row["oracle_before"]
-        if abs(told / true - 1) > ALIKE:
-            told = true = min(told, true)
-        possible = true - row["oracle_after"]
-        if possible > LEAST_GAIN * true:
-            ratios.append((told - row["after_extension"]) / possible)
+        start = told if told < (1 - ALIKE) * true else true
+        possible = start - row["oracle_after"]
+        if possible > LEAST_GAIN * start:
+            ratio = (told - row["after_extension"]) / possible
+            ratios.append(min(ratio, 1.0) if told > (1 + ALIKE) * true else ratio)
     return np.array(ratios)
 
 

@@ -56,6 +56,15 @@ def test_scores_of_known_rows() -> None:
     assert "1 of 3" in next(line for line in text.splitlines() if "first name right" in line)
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "ratio"), [(4.6e-3, 3.2e-3, 1.4 / 1.5), (5.5e-3, 4.3e-3, 0.8), (7e-3, 3e-3, 1.0)]
+)
+def test_a_worse_base_model_keeps_its_gain_and_makes_none(before: float, after: float, ratio: float) -> None:
+    """An error with and without the effect is no part of the gain, and a base model's own that goes is no gain."""
+    seen = row([("stribeck", 2)], [("stribeck", 2)], **AFTER | {"before": before, "after_extension": after})
+    assert gain_ratios([seen]) == pytest.approx([ratio])
+
+
 def test_benchmark_seeds_are_not_the_tuners() -> None:
     """The full benchmark has 300 logs without an effect, and all its seeds are below those that tuning may use."""
     listed = list(tasks(list(STRATA), 1.0, 0))
