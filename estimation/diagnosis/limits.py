@@ -214,7 +214,7 @@ def _limit(
             named.append((np.inf, None))
             continue
         assumed = hypothesis.effect.likely(problem.situation, hypothesis.joint, shape, np.abs(mixtures[0]))
-        fitted = 0 if assumed else len(shape)
+        fitted = min((sum(value is None for value in known) for known in assumed), default=len(shape))
         penalty = (len(root) + fitted) * float(np.log(problem.rows * len(group.joints)))
         needed = detectable_energy(len(root), tries, false_alarm=false_alarm, penalty=penalty)
         smallest = size_per_energy(mixtures, group.gram) * np.sqrt(needed)

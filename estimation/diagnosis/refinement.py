@@ -142,8 +142,9 @@ def refine(
                 [AGAIN * steps[k] if k in steps else None for k in free],
             )
         refined = best[0]
-        for shape in hypothesis.effect.likely(situation, hypothesis.joint, refined.shape, refined.coefficients):
-            evaluate(shape, 0)
+        for known in hypothesis.effect.likely(situation, hypothesis.joint, refined.shape, refined.coefficients):
+            shape = tuple(own if value is None else value for value, own in zip(known, refined.shape, strict=True))
+            evaluate(shape, sum(known[k] is None for k in free))
     found = best[0]
     return replace(found, scatter=_scatter(problem, found, accepted)) if hypothesis.effect.alike else found
 

@@ -61,7 +61,7 @@ class Backlash(Effect):
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
-    ) -> tuple[tuple[float, ...], ...]:
+    ) -> tuple[tuple[float | None, ...], ...]:
         """Gives the gap that the size of the torque tells."""
         shortest, longest = self.shapes[0].lower, self.shapes[0].upper
         return ((float(np.clip(2.0 * coefficients[0], shortest, longest)),),)

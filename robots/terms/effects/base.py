@@ -152,10 +152,11 @@ class Effect(ABC):
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
-    ) -> tuple[tuple[float, ...], ...]:
+    ) -> tuple[tuple[float | None, ...], ...]:
         """Lists shapes near a refined one that machines are built with, such as whole numbers of waves a turn.
 
-        None of their parameters is counted as fitted; nor is what follows from the coefficients (k,) found there.
+        None of their parameters is counted as fitted; nor is what follows from the coefficients (k,) found there. One
+        that is None stays as it was refined, and counts.
         """
         return ()
 

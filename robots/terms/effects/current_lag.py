@@ -36,7 +36,7 @@ class CurrentLag(JointEffect):
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
-    ) -> tuple[tuple[float, ...], ...]:
+    ) -> tuple[tuple[float | None, ...], ...]:
         """Gives the reversals that are as late as all else."""
         return as_late(coefficients)
 

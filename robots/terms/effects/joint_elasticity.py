@@ -49,7 +49,7 @@ class JointElasticity(Effect):
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
-    ) -> tuple[tuple[float, ...], ...]:
+    ) -> tuple[tuple[float | None, ...], ...]:
         """Gives the resonance of the link that the base model describes on a gear of this compliance."""
         assert joint is not None
         inertia = float(np.mean(link_inertia(situation, joint)[:, joint - 1]))

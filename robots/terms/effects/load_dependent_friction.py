@@ -49,7 +49,7 @@ class LoadDependentFriction(StaticJointEffect):
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
-    ) -> tuple[tuple[float, ...], ...]:
+    ) -> tuple[tuple[float | None, ...], ...]:
         """Gives the gear that loses alike both ways."""
         return (ALIKE,)
 

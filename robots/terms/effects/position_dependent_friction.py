@@ -43,7 +43,7 @@ class PositionDependentFriction(StaticJointEffect):
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
-    ) -> tuple[tuple[float, ...], ...]:
+    ) -> tuple[tuple[float | None, ...], ...]:
         """Gives the nearest whole order, where the joint's range does not tell it from the one found."""
         assert joint is not None
         order = max(float(round(shape[0])), 1.0)

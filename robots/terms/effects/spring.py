@@ -71,7 +71,7 @@ class Spring(StaticJointEffect):
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
-    ) -> tuple[tuple[float, ...], ...]:
+    ) -> tuple[tuple[float | None, ...], ...]:
         """Gives the spring without levers."""
         return (PLAIN,)
 

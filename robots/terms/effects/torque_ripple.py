@@ -27,9 +27,10 @@ LARGEST = 400
 
 
 class TorqueRipple(StaticJointEffect):
-    """tau = (a + c l) cos(h q) + (b + d l) sin(h q), h periods per turn: a wave generator's, the teeth's, the poles'.
+    """tau = (a + c l) cos(h p) + (b + d l) sin(h p), h periods per turn: a wave generator's, the teeth's, the poles'.
 
     l is the load, as a share of the joint's torque limit (of 100 N m where it has none): teeth mesh harder under it.
+    p = q - dq T is the position a moment T before: a ripple of 50 Hz and more turns with what delays the torque's log.
 
     Orders are those that the data resolve, known gear or not. Below 3 per turn, or two waves over the joint's range,
     gravity and springs look alike.
@@ -37,7 +38,10 @@ class TorqueRipple(StaticJointEffect):
 
     name: ClassVar[str] = "torque_ripple"
     title: ClassVar[str] = "torque ripple per turn of gear or motor"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("order", "periods per turn", 2.5, 1000.0, "linear"),)
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("order", "periods per turn", 2.5, 1000.0, "linear"),
+        Shape("late", "s", -0.01, 0.01, "linear", (0.0,), default=0.0),
+    )
     rivals: ClassVar[tuple[str, ...]] = ("position_dependent_friction", "spring", "encoder_eccentricity")
     experiments: ClassVar[tuple[str, ...]] = ("sweep",)
 
@@ -65,14 +69,15 @@ class TorqueRipple(StaticJointEffect):
         # Whole orders are the likely ones: the nearest point of the grid moves to each.
         whole = {float(h) for h in range(3, 13) if low <= h <= top}
         return tuple(
-            (order,) for order in sorted({o for o in orders if all(abs(o - h) > spacing / 2 for h in whole)} | whole)
+            (order, 0.0)
+            for order in sorted({o for o in orders if all(abs(o - h) > spacing / 2 for h in whole)} | whole)
         )
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Keeps the order within what the samples resolve."""
         assert joint is not None
-        lowest = self._lowest(situation, joint)
-        return ((lowest, max(self._resolution(situation, joint)[1], lowest + 0.5)),)
+        lowest, late = self._lowest(situation, joint), self.shapes[1]
+        return (lowest, max(self._resolution(situation, joint)[1], lowest + 0.5)), (late.lower, late.upper)
 
     def _lowest(self, situation: Situation, joint: int) -> float:
         """Gives the least order: fewer waves over the joint's range are no ripple but any smooth function."""
@@ -81,15 +86,16 @@ class TorqueRipple(StaticJointEffect):
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
-    ) -> tuple[tuple[float, ...], ...]:
-        """Lists whole orders up to 12, and those of a known gear, within the resolution of an order."""
+    ) -> tuple[tuple[float | None, ...], ...]:
+        """Lists whole orders up to 12, and those of a known gear, within the resolution of an order; none is late."""
         assert joint is not None
         spacing = self._resolution(situation, joint)[0]
         ratio = abs(float(situation.robot.gear_ratio[joint - 1]))
         built = {float(round(shape[0]))} if shape[0] < 12.5 else set()
         built |= {h * ratio for h in (1, 2, 4) if ratio > 1}
-        ((low, high),) = self.bounds(situation, joint)
-        return tuple((order,) for order in sorted(built) if abs(order - shape[0]) <= spacing and low <= order <= high)
+        low, high = self.bounds(situation, joint)[0]
+        near = [order for order in sorted(built) if abs(order - shape[0]) <= spacing and low <= order <= high]
+        return (None, 0.0), *((order, late) for order in near for late in (None, 0.0))
 
     def _resolution(self, situation: Situation, joint: int) -> tuple[float, float]:
         """Gives the grid's spacing and its highest order; zeros for a joint that does not move."""
@@ -110,13 +116,14 @@ class TorqueRipple(StaticJointEffect):
         grid = self.grid(situation, joint)
         if len(grid) <= count:
             return grid
-        orders = np.array([order for (order,) in grid])
+        orders = np.array([order for order, _ in grid])
         power = angle_spectrum(situation.q[:, joint - 1], residual[:, joint - 1], orders)
         return tuple(grid[i] for i in np.argsort(-power)[:count])
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
-        """Builds cos(h q) and sin(h q), by themselves and times the load."""
-        wave = casadi.horzcat(casadi.cos(at.shape[0] * at.q), casadi.sin(at.shape[0] * at.q))
+        """Builds cos(h p) and sin(h p), by themselves and times the load."""
+        angle = at.shape[0] * (at.q - at.dq * at.shape[1])
+        wave = casadi.horzcat(casadi.cos(angle), casadi.sin(angle))
         return casadi.horzcat(wave, wave * at.rigid / torque_reference(robot, joint))
 
     def describe(

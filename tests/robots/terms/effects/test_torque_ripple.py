@@ -40,7 +40,7 @@ def test_fewer_than_two_waves_are_no_ripple(seen):
     now = seen(2, seed=2)
     for joint in (1, 2):
         lowest = 2 * 2 * np.pi / np.ptp(now.q[:, joint - 1])
-        assert min(order for (order,) in RIPPLE.grid(now, joint)) >= min(lowest, 500.0)
+        assert min(order for order, _ in RIPPLE.grid(now, joint)) >= min(lowest, 500.0)
         assert RIPPLE.bounds(now, joint)[0][0] == pytest.approx(max(lowest, 2.5))
 
 
@@ -48,7 +48,7 @@ def test_a_known_gear_gives_its_orders(random_robot, seen):
     """Once, twice and four times a motor turn are on the grid, where the samples resolve them."""
     robot = replace(random_robot(3, 4), gear_ratio=np.full(4, 30.0))
     now = seen(robot=robot)
-    assert {30.0, 60.0, 120.0} <= {order for (order,) in RIPPLE.grid(now, 2)}
+    assert {30.0, 60.0, 120.0} <= {order for order, _ in RIPPLE.grid(now, 2)}
 
 
 def test_an_order_too_fast_for_the_samples_is_left_out(seen):
@@ -72,6 +72,19 @@ def test_orders_of_a_known_gear_and_whole_ones_are_likely(random_robot, seen):
     joint = 1 + int(np.argmax(np.ptp(now.q, axis=0)))
     resolution = np.pi / np.ptp(now.q[:, joint - 1])
     waves = np.ones(4)
-    assert (61.0,) in RIPPLE.likely(now, joint, (61.0 + 0.5 * resolution,), waves)
-    assert RIPPLE.likely(now, joint, (61.0 + 1.5 * resolution,), waves) == ()
-    assert RIPPLE.likely(now, joint, (45.3,), waves) == ()
+    prompt = (None, 0.0)
+    assert RIPPLE.likely(now, joint, (61.0 + 0.5 * resolution, 0.001), waves) == (prompt, (61.0, None), (61.0, 0.0))
+    assert RIPPLE.likely(now, joint, (61.0 + 1.5 * resolution, 0.001), waves) == (prompt,)
+    assert RIPPLE.likely(now, joint, (45.3, 0.001), waves) == (prompt,)
+
+
+def test_a_late_ripple_is_the_one_before(seen):
+    """A ripple that is logged late is the one of the moment before, to the second order of the delay."""
+    late, order, joint = 0.002, 60.0, 2
+    now = seen()
+    before = seen(times=now.t - late)
+    change = RIPPLE.columns(now, joint, (order, late))[:, joint - 1, :2]
+    wanted = RIPPLE.columns(before, joint, (order, 0.0))[:, joint - 1, :2]
+    turned = order * np.abs(now.ddq[:, joint - 1]).max() * late**2 / 2
+    assert np.abs(change - wanted).max() < 1.1 * turned
+    assert np.abs(RIPPLE.columns(now, joint, (order, 0.0))[:, joint - 1, :2] - wanted).max() > 5 * turned
