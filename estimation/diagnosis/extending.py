@@ -26,10 +26,11 @@ Array = NDArray[np.float64]
 DROP = 2.0
 # A value at which the likelihood is less than this below its top may be the true one.
 OPEN = 3.84
-# Moments are tried at so many standard errors, and may be where the profile drops by less than this: (1 - e^(-x / 2))^2
-# is .95, the distribution of the likelihood ratio of a moment of change (Hansen, Econometrica 2000).
-FAR = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 13.0, 20.0)
+# A moment may be where the profile drops by less than this: (1 - e^(-x / 2))^2 is .95, the distribution of the
+# likelihood ratio of a moment of change (Hansen, Econometrica 2000).
 CHANGED = 7.35
+# It is followed each way in growing steps, until so many in a row drop by twice as much.
+FIRST, GROWING, MANY, LOST = 1.5, 1.3, 24, 3
 # Values of a shape that is left as assumed at which the likelihood is asked.
 POINTS = 21
 FAINT = 1e-7
@@ -96,6 +97,10 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         open_ = ~np.isfinite(scale)
         scale[open_] = 1.0
         own = own * scale[:, None] * scale
+        # The profile is no parabola, for a moment of change least of all: what it says is the least that is unknown.
+        profile = np.concatenate([np.zeros(size), scale[size:]])
+        wider = np.maximum(profile / np.sqrt(np.maximum(np.diag(own), 1e-300)), 1.0)
+        own = own * wider[:, None] * wider
         own[open_, open_] = np.inf
         own[range(size, size + shapes), range(size, size + shapes)] += _inexact(member) ** 2
         coefficients = np.clip(values[start : start + size], lower, upper)
@@ -197,10 +202,21 @@ def _drop(problem: Problem, member: Member, k: int, others: Accepted, best: floa
 def _reach(drop: Callable[[float], float], value: float, step: float, bounds: tuple[float, float]) -> float:
     """The farthest of some points at which the moment of a change may be, by the likelihood; zero for none.
 
-    Its profile is a random walk with a drift, not a parabola, and may have a second summit.
+    Its profile is a random walk with a drift, not a parabola: it may have more summits, and what the top's curvature
+    says of its width is little.
     """
-    near = [x for m in FAR for x in (value - m * step, value + m * step) if bounds[0] <= x <= bounds[1]]
-    return max((abs(x - value) for x in near if drop(x) < CHANGED), default=0.0)
+    farthest = 0.0
+    for way in (-1, 1):
+        lost = 0
+        for distance in step * FIRST * GROWING ** np.arange(MANY):
+            x = value + way * distance
+            if lost == LOST or not bounds[0] <= x <= bounds[1]:
+                break
+            lower = drop(x)
+            lost = lost + 1 if lower > 2 * CHANGED else 0
+            # Where it is lost between two points is not known: half way.
+            farthest = max(farthest, distance * (1 + GROWING) / 2) if lower < CHANGED else farthest
+    return float(farthest)
 
 
 def _inexact(member: Member) -> Array:

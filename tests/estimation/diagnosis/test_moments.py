@@ -117,3 +117,27 @@ def test_a_shape_left_as_assumed_may_be_where_the_likelihood_has_its_top(
     assumed = SimpleNamespace(shape=(1.0,))
     found = extending._assumed(None, assumed, None, gain(None, None, (1.0,), None), (0.0, 1.0))  # type: ignore[arg-type]
     assert found == pytest.approx(farthest)
+
+
+def test_a_second_summit_belongs_to_the_interval() -> None:
+    """A moment whose profile drops by 14 and rises again may be at the second summit; what is lost for long is not."""
+
+    def drop(value: float) -> float:
+        away = abs(value - 7.0)
+        if value > 7.0:
+            return 8.0 * away / 0.1
+        return 14.0 if 0.2 < away < 1.0 else 3.0 if away < 1.6 else 40.0 if away < 6.0 else 0.0
+
+    found = extending._reach(drop, 7.0, 0.02, (0.0, 10.0))
+    assert 1.6 / 1.3 <= found <= 1.6 * 1.15
+    assert extending._reach(drop, 7.0, 0.02, (6.9, 10.0)) <= 0.1 * 1.15
+
+
+def test_an_interval_is_no_narrower_than_the_profile(recording: Recording, posed: Callable) -> None:
+    """What the linearised fit says of a moment is no less than what the likelihood's own profile says."""
+    noise = np.random.default_rng(3).normal(size=recording.tau.shape) * [0.02, 0.06]
+    problem = posed(_stepped(recording, 0.06) + noise)
+    nothing = accept(problem, ())
+    found = refine(problem, STEP, (TRUE + 0.3,), nothing)
+    covariance = fit_extended(problem, [found], {}).model.extensions[0].covariance
+    assert np.sqrt(covariance[2, 2]) >= 0.999 * extending._steps(problem, found, nothing)[0]
