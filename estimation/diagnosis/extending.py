@@ -99,8 +99,9 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         own = own * scale[:, None] * scale
         # The profile is no parabola, for a moment of change least of all: what it says is the least that is unknown.
         profile = np.concatenate([np.zeros(size), scale[size:]])
-        wider = np.maximum(profile / np.sqrt(np.maximum(np.diag(own), 1e-300)), 1.0)
+        wider = np.maximum(profile / np.sqrt(np.maximum(np.diag(own), 1e-9 * profile**2 + 1e-300)), 1.0)
         own = own * wider[:, None] * wider
+        own[range(len(own)), range(len(own))] = np.maximum(np.diag(own), profile**2)
         own[open_, open_] = np.inf
         own[range(size, size + shapes), range(size, size + shapes)] += _inexact(member) ** 2
         coefficients = np.clip(values[start : start + size], lower, upper)

@@ -27,14 +27,18 @@ LEAST, MOST = 1 / 8, 8.0
 class Backlash(Effect):
     """The link lags its encoder by (b / 2) side: the side changes from where the load changes sign, over a time T.
 
-    A load that grows by r per second carries the link's inertia M over the gap b in T = (6 b M / r)^(1/3). The torque
-    follows from the lag as for an elastic gear: bursts at zero crossings of the load, not of the velocity. Their size
-    and their time tell the same gap, the time but roughly: nothing flies quite freely from flank to flank.
+    A load that grows by r per second carries the link's inertia M over the gap b in T = (6 b M / r)^(1/3), or in the
+    longest time that the motor, which goes on, leaves it. The torque follows from the lag as for an elastic gear:
+    bursts at zero crossings of the load, not of the velocity. Their size and their time tell the same gap, the time but
+    roughly: nothing flies quite freely from flank to flank.
     """
 
     name: ClassVar[str] = "backlash"
     title: ClassVar[str] = "play in the gear (backlash)"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("gap_crossed", "rad", 1e-7, 0.2, "log"),)
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("gap_crossed", "rad", 1e-7, 0.2, "log"),
+        Shape("longest", "s", 0.01, SLOWEST, "log", (SLOWEST,), default=SLOWEST),
+    )
     rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "presliding_hysteresis", "load_dependent_friction")
     experiments: ClassVar[tuple[str, ...]] = ("payload", "micro_reversals")
 
@@ -57,20 +61,20 @@ class Backlash(Effect):
         _, _, quickness = crossings
         middle = float(np.median(quickness))
         gaps = [time**3 * middle / 6.0 for time in SCANNED]
-        return tuple((gap,) for gap in gaps if self.shapes[0].lower <= gap <= self.shapes[0].upper)
+        return tuple((gap, SLOWEST) for gap in gaps if self.shapes[0].lower <= gap <= self.shapes[0].upper)
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the gap that the size of the torque tells."""
-        shortest, longest = self.shapes[0].lower, self.shapes[0].upper
-        return ((float(np.clip(2.0 * coefficients[0], shortest, longest)),),)
+        """Gives the gap that the size of the torque tells, and crossings that fly freely however long."""
+        gap = float(np.clip(2.0 * coefficients[0], self.shapes[0].lower, self.shapes[0].upper))
+        return (gap, SLOWEST), (gap, None), (None, SLOWEST)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per half play of one."""
         assert joint is not None
         times, ways, quickness = _crossings(situation, joint)
-        durations = np.clip((6.0 * shape[0] / quickness) ** (1 / 3), max(QUICKEST, situation.period), SLOWEST)
+        durations = np.clip((6.0 * shape[0] / quickness) ** (1 / 3), max(QUICKEST, situation.period), shape[1])
         side, rate, curve = (np.zeros(len(situation)) for _ in range(3))
         load = situation.load[:, joint - 1]
         for run in situation.runs:

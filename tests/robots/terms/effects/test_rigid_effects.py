@@ -162,8 +162,9 @@ def test_a_hand_on_the_only_log_shows_nowhere(seen):
     assert EFFECTS["hand_guiding"].grid(seen(), None) == ()
 
 
-def test_a_loose_gear_lets_its_link_cross(seen):
-    """Where the load changes sign the link crosses the play, over the time that the growing load needs for it."""
+@pytest.mark.parametrize(("free", "longest"), [(0.05, 0.1), (0.08, 0.05)])
+def test_a_loose_gear_lets_its_link_cross(seen, free, longest):
+    """Where the load changes sign the link crosses the play, as long as the growing load needs, or the longest time."""
     now = seen(5, seed=1)
     loads = [now.load[:, joint - 1] for joint in range(1, 6)]
     joint = 1 + int(np.argmax([np.count_nonzero(np.diff(np.sign(load))) for load in loads]))
@@ -171,8 +172,8 @@ def test_a_loose_gear_lets_its_link_cross(seen):
     inertia = now.sensitivity("inertia")[:, joint - 1, joint - 1]
     i = int(np.flatnonzero(np.diff(np.sign(load)))[0])
     quickness = abs(load[i + 1] - load[i]) / 0.004 / inertia[i]
-    gap = 0.05**3 * quickness / 6  # crossed in 50 ms
-    X = EFFECTS["backlash"].columns(now, joint, (gap,))[:, joint - 1, 0]
+    gap = free**3 * quickness / 6  # crossed in 50 ms, or in 80 ms
+    X = EFFECTS["backlash"].columns(now, joint, (gap, longest))[:, joint - 1, 0]
     start = now.t[i] - load[i] / (load[i + 1] - load[i]) * 0.004
     s = (now.t - start) / 0.05
     during = (s > 0) & (s < 1)
@@ -214,9 +215,9 @@ def test_a_soft_gear_keeps_its_link_behind(seen):
 def test_size_and_time_of_a_crossing_tell_one_play(seen):
     """Half the play lies within a factor of eight of what the crossing's time says; other effects are as described."""
     robot = seen(5, seed=1).robot
-    assert EFFECTS["backlash"].ranges(robot, 1, (2e-3,)) == ((0.125e-3, 8e-3),)
+    assert EFFECTS["backlash"].ranges(robot, 1, (2e-3, 0.1)) == ((0.125e-3, 8e-3),)
     # No play is larger than a twentieth of a radian each way, whatever its time.
-    assert EFFECTS["backlash"].ranges(robot, 1, (0.2,)) == ((0.0125, 0.05),)
+    assert EFFECTS["backlash"].ranges(robot, 1, (0.2, 0.1)) == ((0.0125, 0.05),)
     described = EFFECTS["joint_elasticity"].parameters(robot, 1)
     assert EFFECTS["joint_elasticity"].ranges(robot, 1, (10.0,)) == tuple((c.lower, c.upper) for c in described)
 
@@ -224,7 +225,8 @@ def test_size_and_time_of_a_crossing_tell_one_play(seen):
 def test_size_of_an_effect_tells_its_time(seen):
     """What follows from a coefficient is offered: the gap that is crossed, a delay's own reversals, a resonance."""
     now = seen(5, seed=1)
-    assert EFFECTS["backlash"].likely(now, 2, (1e-3,), np.array([2e-4])) == ((4e-4,),)
+    crossings = EFFECTS["backlash"].likely(now, 2, (1e-3, 0.07), np.array([2e-4]))
+    assert crossings == ((4e-4, 0.1), (4e-4, None), (None, 0.1))
     for name, joint in (("time_delay", None), ("current_lag", 2)):
         assert EFFECTS[name].likely(now, joint, (1e-3,), np.array([-3e-3])) == ((-3e-3,),)
         assert EFFECTS[name].likely(now, joint, (1e-3,), np.array([0.04])) == ((0.02,),)
