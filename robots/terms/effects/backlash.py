@@ -18,8 +18,12 @@ Array = NDArray[np.float64]
 
 QUICKEST, SLOWEST = 0.004, 0.1
 """Times [s] between which a crossing of the gap takes; a log shows nothing quicker than a sample."""
-SCANNED = (0.006, 0.0085, 0.012, 0.017, 0.025, 0.035, 0.05)
+SCANNED = (0.006, 0.012, 0.025, 0.05)
 """Times [s] of a scan."""
+ASIDE = (-0.03, -0.015, 0.0, 0.015, 0.03)
+"""Loads of a scan at which the link changes sides, as shares of the load's root mean square."""
+FARTHEST = 0.1
+"""Largest such share: of a base model whose zero is less sure nothing follows."""
 LEAST, MOST = 1 / 8, 8.0
 """Shares of the gap that the time of its crossing tells: the time, whose cube that is, is true to a factor of two."""
 
@@ -30,7 +34,8 @@ class Backlash(Effect):
     A load that grows by r per second carries the link's inertia M over the gap b in T = (6 b M / r)^(1/3), or in the
     longest time that the motor, which goes on, leaves it. The torque follows from the lag as for an elastic gear:
     bursts at zero crossings of the load, not of the velocity. Their size and their time tell the same gap, the time but
-    roughly: nothing flies quite freely from flank to flank.
+    roughly: nothing flies quite freely from flank to flank. Zero is where the base model has the load's, to some per
+    cent: what of a joint's torque is offset and what its load, a log tells less well, and a slow load crosses late.
     """
 
     name: ClassVar[str] = "backlash"
@@ -38,6 +43,7 @@ class Backlash(Effect):
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("gap_crossed", "rad", 1e-7, 0.2, "log"),
         Shape("longest", "s", 0.01, SLOWEST, "log", (SLOWEST,), default=SLOWEST),
+        Shape("crossed_at", "N m", -np.inf, np.inf, "linear", (0.0,), default=0.0),
     )
     rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "presliding_hysteresis", "load_dependent_friction")
     experiments: ClassVar[tuple[str, ...]] = ("payload", "micro_reversals")
@@ -53,30 +59,40 @@ class Backlash(Effect):
         return ((max(lower, LEAST * shape[0] / 2), min(upper, MOST * shape[0] / 2)),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists gaps that take 6 to 50 ms; none for a load that hardly ever changes sign."""
+        """Lists gaps that take 6 to 50 ms, at loads near zero; none for a load that hardly ever changes sign."""
         assert joint is not None
-        crossings = _crossings(situation, joint)
+        crossings = _crossings(situation, joint, 0.0)
         if len(crossings[0]) < 2:
             return ()
         _, _, quickness = crossings
         middle = float(np.median(quickness))
         gaps = [time**3 * middle / 6.0 for time in SCANNED]
-        return tuple((gap, SLOWEST) for gap in gaps if self.shapes[0].lower <= gap <= self.shapes[0].upper)
+        size = _size(situation, joint)
+        able = [gap for gap in gaps if self.shapes[0].lower <= gap <= self.shapes[0].upper]
+        return tuple((gap, SLOWEST, aside * size) for gap in able for aside in ASIDE)
+
+    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
+        """Keeps the load at which sides change near zero."""
+        assert joint is not None
+        gap, longest, _ = self.shapes
+        most = FARTHEST * _size(situation, joint)
+        return (gap.lower, gap.upper), (longest.lower, longest.upper), (-most, most)
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the gap that the size of the torque tells, and crossings that fly freely however long."""
+        """Gives the gap that the size of the torque tells, free flight however long, and the base model's zero."""
         gap = float(np.clip(2.0 * coefficients[0], self.shapes[0].lower, self.shapes[0].upper))
-        return (gap, SLOWEST), (gap, None), (None, SLOWEST)
+        # All but what was refined itself: each of the three as it should be, or not.
+        return tuple((g, s, z) for z in (0.0, None) for s in (SLOWEST, None) for g in (gap, None))[:-1]
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per half play of one."""
         assert joint is not None
-        times, ways, quickness = _crossings(situation, joint)
+        times, ways, quickness = _crossings(situation, joint, shape[2])
         durations = np.clip((6.0 * shape[0] / quickness) ** (1 / 3), max(QUICKEST, situation.period), shape[1])
         side, rate, curve = (np.zeros(len(situation)) for _ in range(3))
-        load = situation.load[:, joint - 1]
+        load = situation.load[:, joint - 1] - shape[2]
         for run in situation.runs:
             t = situation.t[run]
             side[run] = np.sign(load[run.start])
@@ -112,17 +128,21 @@ class Backlash(Effect):
         return f"load of joint {joint} [N m]", situation.load[:, joint - 1]
 
 
-def _crossings(situation: Situation, joint: int) -> tuple[Array, Array, Array]:
-    """Finds where the load changes sign: times [s], the new sign, and its rate over the link's inertia [rad/s3]."""
-    load = situation.load[:, joint - 1]
+def _size(situation: Situation, joint: int) -> float:
+    return float(np.sqrt(np.mean(situation.load[:, joint - 1] ** 2)))
+
+
+def _crossings(situation: Situation, joint: int, at: float) -> tuple[Array, Array, Array]:
+    """Finds where the load passes a value: times [s], the new side, and its rate over the link's inertia [rad/s3]."""
+    load = situation.load[:, joint - 1] - at
     inertia = np.maximum(link_inertia(situation, joint)[:, joint - 1], 1e-12)
     small = 1e-4 * float(np.abs(load).max(initial=0.0))
-    at = []
+    found = []
     for run in situation.runs:
         part = load[run]
         # A load that only grazes zero, as a vertical axis' at rest, has no sides.
-        at.append(run.start + np.flatnonzero((part[:-1] * part[1:] < 0) & (np.abs(np.diff(part)) > small)))
-    i = np.concatenate(at) if at else np.zeros(0, dtype=np.intp)
+        found.append(run.start + np.flatnonzero((part[:-1] * part[1:] < 0) & (np.abs(np.diff(part)) > small)))
+    i = np.concatenate(found) if found else np.zeros(0, dtype=np.intp)
     step = situation.t[i + 1] - situation.t[i]
     change = load[i + 1] - load[i]
     times = situation.t[i] - load[i] / np.where(change == 0, 1.0, change) * step

@@ -173,13 +173,32 @@ def test_a_loose_gear_lets_its_link_cross(seen, free, longest):
     i = int(np.flatnonzero(np.diff(np.sign(load)))[0])
     quickness = abs(load[i + 1] - load[i]) / 0.004 / inertia[i]
     gap = free**3 * quickness / 6  # crossed in 50 ms, or in 80 ms
-    X = EFFECTS["backlash"].columns(now, joint, (gap, longest))[:, joint - 1, 0]
+    X = EFFECTS["backlash"].columns(now, joint, (gap, longest, 0.0))[:, joint - 1, 0]
     start = now.t[i] - load[i] / (load[i + 1] - load[i]) * 0.004
     s = (now.t - start) / 0.05
     during = (s > 0) & (s < 1)
     expected = -2 * np.sign(load[i + 1]) * inertia * (60 * s - 180 * s**2 + 120 * s**3) / 0.05**2
     # The lag's own torque, through d rigid/dq, is small beside what its acceleration takes.
     assert np.abs(X[during] - expected[during]).max() < 0.1 * np.abs(expected[during]).max()
+
+
+def test_sides_change_at_the_load_that_is_said(seen):
+    """With another zero of the load, the lag's bursts are where the load passes it, and nowhere before."""
+    now = seen(5, seed=1)
+    sizes = [np.sqrt(np.mean(now.load[:, joint - 1] ** 2)) for joint in range(1, 6)]
+    joint = 1 + int(np.argmax([np.count_nonzero(np.diff(np.sign(now.load[:, j]))) for j in range(5)]))
+    aside = 0.05 * sizes[joint - 1]
+    gap = 0.01**3 / 6  # crossed within some samples
+    X = EFFECTS["backlash"].columns(now, joint, (gap, 0.012, aside))[:, joint - 1, 0]
+    burst = np.abs(X) > 0.2 * np.abs(X).max()
+    passed = np.flatnonzero(np.diff(np.sign(now.load[:, joint - 1] - aside)))
+    near = np.zeros(len(burst), dtype=bool)
+    for i in passed:
+        near[i : i + 6] = True
+    assert burst.sum() >= 2
+    assert not burst[~near].any()
+    plain = EFFECTS["backlash"].columns(now, joint, (gap, 0.012, 0.0))[:, joint - 1, 0]
+    assert (np.abs(plain) > 0.2 * np.abs(plain).max())[~near].any()
 
 
 def test_a_rotor_within_its_link_is_told_from_it(seen):
@@ -215,9 +234,9 @@ def test_a_soft_gear_keeps_its_link_behind(seen):
 def test_size_and_time_of_a_crossing_tell_one_play(seen):
     """Half the play lies within a factor of eight of what the crossing's time says; other effects are as described."""
     robot = seen(5, seed=1).robot
-    assert EFFECTS["backlash"].ranges(robot, 1, (2e-3, 0.1)) == ((0.125e-3, 8e-3),)
+    assert EFFECTS["backlash"].ranges(robot, 1, (2e-3, 0.1, 0.0)) == ((0.125e-3, 8e-3),)
     # No play is larger than a twentieth of a radian each way, whatever its time.
-    assert EFFECTS["backlash"].ranges(robot, 1, (0.2, 0.1)) == ((0.0125, 0.05),)
+    assert EFFECTS["backlash"].ranges(robot, 1, (0.2, 0.1, 0.0)) == ((0.0125, 0.05),)
     described = EFFECTS["joint_elasticity"].parameters(robot, 1)
     assert EFFECTS["joint_elasticity"].ranges(robot, 1, (10.0,)) == tuple((c.lower, c.upper) for c in described)
 
@@ -225,8 +244,10 @@ def test_size_and_time_of_a_crossing_tell_one_play(seen):
 def test_size_of_an_effect_tells_its_time(seen):
     """What follows from a coefficient is offered: the gap that is crossed, a delay's own reversals, a resonance."""
     now = seen(5, seed=1)
-    crossings = EFFECTS["backlash"].likely(now, 2, (1e-3, 0.07), np.array([2e-4]))
-    assert crossings == ((4e-4, 0.1), (4e-4, None), (None, 0.1))
+    crossings = EFFECTS["backlash"].likely(now, 2, (1e-3, 0.07, 0.2), np.array([2e-4]))
+    assert crossings[0] == (4e-4, 0.1, 0.0)
+    assert len(set(crossings)) == 7
+    assert (None, None, None) not in crossings
     for name, joint in (("time_delay", None), ("current_lag", 2)):
         assert EFFECTS[name].likely(now, joint, (1e-3,), np.array([-3e-3])) == ((-3e-3,),)
         assert EFFECTS[name].likely(now, joint, (1e-3,), np.array([0.04])) == ((0.02,),)
