@@ -13,7 +13,7 @@ from estimation.diagnosis.problem import Group, Problem
 Array = NDArray[np.float64]
 
 # A direction of a hypothesis shows only where this share of its energy is left beside the base model.
-VISIBLE = 1e-3
+VISIBLE = 2e-4
 
 
 @dataclass(frozen=True, eq=False)

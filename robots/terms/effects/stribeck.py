@@ -47,6 +47,12 @@ class Stribeck(StaticJointEffect):
         velocities = np.geomspace(min(lowest, 0.5 * top), 0.5 * top, count)
         return tuple((float(v), exponent) for v in velocities for exponent in self.shapes[1].grid)
 
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float | None, ...], ...]:
+        """Gives the two curves of the literature: an exponential, and a Gaussian one."""
+        return tuple((None, exponent) for exponent in self.shapes[1].grid)
+
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds exp(-(|dq| / v_s)^d) sign(dq)."""
         # The power of zero has no derivative; a thousandth of the velocity does no harm.
