@@ -17,7 +17,6 @@ from estimation.diagnosis.states import Recording
 from robots.signals import Log
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effects import EFFECTS
-from robots.terms.effects.joint_elasticity import link_inertia
 from robots.terms.effects.situation import Situation
 
 Array = NDArray[np.float64]
@@ -235,16 +234,12 @@ def _parameter(name: str, value: float, error: float, unit: str, quantile: float
 
 
 def _extension(now: Situation, joint: int, compliance: float, error: float) -> Extension:
-    """The effect of the catalogue; its resonance is that of gear and link, by the model's mean inertia."""
-    inertia = float(np.mean(link_inertia(now, joint)[:, joint - 1]))
-    shape = EFFECTS[EFFECT].shapes[0]
-    resonance = shape.upper
-    if inertia > 0:
-        resonance = float(np.clip(np.sqrt(1 / (compliance * inertia)) / (2 * np.pi), shape.lower, shape.upper))
+    """The effect of the catalogue; its dynamics have the same stiffness."""
+    low, high = EFFECTS[EFFECT].bounds(now, joint)[0]
     return Extension(
         effect=EFFECT,
         joint=joint,
-        shape=(resonance,),
+        shape=(float(np.clip(1.0 / compliance, low, high)) if compliance > 0 else high,),
         coefficients=np.array([compliance]),
         covariance=np.diag([error**2, np.inf]),
     )

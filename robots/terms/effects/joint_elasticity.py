@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter, lfilter_zi
+from scipy.linalg import solve_banded
 
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
@@ -18,20 +18,23 @@ Array = NDArray[np.float64]
 
 DAMPING = 0.05
 """Of the resonance, of its critical one."""
+SCANNED = (8.0, 12.0, 18.0, 30.0, 60.0, 300.0)
+"""Resonances [Hz] of a scan, at the log's mean inertia."""
+LOWEST, HIGHEST = 3.0, 1000.0
+"""Resonances [Hz] that a gear may have."""
 
 
 class JointElasticity(Effect):
     """tau = -(d rigid/dq_j w + d rigid/d(dq_j) w' + M_j w'') c: the torque of a link that lags by its wind-up c w.
 
-    c is the gear's compliance, and w the load of the link: w''/(2 pi f)^2 + w = tau_L, tau_L the load by the motor's
-    motion and f the resonance of link and gear, from which on the link follows the motor no more.
+    c is the gear's compliance, and w the load of the link: M_jj w'' / K + w = tau_L, tau_L the load by the motor's
+    motion. From the resonance sqrt(K / M_jj) on, which changes with the arm's pose, the link follows the motor no more.
+    K, the stiffness by the dynamics, is 1 / c where the base model has the link's inertia right.
     """
 
     name: ClassVar[str] = "joint_elasticity"
     title: ClassVar[str] = "a gear that winds up under load (elasticity)"
-    shapes: ClassVar[tuple[Shape, ...]] = (
-        Shape("resonance", "Hz", 3.0, 1000.0, "log", (8.0, 12.0, 18.0, 30.0, 60.0, 300.0)),
-    )
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("dynamic_stiffness", "N m/rad", 1e-6, 1e12, "log"),)
     rivals: ClassVar[tuple[str, ...]] = ("backlash", "time_delay", "current_lag", "encoder_offset")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "payload")
 
@@ -41,23 +44,29 @@ class JointElasticity(Effect):
         force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
         return (Coefficient("compliance", f"{length}/({force})", 0.0, 0.1),)
 
-    def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of all joints per compliance of one."""
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists the stiffnesses of some resonances."""
         assert joint is not None
-        load = followed(situation, situation.load[:, joint - 1], shape[0])
-        return windup(situation, joint, load, *situation.derivatives(load))[:, :, None]
+        return tuple((_stiffness(situation, joint, resonance),) for resonance in SCANNED)
+
+    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
+        """Keeps the resonance within what gears have."""
+        assert joint is not None
+        return ((_stiffness(situation, joint, LOWEST), _stiffness(situation, joint, HIGHEST)),)
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the resonance of the link that the base model describes on a gear of this compliance."""
-        assert joint is not None
-        inertia = float(np.mean(link_inertia(situation, joint)[:, joint - 1]))
-        square = inertia * float(coefficients[0])
-        if square <= 0:
+        """Gives the stiffness that the compliance says."""
+        if coefficients[0] <= 0:
             return ()
-        lowest, highest = self.shapes[0].lower, self.shapes[0].upper
-        return ((float(np.clip(1 / (2 * np.pi * np.sqrt(square)), lowest, highest)),),)
+        return ((float(np.clip(1.0 / coefficients[0], *self.bounds(situation, joint)[0])),),)
+
+    def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the torque of all joints per compliance of one."""
+        assert joint is not None
+        load = followed(situation, situation.load[:, joint - 1], shape[0], _inertia(situation, joint))
+        return windup(situation, joint, load, *situation.derivatives(load))[:, :, None]
 
     def describe(
         self,
@@ -81,22 +90,39 @@ class JointElasticity(Effect):
         return f"second derivative of the load of joint {joint} [N m/s2]", curve
 
 
-def followed(situation: Situation, load: Array, resonance: float) -> Array:
-    """Passes a load (N,) through a resonance [Hz] that is damped by 5 %; one far above the samples' rate is none."""
-    if resonance * situation.period > 0.2 or situation.period == 0.0:
+def followed(situation: Situation, load: Array, stiffness: float, inertia: Array) -> Array:
+    """Passes a load (N,) through a link of changing inertia (N,) on a spring, damped by 5 %.
+
+    One whose mean resonance is far above the samples' rate follows at once.
+    """
+    w = float(np.sqrt(stiffness / np.mean(inertia)))
+    if w * situation.period > 0.4 * np.pi or situation.period == 0.0:
         return load
-    # The bilinear rule, true at the resonance.
-    k = 2 * np.pi * resonance / np.tan(np.pi * resonance * situation.period)
-    w = 2 * np.pi * resonance
-    numerator = w**2 * np.array([1.0, 2.0, 1.0])
-    middle = 2 * DAMPING * w * k
-    denominator = np.array([k**2 + middle + w**2, 2 * (w**2 - k**2), k**2 - middle + w**2])
-    state = lfilter_zi(numerator / denominator[0], denominator / denominator[0])
+    # The bilinear rule, true at the mean resonance: one row of a lower triangular band a sample, after two at rest.
+    k = 1.0 / np.tan(0.5 * w * situation.period)
+    share = inertia / np.mean(inertia)
+    stored, lost = k**2 * share, 2 * DAMPING * k * np.sqrt(share)
     result = np.empty_like(load)
     for run in situation.runs:
-        start = state * load[run.start]
-        result[run] = lfilter(numerator / denominator[0], denominator / denominator[0], load[run], zi=start)[0]
+        x, m, d = (np.concatenate([values[run][:1]] * 2 + [values[run]]) for values in (load, stored, lost))
+        m, d = m[1:-1], d[1:-1]
+        band = np.ones((3, len(x)))
+        band[0, 2:], band[1, 1:-1], band[2, :-2] = m + d + 1.0, 2.0 - 2.0 * m, m - d + 1.0
+        band[1, 0] = 0.0
+        right = np.concatenate([x[:2], x[2:] + 2.0 * x[1:-1] + x[:-2]])
+        result[run] = solve_banded((2, 0), band, right)[2:]
     return result
+
+
+def _inertia(situation: Situation, joint: int) -> Array:
+    """Gives the inertia (N,) that swings on a joint's gear, no less than a hundredth of its mean."""
+    own = link_inertia(situation, joint)[:, joint - 1]
+    return np.asarray(np.maximum(own, 0.01 * max(float(np.mean(own)), 1e-9)))
+
+
+def _stiffness(situation: Situation, joint: int, resonance: float) -> float:
+    """Gives the stiffness on which the log's mean inertia has a resonance [Hz]."""
+    return float((2 * np.pi * resonance) ** 2 * np.mean(_inertia(situation, joint)))
 
 
 def link_inertia(situation: Situation, joint: int) -> Array:

@@ -56,7 +56,7 @@ def test_an_elastic_gear_lets_its_link_lag(now, torque):
         # Large lags (c = 1) would leave the difference's range: it is scaled to the largest.
         size = max(float(np.abs(part).max()) for part in change)
         expected = _slope(torque, now, [part / size for part in change]) * size
-        X = EFFECTS["joint_elasticity"].columns(now, joint, (1000.0,))[SOME, :, 0]
+        X = EFFECTS["joint_elasticity"].columns(now, joint, (1e9,))[SOME, :, 0]
         # A spline's second derivative is of second order: (2 pi 4 Hz 4 ms)^2 / 12 at the motion's fastest products.
         assert np.abs(X - expected).max() < 2e-3 * np.abs(expected).max()
 
@@ -216,19 +216,29 @@ def test_a_rotor_within_its_link_is_told_from_it(seen):
     np.testing.assert_array_equal(merged.rotors[:, 0], [0.0, rotor])
 
 
-def test_a_soft_gear_keeps_its_link_behind(seen):
-    """The link's load is that of a mass behind a spring, by an integrator of scipy."""
+@pytest.mark.parametrize("swing", [0.0, 0.5])
+def test_a_soft_gear_keeps_its_link_behind(seen, swing):
+    """The link's load is that of a mass, alike or changing, behind a spring, by an integrator of scipy."""
     now = seen(2, seed=2)
     load = np.sin(9.0 * now.t) + 0.3 * np.sin(31.0 * now.t)
-    w = 2 * np.pi * 8.0
+    inertia = 2.0 + swing * np.sin(1.3 * now.t)
+    stiffness = 2.0 * (2 * np.pi * 8.0) ** 2
 
     def rate(t, state):
         drive = np.sin(9.0 * t) + 0.3 * np.sin(31.0 * t)
+        w = np.sqrt(stiffness / (2.0 + swing * np.sin(1.3 * t)))
         return [state[1], w**2 * (drive - state[0]) - 2 * 0.05 * w * state[1]]
 
     exact = solve_ivp(rate, (0, now.t[-1]), [0.0, 0.0], t_eval=now.t, rtol=1e-8, max_step=0.01).y[0]
     # The bilinear rule bends frequencies: at 31 rad/s of 4 ms by 0.1 %, near a resonance that answers a hundredfold.
-    np.testing.assert_allclose(followed(now, load, 8.0), exact, atol=0.05)
+    np.testing.assert_allclose(followed(now, load, stiffness, inertia), exact, atol=0.05)
+
+
+def test_a_stiff_gear_follows_at_once(seen):
+    """A resonance far above the samples' rate leaves the load as it is."""
+    now = seen(2, seed=2)
+    load = np.sin(9.0 * now.t)
+    np.testing.assert_array_equal(followed(now, load, 1e9, np.ones(len(load))), load)
 
 
 def test_size_and_time_of_a_crossing_tell_one_play(seen):
@@ -254,14 +264,15 @@ def test_size_of_an_effect_tells_its_time(seen):
 
 
 def test_a_gear_of_known_compliance_has_a_resonance(now, twin):
-    """A link of inertia M on a gear of compliance c swings at 1 / (2 pi sqrt(c M)), M by pinocchio's torques."""
-    compliance = 1e-4
+    """A link on a gear of compliance c has the stiffness 1 / c; those of a scan are of its inertia, by pinocchio."""
+    elastic = EFFECTS["joint_elasticity"]
     for joint in (1, 3, 5):
         faster = now.ddq + np.eye(5)[joint - 1]
         more, less = (twin(now.robot).torque(now.q, now.dq, ddq, now.robot.inertia) for ddq in (faster, now.ddq))
         inertia = float((more - less)[:, joint - 1].mean())
-        ((resonance,),) = EFFECTS["joint_elasticity"].likely(now, joint, (60.0,), np.array([compliance]))
-        assert resonance == pytest.approx(
-            np.clip(1 / (2 * np.pi * np.sqrt(compliance * inertia)), 3.0, 1000.0), rel=1e-4
-        )
-    assert EFFECTS["joint_elasticity"].likely(now, 1, (60.0,), np.zeros(1)) == ()
+        scanned = [stiffness for (stiffness,) in elastic.grid(now, joint)]
+        wanted = inertia * (2 * np.pi * np.array([8.0, 12.0, 18.0, 30.0, 60.0, 300.0])) ** 2
+        np.testing.assert_allclose(scanned, wanted, rtol=0.01)
+        assert elastic.likely(now, joint, (1.0,), np.array([1 / wanted[2]])) == ((pytest.approx(wanted[2], rel=0.01),),)
+        assert elastic.likely(now, joint, (1.0,), np.array([1e9])) == ((elastic.bounds(now, joint)[0][0],),)
+    assert elastic.likely(now, 1, (60.0,), np.zeros(1)) == ()
