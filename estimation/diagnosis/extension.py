@@ -52,9 +52,7 @@ class Extension:
 
     def parameters(self, robot: Robot) -> list[dict[str, Any]]:
         """Lists its parameters with standard errors: the linear ones, then the shape."""
-        effect = self.source
-        described = [(c.name, c.unit) for c in effect.parameters(robot, self.joint)]
-        described += [(s.name, s.unit) for s in effect.shapes]
+        described = _described(self.source, robot, self.joint)
         values = [*self.coefficients.tolist(), *self.shape]
         errors = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         return [
@@ -94,6 +92,14 @@ def read_extension(data: Mapping[str, Any], robot: Robot) -> Extension:
             f"extension {effect.name} has {len(coefficients)} coefficients and {len(shape)} shape values",
             allowed=f"{count} and {len(effect.shapes)}",
         )
+    names = [str(parameter["name"]) for parameter in data.get("parameters", ())]
+    known = [name for name, _ in _described(effect, robot, joint)]
+    if names and names != known:
+        raise InputError(
+            f"extension {effect.name} has the parameters {', '.join(names)}",
+            allowed=", ".join(known),
+            remedy="it was written by another version: diagnose the logs again",
+        )
     if not (np.isfinite(coefficients).all() and np.isfinite(shape).all()):
         raise InputError(f"extension {effect.name} has values that are not finite")
     return Extension(
@@ -121,6 +127,12 @@ def extension_torque(extensions: Sequence[Extension], state: Situation) -> Array
     for extension in extensions:
         total += extension.torque(state)
     return total
+
+
+def _described(effect: Effect, robot: Robot, joint: int | None) -> list[tuple[str, str]]:
+    """Lists names and units: the linear parameters, then the shape."""
+    linear = [(c.name, c.unit) for c in effect.parameters(robot, joint)]
+    return linear + [(s.name, s.unit) for s in effect.shapes]
 
 
 def _finite(value: float) -> float | None:

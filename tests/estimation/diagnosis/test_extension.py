@@ -75,7 +75,7 @@ def test_an_extension_survives_plain_data(arm: Robot, state: Situation) -> None:
 
 
 def test_a_damaged_extension_is_refused(arm: Robot) -> None:
-    """An unknown effect, a joint that the robot has not, and too few values are named."""
+    """An unknown effect, a joint that the robot has not, too few values, or others than this version has, are named."""
     good = {"effect": "friction_step", "joint": 1, "shape": [1.0], "coefficients": [1, 2], "covariance": np.eye(3)}
     good["covariance"] = np.eye(3).tolist()
     with pytest.raises(InputError, match="unknown effect"):
@@ -86,3 +86,14 @@ def test_a_damaged_extension_is_refused(arm: Robot) -> None:
         read_extension({**good, "coefficients": [1]}, arm)
     with pytest.raises(InputError, match="finite"):
         read_extension({**good, "coefficients": [1, float("inf")]}, arm)
+    old = {
+        "effect": "joint_elasticity",
+        "joint": 1,
+        "shape": [30.0],
+        "coefficients": [1e-4],
+        "covariance": [[1, 0], [0, 1]],
+    }
+    named = [{"name": name, "value": 1.0} for name in ("compliance", "resonance")]
+    with pytest.raises(InputError, match="resonance"):
+        read_extension({**old, "parameters": named}, arm)
+    assert read_extension(old, arm).shape == (30.0,)
