@@ -37,16 +37,22 @@ class BorneOut:
     notes: tuple[str, ...]
 
 
-def bear_out(judgement: Judgement, measure: Callable[[Sequence[Member]], Measured], held_out: bool) -> BorneOut:
+def bear_out(
+    judgement: Judgement,
+    measure: Callable[[Sequence[Member]], Measured],
+    held_out: bool,
+    forms: Callable[[Sequence[Member], int], Sequence[Member]],
+) -> BorneOut:
     """Leaves out what makes unseen errors larger, one after the other, the surest first.
 
-    However well it fits, it is no cause: a few rows at the end of a log. Where a rival that fits about as well is borne
-    out, the rival takes its place.
+    However well it fits, it is no cause: a few rows at the end of a log. Where another form of it that fits about as
+    well is borne out, or a rival, that takes its place.
 
     Args:
         judgement: what was found.
         measure: measures members on unseen data.
         held_out: whether those are logs of their own.
+        forms: lists other forms of one of some members, the likeliest first.
     """
     founds = list(judgement.kept)
     members = [*(found.member for found in founds), *judgement.patterns]
@@ -60,10 +66,11 @@ def bear_out(judgement: Judgement, measure: Callable[[Sequence[Member]], Measure
         if worst >= len(founds):
             # A free function that errs elsewhere is no model; that something is unexplained is as true as before.
             spoiling.append((members.pop(worst), p_values.pop(worst), seen.gains[worst]))
-        elif instead := _instead(founds[worst], worst, members, measure, held_out):
+        elif instead := _instead(founds[worst], worst, members, measure, held_out, forms):
             founds[worst], seen = instead
             members[worst] = founds[worst].member
-            notes.append(_REPLACED.format(label, members[worst].hypothesis.label))
+            if members[worst].hypothesis.label != label:
+                notes.append(_REPLACED.format(label, members[worst].hypothesis.label))
             continue
         else:
             for items in (founds, members, p_values):
@@ -89,8 +96,13 @@ def _instead(
     members: Sequence[Member],
     measure: Callable[[Sequence[Member]], Measured],
     held_out: bool,
+    forms: Callable[[Sequence[Member], int], Sequence[Member]],
 ) -> tuple[Found, Measured] | None:
-    """Finds the closest rival of a name that unseen data bear out where the name was, and what all bring with it."""
+    """Finds another form or the closest rival of a name that unseen data bear out, and what all bring with it."""
+    for form in forms(members, place):
+        seen = measure([*members[:place], form, *members[place + 1 :]])
+        if not _harms(seen, place, form, held_out) and seen.gains[place].ci95[0] > 0:
+            return Found(form, found.p_value, found.rivals), seen
     close = [(rival, worse) for rival, worse in found.rivals if worse < CLOSE]
     for k, (rival, worse) in enumerate(close):
         seen = measure([*members[:place], rival, *members[place + 1 :]])

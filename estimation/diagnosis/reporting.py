@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from estimation.diagnosis.carried import situation_on, unloaded
 from estimation.diagnosis.diagnosis import Diagnosis, Trace
 from estimation.diagnosis.extending import fit_extended
 from estimation.diagnosis.findings import Finding
+from estimation.diagnosis.forms import alike_forms
 from estimation.diagnosis.gain import Unseen
 from estimation.diagnosis.hidden_springs import hidden_springs
 from estimation.diagnosis.limits import Limit
@@ -60,6 +62,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         judgement,
         lambda members: measure_unseen(robot, problem, members, told.held_out, told.seed + 3),
         bool(told.held_out),
+        partial(alike_forms, problem),
     )
     members, founds, seen, spoiling = held.members, held.founds, held.seen, held.spoiling
     verdict = judgement.verdict

@@ -160,6 +160,10 @@ class Effect(ABC):
         """
         return ()
 
+    def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists shapes that a log may not tell apart though other motions do; the likeliest is taken of those."""
+        return ()
+
     def acts_on(self, robot: Robot, joint: Place) -> tuple[int, ...]:
         """Lists the joints, counted from 0, whose torque the effect can change: the rows of `columns` not all zero."""
         return tuple(range(robot.n))

@@ -58,8 +58,12 @@ class Spring(StaticJointEffect):
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists a spring without levers, and levers where a joint turns far enough to tell them."""
         assert joint is not None
-        turns = situation.robot.chain.joints[joint - 1].kind == "revolute"
-        if not turns or np.ptp(situation.q[:, joint - 1]) < TOLD:
+        return (PLAIN,) if np.ptp(situation.q[:, joint - 1]) < TOLD else self.forms(situation, joint)
+
+    def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists a spring without levers, and levers of a joint that turns: a log of few angles tells none of them."""
+        assert joint is not None
+        if situation.robot.chain.joints[joint - 1].kind != "revolute":
             return (PLAIN,)
         return (PLAIN, *((ratio, centre) for ratio in RATIOS for centre in CENTRES))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -42,7 +42,7 @@ class Bench:
     asked: list[tuple[str, ...]] = field(default_factory=list)
 
     def __call__(self, members: Sequence[Member]) -> SimpleNamespace:
-        labels = tuple(member.hypothesis.label for member in members)
+        labels = tuple(_label(member) for member in members)
         self.asked.append(labels)
         shown = [
             next((self.beside[label, other] for other in labels if (label, other) in self.beside), self.shows[label])
@@ -56,6 +56,10 @@ class Bench:
             worse=tuple(s.high < 0 for s in shown),
             kept=tuple(s.kept for s in shown),
         )
+
+
+def _label(member: Member) -> str:
+    return member.hypothesis.label + (f" {member.shape}" if member.shape else "")
 
 
 def _member(name: str, joint: int | None) -> Member:
@@ -82,9 +86,27 @@ def _bench(**shows: Shown) -> Bench:
 
 
 def _borne(
-    bench: Bench, *founds: Found, free: Sequence[Member] = (), p_values: Sequence[float] = (), held_out: bool = True
+    bench: Bench,
+    *founds: Found,
+    free: Sequence[Member] = (),
+    p_values: Sequence[float] = (),
+    held_out: bool = True,
+    forms: Sequence[Member] = (),
 ) -> BorneOut:
-    return bear_out(Judgement("named", founds, tuple(free), tuple(p_values), 1.0), bench, held_out)  # type: ignore[arg-type]
+    judgement = Judgement("named", founds, tuple(free), tuple(p_values), 1.0)
+    return bear_out(judgement, bench, held_out, lambda members, i: forms if members[i] is SPRING else ())  # type: ignore[arg-type]
+
+
+def test_another_form_of_a_cause_goes_before_a_rival() -> None:
+    """A polynomial that errs beyond the angles seen gives way to the first lever that does not; its name stays."""
+    rival, levers = (PRESLIDING, 2.0), [replace(SPRING, shape=(0.35, centre)) for centre in (0.0, 1.0, 2.0)]
+    bench = _bench(spring=HARMS)
+    bench.shows |= {_label(levers[0]): HARMS, _label(levers[1]): HELPS, _label(levers[2]): HELPS}
+    result = _borne(bench, Found(SPRING, 1e-9, (rival,)), forms=levers)
+    assert result.founds[0].member is result.members[0] is levers[1]
+    assert (result.founds[0].p_value, result.founds[0].rivals, result.notes) == (1e-9, (rival,), ())
+    bench.shows |= {_label(lever): HARMS for lever in levers}
+    assert _borne(bench, Found(SPRING, 1e-9, (rival,)), forms=levers).members[0] is PRESLIDING
 
 
 def test_what_helps_stays_as_it_was_found() -> None:
