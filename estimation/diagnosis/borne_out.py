@@ -126,6 +126,8 @@ def _harms(seen: Measured, i: int, member: Member, held_out: bool) -> bool:
         return True
     if joint is not None and seen.unseen.astray(joint - 1):
         return True
+    # Heat that was stored before the unseen data, and what a pause left of it, are told by neither.
+    stored = any(shape.name == "time_constant" for shape in effect.shapes)
     # A free function claims no cause: what it brings elsewhere is all that it is good for.
     idle = effect.name.startswith(PREFIX) and seen.gains[i].ci95[1] < 0
-    return seen.worse[i] or idle or seen.rises[i] > HARM
+    return (seen.worse[i] and not stored) or idle or seen.rises[i] > HARM

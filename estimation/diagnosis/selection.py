@@ -19,14 +19,13 @@ from robots.common.parallel import available_cores
 CONTENDERS = 7
 # A hypothesis whose grid point explains less than this share of the best one's gain is no contender.
 NEAR = 0.3
-# A further effect must explain this share of what one that is found explains on its joints: formulas are true to some
-# per cent of an effect, and what they leave must not be taken for another.
-BEYOND = 0.08
+# What acts for a moment is no contender where twice its gain at the grid is too little: its search takes the longest.
+TWICE = 2.0
 MOST = 4  # effects at once
 # What is reported must be worth its parameters by so much (Schwarz): strong evidence, beside a small p-value.
 LEAST = 10.0
 # But for a single effect whose p-value is below this share of the false-alarm chance: it must be worth them at all.
-SURE = 0.2
+SURE = 0.05
 SHOWN = 40  # outcomes whose p-values are computed
 
 
@@ -113,7 +112,13 @@ def contenders(problem: Problem, result: Scan, members: Sequence[Member] = ()) -
         return []
     ranked = sorted(able, key=lambda o: -(o.gain - o.degrees * np.log(problem.rows)))
     best = max(o.gain for o in able)
-    return [o for o in ranked if o.gain >= NEAR * best][:CONTENDERS]
+    top = ranked[0].gain - ranked[0].degrees * np.log(problem.rows)
+    passing = TWICE * np.array([o.gain for o in ranked]) - np.array([o.degrees for o in ranked]) * np.log(problem.rows)
+    near = [
+        o.gain >= NEAR * best and not (o.hypothesis.effect.passing and p < top)
+        for o, p in zip(ranked, passing, strict=True)
+    ]
+    return [o for o, is_near in zip(ranked, near, strict=True) if is_near][:CONTENDERS]
 
 
 def _best(problem: Problem, outcomes: Sequence[Outcome], accepted: Accepted) -> list[Member]:
@@ -145,11 +150,15 @@ def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> b
     flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
     if hypothesis.effect.alike or (flags is not None and flags.any()):
         return True
+    robot = problem.situation.robot
     able = [
         j
         for j in candidate.group.joints
         if candidate.gain_on([j])
-        >= BEYOND * max((m.gain_on([j]) * candidate.share_beside(m, j) for m in members), default=0.0)
+        >= max(
+            (m.hypothesis.effect.leaves(robot, j) * m.gain_on([j]) * candidate.share_beside(m, j) for m in members),
+            default=0.0,
+        )
     ]
     lost = candidate.gain - candidate.gain_on(able)
     return not members or candidate.bic(problem.rows) - lost > LEAST

@@ -36,6 +36,13 @@ class BaseTilt(Effect):
         """Names the whole robot, if there is gravity."""
         return (None,) if np.any(robot.chain.gravity) else ()
 
+    def leaves(self, robot: Robot, joint: int) -> float:
+        """Gives half of it for a first axis along gravity: moments about it show tilted only, and are as described."""
+        first = robot.chain.joints[0]
+        down = np.asarray(robot.chain.gravity, dtype=float)
+        along = float(abs(first.rotation @ first.axis @ down)) > 0.99 * float(np.linalg.norm(down))
+        return 0.5 if joint == 0 and along else super().leaves(robot, joint)
+
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per angle."""
         axes = level_axes(np.asarray(situation.robot.chain.gravity, dtype=float))

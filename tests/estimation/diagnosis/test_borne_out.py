@@ -97,6 +97,15 @@ def _borne(
     return bear_out(judgement, bench, held_out, lambda members, i: forms if members[i] is SPRING else ())  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(("rise", "stays"), [(HARM - 0.03, True), (HARM + 0.01, False)])
+def test_heat_before_the_unseen_data_is_not_held_against_a_cause(rise: float, stays: bool) -> None:
+    """What a pause left of the heat is not known: sure errors leave a thermal cause alone unless they are large."""
+    warm = _member("thermal_friction", 2)
+    bench = _bench()
+    bench.shows[warm.hypothesis.label] = Shown(-0.004, -0.001, rise)
+    assert (_borne(bench, Found(warm, 1e-9, ())).members == (warm,)) is stays
+
+
 def test_another_form_of_a_cause_goes_before_a_rival() -> None:
     """A polynomial that errs beyond the angles seen gives way to the first lever that does not; its name stays."""
     rival, levers = (PRESLIDING, 2.0), [replace(SPRING, shape=(0.35, centre)) for centre in (0.0, 1.0, 2.0)]

@@ -11,7 +11,8 @@ import pytest
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Group
 from estimation.diagnosis.refinement import RARE, Member, agreed_gain
-from estimation.diagnosis.selection import _beyond
+from estimation.diagnosis.scan import Outcome
+from estimation.diagnosis.selection import _beyond, contenders
 from robots.terms.effects import EFFECTS
 
 ROWS, ACTING = 5000, 40
@@ -114,6 +115,26 @@ def test_what_one_joint_alone_tells_is_no_common_coefficient() -> None:
     assert agreed < 0.01 * _shared(1.0, 1.0, 1.0, 1.0)[0]
 
 
+def test_a_contact_that_cannot_win_is_not_searched() -> None:
+    """Twice its gain at the grid is less than the best's worth: it is left out; what lasts is searched all the same."""
+
+    def outcome(name: str, joint: int | None, gain: float, degrees: int) -> Outcome:
+        return Outcome(Hypothesis(EFFECTS[name], joint), (), gain, 1.0, gain / 2, degrees)
+
+    problem = SimpleNamespace(rows=ROWS)
+    best = outcome("spring", 1, 400.0, 3)
+    weak, strong = outcome("external_contact", None, 180.0, 6), outcome("external_contact", None, 250.0, 6)
+    lasting = outcome("backlash", 1, 180.0, 1)
+
+    def chosen(*outcomes: Outcome) -> set[str]:
+        scanned = SimpleNamespace(outcomes=outcomes)
+        return {o.hypothesis.name for o in contenders(problem, scanned)}  # type: ignore[arg-type]
+
+    assert chosen(best, weak, lasting) == {"spring", "backlash"}
+    assert chosen(best, strong, lasting) == {"spring", "external_contact", "backlash"}
+    assert chosen(weak) == {"external_contact"}
+
+
 def test_what_a_log_shows_by_itself_is_no_leftover() -> None:
     """Beside an effect of a hundred times its gain, a further one counts where tops are flat, and nowhere else."""
     rng = np.random.default_rng(5)
@@ -124,7 +145,7 @@ def test_what_a_log_shows_by_itself_is_no_leftover() -> None:
     other = _member("stribeck", 1, ((flat - tau)[:, :1],))
 
     def beyond(candidate: Member, measured: np.ndarray) -> bool:
-        situation = SimpleNamespace(runs=(slice(0, ROWS),))
+        situation = SimpleNamespace(runs=(slice(0, ROWS),), robot=None)
         problem = SimpleNamespace(situation=situation, recording=SimpleNamespace(tau=measured), rows=ROWS)
         return _beyond(problem, replace(candidate, gain=200.0), [large])  # type: ignore[arg-type]
 
