@@ -30,6 +30,7 @@ from estimation.diagnosis.wording import word_finding
 from estimation.provenance import describe_logs
 from robots.robot import Robot
 from robots.signals import Log
+from robots.terms.effects import EFFECTS
 from robots.version import VERSION
 
 Array = NDArray[np.float64]
@@ -160,8 +161,10 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
         if j not in strange
     ]
     for finding in findings:
+        shapes = EFFECTS[finding.effect].shapes if finding.effect in EFFECTS else ()
+        assumed = {(shape.name, shape.default) for shape in shapes}
         lost = [p for p in finding.parameters if not p.determined and p.unit == "s" and np.isnan(p.standard_error)]
-        for parameter in lost:
+        for parameter in (p for p in lost if (p.name, p.value) not in assumed):
             notes.append(
                 f"{parameter.name} of {finding.effect} is not determined by {recording.duration:.0f} s of logs: the "
                 f"value {parameter.value:.3g} s is one of many that fit."
