@@ -70,10 +70,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         deviations.append(steps)
         at += X.shape[2] + len(member.shape)
     columns = np.concatenate(blocks, axis=2)
-    root = np.linalg.cholesky(white.precision)
-    mixed = np.einsum("jk,njb->nkb", root, white.all(columns), optimize=True)
-    tau = (white.all(problem.recording.tau) @ root).reshape(-1)
-    flat = mixed.reshape(-1, mixed.shape[2])
+    flat, tau = white.independent(columns), white.independent(problem.recording.tau)
     linear = np.ones(columns.shape[2], dtype=bool)
     for start, size, shapes in slices:
         linear[start + size : start + size + shapes] = False

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.extending import dense
 from estimation.diagnosis.problem import Problem
@@ -18,8 +17,6 @@ from estimation.diagnosis.regularisation import explained, row_weight
 from estimation.diagnosis.scoring import accept
 from estimation.diagnosis.shrinkage import pull_on
 from estimation.pulls import Pull
-
-Array = NDArray[np.float64]
 
 # Forms whose fits differ by less than this, twice a log-likelihood, are alike to the log.
 ALIKE = 3.0
@@ -38,18 +35,11 @@ def alike_forms(problem: Problem, members: Sequence[Member], i: int) -> list[Mem
 def _evidence(problem: Problem, others: Sequence[Member]) -> Callable[[Member], float]:
     """Builds the function that gives twice the log-evidence of a form, up to what all forms have alike."""
     baseline, white = problem.baseline, problem.whitening
-    root = np.linalg.cholesky(white.precision)
     blocks = [baseline.regressor, baseline.nuisance, *(dense(problem, m.hypothesis, m.shape) for m in others)]
-
-    def whitened(columns: Array) -> Array:
-        tilted = np.einsum("jk,njb->nkb", root, white.all(columns), optimize=True)
-        return np.asarray(tilted.reshape(-1, columns.shape[2]))
-
-    known = whitened(np.concatenate(blocks, axis=2))
-    tau = (white.all(problem.recording.tau) @ root).reshape(-1)
+    known, tau = white.independent(np.concatenate(blocks, axis=2)), white.independent(problem.recording.tau)
 
     def evidence(form: Member) -> float:
-        flat = np.hstack([known, whitened(dense(problem, form.hypothesis, form.shape))])
+        flat = np.hstack([known, white.independent(dense(problem, form.hypothesis, form.shape))])
         pull = pull_on(problem, [*others, form])
         precision = pull.precision / row_weight(white)
         gram = flat.T @ flat

@@ -110,15 +110,14 @@ def contenders(problem: Problem, result: Scan, members: Sequence[Member] = ()) -
     able = [o for o in result.outcomes if o.degrees and (o.hypothesis.name, o.hypothesis.joint) not in taken]
     if not able:
         return []
-    ranked = sorted(able, key=lambda o: -(o.gain - o.degrees * np.log(problem.rows)))
-    best = max(o.gain for o in able)
-    top = ranked[0].gain - ranked[0].degrees * np.log(problem.rows)
-    passing = TWICE * np.array([o.gain for o in ranked]) - np.array([o.degrees for o in ranked]) * np.log(problem.rows)
-    near = [
-        o.gain >= NEAR * best and not (o.hypothesis.effect.passing and p < top)
-        for o, p in zip(ranked, passing, strict=True)
-    ]
-    return [o for o, is_near in zip(ranked, near, strict=True) if is_near][:CONTENDERS]
+
+    def worth(outcome: Outcome, times: float = 1.0) -> float:
+        return float(times * outcome.gain - outcome.degrees * np.log(problem.rows))
+
+    ranked = sorted(able, key=worth, reverse=True)
+    best, top = max(o.gain for o in able), worth(ranked[0])
+    hopeless = {o.hypothesis for o in able if o.hypothesis.effect.passing and worth(o, TWICE) < top}
+    return [o for o in ranked if o.gain >= NEAR * best and o.hypothesis not in hopeless][:CONTENDERS]
 
 
 def _best(problem: Problem, outcomes: Sequence[Outcome], accepted: Accepted) -> list[Member]:

@@ -82,6 +82,12 @@ class Whitening:
         """Whitens (N, n) or (N, n, k)."""
         return np.stack([self.apply(series[:, j], j) for j in range(series.shape[1])], axis=1)
 
+    def independent(self, series: Array) -> Array:
+        """Whitens (N, n) or (N, n, k) across the joints too: a row each of white row and joint, (N n,) or (N n, k)."""
+        root = np.linalg.cholesky(self.precision)  # P = L L'
+        mixed = np.einsum("jk,nj...->nk...", root, self.all(series), optimize=True)
+        return np.asarray(mixed.reshape(-1, *series.shape[2:]))
+
     def draw(self, rows: int, draws: int, rng: np.random.Generator) -> NDArray[np.float32]:
         """Draws white noise (N, n, draws) from the innovations themselves: their tails, their correlation."""
         at = rng.integers(0, len(self.innovations), (rows, draws))

@@ -8,17 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.diagnosis.baseline import base_parameters, build_baseline, inertia_of
+from estimation.diagnosis.baseline import base_parameters, build_baseline
 from estimation.diagnosis.extending import fit_extended
 from estimation.diagnosis.extension import extension_torque
 from estimation.diagnosis.forms import ALIKE, alike_forms
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.noise import estimate_whitening
-from estimation.diagnosis.posing import fit_values, pose
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.refinement import refine
-from estimation.diagnosis.regularisation import pull_of
 from estimation.diagnosis.scoring import accept
 from estimation.diagnosis.states import record
 from robots.robot import Robot
@@ -40,15 +37,6 @@ def _balancer(q: np.ndarray) -> np.ndarray:
     return (energy(q + 1e-5) - energy(q - 1e-5)) / 2e-5
 
 
-def _problem(arm: Robot, recording: Recording) -> Problem:
-    baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
-    pull = pull_of(baseline, recording)
-    values = fit_values(baseline, recording.tau.std(axis=0), recording.unsure, recording.tau, pull)
-    residual = recording.tau - baseline.regressor @ values
-    whitening = estimate_whitening(recording, residual, baseline.base.size, inertia_of(baseline, recording, values))
-    return pose(recording, baseline, whitening, draws=0, rng=np.random.default_rng(0))
-
-
 @pytest.fixture(scope="module")
 def narrow(arm: Robot, arm_log: Callable[..., Log]) -> tuple[Recording, Recording]:
     """A motion of few angles, and the wide one, with the torque of one arm that is nearly as described."""
@@ -60,12 +48,14 @@ def narrow(arm: Robot, arm_log: Callable[..., Log]) -> tuple[Recording, Recordin
     return replace(small, tau=Y_small @ values), replace(whole, tau=Y @ values)
 
 
-def test_forms_of_a_spring_that_fit_alike_are_listed(arm: Robot, narrow: tuple[Recording, Recording]) -> None:
+def test_forms_of_a_spring_that_fit_alike_are_listed(
+    pose_arm: Callable[..., Problem], narrow: tuple[Recording, Recording]
+) -> None:
     """Fitted within a third of the angles, several levers fit as the polynomial does; the likeliest come first."""
     small, wide = narrow
     rng = np.random.default_rng(4)
     extra = np.column_stack([_balancer(small.q[:, 0]), 0 * small.t])
-    problem = _problem(arm, replace(small, tau=small.tau + extra + rng.normal(size=small.tau.shape) * NOISE))
+    problem = pose_arm(replace(small, tau=small.tau + extra + rng.normal(size=small.tau.shape) * NOISE))
     plain = refine(problem, SPRING, (0.0, 0.0), accept(problem, ()), effort=0)
     forms = alike_forms(problem, [plain], 0)
     assert len(forms) >= 2
@@ -81,13 +71,15 @@ def test_forms_of_a_spring_that_fit_alike_are_listed(arm: Robot, narrow: tuple[R
     assert errors[0] < errors[1]
 
 
-def test_a_form_that_fits_worse_is_not_listed(arm: Robot, narrow: tuple[Recording, Recording]) -> None:
+def test_a_form_that_fits_worse_is_not_listed(
+    pose_arm: Callable[..., Problem], narrow: tuple[Recording, Recording]
+) -> None:
     """A cable that stiffens over all angles is the polynomial that it is; an effect of one form has no other."""
     _, wide = narrow
     q = wide.q[:, 0]
     rng = np.random.default_rng(5)
     extra = np.column_stack([3.0 * q + 4.0 * q**3, 0 * q])
-    problem = _problem(arm, replace(wide, tau=wide.tau + extra + rng.normal(size=wide.tau.shape) * NOISE))
+    problem = pose_arm(replace(wide, tau=wide.tau + extra + rng.normal(size=wide.tau.shape) * NOISE))
     plain = refine(problem, SPRING, (0.0, 0.0), accept(problem, ()), effort=0)
     assert alike_forms(problem, [plain], 0) == []
     stribeck = refine(problem, Hypothesis(EFFECTS["stribeck"], 1), (0.1, 1.0), accept(problem, ()), effort=0)

@@ -10,15 +10,11 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis import extending
-from estimation.diagnosis.baseline import base_parameters, build_baseline, inertia_of
 from estimation.diagnosis.extending import fit_extended
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.noise import estimate_whitening
-from estimation.diagnosis.posing import fit_values, pose
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.refinement import refine
-from estimation.diagnosis.regularisation import pull_of
 from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.states import record
 from robots.robot import Robot
@@ -38,18 +34,9 @@ def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
 
 
 @pytest.fixture(scope="module")
-def posed(arm: Robot, recording: Recording) -> Callable[[np.ndarray], Problem]:
+def posed(recording: Recording, pose_arm: Callable[..., Problem]) -> Callable[[np.ndarray], Problem]:
     """Pose the log with more torque on it (N, 2)."""
-
-    def build(extra: np.ndarray) -> Problem:
-        data = replace(recording, tau=recording.tau + extra)
-        baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), data)
-        values = fit_values(baseline, data.tau.std(axis=0), data.unsure, data.tau, pull_of(baseline, data))
-        residual = data.tau - baseline.regressor @ values
-        whitening = estimate_whitening(data, residual, baseline.base.size, inertia_of(baseline, data, values))
-        return pose(data, baseline, whitening, draws=0, rng=np.random.default_rng(0))
-
-    return build
+    return lambda extra: pose_arm(replace(recording, tau=recording.tau + extra))
 
 
 def _stepped(recording: Recording, size: float) -> np.ndarray:

@@ -8,12 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from estimation.diagnosis.baseline import base_parameters, build_baseline, inertia_of
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.noise import estimate_whitening
-from estimation.diagnosis.posing import fit_values, pose
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.regularisation import pull_of
 from estimation.diagnosis.scan import measure, scan, surprise
 from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.states import record
@@ -24,15 +20,9 @@ from robots.terms.effects import EFFECTS
 
 
 @pytest.fixture(scope="module")
-def problem(arm: Robot, arm_log: Callable[..., Log]) -> Problem:
+def problem(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]) -> Problem:
     """A log of the arm without effects, white."""
-    recording = record(arm, [arm_log(torque_noise=0.02)])
-    baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
-    pull = pull_of(baseline, recording)
-    values = fit_values(baseline, recording.tau.std(axis=0), recording.unsure, recording.tau, pull)
-    residual = recording.tau - baseline.regressor @ values
-    whitening = estimate_whitening(recording, residual, baseline.base.size, inertia_of(baseline, recording, values))
-    return pose(recording, baseline, whitening, draws=300, rng=np.random.default_rng(0))
+    return pose_arm(record(arm, [arm_log(torque_noise=0.02)]), draws=300)
 
 
 def _written_out(problem: Problem, extra: np.ndarray) -> tuple[float, float]:

@@ -1,0 +1,31 @@
+"""Logs of the arm, posed as the diagnosis does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.baseline import base_parameters, build_baseline, inertia_of
+from estimation.diagnosis.noise import estimate_whitening
+from estimation.diagnosis.posing import fit_values, pose
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.recording import Recording
+from estimation.diagnosis.regularisation import pull_of
+from robots.robot import Robot
+
+
+@pytest.fixture(scope="session")
+def pose_arm(arm: Robot) -> Callable[..., Problem]:
+    """Fit the arm's base model to a recording, estimate the noise, and pose the whitened regression."""
+
+    def build(recording: Recording, draws: int = 0) -> Problem:
+        baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
+        pull = pull_of(baseline, recording)
+        values = fit_values(baseline, recording.tau.std(axis=0), recording.unsure, recording.tau, pull)
+        residual = recording.tau - baseline.regressor @ values
+        whitening = estimate_whitening(recording, residual, baseline.base.size, inertia_of(baseline, recording, values))
+        return pose(recording, baseline, whitening, draws=draws, rng=np.random.default_rng(0))
+
+    return build
