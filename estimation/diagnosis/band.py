@@ -82,7 +82,7 @@ def _response(band: Band, rows: int, after: int) -> tuple[int, NDArray[np.comple
     return size, scipy.fft.fft(centred)
 
 
-def find_bands(recording: Recording, inertia: Array, torque_density: Array) -> tuple[Band, ...]:
+def find_bands(recording: Recording, inertia: Array, torque_density: Array, share: float = SHARE) -> tuple[Band, ...]:
     """Finds each joint's band: up to where the error of all accelerations, as a torque, comes near the torque noise.
 
     Rows are thinned alike for all joints, by what the fastest band needs.
@@ -91,15 +91,17 @@ def find_bands(recording: Recording, inertia: Array, torque_density: Array) -> t
         recording: the data.
         inertia: torque on each joint per acceleration of each (n, n) [kg m2].
         torque_density: power density of the torque noise at high frequency (n,) [(N m)^2/Hz].
+        share: of the torque noise's power, what the error may have.
     """
     rate = 1 / recording.step
     error = np.maximum(inertia**2 @ recording.floor, 1e-300)
-    limits = (SHARE * torque_density / error) ** 0.25 / (2 * np.pi)
+    limits = (share * torque_density / error) ** 0.25 / (2 * np.pi)
     cutoffs = np.clip(limits, min(SLOWEST, FASTEST * rate), FASTEST * rate)
     stride = max(1, int(rate / (2.5 * cutoffs.max())))
-    return tuple(_band(float(cutoff), rate, stride) for cutoff in cutoffs)
+    return tuple(low_pass(float(cutoff), rate, stride) for cutoff in cutoffs)
 
 
-def _band(cutoff: float, rate: float, stride: int) -> Band:
+def low_pass(cutoff: float, rate: float, stride: int) -> Band:
+    """Builds a low-pass [Hz] for rows at a rate [Hz], of which `stride` become one."""
     length = int(np.ceil(3.6 * rate / (TRANSITION * cutoff))) | 1
     return Band(firwin(length, cutoff * (1 - TRANSITION / 2), fs=rate, window=("kaiser", 6.0)), stride, cutoff)

@@ -26,6 +26,7 @@ from estimation.diagnosis.reporting import Told, assemble
 from estimation.diagnosis.scan import Entry, measure
 from estimation.diagnosis.selection import Selection, select
 from estimation.diagnosis.states import Recording, record
+from estimation.diagnosis.upper import WIDER, pose_upper
 from estimation.diagnosis.verdict import Judgement, judge
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError, NotIdentifiableError
@@ -195,9 +196,14 @@ def _search(
             # Its columns are most of what a diagnosis keeps in memory: they go before others come.
             search = None
             give_back()
+        upper = None
+        if any(effect.fast for effect in effects):
+            wide = estimate_whitening(recording, residual, baseline.base.size + known, inertia, WIDER)
+            remainder = tau - baseline.regressor @ values
+            upper = pose_upper(recording, baseline, remainder, residual, whitening.bands, wide)
         rng = np.random.default_rng(seed)
         search = _searched(
-            pose(recording, baseline, whitening, draws=DRAWS, rng=rng, extra=extra),
+            pose(recording, baseline, whitening, draws=DRAWS, rng=rng, extra=extra, upper=upper),
             hypotheses,
             false_alarm,
             rng,

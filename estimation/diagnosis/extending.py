@@ -70,7 +70,15 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         deviations.append(steps)
         at += X.shape[2] + len(member.shape)
     columns = np.concatenate(blocks, axis=2)
+    fast = np.zeros(columns.shape[2], dtype=bool)
+    for member, (start, size, shapes) in zip(members, slices, strict=True):
+        fast[start : start + size + shapes] = member.hypothesis.effect.fast
     flat, tau = white.independent(columns), white.independent(problem.recording.tau)
+    if problem.upper is not None and fast.any():
+        above, beyond = problem.upper.regression(columns[:, :, fast])
+        higher = np.zeros((len(above), len(fast)))
+        higher[:, fast] = above
+        flat, tau = np.concatenate([flat, higher]), np.concatenate([tau, beyond])
     linear = np.ones(columns.shape[2], dtype=bool)
     for start, size, shapes in slices:
         linear[start + size : start + size + shapes] = False
@@ -224,9 +232,7 @@ def _inexact(member: Member) -> Array:
 
 
 def _gain(problem: Problem, member: Member, shape: tuple[float, ...], others: Accepted) -> float:
-    joints, columns = problem.columns_of(member.hypothesis, shape)
-    group = problem.group(joints, columns, agreed=member.hypothesis.effect.alike)
-    return score(problem, group, others).gain
+    return score(problem, problem.measured(member.hypothesis, shape), others).gain
 
 
 def _moved(shape: tuple[float, ...], k: int, value: float) -> tuple[float, ...]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from estimation.diagnosis.band import find_bands
+from estimation.diagnosis.band import SHARE, find_bands
 from estimation.diagnosis.gaps import find_gaps, free_columns, long_gap
 from estimation.diagnosis.states import Recording
 from estimation.diagnosis.whitening import Whitening
@@ -41,7 +41,9 @@ HUBER = 3.5
 TOGETHER, KICKED = 0.05, 0.15
 
 
-def estimate_whitening(recording: Recording, residual: Array, parameters: int, inertia: Array) -> Whitening:
+def estimate_whitening(
+    recording: Recording, residual: Array, parameters: int, inertia: Array, share: float = SHARE
+) -> Whitening:
     """Estimates the noise.
 
     It is the residual of the model: what is found in it later is taken out, and the noise estimated anew. Differences
@@ -53,6 +55,7 @@ def estimate_whitening(recording: Recording, residual: Array, parameters: int, i
         residual: torque less model (N, n) [N m or N].
         parameters: how many were fitted to it: they have taken some of the noise.
         inertia: torque on each joint per acceleration of each (n, n) [kg m2], for what their errors make.
+        share: of the torque noise, what those may make in the bands.
     """
     longest = long_gap(recording.step)
     gaps = find_gaps(recording.unsure, recording.starts, longest)
@@ -60,7 +63,7 @@ def estimate_whitening(recording: Recording, residual: Array, parameters: int, i
     all_gaps = find_gaps(recording.unsure, recording.starts)
     bridged = np.column_stack([all_gaps.bridged(column, j) for j, column in enumerate(residual.T)])
     pieces = [bridged[run] for run in recording.runs]
-    bands = find_bands(recording, inertia, _density(pieces, recording.step))
+    bands = find_bands(recording, inertia, _density(pieces, recording.step), share)
     pieces = [
         np.column_stack([band.passed(column) for band, column in zip(bands, piece.T, strict=True)]) for piece in pieces
     ]

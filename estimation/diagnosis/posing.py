@@ -10,6 +10,7 @@ from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.regularisation import held, pull_of
 from estimation.diagnosis.states import Recording
+from estimation.diagnosis.upper import Upper
 from estimation.diagnosis.whitening import Whitening
 from estimation.pulls import Pull
 
@@ -25,6 +26,7 @@ def pose(
     rng: np.random.Generator,
     extra: Array | None = None,
     pull: Pull | None = None,
+    upper: Upper | None = None,
 ) -> Problem:
     """Fits the base model to white data and prepares the null.
 
@@ -36,6 +38,7 @@ def pose(
         rng: draws it.
         extra: torque (N, n) of effects that are known already, taken off before the base model's situation is computed.
         pull: what holds base parameters that the data leave open; by default `pull_of`.
+        upper: the frequencies above the bands.
     """
     n = recording.n
     root = np.linalg.cholesky(whitening.precision)  # P = L L'
@@ -74,6 +77,7 @@ def pose(
         nulls=(pressed, projected),
         remainder=remainder,
         pull=pull,
+        upper=upper,
     )
 
 

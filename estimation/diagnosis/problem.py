@@ -13,9 +13,10 @@ from scipy.ndimage import maximum_filter1d
 from estimation.diagnosis.baseline import Baseline
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.states import Recording
+from estimation.diagnosis.upper import Upper
 from estimation.diagnosis.whitening import Whitening
 from estimation.pulls import Pull
-from robots.terms.effects import Situation
+from robots.terms.effects import Effect, Situation
 
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
@@ -38,6 +39,7 @@ class Group:
         gram: of what the base model leaves of the columns (k, k).
         raw: squared norms (k,) before that; infinite for columns that are nearly all in rows that do not count.
         cross: with the residual (k,).
+        above: white columns (N', k) of each of the joints above its band; none for effects that are not `fast`.
     """
 
     joints: tuple[int, ...]
@@ -46,6 +48,7 @@ class Group:
     gram: Array
     raw: Array
     cross: Array
+    above: tuple[Small, ...] = ()
 
     @property
     def size(self) -> int:
@@ -71,6 +74,7 @@ class Problem:
         nulls: P times white noise (n, N, draws), and its products with Q (b, draws).
         remainder: torque less base model (N0, n) [N m or N], at the recording's own rows.
         pull: what holds base parameters that the data leave open, in units of rows over the noise's scale.
+        upper: the frequencies above the bands; None where nothing is asked of them.
     """
 
     recording: Recording
@@ -84,6 +88,7 @@ class Problem:
     nulls: tuple[Small, Array]
     remainder: Array
     pull: Pull
+    upper: Upper | None = None
 
     @property
     def n(self) -> int:
@@ -104,16 +109,20 @@ class Problem:
         """Evaluates a hypothesis: the joints it acts on, and its columns (N, k) on each."""
         return hypothesis.columns(self.situation, shape)
 
-    def group(self, joints: tuple[int, ...], columns: tuple[Array, ...], *, agreed: bool = False) -> Group:
+    def measured(self, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Group:
+        """Evaluates a hypothesis at a shape and measures it."""
+        return self.group(*self.columns_of(hypothesis, shape), effect=hypothesis.effect)
+
+    def group(self, joints: tuple[int, ...], columns: tuple[Array, ...], *, effect: Effect | None = None) -> Group:
         """Whitens columns (N, k) of some joints and projects the base model out of them.
 
-        Where joints must have `agreed` on what they tell, columns count that are largest where motion is not known, if
-        most of what counts is from elsewhere.
+        Of an `effect` on whose size all joints agree, columns count that are largest where motion is not known, if most
+        of what counts is from elsewhere. One that is fast is measured above the bands too.
         """
-        return self.groups(joints, columns, 1, agreed=agreed)[0]
+        return self.groups(joints, columns, 1, effect=effect)[0]
 
     def groups(
-        self, joints: tuple[int, ...], columns: tuple[Array, ...], count: int, *, agreed: bool = False
+        self, joints: tuple[int, ...], columns: tuple[Array, ...], count: int, *, effect: Effect | None = None
     ) -> list[Group]:
         """Does what `group` does for several groups on the same joints at once: columns (N, count k), k of each."""
         whole = [self.whitening.filtered(part, j) for j, part in zip(joints, columns, strict=True)]
@@ -124,7 +133,7 @@ class Problem:
         power = [sum(P[j, j] * _squares(part) for j, part in zip(joints, kind, strict=True)) for kind in (white, whole)]
         raw = np.where(power[0] > COUNTED * power[1], power[0], np.inf)
         doubtful = np.flatnonzero(np.isinf(raw) & (power[0] > FAINT * power[1]))
-        if agreed and len(doubtful):
+        if effect is not None and effect.alike and len(doubtful):
             known = self._known(joints, [part[:, doubtful] for part in columns])
             raw[doubtful] = np.where(known > KNOWN * power[0][doubtful], power[0][doubtful], np.inf)
         against, cross = np.zeros((total, self.mixed.shape[2])), np.zeros(total)
@@ -137,6 +146,17 @@ class Problem:
             for b in range(a):
                 part = P[j, joints[b]] * (split[a] @ split[b].transpose(0, 2, 1))
                 gram += part + part.transpose(0, 2, 1)
+        above: list[Array] = []
+        if self.upper is not None and effect is not None and effect.fast:
+            above = [self.upper.columns(part, j) for j, part in zip(joints, columns, strict=True)]
+            above = above if any(map(len, above)) else []
+        for j, part in zip(joints, above, strict=False):
+            assert self.upper is not None
+            cross += self.upper.cross(part, j)
+            raw += _squares(part)
+            apart = part.T.reshape(count, k, -1)
+            gram += apart @ apart.transpose(0, 2, 1)
+        high = [np.asfortranarray(part, dtype=np.float32) for part in above]
         small = [np.asfortranarray(part, dtype=np.float32) for part in white]
         return [
             Group(
@@ -146,6 +166,7 @@ class Problem:
                 gram=gram[i] - against[own] @ against[own].T,
                 raw=np.asarray(raw[own]),
                 cross=cross[own],
+                above=tuple(part[:, own] for part in high),
             )
             for i, own in enumerate(slice(i * k, (i + 1) * k) for i in range(count))
         ]
@@ -175,7 +196,18 @@ class Problem:
         total = -(np.concatenate([group.against for group in groups]) @ projected)
         for a, j in enumerate(groups[0].joints):
             total += np.concatenate([group.columns[a] for group in groups], axis=1).T @ noise[j]
-        return np.asarray(total.reshape(len(groups), -1, projected.shape[1]))
+        null = np.asarray(total.reshape(len(groups), -1, projected.shape[1]))
+        for at, group in enumerate(groups):
+            for part in group.above:
+                null[at] += self._drawn(part)
+        return null
+
+    def _drawn(self, columns: Small) -> Array:
+        """Products (k, draws) of columns above the band with noise: of many rows, and so as good as normal."""
+        gram = (columns.T @ columns).astype(float)
+        values, vectors = np.linalg.eigh(gram)
+        unit = np.random.default_rng(len(columns)).standard_normal((len(gram), self.nulls[1].shape[1]))
+        return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ unit)
 
     def product(self, first: Group, second: Group) -> Array:
         """Inner products (k1, k2) of what the base model leaves of two groups."""
@@ -185,6 +217,10 @@ class Problem:
             for b, right in zip(second.joints, second.columns, strict=True):
                 if P[a, b]:
                     total = total + P[a, b] * (left.T @ right).astype(float)
+        for a, left in zip(first.joints, first.above, strict=False):
+            for b, right in zip(second.joints, second.above, strict=False):
+                if a == b:
+                    total = total + (left.T @ right).astype(float)
         return total
 
 

@@ -17,8 +17,11 @@ Array = NDArray[np.float64]
 
 # Evaluations a shape parameter.
 EFFORT = 20
-# Points of each look for a moment; and a step of the search from there, as a share of the first.
-ZOOMS, AGAIN = (21, 11, 11), 0.1
+# Points of each look for a moment, and how far it reaches in steps of the one before; and a step of the search from
+# there, as a share of the first. A sudden change has a narrow summit on a broad one: of one joint, where a look costs
+# little, a wide one is taken between.
+ZOOMS, AGAIN = ((21, 1.2), (11, 1.2), (11, 1.2)), 0.1
+WIDE = (101, 6.0)
 # First step of the search: a factor of a logarithmic parameter, a share of the range of another.
 FACTOR, SHARE = 1.5, 0.04
 # An effect acts where its torque is more than this share of its largest.
@@ -109,8 +112,7 @@ def refine(
     best: list[Member] = []
 
     def evaluate(shape: tuple[float, ...], fitted: int = len(free)) -> float:
-        joints, columns = problem.columns_of(hypothesis, shape)
-        group = problem.group(joints, columns, agreed=hypothesis.effect.alike)
+        group = problem.measured(hypothesis, shape)
         result = score(problem, group, accepted)
         gain, coefficients = result.bounded(*hypothesis.coefficient_bounds(situation.robot, shape))
         member = Member(hypothesis, shape, group, gain, coefficients, result.degrees + fitted, result.visible)
@@ -130,7 +132,9 @@ def refine(
             return evaluate(tuple(at))
 
         for k, step in steps.items():
-            _zoom(lambda value, k=k: evaluate((*at[:k], value, *at[k + 1 :])), at[k], step, bounds[k])  # type: ignore[misc]
+            sudden = len(free) == 1 and len(best[0].group.joints) == 1
+            looks = (ZOOMS[0], WIDE, *ZOOMS[1:]) if sudden else ZOOMS
+            _zoom(lambda value, k=k: evaluate((*at[:k], value, *at[k + 1 :])), at[k], step, bounds[k], looks)  # type: ignore[misc]
             at[:] = best[0].shape
         if len(steps) < len(free):
             _search(
@@ -153,7 +157,8 @@ def _scatter(problem: Problem, member: Member, accepted: Accepted) -> float:
     """How much more the joints differ in the one coefficient that they share than they may (Birge 1932)."""
     joints, columns = problem.columns_of(member.hypothesis, member.shape)
     scores = [
-        score(problem, problem.group((j,), (X,), agreed=True), accepted) for j, X in zip(joints, columns, strict=True)
+        score(problem, problem.group((j,), (X,), effect=member.hypothesis.effect), accepted)
+        for j, X in zip(joints, columns, strict=True)
     ]
     gram, cross = (
         np.array([float(np.ravel(part)[0]) for part in parts])
@@ -190,12 +195,18 @@ def _spacing(grid: Sequence[tuple[float, ...]], k: int, start: tuple[float, ...]
     return near[min(1, len(near) - 1)] if near else 1.0
 
 
-def _zoom(evaluate: Callable[[float], float], start: float, width: float, bounds: tuple[float, float]) -> None:
+def _zoom(
+    evaluate: Callable[[float], float],
+    start: float,
+    width: float,
+    bounds: tuple[float, float],
+    looks: Sequence[tuple[int, float]],
+) -> None:
     """Looks for a moment on points that get closer and closer: no method that climbs finds the top of a random walk."""
-    for count in ZOOMS:
-        points = np.clip(start + width * np.linspace(-1.2, 1.2, count), *bounds)
+    for count, reach in looks:
+        points = np.clip(start + width * np.linspace(-reach, reach, count), *bounds)
         worth = [evaluate(float(point)) for point in points]
-        start, width = float(points[int(np.argmax(worth))]), 2.4 * width / (count - 1)
+        start, width = float(points[int(np.argmax(worth))]), 2 * reach * width / (count - 1)
 
 
 def _search(

@@ -40,6 +40,7 @@ class Entry:
         shapes: the points scanned.
         groups: one a point.
         tries: points that the choice was made from.
+        charged: whether the grid is charged whole, for all of its points, and not for what null logs make of it.
         nulls: products of each group with the null logs (points, k, draws); none where the grid is charged whole.
         sizes: mean products of each group's columns as shares of the joint's torque (points, k, k), on the joint where
             they are largest.
@@ -49,6 +50,7 @@ class Entry:
     shapes: tuple[tuple[float, ...], ...]
     groups: tuple[Group, ...]
     tries: int
+    charged: bool
     nulls: Small
     sizes: Array
 
@@ -146,20 +148,27 @@ def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
             groups.update(
                 zip(
                     (at for at, _ in chunk),
-                    problem.groups(joints, together, len(chunk), agreed=hypothesis.effect.alike),
+                    problem.groups(joints, together, len(chunk), effect=hypothesis.effect),
                     strict=True,
                 )
             )
         sizes.update((at, _size(problem, joints, columns)) for at, columns in members)
     ordered = tuple(groups[at] for at in range(len(kept)))
     nulls = np.zeros((0, 0, 0), np.float32)
-    if tries <= LONG and problem.nulls[1].shape[1]:
+    charged = tries > LONG or any(group.above for group in ordered)
+    if not charged and problem.nulls[1].shape[1]:
         nulls = np.empty((len(kept), ordered[0].size, problem.nulls[1].shape[1]), np.float32)
         for members in batches.values():
             places = [at for at, _ in members]
             nulls[places] = problem.null_crosses([groups[at] for at in places])
     return Entry(
-        hypothesis, tuple(kept), ordered, max(tries, 1), nulls, np.stack([sizes[at] for at in range(len(kept))])
+        hypothesis=hypothesis,
+        shapes=tuple(kept),
+        groups=ordered,
+        tries=max(tries, 1),
+        charged=charged,
+        nulls=nulls,
+        sizes=np.stack([sizes[at] for at in range(len(kept))]),
     )
 
 
@@ -200,7 +209,7 @@ def scan(
     largest = np.zeros(draws)
     for entry, (outcome, null) in zip(entries, results, strict=True):
         if outcome.degrees:
-            if entry.tries > LONG and draws:
+            if entry.charged and draws:
                 null = rng.exponential(size=draws)  # corrected for its grid, a p-value is uniform
             np.maximum(largest, null, out=largest)
     outcomes = sorted((outcome for outcome, _ in results), key=lambda o: -o.evidence)
@@ -218,7 +227,7 @@ def _outcome(problem: Problem, entry: Entry, accepted: Accepted, draws: int) -> 
         # Within physical bounds: a gear of negative stiffness is no alarm.
         gain = result.bounded(*entry.hypothesis.coefficient_bounds(robot, shape))[0]
         evidence = float(surprise(np.array(gain), result.degrees))
-        if draws and entry.tries <= LONG:
+        if draws and not entry.charged:
             cross = entry.nulls[at] - result.onto.T @ accepted.nulls
             stats = ((result.root @ cross) ** 2).sum(axis=0)
             highest[result.degrees] = np.maximum(highest.get(result.degrees, np.zeros(draws)), stats)
@@ -229,7 +238,7 @@ def _outcome(problem: Problem, entry: Entry, accepted: Accepted, draws: int) -> 
         np.maximum(worst, surprise(stats, degrees), out=worst)
     if best[4] == 0:
         return Outcome(entry.hypothesis, entry.shapes[0], 0.0, 0.0, 0.0, 0), worst
-    correction = np.log(entry.tries) if entry.tries > LONG else _tries(worst)
+    correction = np.log(entry.tries) if entry.charged else _tries(worst)
     null = np.maximum(worst - correction, 0.0)
     evidence = max(best[0] - correction, 0.0)
     return Outcome(entry.hypothesis, best[2], best[1], best[3], evidence, best[4]), null

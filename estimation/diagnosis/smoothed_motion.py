@@ -27,7 +27,7 @@ def smoothed(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array, Arr
         if cutoff <= 0:
             continue
         sections = butter(ORDER, min(cutoff * 2 * period, 0.99), output="sos")
-        padding = min(len(x) - 1, round(6 / (cutoff * period)))
+        padding = min(len(x) - 1, round(12 / (cutoff * period)))
         q[:, j] = sosfiltfilt(sections, x[:, j], padtype="odd", padlen=padding)
     dq, ddq = differentiated(q, period)
     return q, dq, ddq

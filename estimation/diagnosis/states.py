@@ -30,6 +30,9 @@ STANDS_OUT = 3.0
 # Least and most of the cut-off [Hz, share of the sampling rate].
 LOWEST, HIGHEST = 2.0, 0.4
 ORDER = 8  # of the low-pass before thinning
+# Periods of the cut-off, and a share of the log at most, that the ends lose: there the low-pass of the positions rings,
+# as it does for what no log has before it began, and its second derivative more than any encoder's noise.
+RINGING, MOST_LOST = 8.0, 0.05
 SHORTEST = 5.0  # [s] of log below which nothing can be told
 # Spectra are taken of this difference of the positions: the slow motion would leak over all of the band otherwise.
 DIFFERENCE = 3
@@ -143,7 +146,7 @@ def _part(
             # What does not repeat is motion too, where it stands out of the noise.
             whole[rows] = np.where(better, harmonic + other, whole[rows])
         cutoffs = np.where(better, known, cutoffs)
-    edge = min(4.0 / float(cutoffs.min()), 0.02 * (grid[-1] - grid[0]))
+    edge = min(RINGING / float(cutoffs.min()), MOST_LOST * (grid[-1] - grid[0]))
     # On a sample: between two of them nobody knows when a torque jumped.
     begin = grid[0] + np.ceil(edge / period - 1e-9) * period
     count = int(np.floor((grid[-1] - edge - begin) / step + 1e-6)) + 1

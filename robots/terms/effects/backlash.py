@@ -46,6 +46,7 @@ class Backlash(Effect):
         Shape("crossed_at", "N m", -np.inf, np.inf, "linear", (0.0,), default=0.0),
     )
     rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "presliding_hysteresis", "load_dependent_friction")
+    fast: ClassVar[bool] = True
     experiments: ClassVar[tuple[str, ...]] = ("payload", "micro_reversals")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:

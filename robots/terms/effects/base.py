@@ -78,6 +78,7 @@ class Effect(ABC):
         depends_on: ``state`` where one and the same motion always meets it, ``time`` where it comes, goes or builds up.
         passing: whether it belongs to the logs it is found in, and may be gone or different in others.
         alike: whether it has one coefficient, that all joints share: each joint tells it, and they must agree.
+        fast: whether its torque owes nothing to accelerations: it is looked for above the frequencies of those, too.
         shapes: the parameters that the columns are not linear in.
         rivals: effects that resemble it, the closest first.
         experiments: kinds of experiment that separate it from them, the best first.
@@ -90,6 +91,7 @@ class Effect(ABC):
     depends_on: ClassVar[Literal["state", "time"]] = "state"
     passing: ClassVar[bool] = False
     alike: ClassVar[bool] = False
+    fast: ClassVar[bool] = False
     shapes: ClassVar[tuple[Shape, ...]] = ()
     rivals: ClassVar[tuple[str, ...]] = ()
     experiments: ClassVar[tuple[str, ...]] = ()

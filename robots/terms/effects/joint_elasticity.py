@@ -20,6 +20,8 @@ DAMPING = 0.05
 """Of the resonance, of its critical one."""
 SCANNED = (8.0, 12.0, 18.0, 30.0, 60.0, 300.0)
 """Resonances [Hz] of a scan, at the log's mean inertia."""
+LIGHTEST = 0.02
+"""Of a joint's largest inertia, the least that an arm makes it in any pose."""
 LOWEST, HIGHEST = 3.0, 1000.0
 """Resonances [Hz] that a gear may have."""
 
@@ -115,9 +117,12 @@ def followed(situation: Situation, load: Array, stiffness: float, inertia: Array
 
 
 def _inertia(situation: Situation, joint: int) -> Array:
-    """Gives the inertia (N,) that swings on a joint's gear, no less than a hundredth of its mean."""
+    """Gives the inertia (N,) that swings on a joint's gear, no less than a share of its largest.
+
+    A wrist's is so small that its fit may be negative: the link would then not swing but run away.
+    """
     own = link_inertia(situation, joint)[:, joint - 1]
-    return np.asarray(np.maximum(own, 0.01 * max(float(np.mean(own)), 1e-9)))
+    return np.asarray(np.maximum(own, LIGHTEST * max(float(np.abs(own).max(initial=0.0)), 1e-9)))
 
 
 def _stiffness(situation: Situation, joint: int, resonance: float) -> float:

@@ -43,6 +43,7 @@ class TorqueRipple(StaticJointEffect):
         Shape("late", "s", -0.01, 0.01, "linear", (0.0,), default=0.0),
     )
     rivals: ClassVar[tuple[str, ...]] = ("position_dependent_friction", "spring", "encoder_eccentricity")
+    fast: ClassVar[bool] = True
     experiments: ClassVar[tuple[str, ...]] = ("sweep",)
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:

@@ -13,6 +13,7 @@ from estimation.diagnosis.posing import fit_values, pose
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.regularisation import pull_of
+from estimation.diagnosis.upper import pose_upper
 from robots.robot import Robot
 
 
@@ -20,12 +21,17 @@ from robots.robot import Robot
 def pose_arm(arm: Robot) -> Callable[..., Problem]:
     """Fit the arm's base model to a recording, estimate the noise, and pose the whitened regression."""
 
-    def build(recording: Recording, draws: int = 0) -> Problem:
+    def build(recording: Recording, draws: int = 0, wider: float | None = None) -> Problem:
         baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
         pull = pull_of(baseline, recording)
         values = fit_values(baseline, recording.tau.std(axis=0), recording.unsure, recording.tau, pull)
         residual = recording.tau - baseline.regressor @ values
-        whitening = estimate_whitening(recording, residual, baseline.base.size, inertia_of(baseline, recording, values))
-        return pose(recording, baseline, whitening, draws=draws, rng=np.random.default_rng(0))
+        inertia = inertia_of(baseline, recording, values)
+        whitening = estimate_whitening(recording, residual, baseline.base.size, inertia)
+        upper = None
+        if wider is not None:
+            wide = estimate_whitening(recording, residual, baseline.base.size, inertia, wider)
+            upper = pose_upper(recording, baseline, residual, residual, whitening.bands, wide)
+        return pose(recording, baseline, whitening, draws=draws, rng=np.random.default_rng(0), upper=upper)
 
     return build

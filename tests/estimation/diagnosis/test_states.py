@@ -49,6 +49,21 @@ def test_a_repeated_motion_is_known_better_than_a_single_pass(arm: Robot, fourie
     assert np.all(error[200:-200].std(axis=0) < 0.01 * motion.ddq.std(axis=0))
 
 
+def test_a_log_that_begins_in_motion_is_known_to_its_ends(arm: Robot) -> None:
+    """A fine encoder's accelerations err no more at the ends of a log than in its middle: filters have rung out."""
+    rng = np.random.default_rng(0)
+    t, f = 0.004 * np.arange(5000), np.linspace(0.1, 60.0, 600)[:, None]
+    phases = 2 * np.pi * (f[:, :, None] * t[:, None] + rng.uniform(size=(600, 1, 2)))
+    q = np.sum(np.sin(phases) / (1 + f[:, :, None]) ** 4, axis=0)
+    ddq = -np.sum((2 * np.pi * f[:, :, None]) ** 2 * np.sin(phases) / (1 + f[:, :, None]) ** 4, axis=0)
+    count = 1e-7
+    recording = record(arm, [Log(t=t, q=np.round(q / count) * count, tau=np.ones_like(q))])
+    first = int(np.argmin(np.abs(t - recording.t[0])))
+    error = np.abs(recording.ddq - ddq[first : first + len(recording)])
+    ends = np.concatenate([error[:20], error[-20:]])
+    assert np.all(ends.max(axis=0) < 1.5 * error[100:-100].max(axis=0))
+
+
 def test_rows_about_a_reversal_are_unsure(arm: Robot, fourier_motion: Callable) -> None:
     """Wherever a joint reverses, the rows beside do not count; they are few."""
     recording = record(arm, [_log(fourier_motion(arm, duration=20.0), 2**20)])

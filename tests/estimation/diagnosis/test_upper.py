@@ -1,0 +1,127 @@
+"""Specification of the frequencies above the bands: what shows there, how much it tells, and noise that repeats."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.band import TRANSITION
+from estimation.diagnosis.extending import fit_extended
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.periods import Cycle
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.recording import Recording, cut
+from estimation.diagnosis.refinement import refine
+from estimation.diagnosis.scoring import accept, score
+from estimation.diagnosis.states import record
+from estimation.diagnosis.upper import WIDER
+from robots.robot import Robot
+from robots.signals import Log
+from robots.terms.effects import EFFECTS
+
+RIPPLE = Hypothesis(EFFECTS["torque_ripple"], 1)
+SHAPE = (150.0, 0.0)
+NOISE = 0.1  # of the torque, white [N m]
+SIZE = 0.02  # of the ripple, a fifth of it
+
+
+@pytest.fixture(scope="module")
+def clean(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
+    """A log of the arm without torque noise that passes as one of a coarse encoder."""
+    return replace(record(arm, [arm_log(torque_noise=0.0)]), floor=np.full(2, 1e-11), cycles=(None,))
+
+
+@pytest.fixture(scope="module")
+def recording(clean: Recording) -> Recording:
+    """The same with white torque noise of a known size."""
+    return replace(clean, tau=clean.tau + NOISE * np.random.default_rng(1).standard_normal(clean.tau.shape))
+
+
+def _rippled(recording: Recording) -> Recording:
+    tau = recording.tau.copy()
+    tau[:, 0] += SIZE * np.cos(SHAPE[0] * recording.q[:, 0])
+    return replace(recording, tau=tau)
+
+
+def _cosine(problem: Problem) -> tuple[float, float]:
+    """Size of the ripple's cosine beside the base model, that of nothing else, and its standard error."""
+    group = problem.measured(RIPPLE, SHAPE)
+    return float(group.cross[0] / group.gram[0, 0]), float(group.gram[0, 0] ** -0.5)
+
+
+def test_a_ripple_tells_its_energy_over_the_noise(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
+    """What is told above the band is the wave's energy between the two cut-offs, over the noise's.
+
+    In the rows that count: not where the direction of motion is not known, nor at the ends, where the filter begins.
+    """
+    below, both = (pose_arm(_rippled(recording), wider=wider) for wider in (None, WIDER))
+    cutoffs = below.whitening.bands[0].cutoff, both.upper.whitening.bands[0].cutoff  # type: ignore[union-attr]
+    assert cutoffs[0] < 12.0
+    assert cutoffs[1] > 2 * cutoffs[0]
+    spectrum = np.fft.rfft(np.cos(SHAPE[0] * recording.q[:, 0]))
+    f = np.fft.rfftfreq(len(recording), recording.step)
+    half = 1 - TRANSITION / 2  # of a cut-off, where the filter passes half
+    spectrum[(f < half * cutoffs[0]) | (f > half * cutoffs[1])] = 0.0
+    wave = np.fft.irfft(spectrum, len(recording))
+    wave[recording.unsure[:, 0]] = 0.0
+    edge = round(7.2 / cutoffs[0] / recording.step)
+    (_, slow), (size, error) = _cosine(below), _cosine(both)
+    assert error**-2 - slow**-2 == pytest.approx(np.sum(wave[edge:-edge] ** 2) / NOISE**2, rel=0.2)
+    assert abs(size - SIZE) < 4 * error  # fails wrongly once in 16,000
+
+
+def test_only_fast_effects_are_measured_there(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
+    """An effect by acceleration has no rows above the band; what is slow has next to nothing of its energy there."""
+    problem = pose_arm(recording, wider=WIDER)
+    assert problem.measured(RIPPLE, SHAPE).above[0].shape[1] == 4
+    assert not problem.measured(Hypothesis(EFFECTS["encoder_offset"], 1), ()).above
+    assert problem.upper is not None
+    slow = np.sin(recording.t)[:, None]
+    assert np.sum(problem.upper.columns(slow, 0) ** 2) < 1e-3 * np.sum(problem.whitening.apply(slow, 0) ** 2)
+
+
+def test_found_beside_it_a_ripple_is_taken_off(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
+    """Once accepted, it leaves nothing of itself, neither in the data nor in the null."""
+    problem = pose_arm(_rippled(recording), wider=WIDER, draws=200)
+    group = problem.measured(RIPPLE, SHAPE)
+    accepted = accept(problem, (group,))
+    assert accepted.gain > 15.0
+    # Its noise is of unit variance: the error of a variance of 800 numbers is 5 %.
+    assert accepted.nulls.var() == pytest.approx(1.0, abs=0.2)
+    assert score(problem, group, accepted).gain == pytest.approx(0.0, abs=1e-3)
+
+
+def test_the_extended_model_knows_it_as_well(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
+    """What is above the band makes the coefficients' standard errors smaller by as much as it does in a score."""
+    told, extended = [], []
+    for wider in (None, WIDER):
+        problem = pose_arm(_rippled(recording), wider=wider)
+        member = refine(problem, RIPPLE, SHAPE, accept(problem, ()), effort=0)
+        told.append(np.sqrt(np.sum(score(problem, member.group, accept(problem, ())).root ** 2, axis=0)))
+        extension = fit_extended(problem, [member], {}).model.extensions[0]
+        extended.append(np.sqrt(np.diag(extension.covariance)[:4]))
+    assert np.all(told[1] < 0.5 * told[0])
+    assert extended[1] / extended[0] == pytest.approx(told[1] / told[0], rel=0.4)  # which counts the shape too
+
+
+@pytest.mark.parametrize(("same", "level"), [(True, 5**0.5), (False, 1.0)])
+def test_noise_that_repeats_with_the_motion_tells_less(
+    clean: Recording, pose_arm: Callable[..., Problem], same: bool, level: float
+) -> None:
+    """Rounding that is alike in five repetitions counts as one: its level at their harmonics is the root of five.
+
+    The noise of some 300 frequencies is known to 4 % there.
+    """
+    period = len(clean) // 5
+    noise = np.random.default_rng(3).standard_normal((5 * period, 2))
+    if same:
+        noise = np.tile(noise[:period], (5, 1))
+    repeated = cut(clean, slice(0, 5 * period))
+    cycle = Cycle(0, 5 * period, period * clean.step, 5)
+    problem = pose_arm(replace(repeated, tau=repeated.tau + NOISE * noise, cycles=(cycle,)), wider=WIDER)
+    assert problem.upper is not None
+    levels = [above.level for above in problem.upper.joints if above is not None]
+    assert levels == pytest.approx([level] * 2, rel=0.12)
