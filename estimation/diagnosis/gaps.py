@@ -29,9 +29,10 @@ LONG_GAP = 0.3
 class Gaps:
     """Rows in which a joint's direction of motion is not known, nor then the sign of its friction.
 
-    Short ones are given a torque of their own each, as many numbers as the band lets through: white columns that are
-    projected out of torque and hypotheses alike. Long ones, a joint at rest, are bridged by straight lines in both, so
-    that filters pass over them, and do not count.
+    They are bridged by straight lines in torque and hypotheses alike, so that filters pass over them: a friction that
+    turns round somewhere in them would ring far beyond. Short ones are given a torque of their own each besides, as
+    many numbers as the band lets through: white columns that are projected out of both. Long ones, a joint at rest, do
+    not count.
 
     Attributes:
         bridges: per joint the rows, those before and after that count, and the weight of the latter.
@@ -42,7 +43,7 @@ class Gaps:
     free: tuple[csc_matrix, ...]
 
     def bridged(self, series: Array, joint: int) -> Array:
-        """Replaces the rows of long gaps in columns (N,) or (N, k) of a joint, counted from 0."""
+        """Replaces the rows of gaps in columns (N,) or (N, k) of a joint, counted from 0."""
         rows, before, after, weight = self.bridges[joint]
         if not len(rows):
             return series

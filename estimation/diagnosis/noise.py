@@ -58,10 +58,10 @@ def estimate_whitening(
         share: of the torque noise, what those may make in the bands.
     """
     longest = long_gap(recording.step)
-    gaps = find_gaps(recording.unsure, recording.starts, longest)
+    rests = find_gaps(recording.unsure, recording.starts, longest)
     # Where the direction of motion is not known the residual is no noise.
-    all_gaps = find_gaps(recording.unsure, recording.starts)
-    bridged = np.column_stack([all_gaps.bridged(column, j) for j, column in enumerate(residual.T)])
+    gaps = find_gaps(recording.unsure, recording.starts)
+    bridged = np.column_stack([gaps.bridged(column, j) for j, column in enumerate(residual.T)])
     pieces = [bridged[run] for run in recording.runs]
     bands = find_bands(recording, inertia, _density(pieces, recording.step), share)
     pieces = [
@@ -71,7 +71,7 @@ def estimate_whitening(
     step = recording.step * stride
     cutoffs = np.array([band.cutoff for band in bands])
     widths = 1 / (2 * cutoffs * recording.step)
-    resting = gaps.resting(recording.starts, len(residual), stride, int(np.ceil(1.5 * widths.max())) + 2)
+    resting = rests.resting(recording.starts, len(residual), stride, int(np.ceil(1.5 * widths.max())) + 2)
     counts = np.maximum((~resting).sum(axis=0), 1).astype(float)
     tells = sum(map(len, pieces)) * step * FLAT >= FEWEST
     slowest, fastest = FLAT if tells else 0.0, INSIDE * cutoffs

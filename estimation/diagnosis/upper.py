@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +12,7 @@ from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.band import Band, low_pass
 from estimation.diagnosis.baseline import FAINT, Baseline
+from estimation.diagnosis.gaps import find_gaps, long_gap
 from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.whitening import Whitening
@@ -96,6 +97,8 @@ def pose_upper(
         bands: each joint's.
         wide: whitens the noise in wider bands.
     """
+    # Rows beside reversals are left out after the filters: a ripple goes on through them, and need not be bridged.
+    wide = replace(wide, gaps=find_gaps(recording.unsure, recording.starts, long_gap(recording.step)))
     rate = 1 / (recording.step * wide.stride)
     joints: list[Above | None] = []
     for j, (band, wider) in enumerate(zip(bands, wide.bands, strict=True)):
