@@ -14,6 +14,7 @@ from estimation.diagnosis.band import Band, low_pass
 from estimation.diagnosis.baseline import FAINT, Baseline
 from estimation.diagnosis.gaps import find_gaps, long_gap
 from estimation.diagnosis.orthonormal import orthonormal
+from estimation.diagnosis.periods import Cycle
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.whitening import Whitening
 
@@ -120,18 +121,25 @@ def _repeating(white: Array, recording: Recording, stride: int) -> float:
 
     In white rows (N',), `stride` of the recording's in each. Logs that do not repeat count as they are.
     """
-    harmonic = total = 0.0
+    coherent = total = 0.0
     for cycle, run in zip(recording.cycles, _runs(white, recording.starts, len(recording), stride), strict=True):
-        if cycle is None or cycle.count < 2:
-            power = float(run @ run)
-            harmonic, total = harmonic + power, total + power
-            continue
-        first = -(-cycle.start // stride)
-        rows = round(cycle.count * cycle.period / (recording.step * stride))
-        spectrum = np.abs(np.fft.rfft(run[first : first + rows])) ** 2
-        harmonic += cycle.count * float(spectrum[:: cycle.count].sum())
-        total += float(spectrum.sum())
-    return max(1.0, float(np.sqrt(harmonic / max(total, 1e-300))))
+        power = float(run @ run)
+        total += power
+        coherent += power * (1.0 if cycle is None else _coherence(run, cycle, recording.step, stride))
+    return max(1.0, float(np.sqrt(coherent / max(total, 1e-300))))
+
+
+def _coherence(run: Array, cycle: Cycle, step: float, stride: int) -> float:
+    """The power density at a cycle's harmonics over that at all frequencies: of noise that repeats, its repetitions."""
+    repeats = (cycle.stop - cycle.start) * step / cycle.period
+    whole = int(repeats + 1e-6)
+    if whole < 2:
+        return 1.0
+    first = -(-cycle.start // stride)
+    spectrum = np.abs(np.fft.rfft(run[first : first + round(whole * cycle.period / (step * stride))])) ** 2
+    # Seen in whole repetitions, which the ends of a log may leave fewer of than there are.
+    ratio = whole * float(spectrum[::whole].sum()) / max(float(spectrum.sum()), 1e-300)
+    return 1.0 + (ratio - 1.0) / (whole - 1) * (repeats - 1.0)
 
 
 def _runs(white: Array, starts: Sequence[int], rows: int, stride: int) -> list[Array]:

@@ -107,21 +107,24 @@ def test_the_extended_model_knows_it_as_well(recording: Recording, pose_arm: Cal
     assert extended[1] / extended[0] == pytest.approx(told[1] / told[0], rel=0.4)  # which counts the shape too
 
 
+@pytest.mark.parametrize("cut_off", [0, 30])
 @pytest.mark.parametrize(("same", "level"), [(True, 5**0.5), (False, 1.0)])
 def test_noise_that_repeats_with_the_motion_tells_less(
-    clean: Recording, pose_arm: Callable[..., Problem], same: bool, level: float
+    clean: Recording, pose_arm: Callable[..., Problem], same: bool, level: float, cut_off: int
 ) -> None:
     """Rounding that is alike in five repetitions counts as one: its level at their harmonics is the root of five.
 
-    The noise of some 300 frequencies is known to 4 % there.
+    So it is where the ends of the log were cut off, and the fifth is not whole. The noise of some 60 frequencies is
+    known to 7 % there: each of eight levels fails wrongly once in 370.
     """
     period = len(clean) // 5
     noise = np.random.default_rng(3).standard_normal((5 * period, 2))
     if same:
         noise = np.tile(noise[:period], (5, 1))
-    repeated = cut(clean, slice(0, 5 * period))
-    cycle = Cycle(0, 5 * period, period * clean.step, 5)
-    problem = pose_arm(replace(repeated, tau=repeated.tau + NOISE * noise, cycles=(cycle,)), wider=WIDER)
+    rows = slice(0, 5 * period - cut_off)
+    repeated = cut(clean, rows)
+    cycle = Cycle(0, rows.stop, period * clean.step, 5)
+    problem = pose_arm(replace(repeated, tau=repeated.tau + NOISE * noise[rows], cycles=(cycle,)), wider=WIDER)
     assert problem.upper is not None
     levels = [above.level for above in problem.upper.joints if above is not None]
-    assert levels == pytest.approx([level] * 2, rel=0.12)
+    assert levels == pytest.approx([level] * 2, rel=0.21)
