@@ -30,9 +30,10 @@ STANDS_OUT = 3.0
 # Least and most of the cut-off [Hz, share of the sampling rate].
 LOWEST, HIGHEST = 2.0, 0.4
 ORDER = 8  # of the low-pass before thinning
-# Periods of the cut-off, and a share of the log at most, that the ends lose: there the low-pass of the positions rings,
-# as it does for what no log has before it began, and its second derivative more than any encoder's noise.
-RINGING, MOST_LOST = 8.0, 0.05
+# At the ends of a log the low-pass of the positions rings, for what no log has before it begins: by a factor of e less
+# in so many periods of the cut-off. They are lost, until less is left of it than of the encoder's noise; so many
+# periods in any case, and so many at most, and no more than a share of the log.
+DECAY, RINGING, MOST_LOST = 0.82, (4.0, 8.0), 0.02
 SHORTEST = 5.0  # [s] of log below which nothing can be told
 # Spectra are taken of this difference of the positions: the slow motion would leak over all of the band otherwise.
 DIFFERENCE = 3
@@ -146,7 +147,8 @@ def _part(
             # What does not repeat is motion too, where it stands out of the noise.
             whole[rows] = np.where(better, harmonic + other, whole[rows])
         cutoffs = np.where(better, known, cutoffs)
-    edge = min(RINGING / float(cutoffs.min()), MOST_LOST * (grid[-1] - grid[0]))
+    floor = np.array([spectrum[2] if cap == np.inf else _density_at(cap, *spectrum) for spectrum in spectra])
+    edge = min(_ringing(ddq, cutoffs, floor), MOST_LOST * (grid[-1] - grid[0]))
     # On a sample: between two of them nobody knows when a torque jumped.
     begin = grid[0] + np.ceil(edge / period - 1e-9) * period
     count = int(np.floor((grid[-1] - edge - begin) / step + 1e-6)) + 1
@@ -162,7 +164,6 @@ def _part(
         start = max(0, int(np.ceil((cycle.start - first) * period / step)))
         stop = min(count, int(np.floor((cycle.stop - first) * period / step)))
         moved = Cycle(start, stop, cycle.period, int((stop - start) * step / cycle.period + 0.1))
-    floor = np.array([spectrum[2] if cap == np.inf else _density_at(cap, *spectrum) for spectrum in spectra])
     if cycle is not None:
         floor = np.where(better, floor / cycle.count, floor)
     ends = [float(np.interp(cutoff, f, density)) for cutoff, (f, density, _) in zip(cutoffs, spectra, strict=True)]
@@ -170,6 +171,13 @@ def _part(
     cut = slice(None) if moved is not None else _moving(states[1], step)
     q, dq, ddq = (array[cut] for array in states)
     return t[cut], q, dq, ddq, tau[cut], moved, float(cutoffs.min()), unsure[cut], floor
+
+
+def _ringing(ddq: Array, cutoffs: Array, floor: Array) -> float:
+    """The time [s] in which low-passes have rung out, to the noise that they leave to accelerations (N, n)."""
+    noise = (2 * np.pi * cutoffs) ** 2 * np.sqrt(np.maximum(floor, 0.0) * cutoffs / 5)
+    periods = DECAY * np.log(np.maximum(np.abs(ddq).max(axis=0), 1e-300) / np.maximum(noise, 1e-300))
+    return float(np.max(np.clip(periods, *RINGING) / cutoffs))
 
 
 def _cutoffs(positions: Array, period: float) -> Array:

@@ -95,7 +95,7 @@ def test_found_beside_it_a_ripple_is_taken_off(recording: Recording, pose_arm: C
 
 
 def test_the_extended_model_knows_it_as_well(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
-    """What is above the band makes the coefficients' standard errors smaller by as much as it does in a score."""
+    """What is above the band makes the coefficients' standard errors smaller by as much as it does in a score, or more."""
     told, extended = [], []
     for wider in (None, WIDER):
         problem = pose_arm(_rippled(recording), wider=wider)
@@ -104,7 +104,8 @@ def test_the_extended_model_knows_it_as_well(recording: Recording, pose_arm: Cal
         extension = fit_extended(problem, [member], {}).model.extensions[0]
         extended.append(np.sqrt(np.diag(extension.covariance)[:4]))
     assert np.all(told[1] < 0.5 * told[0])
-    assert extended[1] / extended[0] == pytest.approx(told[1] / told[0], rel=0.4)  # which counts the shape too
+    # They count what is not known of the shape, too, which is less above the band.
+    assert np.all(extended[1] / extended[0] < 1.4 * told[1] / told[0])
 
 
 @pytest.mark.parametrize("cut_off", [0, 30])
