@@ -95,7 +95,7 @@ def test_found_beside_it_a_ripple_is_taken_off(recording: Recording, pose_arm: C
 
 
 def test_the_extended_model_knows_it_as_well(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
-    """What is above the band makes the coefficients' standard errors smaller by as much as it does in a score, or more."""
+    """What is above the band makes the standard errors of coefficients smaller, by as much as in a score or more."""
     told, extended = [], []
     for wider in (None, WIDER):
         problem = pose_arm(_rippled(recording), wider=wider)
