@@ -203,10 +203,13 @@ class Problem:
         return null
 
     def _drawn(self, columns: Small) -> Array:
-        """Products (k, draws) of columns above the band with noise: of many rows, and so as good as normal."""
+        """Products (k, draws) of columns above the band with noise: of many rows, and so as good as normal.
+
+        The same columns meet the same noise.
+        """
         gram = (columns.T @ columns).astype(float)
         values, vectors = np.linalg.eigh(gram)
-        unit = np.random.default_rng(len(columns)).standard_normal((len(gram), self.nulls[1].shape[1]))
+        unit = np.random.default_rng(gram.ravel().view(np.uint64)).standard_normal((len(gram), self.nulls[1].shape[1]))
         return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ unit)
 
     def product(self, first: Group, second: Group) -> Array:
