@@ -8,13 +8,13 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.signal import firwin
 
-from estimation.diagnosis.band import Band, low_pass
+from estimation.diagnosis.band import TRANSITION, Band, low_pass
 from estimation.diagnosis.baseline import FAINT, Baseline
 from estimation.diagnosis.gaps import find_gaps, long_gap
 from estimation.diagnosis.orthonormal import orthonormal
-from estimation.diagnosis.periods import Cycle
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.whitening import Whitening
 
@@ -25,6 +25,10 @@ NEARLY = 0.8
 # Above the bands, the error of the accelerations may have so many times the power of the torque noise: it is part of
 # the noise there.
 WIDER = 50.0
+# Length [s] over which the noise there is taken to be as strong as it is, where that is more than usual.
+BURST = 0.4
+# Parts of the frequencies above a band whose noise is levelled, and the fewest frequencies that a part has.
+PARTS, FEWEST = 8, 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,18 +36,15 @@ class Above:
     """What one joint's torque is above its band.
 
     Attributes:
-        kept: low-pass of the joint's band, at the white rows: the rest is above it.
+        passing: lets through what is above, at the white rows, and levels its noise.
         counts: weights of the rows (N',): none for those whose direction of motion is not known.
         base: orthonormal columns of the base model (N', b).
-        level: of the noise at the frequencies of what repeats, over that at all of them: an encoder rounds each
-            repetition of a motion alike.
-        residual: white torque that the base model leaves, over that level (N',).
+        residual: white torque that the base model leaves (N',).
     """
 
-    kept: Band
+    passing: Band
     counts: Array
     base: Array
-    level: float
     residual: Array
 
 
@@ -67,8 +68,8 @@ class Upper:
         above = self.joints[joint]
         if above is None:
             return np.zeros((0, series.shape[1]))
-        white = _passed(self.whitening, series, joint, above.kept) * above.counts[:, None]
-        return np.asarray(white - above.base @ (above.base.T @ white)) / above.level
+        white = _passed(self.whitening, series, joint, above.passing) * above.counts[:, None]
+        return np.asarray(white - above.base @ (above.base.T @ white))
 
     def cross(self, columns: Array, joint: int) -> Array:
         """Gives the products (k,) of such columns with the residual."""
@@ -100,46 +101,81 @@ def pose_upper(
     """
     # Rows beside reversals are left out after the filters: a ripple goes on through them, and need not be bridged.
     wide = replace(wide, gaps=find_gaps(recording.unsure, recording.starts, long_gap(recording.step)))
-    rate = 1 / (recording.step * wide.stride)
     joints: list[Above | None] = []
     for j, (band, wider) in enumerate(zip(bands, wide.bands, strict=True)):
         if band.cutoff > NEARLY * wider.cutoff:
             joints.append(None)
             continue
-        kept = low_pass(band.cutoff, rate, 1)
-        counts = _counts(wide, recording, j, kept)
-        level = _repeating(_passed(wide, noise[:, j, None], j, kept)[:, 0] * counts, recording, wide.stride)
+        passing = _levelling(wide, recording, noise[:, j, None], j, band.cutoff)
+        counts = _counts(wide, recording, j, passing)
+        left = _passed(wide, noise[:, j, None], j, passing)[:, 0] * counts
+        counts *= _calmness(left, counts, round(BURST / (recording.step * wide.stride)))
         own = np.concatenate([baseline.regressor[:, j], baseline.nuisance[:, j]], axis=1)
-        base = orthonormal(_passed(wide, own[:, own.any(axis=0)], j, kept) * counts[:, None], FAINT)
-        white = _passed(wide, remainder[:, j, None], j, kept)[:, 0] * counts
-        joints.append(Above(kept, counts, base, level, (white - base @ (base.T @ white)) / level))
+        base = orthonormal(_passed(wide, own[:, own.any(axis=0)], j, passing) * counts[:, None], FAINT)
+        white = _passed(wide, remainder[:, j, None], j, passing)[:, 0] * counts
+        joints.append(Above(passing, counts, base, white - base @ (base.T @ white)))
     return Upper(wide, tuple(joints))
 
 
-def _repeating(white: Array, recording: Recording, stride: int) -> float:
-    """The noise's standard deviation at the harmonics of repeated motions over that at all frequencies, one at least.
+def _levelling(wide: Whitening, recording: Recording, noise: Array, joint: int, cutoff: float) -> Band:
+    """Builds the filter of what is above a joint's band [Hz], in which its noise (N, 1) has unit density.
 
-    In white rows (N',), `stride` of the recording's in each. Logs that do not repeat count as they are.
+    An autoregressive process has the noise of unknown accelerations, which grows with the fourth power of the
+    frequency, but roughly. Where a motion repeats, noise is what is at its harmonics: an encoder rounds each repetition
+    alike, and what repeats is all that an effect of the motion is told from.
     """
-    coherent = total = 0.0
-    for cycle, run in zip(recording.cycles, _runs(white, recording.starts, len(recording), stride), strict=True):
-        power = float(run @ run)
-        total += power
-        coherent += power * (1.0 if cycle is None else _coherence(run, cycle, recording.step, stride))
-    return max(1.0, float(np.sqrt(coherent / max(total, 1e-300))))
+    rate = 1 / (recording.step * wide.stride)
+    whole = low_pass(cutoff, rate, 1)
+    low, high = ((1 - TRANSITION / 2) * f for f in (cutoff, wide.bands[joint].cutoff))
+    longest = max(_lines(recording, run)[0] for run in range(len(recording.runs)))
+    parts = int(np.clip((high - low) * longest / FEWEST, 1, PARTS))
+    edges = np.linspace(low, high, parts + 1)
+    passes = [firwin(len(whole.taps), f, fs=rate, window=("kaiser", 6.0)) for f in edges]
+    between = [Band(above - below, 1, float(high)) for below, above in pairwise(passes)]
+    plain = Band(passes[-1] - passes[0], 1, float(high))
+    white = _passed(wide, noise, joint, plain)[:, 0] * _counts(wide, recording, joint, plain)
+    density = np.zeros(parts)
+    rows = _runs(white, recording.starts, len(recording), wide.stride)
+    for run, values in enumerate(rows):
+        period, first, repeats = _lines(recording, run)
+        start, count = -(-first // wide.stride), max(int(repeats + 1e-6), 1)
+        values = values[start : start + round(count * period * rate)]
+        power = np.abs(np.fft.rfft(values)) ** 2 / max(np.count_nonzero(values), 1)
+        f = np.fft.rfftfreq(len(values), 1 / rate)
+        lines = np.arange(len(f)) % count == 0
+        for part, (below, above) in enumerate(pairwise(edges)):
+            inside = (f >= below) & (f < above)
+            everywhere = float(power[inside].mean()) if inside.any() else 0.0
+            at_lines = float(power[inside & lines].mean()) if (inside & lines).any() else everywhere
+            # In whole repetitions, which the ends of a log may leave fewer of than there are.
+            more = max(at_lines - everywhere, 0.0) * (repeats - 1.0) / (count - 1.0) if count > 1 else 0.0
+            density[part] += (everywhere + more) * len(values) / max(sum(map(len, rows)), 1)
+    taps = sum(
+        (band.taps / np.sqrt(value) for band, value in zip(between, density, strict=True) if value > 0),
+        np.zeros(len(whole.taps)),
+    )
+    return Band(taps, 1, float(high))
 
 
-def _coherence(run: Array, cycle: Cycle, step: float, stride: int) -> float:
-    """The power density at a cycle's harmonics over that at all frequencies: of noise that repeats, its repetitions."""
-    repeats = (cycle.stop - cycle.start) * step / cycle.period
-    whole = int(repeats + 1e-6)
-    if whole < 2:
-        return 1.0
-    first = -(-cycle.start // stride)
-    spectrum = np.abs(np.fft.rfft(run[first : first + round(whole * cycle.period / (step * stride))])) ** 2
-    # Seen in whole repetitions, which the ends of a log may leave fewer of than there are.
-    ratio = whole * float(spectrum[::whole].sum()) / max(float(spectrum.sum()), 1e-300)
-    return 1.0 + (ratio - 1.0) / (whole - 1) * (repeats - 1.0)
+def _lines(recording: Recording, run: int) -> tuple[float, int, float]:
+    """A log's period [s], the row at which it begins, and how often it is there; all of a log that does not repeat."""
+    rows, cycle = recording.runs[run], recording.cycles[run]
+    if cycle is not None:
+        repeats = (cycle.stop - cycle.start) * recording.step / cycle.period
+        if repeats >= 2 - 1e-6:
+            return cycle.period, cycle.start, repeats
+    return (rows.stop - rows.start) * recording.step, 0, 1.0
+
+
+def _calmness(noise: Array, counts: Array, width: int) -> Array:
+    """Weights of white rows (N',) by the noise about each, one at most.
+
+    Joints that turn round kick each other: what is not known of accelerations comes in bursts, the same in each
+    repetition of a motion.
+    """
+    near = uniform_filter1d(noise**2, width) / np.maximum(uniform_filter1d(counts**2, width), 1e-3)
+    mean = float(np.sum(noise**2) / max(np.sum(counts**2), 1e-300))
+    return np.asarray(1.0 / np.sqrt(np.maximum(near / max(mean, 1e-300), 1.0)))
 
 
 def _runs(white: Array, starts: Sequence[int], rows: int, stride: int) -> list[Array]:
@@ -148,20 +184,20 @@ def _runs(white: Array, starts: Sequence[int], rows: int, stride: int) -> list[A
     return np.split(white, np.cumsum(lengths)[:-1])
 
 
-def _passed(wide: Whitening, series: Array, joint: int, kept: Band) -> Array:
-    """Whitens columns (N, k) of a joint and takes off what is in its band (N', k)."""
+def _passed(wide: Whitening, series: Array, joint: int, passing: Band) -> Array:
+    """Whitens columns (N, k) of a joint and filters them (N', k)."""
     runs = _runs(wide.filtered(series, joint), wide.starts, len(series), wide.stride)
-    return np.concatenate([run - kept.passed(run) for run in runs])
+    return np.concatenate([passing.passed(run) for run in runs])
 
 
-def _counts(wide: Whitening, recording: Recording, joint: int, kept: Band) -> Array:
+def _counts(wide: Whitening, recording: Recording, joint: int, passing: Band) -> Array:
     """Weights of a joint's white rows (N',).
 
-    None beside rows in which its direction is not known, nor at the ends of a log, where the low-pass sees the torque
+    None beside rows in which its direction is not known, nor at the ends of a log, where the filter sees the torque
     begin and end. They come after the filters: before, they would turn slow torque into fast.
     """
     reach = int(np.ceil(0.5 / wide.bands[joint].cutoff / recording.step))
-    edge = len(kept.taps) // 2
+    edge = len(passing.taps) // 2
     parts = []
     for run in recording.runs:
         part = ~maximum_filter1d(recording.unsure[run, joint], 2 * reach + 1)[:: wide.stride]
