@@ -106,8 +106,9 @@ def pose_upper(
         if band.cutoff > NEARLY * wider.cutoff:
             joints.append(None)
             continue
-        passing = _levelling(wide, recording, noise[:, j, None], j, band.cutoff)
-        counts = _counts(wide, recording, j, passing)
+        length = len(low_pass(band.cutoff, 1 / (recording.step * wide.stride), 1).taps)
+        counts = _counts(wide, recording, j, length // 2)
+        passing = _levelling(wide, recording, noise[:, j, None], counts, j, band.cutoff, length)
         left = _passed(wide, noise[:, j, None], j, passing)[:, 0] * counts
         counts *= _calmness(left, counts, round(BURST / (recording.step * wide.stride)))
         own = np.concatenate([baseline.regressor[:, j], baseline.nuisance[:, j]], axis=1)
@@ -117,43 +118,42 @@ def pose_upper(
     return Upper(wide, tuple(joints))
 
 
-def _levelling(wide: Whitening, recording: Recording, noise: Array, joint: int, cutoff: float) -> Band:
-    """Builds the filter of what is above a joint's band [Hz], in which its noise (N, 1) has unit density.
+def _levelling(
+    wide: Whitening, recording: Recording, noise: Array, counts: Array, joint: int, cutoff: float, length: int
+) -> Band:
+    """Builds the filter, of a length, of what is above a joint's band [Hz]: its noise (N, 1) has unit density there.
 
     An autoregressive process has the noise of unknown accelerations, which grows with the fourth power of the
     frequency, but roughly. Where a motion repeats, noise is what is at its harmonics: an encoder rounds each repetition
     alike, and what repeats is all that an effect of the motion is told from.
     """
     rate = 1 / (recording.step * wide.stride)
-    whole = low_pass(cutoff, rate, 1)
     low, high = ((1 - TRANSITION / 2) * f for f in (cutoff, wide.bands[joint].cutoff))
     longest = max(_lines(recording, run)[0] for run in range(len(recording.runs)))
     parts = int(np.clip((high - low) * longest / FEWEST, 1, PARTS))
     edges = np.linspace(low, high, parts + 1)
-    passes = [firwin(len(whole.taps), f, fs=rate, window=("kaiser", 6.0)) for f in edges]
+    passes = [firwin(length, f, fs=rate, window=("kaiser", 6.0)) for f in edges]
     between = [Band(above - below, 1, float(high)) for below, above in pairwise(passes)]
     plain = Band(passes[-1] - passes[0], 1, float(high))
-    white = _passed(wide, noise, joint, plain)[:, 0] * _counts(wide, recording, joint, plain)
-    density = np.zeros(parts)
-    rows = _runs(white, recording.starts, len(recording), wide.stride)
-    for run, values in enumerate(rows):
+    white = _passed(wide, noise, joint, plain)[:, 0] * counts
+    density, known = np.zeros(parts), 0
+    for run, values in enumerate(_runs(white, recording.starts, len(recording), wide.stride)):
         period, first, repeats = _lines(recording, run)
         start, count = -(-first // wide.stride), max(int(repeats + 1e-6), 1)
         values = values[start : start + round(count * period * rate)]
         power = np.abs(np.fft.rfft(values)) ** 2 / max(np.count_nonzero(values), 1)
         f = np.fft.rfftfreq(len(values), 1 / rate)
         lines = np.arange(len(f)) % count == 0
+        known += len(values)
         for part, (below, above) in enumerate(pairwise(edges)):
             inside = (f >= below) & (f < above)
             everywhere = float(power[inside].mean()) if inside.any() else 0.0
             at_lines = float(power[inside & lines].mean()) if (inside & lines).any() else everywhere
             # In whole repetitions, which the ends of a log may leave fewer of than there are.
             more = max(at_lines - everywhere, 0.0) * (repeats - 1.0) / (count - 1.0) if count > 1 else 0.0
-            density[part] += (everywhere + more) * len(values) / max(sum(map(len, rows)), 1)
-    taps = sum(
-        (band.taps / np.sqrt(value) for band, value in zip(between, density, strict=True) if value > 0),
-        np.zeros(len(whole.taps)),
-    )
+            density[part] += (everywhere + more) * len(values)
+    levels = np.sqrt(density / max(known, 1))
+    taps = sum((band.taps / level for band, level in zip(between, levels, strict=True) if level > 0), np.zeros(length))
     return Band(taps, 1, float(high))
 
 
@@ -190,14 +190,13 @@ def _passed(wide: Whitening, series: Array, joint: int, passing: Band) -> Array:
     return np.concatenate([passing.passed(run) for run in runs])
 
 
-def _counts(wide: Whitening, recording: Recording, joint: int, passing: Band) -> Array:
+def _counts(wide: Whitening, recording: Recording, joint: int, edge: int) -> Array:
     """Weights of a joint's white rows (N',).
 
-    None beside rows in which its direction is not known, nor at the ends of a log, where the filter sees the torque
-    begin and end. They come after the filters: before, they would turn slow torque into fast.
+    None beside rows in which its direction is not known, nor in the `edge` rows at the ends of a log, where the filter
+    sees the torque begin and end. They come after the filters: before, they would turn slow torque into fast.
     """
     reach = int(np.ceil(0.5 / wide.bands[joint].cutoff / recording.step))
-    edge = len(passing.taps) // 2
     parts = []
     for run in recording.runs:
         part = ~maximum_filter1d(recording.unsure[run, joint], 2 * reach + 1)[:: wide.stride]

@@ -133,12 +133,17 @@ def test_noise_that_repeats_with_the_motion_tells_less(
     assert told[1] / told[0] == pytest.approx(5.0 if same else 1.0, rel=0.5)
 
 
-def test_noise_is_levelled(clean: Recording, pose_arm: Callable[..., Problem]) -> None:
-    """Noise that grows with the frequency, as unknown accelerations make it, is of unit density above the band."""
+@pytest.mark.parametrize("periods", [0.0, 2.95])
+def test_noise_is_levelled(clean: Recording, pose_arm: Callable[..., Problem], periods: float) -> None:
+    """Noise that grows with the frequency, as unknown accelerations make it, is of unit density above the band.
+
+    So it is in a log that repeats its motion, but not a whole number of times.
+    """
     rng = np.random.default_rng(5)
     noise = NOISE * rng.standard_normal(clean.tau.shape)
     noise += np.gradient(np.gradient(rng.standard_normal(clean.tau.shape), axis=0), axis=0) * 0.3
-    problem = pose_arm(replace(clean, tau=clean.tau + noise), wider=WIDER)
+    cycle = Cycle(0, len(clean), len(clean) * clean.step / periods, 2) if periods else None
+    problem = pose_arm(replace(clean, tau=clean.tau + noise, cycles=(cycle,)), wider=WIDER)
     assert problem.upper is not None
     wide = problem.upper.whitening
     for j, above in enumerate(problem.upper.joints):
