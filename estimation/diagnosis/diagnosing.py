@@ -9,11 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.baseline import Baseline, base_parameters, build_baseline, inertia_of
-from estimation.diagnosis.carried import lightened, unloaded
+from estimation.diagnosis.baseline import base_parameters, build_baseline, inertia_of
+from estimation.diagnosis.carried import lightened
 from estimation.diagnosis.diagnosis import Diagnosis
 from estimation.diagnosis.excess import residual_shares
-from estimation.diagnosis.extending import dense
 from estimation.diagnosis.hopeless_logs import hopeless_logs
 from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.limits import find_limits
@@ -21,10 +20,11 @@ from estimation.diagnosis.noise import estimate_whitening
 from estimation.diagnosis.patterns import all_patterns
 from estimation.diagnosis.posing import fit_values, pose
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.regularisation import held, pull_of
+from estimation.diagnosis.regularisation import pull_of
 from estimation.diagnosis.reporting import Told, assemble
 from estimation.diagnosis.scan import Entry, measure
 from estimation.diagnosis.selection import Selection, select
+from estimation.diagnosis.settling import Settled, calmer, moved, settle
 from estimation.diagnosis.states import Recording, record
 from estimation.diagnosis.upper import WIDER, pose_upper
 from estimation.diagnosis.verdict import Judgement, judge
@@ -40,10 +40,6 @@ from robots.terms.effects import EFFECTS, Effect
 Array = NDArray[np.float64]
 
 DRAWS = 200
-# After an effect is found the noise is estimated anew; where it changes by less than this the search stands.
-CALMER = 0.03
-# So does it where the base model beside the effects makes a torque different by less than this share.
-MOVED = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,28 +178,27 @@ def _search(
     baseline = build_baseline(base, recording)
     tau = recording.tau
     values = fit_values(baseline, tau.std(axis=0) + 1e-12, recording.unsure, tau, pull_of(baseline, recording))
-    residual = tau - baseline.regressor @ values
+    settled = Settled(tau - baseline.regressor @ values, values)
     search: Search | None = None
-    extra: Array | None = None
-    known = 0
     for attempt in range(2):
         share = 0.1 + 0.3 * attempt
-        inertia = inertia_of(baseline, recording, values)
-        whitening = estimate_whitening(recording, residual, baseline.base.size + known, inertia)
+        inertia = inertia_of(baseline, recording, settled.values)
+        fitted = baseline.base.size + settled.degrees
+        whitening = estimate_whitening(recording, settled.residual, fitted, inertia)
         if search is not None:
-            if not (_calmer(search.problem, whitening.scale) or _moved(search.problem, values)):
+            if not (calmer(search.problem, whitening.scale) or moved(search.problem, settled.values)):
                 break
             # Its columns are most of what a diagnosis keeps in memory: they go before others come.
             search = None
             give_back()
         upper = None
         if any(effect.fast for effect in effects):
-            wide = estimate_whitening(recording, residual, baseline.base.size + known, inertia, WIDER)
-            remainder = tau - baseline.regressor @ values
-            upper = pose_upper(recording, baseline, remainder, residual, whitening.bands, wide)
+            wide = estimate_whitening(recording, settled.residual, fitted, inertia, WIDER)
+            remainder = tau - baseline.regressor @ settled.values
+            upper = pose_upper(recording, baseline, remainder, settled.residual, whitening.bands, wide)
         rng = np.random.default_rng(seed)
         search = _searched(
-            pose(recording, baseline, whitening, draws=DRAWS, rng=rng, extra=extra, upper=upper),
+            pose(recording, baseline, whitening, draws=DRAWS, rng=rng, extra=settled.extra, upper=upper),
             hypotheses,
             false_alarm,
             rng,
@@ -212,8 +207,7 @@ def _search(
         )
         if not search.selection.found:
             break
-        residual, values, extra = _cleaned(search.problem, baseline, search.selection)
-        known = sum(found.member.degrees for found in search.selection.found)
+        settled = settle(search.problem, [found.member for found in search.selection.found])
     assert search is not None
     return search
 
@@ -238,38 +232,6 @@ def _teller(bar: Progress, start: float, share: float) -> Callable[[float], None
 
 def _noter(bar: Progress, at: float) -> Callable[[str], None]:
     return lambda note: bar.update(at, note)
-
-
-def _calmer(problem: Problem, scale: Array) -> bool:
-    """Whether the noise without what was found is smaller than it was taken to be."""
-    return bool(np.max(np.log(problem.whitening.scale / scale)) > CALMER)
-
-
-def _moved(problem: Problem, values: Array) -> bool:
-    """Whether the base model's torque beside what was found differs from that without by a share that effects feel.
-
-    Effects that grow with load or friction were measured by a base model that had taken what it could of others.
-    """
-    base = problem.baseline.base
-    full = np.zeros(base.model.size)
-    full[list(base.independent)] = values
-    change = problem.baseline.regressor @ (full - unloaded(problem))[list(base.independent)]
-    torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
-    return bool(np.max(np.sqrt(np.mean(change**2, axis=0)) / np.maximum(torque, 1e-12)) > MOVED)
-
-
-def _cleaned(problem: Problem, baseline: Baseline, selection: Selection) -> tuple[Array, Array, Array]:
-    """Residual (N, n) of base model and effects found, fitted together, the base parameters, the effects' torque."""
-    blocks = [baseline.regressor, baseline.nuisance]
-    for found in selection.found:
-        blocks.append(dense(problem, found.member.hypothesis, found.member.shape))
-    full = np.concatenate(blocks, axis=2)
-    weights = ~problem.recording.unsure / problem.whitening.scales(len(problem.recording))
-    flat = (full * weights[:, :, None]).reshape(-1, full.shape[2])
-    values = held(flat.T @ flat, flat.T @ (problem.recording.tau * weights).reshape(-1), problem.pull)
-    known = len(problem.pull.target)
-    extra = full[:, :, known:] @ values[known:]
-    return problem.recording.tau - full @ values, values[: baseline.base.size], extra
 
 
 __all__ = ["Judgement", "Search", "diagnose"]

@@ -1,0 +1,114 @@
+"""Base model and effects found, brought into line: what one search leaves for the next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.carried import unloaded
+from estimation.diagnosis.extending import dense
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.refinement import Member, refine
+from estimation.diagnosis.regularisation import held
+from estimation.diagnosis.scoring import accept
+
+Array = NDArray[np.float64]
+
+# Rounds in which rows that an effect makes useless and the base model beside them are found in turn.
+ROUNDS = 3
+# The noise is another where its logarithm changes by more than this.
+CALMER = 0.03
+# So is the base model's torque beside the effects where it is different by more than this share.
+MOVED = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """Base model and effects, fitted together.
+
+    Attributes:
+        residual: what they leave (N, n) [N m or N].
+        values: base parameters (b,).
+        extra: torque of the effects (N, n) [N m or N]; None without any.
+        degrees: parameters of the effects.
+    """
+
+    residual: Array
+    values: Array
+    extra: Array | None = None
+    degrees: int = 0
+
+
+def settle(problem: Problem, members: Sequence[Member]) -> Settled:
+    """Fits base model and effects together.
+
+    Torque that was cut off draws the base model towards what is left of it, and how much was cut is then told by that.
+    So the base model is fitted without such rows first, and the cut once more beside it.
+    """
+    cut = {k for k, member in enumerate(members) if _useless(problem, member) is not None}
+    if cut:
+        whole = [member for k, member in enumerate(members) if k not in cut]
+        for _ in range(ROUNDS):
+            useless = [_useless(problem, members[k]) for k in cut]
+            values, _ = _fit(problem, whole, ~np.logical_or.reduce([flags for flags in useless if flags is not None]))
+            problem = _with_values(problem, values)
+        members = [_again(problem, members, k) if k in cut else member for k, member in enumerate(members)]
+    values, full = _fit(problem, members, np.ones_like(problem.recording.unsure))
+    known = len(problem.pull.target)
+    return Settled(
+        residual=problem.recording.tau - full @ values,
+        values=values[: problem.baseline.base.size],
+        extra=full[:, :, known:] @ values[known:],
+        degrees=sum(member.degrees for member in members),
+    )
+
+
+def calmer(problem: Problem, scale: Array) -> bool:
+    """Whether the noise without what was found is smaller than it was taken to be."""
+    return bool(np.max(np.log(problem.whitening.scale / scale)) > CALMER)
+
+
+def moved(problem: Problem, values: Array) -> bool:
+    """Whether the base model's torque beside what was found differs from that without by a share that effects feel.
+
+    Effects that grow with load or friction were measured by a base model that had taken what it could of others.
+    """
+    base = problem.baseline.base
+    full = np.zeros(base.model.size)
+    full[list(base.independent)] = values
+    change = problem.baseline.regressor @ (full - unloaded(problem))[list(base.independent)]
+    torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
+    return bool(np.max(np.sqrt(np.mean(change**2, axis=0)) / np.maximum(torque, 1e-12)) > MOVED)
+
+
+def _fit(problem: Problem, members: Sequence[Member], counted: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Fits base model, nuisance and members to the rows (N, n) that count: all values, and their columns."""
+    baseline, recording = problem.baseline, problem.recording
+    blocks = [dense(problem, member.hypothesis, member.shape) for member in members]
+    full = np.concatenate([baseline.regressor, baseline.nuisance, *blocks], axis=2)
+    weights = counted & ~recording.unsure
+    scaled = weights / problem.whitening.scales(len(recording))
+    flat = (full * scaled[:, :, None]).reshape(-1, full.shape[2])
+    return held(flat.T @ flat, flat.T @ (recording.tau * scaled).reshape(-1), problem.pull), full
+
+
+def _useless(problem: Problem, member: Member) -> NDArray[np.bool_] | None:
+    """Rows (N, n) that an effect makes useless as measurements, by the log and by its torque; None if it makes none."""
+    hypothesis = member.hypothesis
+    flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
+    return None if flags is None else flags | dense(problem, hypothesis, member.shape).any(axis=2)
+
+
+def _with_values(problem: Problem, values: Array) -> Problem:
+    """The problem, its effects evaluated at other base parameters."""
+    return replace(
+        problem, situation=problem.baseline.situation(problem.recording, values[: problem.baseline.base.size])
+    )
+
+
+def _again(problem: Problem, members: Sequence[Member], k: int) -> Member:
+    others = tuple(member.group for i, member in enumerate(members) if i != k)
+    return refine(problem, members[k].hypothesis, members[k].shape, accept(problem, others))

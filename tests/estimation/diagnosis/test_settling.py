@@ -1,0 +1,54 @@
+"""Specification of how base model and effects found are brought into line before the next search."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.refinement import refine
+from estimation.diagnosis.scoring import accept
+from estimation.diagnosis.settling import settle
+from estimation.diagnosis.states import record
+from robots.robot import Robot
+from robots.signals import Log
+from robots.terms.effects import EFFECTS
+
+LOST = 0.25
+"""Of the shoulder's largest torque."""
+
+
+def test_torque_that_is_cut_off_does_not_draw_the_base_model(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
+) -> None:
+    """Fitted to a log with flat tops, the base model is too low there; settled, it is right to a hundredth.
+
+    The log is cut with its noise, of which the tops then keep what is negative.
+    """
+    recording = record(arm, [arm_log(torque_noise=0.05)])
+    true = recording.tau[:, 0]
+    limit = (1 - LOST) * np.abs(true).max()
+    tau = recording.tau.copy()
+    tau[:, 0] = np.clip(true, -limit, limit)
+    problem = pose_arm(replace(recording, tau=tau))
+    fitted = problem.situation.torque[:, 0]
+    hypothesis = Hypothesis(EFFECTS["current_clipping"], 1)
+    member = refine(problem, hypothesis, (0.8 * float(np.abs(fitted).max()),), accept(problem, ()))
+    settled = settle(problem, [member])
+    cut = np.abs(true) > limit
+    assert 0.03 < cut.mean() < 0.3
+    whole = pose_arm(recording)
+
+    def error(torque: np.ndarray) -> float:
+        """Root mean square difference from the fit to the whole torque where it was cut off [N m]."""
+        return float(np.sqrt(np.mean((torque - whole.situation.torque[:, 0])[cut] ** 2)))
+
+    assert error(fitted) > 1.0
+    assert error((problem.baseline.regressor @ settled.values)[:, 0]) < 0.05
+    assert settled.extra is not None
+    np.testing.assert_allclose(settled.extra[:, 1], 0.0)
+    kept = ~recording.unsure[:, 0]
+    assert settled.residual[kept, 0].std() < whole.remainder[kept, 0].std() < problem.remainder[kept, 0].std() / 1.5
