@@ -221,7 +221,8 @@ def _vibration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -
 def _turns(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     q, v, a = (x[:, joint - 1] for x in (s.q, s.dq, s.ddq))
     waves = (np.cos(shape[0] * q), np.sin(shape[0] * q))
-    return np.column_stack([wave * factor for factor in (np.ones(len(s)), v**2, a) for wave in waves])
+    # What an error of the position of so many waves does through stiffness, friction and inertia.
+    return np.column_stack([wave * factor for factor in (np.ones(len(s)), v, v**2, a) for wave in waves])
 
 
 _FAMILIES: dict[str, Callable[[Situation, int, int, tuple[float, ...]], Array]] = {
@@ -246,7 +247,7 @@ _COUNTS = {
     "time": KNOTS,
     "ringing": 4,
     "vibration": 6,
-    "turns": 6,
+    "turns": 8,
 }
 _WORDS = {
     "angle": "depends on the position of {who}",

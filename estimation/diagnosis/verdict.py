@@ -108,9 +108,24 @@ def _holds(
     free, _ = _patterns(problem, here, others, false_alarm, rng)
     if gain - degrees < ENOUGH * sum(map(_worth, free)):
         return False
+    if len(own) > 1 and not _thriftier(problem, own, others, free):
+        return False
+    whole = [member for member in others if member.hypothesis.joint is None]
+    if not whole:
+        return True
+    # What acts on all joints may have been named for what the name on this one left.
+    others = [member for member in others if member.hypothesis.joint is not None]
+    free, _ = _patterns(problem, here, others, false_alarm, rng)
+    return _thriftier(problem, [*own, *whole], others, free)
+
+
+def _thriftier(problem: Problem, names: Sequence[Member], others: Sequence[Member], free: Sequence[Member]) -> bool:
+    """Whether names fit better than free functions in their place, all parameters counted."""
+    gain = accept(problem, tuple(m.group for m in (*others, *names))).gain
+    gain -= accept(problem, tuple(m.group for m in others)).gain
     price = float(np.log(problem.rows))
     criterion = sum(member.gain - member.degrees * price for member in free)
-    return len(own) == 1 or not free or gain - degrees * price > criterion
+    return not free or gain - sum(member.degrees for member in names) * price > criterion
 
 
 def _worth(member: Member) -> float:
