@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,8 @@ from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.regularisation import held, row_weight
-from estimation.diagnosis.scoring import Accepted, accept, score
+from estimation.diagnosis.scoring import accept
+from estimation.diagnosis.shape_errors import inexact, shape_errors, with_value
 from estimation.diagnosis.shrinkage import pull_on
 from estimation.identification import NEGLIGIBLE, RELATIVE
 from estimation.model import Model
@@ -22,17 +22,6 @@ from estimation.pulls import Pull
 
 Array = NDArray[np.float64]
 
-# Steps of a shape parameter along which its likelihood is followed: up to where it drops by this much.
-DROP = 2.0
-# A value at which the likelihood is less than this below its top may be the true one.
-OPEN = 3.84
-# A moment may be where the profile drops by less than this: (1 - e^(-x / 2))^2 is .95, the distribution of the
-# likelihood ratio of a moment of change (Hansen, Econometrica 2000).
-CHANGED = 7.35
-# It is followed each way in growing steps, until so many in a row drop by twice as much.
-FIRST, GROWING, MANY, LOST = 1.5, 1.3, 24, 3
-# Values of a shape that is left as assumed at which the likelihood is asked.
-POINTS = 21
 FAINT = 1e-7
 
 
@@ -63,7 +52,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
     for i, member in enumerate(members):
         X = dense(problem, member.hypothesis, member.shape)
         others = accept(problem, tuple(m.group for k, m in enumerate(members) if k != i))
-        steps = _steps(problem, member, others)
+        steps = shape_errors(problem, member, others)
         slopes = [_slope(problem, member, k, abs(step)) for k, step in enumerate(steps)]
         blocks += [X, *slopes]
         slices.append((at, X.shape[2], len(member.shape)))
@@ -108,7 +97,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         own = own * wider[:, None] * wider
         own[range(len(own)), range(len(own))] = np.maximum(np.diag(own), profile**2)
         own[open_, open_] = np.inf
-        own[range(size, size + shapes), range(size, size + shapes)] += _inexact(member) ** 2
+        own[range(size, size + shapes), range(size, size + shapes)] += inexact(member) ** 2
         coefficients = np.clip(values[start : start + size], lower, upper)
         errors = np.sqrt(np.maximum(np.diag(own), 0.0))
         determined = np.concatenate(
@@ -152,93 +141,6 @@ def dense(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) ->
     return X
 
 
-def _steps(problem: Problem, member: Member, others: Accepted) -> list[float]:
-    """Finds each shape parameter's standard error by its profile; infinite where the likelihood hardly drops."""
-    situation = problem.situation
-    bounds = member.hypothesis.effect.bounds(situation, member.hypothesis.joint)
-    steps = []
-    for k, (value, (low, high), shape) in enumerate(
-        zip(member.shape, bounds, member.hypothesis.effect.shapes, strict=True)
-    ):
-        best = _gain(problem, member, member.shape, others)
-        room = (high - low) if np.isfinite(high - low) else max(abs(value), 1.0)
-        step = 0.05 * abs(value) if shape.scale == "log" else 1e-3 * room
-        found = np.inf
-        for _ in range(14):
-            drops = [
-                best - _gain(problem, member, _moved(member.shape, k, x), others)
-                for x in (value - step, value + step)
-                if low <= x <= high
-            ]
-            if not drops:
-                break
-            drop = float(np.mean(drops))
-            if drop >= DROP:
-                found = step / np.sqrt(drop)
-                if drop <= 8 * DROP:
-                    break
-                step *= float(np.sqrt(2 * DROP / drop))
-            elif np.isfinite(found):
-                break
-            else:
-                step *= 2.0
-        if shape.unit == "s" and shape.scale == "linear" and np.isfinite(found):
-            profile = partial(_drop, problem, member, k, others, best)
-            found = max(found, _reach(profile, value, found, (low, high)) / 1.96)
-        if value == shape.default and len(member.shape) == 1:
-            found = _assumed(problem, member, others, best, (low, high)) / 1.96
-        steps.append(found if found <= (abs(value) if shape.scale == "log" else 0.3 * room) else np.inf)
-    return steps
-
-
-def _assumed(problem: Problem, member: Member, others: Accepted, best: float, bounds: tuple[float, float]) -> float:
-    """How far a shape may be from what is assumed of it, by the likelihood's own top, which was not worth its price."""
-    points = np.linspace(*bounds, POINTS)
-    gains = [_gain(problem, member, (float(x),), others) for x in points]
-    top = max(best, *gains)
-    near = [abs(float(x) - member.shape[0]) for x, gain in zip(points, gains, strict=True) if top - gain < OPEN]
-    return max(near, default=0.0)
-
-
-def _drop(problem: Problem, member: Member, k: int, others: Accepted, best: float, value: float) -> float:
-    """How much less is explained with another value of a shape parameter."""
-    return best - _gain(problem, member, _moved(member.shape, k, value), others)
-
-
-def _reach(drop: Callable[[float], float], value: float, step: float, bounds: tuple[float, float]) -> float:
-    """The farthest of some points at which the moment of a change may be, by the likelihood; zero for none.
-
-    Its profile is a random walk with a drift, not a parabola: it may have more summits, and what the top's curvature
-    says of its width is little.
-    """
-    farthest = 0.0
-    for way in (-1, 1):
-        lost = 0
-        for distance in step * FIRST * GROWING ** np.arange(MANY):
-            x = value + way * distance
-            if lost == LOST or not bounds[0] <= x <= bounds[1]:
-                break
-            lower = drop(x)
-            lost = lost + 1 if lower > 2 * CHANGED else 0
-            # Where it is lost between two points is not known: half way.
-            farthest = max(farthest, distance * (1 + GROWING) / 2) if lower < CHANGED else farthest
-    return float(farthest)
-
-
-def _inexact(member: Member) -> Array:
-    """Standard errors (s,) that the formula adds to those of the data."""
-    described = zip(member.hypothesis.effect.shapes, member.shape, strict=True)
-    return np.array([s.inexact * (abs(value) if s.scale == "log" else 1.0) for s, value in described])
-
-
-def _gain(problem: Problem, member: Member, shape: tuple[float, ...], others: Accepted) -> float:
-    return score(problem, problem.measured(member.hypothesis, shape), others).gain
-
-
-def _moved(shape: tuple[float, ...], k: int, value: float) -> tuple[float, ...]:
-    return (*shape[:k], value, *shape[k + 1 :])
-
-
 def _slope(problem: Problem, member: Member, k: int, step: float) -> Array:
     """How the member's torque changes by one standard error of a shape parameter (N, n, 1)."""
     value = member.shape[k]
@@ -247,7 +149,7 @@ def _slope(problem: Problem, member: Member, k: int, step: float) -> Array:
     up, down = min(value + h, high), max(value - h, low)
     if up <= down:
         return np.zeros((len(problem.recording), problem.n, 1))
-    above, below = (dense(problem, member.hypothesis, _moved(member.shape, k, x)) for x in (up, down))
+    above, below = (dense(problem, member.hypothesis, with_value(member.shape, k, x)) for x in (up, down))
     return ((above - below) @ member.coefficients * (h / (up - down)))[:, :, None]
 
 

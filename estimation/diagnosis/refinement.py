@@ -96,13 +96,19 @@ class Member:
 
 
 def refine(
-    problem: Problem, hypothesis: Hypothesis, start: tuple[float, ...], accepted: Accepted, *, effort: int = EFFORT
+    problem: Problem,
+    hypothesis: Hypothesis,
+    start: tuple[float, ...],
+    accepted: Accepted,
+    *,
+    effort: int = EFFORT,
+    likely: bool = True,
 ) -> Member:
     """Searches the shape that explains most for its number of parameters, from a point of the grid.
 
     The linear coefficients and the base model are projected out at every step (variable projection, Golub and Pereyra
     1973), so that the search has as many dimensions as the effect has shape parameters. Shapes that machines are built
-    with are then tried, without a parameter to pay for.
+    with, `likely` ones, are then tried, without a parameter to pay for.
     """
     situation = problem.situation
     bounds = hypothesis.effect.bounds(situation, hypothesis.joint)
@@ -137,7 +143,7 @@ def refine(
             _zoom(lambda value, k=k: evaluate((*at[:k], value, *at[k + 1 :])), at[k], step, bounds[k], looks)  # type: ignore[misc]
             at[:] = best[0].shape
         if len(steps) < len(free):
-            _search(
+            climb(
                 along,
                 tuple(at[k] for k in free),
                 tuple(bounds[k] for k in free),
@@ -146,7 +152,8 @@ def refine(
                 [AGAIN * steps[k] if k in steps else None for k in free],
             )
         refined = best[0]
-        for known in hypothesis.effect.likely(situation, hypothesis.joint, refined.shape, refined.coefficients):
+        built = hypothesis.effect.likely(situation, hypothesis.joint, refined.shape, refined.coefficients)
+        for known in built if likely else ():
             shape = tuple(own if value is None else value for value, own in zip(known, refined.shape, strict=True))
             evaluate(shape, sum(known[k] is None for k in free))
     found = best[0]
@@ -209,7 +216,7 @@ def _zoom(
         start, width = float(points[int(np.argmax(worth))]), 2 * reach * width / (count - 1)
 
 
-def _search(
+def climb(
     evaluate: Callable[[tuple[float, ...]], float],
     start: tuple[float, ...],
     bounds: tuple[tuple[float, float], ...],

@@ -25,7 +25,7 @@ class Stribeck(StaticJointEffect):
     name: ClassVar[str] = "stribeck"
     title: ClassVar[str] = "more friction at low speed (Stribeck)"
     shapes: ClassVar[tuple[Shape, ...]] = (
-        Shape("stribeck_velocity", "rad/s", 1e-3, 2.0, "log"),
+        Shape("stribeck_velocity", "rad/s", 1e-3, 2.0, "log", inexact=0.03),
         Shape("exponent", "1", 0.5, 2.5, "linear", (1.0, 2.0)),
     )
     rivals: ClassVar[tuple[str, ...]] = ("shear_thinning", "presliding_hysteresis", "load_dependent_friction")

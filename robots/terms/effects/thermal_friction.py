@@ -28,7 +28,7 @@ class ThermalFriction(HeatEffect):
     name: ClassVar[str] = "thermal_friction"
     title: ClassVar[str] = "friction that falls as the joint warms up"
     shapes: ClassVar[tuple[Shape, ...]] = (
-        Shape("time_constant", "s", 5.0, 7200.0, "log", (15.0, 45.0, 135.0, 400.0, 1200.0, 3600.0)),
+        Shape("time_constant", "s", 5.0, 7200.0, "log", (15.0, 45.0, 135.0, 400.0, 1200.0, 3600.0), 0.05),
     )
     rivals: ClassVar[tuple[str, ...]] = ("friction_step", "torque_sensor_drift", "torque_constant_heat", "load_heat")
     experiments: ClassVar[tuple[str, ...]] = ("pause", "single_joint", "static_hold")

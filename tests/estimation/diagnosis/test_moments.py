@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from estimation.diagnosis import extending
+from estimation.diagnosis import shape_errors as errors
 from estimation.diagnosis.extending import fit_extended
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
@@ -100,9 +100,9 @@ def test_a_shape_left_as_assumed_may_be_where_the_likelihood_has_its_top(
     def gain(problem: object, member: object, shape: tuple[float, ...], others: object) -> float:
         return 30.0 - ((shape[0] - top) / 0.1) ** 2
 
-    monkeypatch.setattr(extending, "_gain", gain)
+    monkeypatch.setattr(errors, "_gain", gain)
     assumed = SimpleNamespace(shape=(1.0,))
-    found = extending._assumed(None, assumed, None, gain(None, None, (1.0,), None), (0.0, 1.0))  # type: ignore[arg-type]
+    found = errors._assumed(None, assumed, None, gain(None, None, (1.0,), None), (0.0, 1.0))  # type: ignore[arg-type]
     assert found == pytest.approx(farthest)
 
 
@@ -115,9 +115,9 @@ def test_a_second_summit_belongs_to_the_interval() -> None:
             return 8.0 * away / 0.1
         return 14.0 if 0.2 < away < 1.0 else 3.0 if away < 1.6 else 40.0 if away < 6.0 else 0.0
 
-    found = extending._reach(drop, 7.0, 0.02, (0.0, 10.0))
+    found = errors._reach(drop, 7.0, 0.02, (0.0, 10.0))
     assert 1.6 / 1.3 <= found <= 1.6 * 1.15
-    assert extending._reach(drop, 7.0, 0.02, (6.9, 10.0)) <= 0.1 * 1.15
+    assert errors._reach(drop, 7.0, 0.02, (6.9, 10.0)) <= 0.1 * 1.15
 
 
 def test_an_interval_is_no_narrower_than_the_profile(recording: Recording, posed: Callable) -> None:
@@ -127,4 +127,4 @@ def test_an_interval_is_no_narrower_than_the_profile(recording: Recording, posed
     nothing = accept(problem, ())
     found = refine(problem, STEP, (TRUE + 0.3,), nothing)
     covariance = fit_extended(problem, [found], {}).model.extensions[0].covariance
-    assert np.sqrt(covariance[2, 2]) >= 0.999 * extending._steps(problem, found, nothing)[0]
+    assert np.sqrt(covariance[2, 2]) >= 0.999 * errors.shape_errors(problem, found, nothing)[0]
