@@ -39,11 +39,15 @@ SHORTEST = 5.0  # [s] of log below which nothing can be told
 DIFFERENCE = 3
 # Below so many standard errors of its velocity a joint's direction is not known.
 SURE = 4.0
-BESIDE, KICK = 3, 0.3
+KICK = 0.3
+# Rows to either side of a reversal that count for nothing: those that a kick spreads to at this share of a period of the
+# cut-off, so many at most. A kick below this share of the RMS acceleration is none.
+BESIDE, SPREAD, NO_KICK = 3, 0.25, 0.02
 # The largest jump, over the root mean square of all.
 LARGER = 3.0
 # A mean over repetitions is taken where it knows frequencies higher by this factor than a single pass.
 SHARPER = 1.2
+ALIKE = 0.02  # Share of a period within which two instants are one
 # A joint slower than this share of its RMS speed for so long [s] creeps: its friction may have any value.
 CREEP, CREEPING = 0.03, 0.15
 # At the ends of a log, rows in which all joints are slower than this share are left out, up to so long [s].
@@ -167,7 +171,9 @@ def _part(
     if cycle is not None:
         floor = np.where(better, floor / cycle.count, floor)
     ends = [float(np.interp(cutoff, f, density)) for cutoff, (f, density, _) in zip(cutoffs, spectra, strict=True)]
-    unsure = _unsure(states[1], states[2], cutoffs, floor, np.maximum(ends, floor), step)
+    beside = log.log.t[np.clip(np.searchsorted(log.log.t, t), 1, len(log.log.t) - 1) + np.array([[-1], [0]])]
+    sampled = abs(step - period) < 1e-9 and bool(np.abs(beside - t).min(axis=0).max() < ALIKE * period)
+    unsure = _unsure(states[1], states[2], cutoffs, floor, np.maximum(ends, floor), step, sampled)
     cut = slice(None) if moved is not None else _moving(states[1], step)
     q, dq, ddq = (array[cut] for array in states)
     return t[cut], q, dq, ddq, tau[cut], moved, float(cutoffs.min()), unsure[cut], floor
@@ -246,13 +252,16 @@ def _moving(dq: Array, step: float) -> slice:
     return slice(min(int(active[0]), most), max(int(active[-1]) + 1, len(dq) - most))
 
 
-def _unsure(dq: Array, ddq: Array, cutoffs: Array, floor: Array, ends: Array, step: float) -> NDArray[np.bool_]:
+def _unsure(
+    dq: Array, ddq: Array, cutoffs: Array, floor: Array, ends: Array, step: float, sampled: bool
+) -> NDArray[np.bool_]:
     """Flags the rows (N, n) in which a joint's direction is not known.
 
     Friction that turns round kicks the joint: its acceleration jumps, and a velocity known up to a frequency f only is
     wrong beside a jump J by some J / (2 pi f) times `KICK`. Jumps at a rate r give the position a power density of
     2 r J^2 / (2 pi f)^6, so that the density at f (`ends`) bounds them. Encoder noise adds to that. The rows beside a
-    reversal are flagged in any case, for a sharp sign turns round between samples.
+    reversal are flagged in any case, for a sharp sign turns round between samples, and `BESIDE` of them where torque was
+    not `sampled` at these rows, or where the acceleration of a kick is known no better than that.
     """
     rows = len(dq)
     flags = np.zeros(dq.shape, dtype=bool)
@@ -262,11 +271,14 @@ def _unsure(dq: Array, ddq: Array, cutoffs: Array, floor: Array, ends: Array, st
         if rows > 2 * reach:
             jump[reach:-reach] = np.abs(ddq[2 * reach :, j] - ddq[: -2 * reach, j])
         rate = max(float(np.sum(dq[1:, j] * dq[:-1, j] < 0)), 1.0) / (rows * step)
-        jump = np.minimum(jump, LARGER * np.sqrt(ends[j] / (2 * rate)) * (2 * np.pi * cutoff) ** 3)
+        largest = float(LARGER * np.sqrt(ends[j] / (2 * rate)) * (2 * np.pi * cutoff) ** 3)
+        jump = np.minimum(jump, largest)
         error = KICK * maximum_filter1d(jump, 2 * reach + 1) / (2 * np.pi * cutoff)
         error = np.hypot(error, 2 * np.pi * np.sqrt(floor[j] * cutoff**3 / 3))
         turned = np.concatenate([dq[1:, j] * dq[:-1, j] < 0, [False]])
-        near = maximum_filter1d(turned.astype(np.int8), 2 * BESIDE, origin=0) > 0
+        kicked = largest > NO_KICK * float(np.sqrt(np.mean(ddq[:, j] ** 2)))
+        beside = int(np.clip(np.ceil(SPREAD / (cutoff * step)) if kicked else 1, 1, BESIDE)) if sampled else BESIDE
+        near = maximum_filter1d(turned.astype(np.int8), 2 * beside, origin=0) > 0
         speed = float(np.sqrt(np.mean(dq[:, j] ** 2)))
         flags[:, j] = (np.abs(dq[:, j]) < np.maximum(SURE * error, SLOW * speed)) | near
         creeping = np.abs(dq[:, j]) < CREEP * speed
