@@ -162,6 +162,14 @@ def refine(
 
 def _scatter(problem: Problem, member: Member, accepted: Accepted) -> float:
     """How much more the joints differ in the one coefficient that they share than they may (Birge 1932)."""
+    gram, cross = joint_by_joint(problem, member, accepted)
+    told = gram > 0
+    gram, cross = gram[told], cross[told]
+    return max(1.0, float(cross.sum() ** 2 / gram.sum()) / agreed_gain(gram, cross)) if len(gram) > 1 else 1.0
+
+
+def joint_by_joint(problem: Problem, member: Member, accepted: Accepted) -> tuple[Array, Array]:
+    """Squares of an effect's one column on each of its joints (m,), beside others, and products with the residual."""
     joints, columns = problem.columns_of(member.hypothesis, member.shape)
     scores = [
         score(problem, problem.group((j,), (X,), effect=member.hypothesis.effect), accepted)
@@ -171,8 +179,7 @@ def _scatter(problem: Problem, member: Member, accepted: Accepted) -> float:
         np.array([float(np.ravel(part)[0]) for part in parts])
         for parts in zip(*((s.gram, s.cross) for s in scores), strict=True)
     )
-    gram, cross = gram[gram > 0], cross[gram > 0]
-    return max(1.0, float(cross.sum() ** 2 / gram.sum()) / agreed_gain(gram, cross)) if len(gram) > 1 else 1.0
+    return gram, cross
 
 
 def agreed_gain(gram: Array, cross: Array) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.quiet_logs import profile_gain
-from estimation.diagnosis.refinement import Member, refine
+from estimation.diagnosis.refinement import Member, agreed_gain, joint_by_joint, refine
 from estimation.diagnosis.scan import Entry, Outcome, Scan, scan
 from estimation.diagnosis.scoring import Accepted, accept, score
 from robots.common.parallel import available_cores
@@ -142,13 +142,15 @@ def _sure(problem: Problem, candidate: Member, p_value: float, chance: float) ->
 def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
     """Whether a candidate is worth it by the joints alone on which it is more than what others may leave.
 
-    What the torque as logged shows by itself, such as flat tops, no other formula leaves; nor does one leave the same
-    coefficient on joints that must agree on it.
+    What the torque as logged shows by itself, such as flat tops, no other formula leaves. Nor does one leave the same
+    coefficient on joints that must agree on it: those on which another effect explains more must do no more than that.
     """
     hypothesis = candidate.hypothesis
     flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
-    if hypothesis.effect.alike or (flags is not None and flags.any()):
+    if flags is not None and flags.any():
         return True
+    if hypothesis.effect.alike:
+        return not members or _agreed(problem, candidate, members)
     robot = problem.situation.robot
     able = [
         j
@@ -161,6 +163,19 @@ def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> b
     ]
     lost = candidate.gain - candidate.gain_on(able)
     return not members or candidate.bic(problem.rows) - lost > LEAST
+
+
+def _agreed(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
+    """Whether joints on which no effect of theirs explains more tell a common coefficient by themselves."""
+    gram, cross = joint_by_joint(problem, candidate, accept(problem, tuple(m.group for m in members)))
+    own = [m for m in members if m.hypothesis.joint is not None]
+    others = [max((m.gain_on([j]) for m in own), default=0.0) for j in candidate.group.joints]
+    told = (gram > 0) & (cross**2 >= gram * others)
+    if not told.any():
+        return False
+    gram, cross = gram[told], cross[told]
+    gain = agreed_gain(gram, cross) if len(gram) > 1 else float(cross[0] ** 2 / gram[0])
+    return gain - candidate.degrees * float(np.log(problem.rows * len(gram))) > LEAST
 
 
 def _polished(

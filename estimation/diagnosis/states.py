@@ -40,8 +40,8 @@ DIFFERENCE = 3
 # Below so many standard errors of its velocity a joint's direction is not known.
 SURE = 4.0
 KICK = 0.3
-# Rows to either side of a reversal that count for nothing: those that a kick spreads to at this share of a period of the
-# cut-off, so many at most. A kick below this share of the RMS acceleration is none.
+# Rows to either side of a reversal that count for nothing: those that a kick spreads to, in this share of a period of
+# the cut-off, so many at most. A kick below this share of the RMS acceleration is none.
 BESIDE, SPREAD, NO_KICK = 3, 0.25, 0.02
 # The largest jump, over the root mean square of all.
 LARGER = 3.0
@@ -260,7 +260,7 @@ def _unsure(
     Friction that turns round kicks the joint: its acceleration jumps, and a velocity known up to a frequency f only is
     wrong beside a jump J by some J / (2 pi f) times `KICK`. Jumps at a rate r give the position a power density of
     2 r J^2 / (2 pi f)^6, so that the density at f (`ends`) bounds them. Encoder noise adds to that. The rows beside a
-    reversal are flagged in any case, for a sharp sign turns round between samples, and `BESIDE` of them where torque was
+    reversal are flagged in any case, for a sharp sign turns round between samples; `BESIDE` of them where torque was
     not `sampled` at these rows, or where the acceleration of a kick is known no better than that.
     """
     rows = len(dq)
