@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from estimation.diagnosis import selection
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Group
 from estimation.diagnosis.refinement import RARE, Member, agreed_gain
@@ -152,3 +153,28 @@ def test_what_a_log_shows_by_itself_is_no_leftover() -> None:
     assert beyond(small, flat)
     assert not beyond(small, tau)
     assert not beyond(other, flat)
+
+
+@pytest.mark.parametrize(
+    ("gains", "other", "counts"),
+    [
+        ((500.0, 1.0), 1000.0, False),  # what the other effect left, and nothing else
+        ((500.0, 80.0), 1000.0, True),  # the second joint tells it by itself
+        ((500.0, 400.0), 100.0, True),  # both do
+        ((500.0, 1.0), 0.0, False),  # the joints are at odds
+    ],
+)
+def test_what_all_joints_share_is_told_by_those_without_a_stronger_effect(
+    gains: tuple[float, float], other: float, counts: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A common coefficient beside an effect of the first joint that explains so much."""
+    rng = np.random.default_rng(6)
+    column = rng.normal(size=(ROWS, 1))
+    delay = replace(_member("time_delay", None, (column, column)), gain=sum(gains))
+    ripple = replace(_member("torque_ripple", 1, (column,)), gain=other)
+    gram = np.array([1e4, 1e4])
+    monkeypatch.setattr(selection, "accept", lambda problem, groups: None)
+    monkeypatch.setattr(selection, "joint_by_joint", lambda *_: (gram, np.sqrt(np.array(gains) * gram)))
+    situation = SimpleNamespace(runs=(slice(0, ROWS),), robot=None)
+    problem = SimpleNamespace(situation=situation, recording=SimpleNamespace(tau=column), rows=ROWS)
+    assert _beyond(problem, delay, [ripple]) is counts  # type: ignore[arg-type]
