@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -191,6 +191,8 @@ def _search(
             # Its columns are most of what a diagnosis keeps in memory: they go before others come.
             search = None
             give_back()
+            # What turns round late or gradually made the sign of friction less sharp than it is.
+            baseline = build_baseline(base, replace(recording, tau=settled.without_effects(tau)))
         upper = None
         if any(effect.fast for effect in effects):
             wide = estimate_whitening(recording, settled.residual, fitted, inertia, WIDER)

@@ -45,6 +45,9 @@ def pose(
     columns = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
     norms = np.sqrt((columns**2).sum(axis=(0, 1)))
     white = whitening.all(columns[:, :, norms > 0])
+    # What is left of a column that acts in rows of unknown direction alone is rounding.
+    left = np.sqrt((white**2).sum(axis=(0, 1))) * whitening.scale.max() / norms[norms > 0]
+    white = white[:, :, left > FAINT]
     N = len(white)
     mixed = np.einsum("jk,njb->nkb", root, white, optimize=True)
     Q = orthonormal(mixed.reshape(N * n, -1), FAINT).reshape(N, n, -1)

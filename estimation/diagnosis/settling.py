@@ -41,6 +41,10 @@ class Settled:
     extra: Array | None = None
     degrees: int = 0
 
+    def without_effects(self, tau: Array) -> Array:
+        """Takes the torque of the effects off the measured one (N, n)."""
+        return tau if self.extra is None else tau - self.extra
+
 
 def settle(problem: Problem, members: Sequence[Member]) -> Settled:
     """Fits base model and effects together.

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from robots.regressor import TorqueModel
 
 Array = NDArray[np.float64]
+Kept = TypeVar("Kept")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,7 +54,7 @@ class Situation:
     torque: Array
     velocity_scale: Array
     parts: tuple[Situation, ...] = ()
-    _cache: dict[object, Array] = field(default_factory=dict, repr=False)
+    _cache: dict[object, Any] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -141,11 +142,11 @@ class Situation:
             self._cache[kind] = np.concatenate(parts) if parts else evaluate(kind, self)
         return self._cache[kind]
 
-    def cached(self, key: object, compute: object) -> Array:
+    def cached(self, key: object, compute: Callable[[], Kept]) -> Kept:
         """Gives `compute()`, computed once per key: a state that several columns share."""
         if key not in self._cache:
-            self._cache[key] = compute()  # type: ignore[operator]
-        return self._cache[key]
+            self._cache[key] = compute()
+        return cast(Kept, self._cache[key])
 
 
 def situation(

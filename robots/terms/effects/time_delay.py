@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator, make_interp_spline
 
 from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
 
@@ -14,14 +16,16 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+SMALL = 1e-5  # [s]
 SHIFT = Shape("reversals_late", "s", -0.02, 0.02, "linear", (-0.003, -0.001, -0.0002, 0.0002, 0.001, 0.003, 0.008))
 
 
 class TimeDelay(Effect):
     """tau(t - d) - tau(t): the logged torque lags the logged position by d, on all joints alike.
 
-    Of the smooth torque that is -d dtau/dt. Coulomb friction turns round within less than a sample, so that its
-    difference is taken as it is, at the velocities of a moment d' before; d' = d where all is as it should be.
+    It is d times a difference quotient over d', which the base model's torque and velocities of a moment before say:
+    Coulomb friction turns round within less than a sample, and a joint that sticks breaks loose in one, so that neither
+    follows from rates. d' = d where all is as it should be.
     """
 
     name: ClassVar[str] = "time_delay"
@@ -67,19 +71,40 @@ class TimeDelay(Effect):
 
 
 def lateness(situation: Situation, shift: float) -> Array:
-    """Gives the change of the base model's torque per delay (N, n) [N m/s], Coulomb friction turning `shift` [s] late.
+    """Gives the change of the base model's torque per delay (N, n) [N m/s], as it was `shift` [s] before.
 
-    Of a robot that hardly turns round, this is -dtau/dt.
+    Of a small shift, and of a robot that hardly turns round, this is -dtau/dt.
     """
 
     def evaluate() -> Array:
-        smooth = situation.cached("rate", lambda: situation.derivatives(situation.torque - situation.friction)[0])
-        step = shift if abs(shift) > 1e-7 else 1e-7
-        before = situation.friction_at(situation.dq - step * situation.ddq)
-        return (before - situation.friction) / step - smooth
+        step = shift if abs(shift) > SMALL else SMALL
+        smooth = situation.torque - situation.friction
+        before, dq = np.empty_like(smooth), np.empty_like(smooth)
+        for run, (torque, velocity) in zip(
+            situation.runs, situation.cached("past", lambda: _past(situation, smooth)), strict=True
+        ):
+            t = situation.t[run]
+            past = np.clip(t - step, t[0], t[-1])
+            before[run], dq[run] = torque(past), velocity(past)
+        return (before - smooth + situation.friction_at(dq) - situation.friction) / step
 
     # Joints share the points of the grid; those of a search are as many as they are brief.
     return situation.cached(("lateness", shift), evaluate) if shift in SHIFT.grid else evaluate()
+
+
+def _past(situation: Situation, smooth: Array) -> list[tuple[Callable[[Array], Array], Callable[[Array], Array]]]:
+    """Gives each log's torque without friction, and its velocities, between the samples.
+
+    Velocities by cubics that do not overshoot: those of a joint that breaks loose would turn round before.
+    """
+    result = []
+    for run in situation.runs:
+        t, count = situation.t[run], run.stop - run.start
+        torque = make_interp_spline(t, smooth[run], min(3, count - 1))
+        dq = situation.dq[run]
+        velocity = PchipInterpolator(t, dq, axis=0) if count > 1 else make_interp_spline(t, dq, 0)
+        result.append((torque, velocity))
+    return result
 
 
 def as_late(coefficients: Array) -> tuple[tuple[float, ...], ...]:

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from robots.terms.effects import EFFECTS
+from robots.terms.effects.situation import situation
 from robots.terms.effects.states import bristle, change_times
 from robots.terms.effects.thermal_friction import heat
 
@@ -99,7 +100,7 @@ def test_flat_tops_are_flagged(seen):
     assert flagged[:, 1].sum() > 0.7 * np.sum(np.abs(torque[:, 1]) > level)  # all but tops of one or two samples
 
 
-@pytest.mark.parametrize(("delay", "sharp"), [(0.003, 0.2), (0.003, 2e-3), (0.0003, 2e-3), (-0.001, 2e-3)])
+@pytest.mark.parametrize(("delay", "sharp"), [(0.003, 0.2), (0.008, 2e-3), (0.0003, 2e-3), (-0.001, 2e-3)])
 def test_a_delayed_torque_is_the_one_before(seen, motion, delay, sharp):
     """A delay changes the torque as taking it a moment earlier does, also where friction turns round in a sample."""
     now = seen(velocity_scale=sharp)
@@ -107,7 +108,26 @@ def test_a_delayed_torque_is_the_one_before(seen, motion, delay, sharp):
     early = seen(velocity_scale=sharp, times=now.t - delay)
     change = early.torque - now.torque
     error = delay * X - change
-    assert np.sqrt(np.mean(error[2:-2] ** 2)) < 0.05 * np.sqrt(np.mean(change**2))  # the second order of the delay
+    assert np.sqrt(np.mean(error[2:-3] ** 2)) < 0.01 * np.sqrt(np.mean(change**2))
+
+
+def test_friction_of_a_joint_that_breaks_loose_is_late_as_well(seen):
+    """A joint that creeps and breaks loose at 8 rad/s2 had crept a moment before: it had not turned round."""
+    still = seen(velocity_scale=2e-3)
+    friction = np.where([c.term == "friction" for c in still.model.columns], still.parameters, 0.0)
+    loose, delay = float(still.t[700]) + 0.001, 0.005
+
+    def at(times):
+        after = np.maximum(times - loose, 0.0)[:, None] * np.ones(4)
+        q = 1e-3 * times[:, None] + 4.0 * after**2
+        return situation(still.model, friction, times, q, 1e-3 + 8.0 * after, 8.0 * (after > 0))
+
+    now, early = at(still.t), at(still.t - delay)
+    change = (early.torque - now.torque)[695:715]
+    columns = delay * EFFECTS["time_delay"].columns(now, None, (delay,))[695:715, :, 0]
+    assert np.all(np.abs(change).max(axis=0) > 0.4 * np.abs(now.friction).min(axis=0).max())
+    # Between the two samples about the jump the velocity is known to some hundredths of its change.
+    assert np.all(np.abs(columns - change).max(axis=0) < 0.25 * np.abs(change).max(axis=0))
 
 
 def test_a_zero_that_wanders_is_followed(seen):
