@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
-from robots.terms.effects.time_delay import SHIFT, as_late, lateness
+from robots.terms.effects.time_delay import SHIFT, SMALL, as_late, lateness, near
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -22,13 +23,18 @@ class CurrentLag(JointEffect):
     name: ClassVar[str] = "current_lag"
     title: ClassVar[str] = "torque of one joint that is logged late (filter)"
     rare: ClassVar[bool] = True
-    shapes: ClassVar[tuple[Shape, ...]] = (SHIFT,)
+    shapes: ClassVar[tuple[Shape, ...]] = (replace(SHIFT, lower=0.0, grid=tuple(s for s in SHIFT.grid if s > 0)),)
     rivals: ClassVar[tuple[str, ...]] = ("time_delay", "presliding_hysteresis", "joint_elasticity")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "micro_reversals")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the lag: a filter has no other sign, and more than 50 ms is no drive's."""
         return (Coefficient("lag", "s", 0.0, 0.05),)
+
+    def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
+        """Keeps the lag near that of the reversals, and positive."""
+        ((low, high),) = near(shape[0])
+        return ((max(low, 0.0), max(high, SMALL)),)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the change of the joint's torque per delay."""

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SMALL = 1e-5  # [s]
+APART = 2.5
 SHIFT = Shape("reversals_late", "s", -0.02, 0.02, "linear", (-0.003, -0.001, -0.0002, 0.0002, 0.001, 0.003, 0.008))
 
 
@@ -39,6 +40,10 @@ class TimeDelay(Effect):
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the delay; more than 50 ms is no sensor's."""
         return (Coefficient("delay", "s", -0.05, 0.05),)
+
+    def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
+        """Keeps the delay near that of the reversals, of which the torque's own is a difference quotient."""
+        return near(shape[0])
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the change of torque per delay."""
@@ -81,7 +86,7 @@ def lateness(situation: Situation, shift: float) -> Array:
         smooth = situation.torque - situation.friction
         before, dq = np.empty_like(smooth), np.empty_like(smooth)
         for run, (torque, velocity) in zip(
-            situation.runs, situation.cached("past", lambda: _past(situation, smooth)), strict=True
+            situation.runs, situation.cached("before", lambda: _past(situation, smooth)), strict=True
         ):
             t = situation.t[run]
             past = np.clip(t - step, t[0], t[-1])
@@ -105,6 +110,15 @@ def _past(situation: Situation, smooth: Array) -> list[tuple[Callable[[Array], A
         velocity = PchipInterpolator(t, dq, axis=0) if count > 1 else make_interp_spline(t, dq, 0)
         result.append((torque, velocity))
     return result
+
+
+def near(shift: float) -> tuple[tuple[float, float], ...]:
+    """Gives the range of a delay beside that of reversals: within a factor of `APART`.
+
+    A quotient over far more than the delay would be the torque's second derivative as much as its first.
+    """
+    low, high = sorted((shift / APART, shift * APART))
+    return ((low - SMALL, high + SMALL),)
 
 
 def as_late(coefficients: Array) -> tuple[tuple[float, ...], ...]:

@@ -130,6 +130,20 @@ def test_friction_of_a_joint_that_breaks_loose_is_late_as_well(seen):
     assert np.all(np.abs(columns - change).max(axis=0) < 0.25 * np.abs(change).max(axis=0))
 
 
+@pytest.mark.parametrize("name", ["time_delay", "current_lag"])
+@pytest.mark.parametrize("shift", [-0.008, 0.0, 0.0002, 0.004])
+def test_a_delay_is_near_that_of_the_reversals(name, shift, random_robot):
+    """A quotient over 8 ms is no rate: it measures a delay of 2 ms by the torque's second derivative as well."""
+    ((low, high),) = EFFECTS[name].ranges(random_robot(3, 4), 1, (shift,))
+    assert low < high
+    late = [0.0002 * k for k in range(-100, 101)]
+    allowed = [d for d in late if low <= d <= high]
+    if name == "current_lag":
+        assert all(d >= 0 for d in allowed)
+    assert all(abs(shift) / 3 < abs(d) < 3 * abs(shift) for d in allowed if d)
+    assert shift in [pytest.approx(d) for d in allowed] or (name, shift) == ("current_lag", -0.008)
+
+
 def test_a_zero_that_wanders_is_followed(seen):
     """Drifts of each stretch add up to straight lines between knots, constant after the last."""
     now = seen()
