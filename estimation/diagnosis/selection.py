@@ -168,8 +168,10 @@ def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> b
 def _agreed(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
     """Whether joints on which no effect of theirs explains more tell a common coefficient by themselves."""
     gram, cross = joint_by_joint(problem, candidate, accept(problem, tuple(m.group for m in members)))
-    own = [m for m in members if m.hypothesis.joint is not None]
-    others = [max((m.gain_on([j]) for m in own), default=0.0) for j in candidate.group.joints]
+    others = [
+        max((m.gain_on([j]) for m in members if m.hypothesis.joint == j + 1), default=0.0)
+        for j in candidate.group.joints
+    ]
     told = (gram > 0) & (cross**2 >= gram * others)
     if not told.any():
         return False

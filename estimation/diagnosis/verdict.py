@@ -10,7 +10,7 @@ import numpy as np
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scan import Entry, scan
-from estimation.diagnosis.scoring import accept
+from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.selection import Found, Selection
 
 # Named effects that explain less than this share of what stands out of the noise do not explain it.
@@ -18,6 +18,8 @@ ENOUGH = 0.7
 # Rivals within this of the best BIC stay possible.
 CLOSE = 10.0
 MOST_PATTERNS = 3
+# A name of the whole robot is not owed to a joint where a free function there leaves it this share of its gain.
+STAYS = 0.75
 # A pattern beside named effects counts when it explains this share of what they do on its joint: formulas are true to
 # some per cent.
 BEYOND = 0.05
@@ -114,9 +116,11 @@ def _holds(
     if not whole:
         return True
     # What acts on all joints may have been named for what the name on this one left.
-    others = [member for member in others if member.hypothesis.joint is not None]
-    free, _ = _patterns(problem, here, others, false_alarm, rng)
-    return _thriftier(problem, [*own, *whole], others, free)
+    single = [member for member in others if member.hypothesis.joint is not None]
+    free, _ = _patterns(problem, here, single, false_alarm, rng)
+    beside = accept(problem, tuple(m.group for m in (*single, *free)))
+    stays = all(score(problem, m.group, beside).gain > STAYS * m.gain for m in whole)
+    return stays or _thriftier(problem, [*own, *whole], single, free)
 
 
 def _thriftier(problem: Problem, names: Sequence[Member], others: Sequence[Member], free: Sequence[Member]) -> bool:
