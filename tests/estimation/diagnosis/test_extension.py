@@ -57,6 +57,19 @@ def test_an_odd_pattern_turns_round_with_the_motion(arm: Robot, state: Situation
     assert "direction" in odd.sentence(1)
 
 
+def test_what_repeats_per_turn_is_all_that_an_error_of_the_position_does(state: Situation) -> None:
+    """An error e of eight waves a turn makes M e'' + D e' + K e, its derivatives in closed form."""
+    pattern = build_pattern("pattern:turns:0:even")
+    assert pattern is not None
+    h, phase = 8.0, 0.7
+    q, v, a = (x[:, 0] for x in (state.q, state.dq, state.ddq))
+    s, c = np.sin(h * q + phase), np.cos(h * q + phase)
+    torque = 3.0 * (-h * a * s - (h * v) ** 2 * c) + 20.0 * (-h * v * s) + 400.0 * c
+    X = pattern.local(state, 1, (h,))
+    left = torque - X @ np.linalg.lstsq(X, torque)[0]
+    assert np.abs(left).max() < 1e-9 * np.abs(torque).max()
+
+
 def test_an_extension_survives_plain_data(arm: Robot, state: Situation) -> None:
     """Effect, joint, shape, coefficients and covariance, unknown variances too."""
     extension = Extension(

@@ -1,0 +1,52 @@
+"""Specification of the verdict: names beside free functions in their place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis import verdict
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.problem import Group
+from estimation.diagnosis.refinement import Member
+from robots.terms.effects import EFFECTS
+
+ROWS = 5000
+PRICE = float(np.log(ROWS))
+
+
+def _member(name: str, joint: int | None, gain: float, degrees: int) -> Member:
+    group = Group((0,), (np.ones((ROWS, 1), np.float32),), np.zeros((1, 1)), np.eye(1), np.ones(1), np.ones(1))
+    return replace(Member(Hypothesis(EFFECTS[name], joint), (), group, gain, np.ones(1), degrees, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("free", "left", "holds"),
+    [
+        (400.0, 40.0, False),  # one free function explains what ripple and push do: the push was the ripple's rest
+        (400.0, 95.0, True),  # the push is there all the same
+        (310.0, 40.0, True),  # the free function explains less than the two, all parameters counted
+    ],
+)
+def test_a_name_of_the_whole_robot_may_be_what_a_name_on_a_joint_left(
+    free: float, left: float, holds: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A ripple of a gain of 300 and a push of 100 beside it, of 4 and 6 parameters."""
+    ripple, push = _member("torque_ripple", 1, 300.0, 4), _member("external_contact", None, 100.0, 6)
+    gains = {(): 0.0, ("external_contact",): 100.0, ("external_contact", "torque_ripple"): 400.0}
+    gains["torque_ripple", "external_contact"] = 400.0
+    labels = {id(m.group): m.hypothesis.name for m in (ripple, push)}
+    monkeypatch.setattr(
+        verdict,
+        "accept",
+        lambda problem, groups: SimpleNamespace(gain=gains.get(tuple(labels.get(id(g), "free") for g in groups), 0.0)),
+    )
+    monkeypatch.setattr(verdict, "score", lambda problem, group, beside: SimpleNamespace(gain=left))
+    found = replace(ripple, gain=free, degrees=8, group=replace(ripple.group))
+    monkeypatch.setattr(verdict, "_patterns", lambda *arguments: ([found] if push not in arguments[2] else [], []))
+    problem = SimpleNamespace(rows=ROWS)
+    assert verdict._holds(problem, 1, [ripple, push], [], [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
+    assert (free - 8 * PRICE < 400.0 - 10 * PRICE) is (free == 310.0)
