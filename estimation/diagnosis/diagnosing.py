@@ -180,6 +180,7 @@ def _search(
     values = fit_values(baseline, tau.std(axis=0) + 1e-12, recording.unsure, tau, pull_of(baseline, recording))
     settled = Settled(tau - baseline.regressor @ values, values)
     search: Search | None = None
+    blurred = False
     for attempt in range(2):
         share = 0.1 + 0.3 * attempt
         inertia = inertia_of(baseline, recording, settled.values)
@@ -191,8 +192,8 @@ def _search(
             # Its columns are most of what a diagnosis keeps in memory: they go before others come.
             search = None
             give_back()
-            # What turns round late or gradually made the sign of friction less sharp than it is.
-            baseline = build_baseline(base, replace(recording, tau=settled.without_effects(tau)))
+            if blurred:
+                baseline = build_baseline(base, replace(recording, tau=settled.without_effects(tau)))
         upper = None
         if any(effect.fast for effect in effects):
             wide = estimate_whitening(recording, settled.residual, fitted, inertia, WIDER)
@@ -210,6 +211,8 @@ def _search(
         if not search.selection.found:
             break
         settled = settle(search.problem, [found.member for found in search.selection.found])
+        # A delay made the sign of friction look less sharp than it is.
+        blurred = any(found.member.hypothesis.effect.blurs for found in search.selection.found)
     assert search is not None
     return search
 

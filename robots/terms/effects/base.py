@@ -79,6 +79,7 @@ class Effect(ABC):
         passing: whether it belongs to the logs it is found in, and may be gone or different in others.
         alike: whether it has one coefficient, that all joints share: each joint tells it, and they must agree.
         fast: whether its torque owes nothing to accelerations: it is looked for above the frequencies of those, too.
+        blurs: whether it lets friction turn round later or over some time: how sharp its sign is shows beside it only.
         shapes: the parameters that the columns are not linear in.
         rivals: effects that resemble it, the closest first.
         experiments: kinds of experiment that separate it from them, the best first.
@@ -92,6 +93,7 @@ class Effect(ABC):
     passing: ClassVar[bool] = False
     alike: ClassVar[bool] = False
     fast: ClassVar[bool] = False
+    blurs: ClassVar[bool] = False
     shapes: ClassVar[tuple[Shape, ...]] = ()
     rivals: ClassVar[tuple[str, ...]] = ()
     experiments: ClassVar[tuple[str, ...]] = ()
