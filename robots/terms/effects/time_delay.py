@@ -108,7 +108,9 @@ def _past(situation: Situation, smooth: Array) -> list[tuple[Callable[[Array], A
         t, count = situation.t[run], run.stop - run.start
         torque = make_interp_spline(t, smooth[run], min(3, count - 1))
         dq = situation.dq[run]
-        velocity = PchipInterpolator(t, dq, axis=0) if count > 1 else make_interp_spline(t, dq, 0)
+        # The harmonic mean of slopes next to nothing, of a joint at rest, overflows; its inverse is as good as zero.
+        with np.errstate(over="ignore"):
+            velocity = PchipInterpolator(t, dq, axis=0) if count > 1 else make_interp_spline(t, dq, 0)
         result.append((torque, velocity))
     return result
 

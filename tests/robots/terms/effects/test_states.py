@@ -130,6 +130,16 @@ def test_friction_of_a_joint_that_breaks_loose_is_late_as_well(seen):
     assert np.all(np.abs(columns - change).max(axis=0) < 0.25 * np.abs(change).max(axis=0))
 
 
+def test_a_joint_at_rest_is_not_late(seen):
+    """Velocities that are rounding, below the smallest normal number even, make no warning and no torque."""
+    still = seen(velocity_scale=2e-3)
+    zero = np.zeros((40, 4))
+    dq = 5e-324 * np.arange(40.0)[:, None] * np.ones(4)
+    now = situation(still.model, still.parameters, 0.004 * np.arange(40), zero, dq, zero)
+    X = EFFECTS["time_delay"].columns(now, None, (0.003,))
+    np.testing.assert_allclose(X, 0.0, atol=1e-9)
+
+
 @pytest.mark.parametrize("name", ["time_delay", "current_lag"])
 @pytest.mark.parametrize("shift", [-0.008, 0.0, 0.0002, 0.004])
 def test_a_delay_is_near_that_of_the_reversals(name, shift, random_robot):
