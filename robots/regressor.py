@@ -10,7 +10,7 @@ import casadi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from robots.batch import BatchFunction, batch_function
+from robots.batch import BatchFunction, batch_function, builds_expressions
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.terms import (
@@ -99,6 +99,7 @@ class TorqueModel:
         gradients = [casadi.densify(casadi.gradient(total, symbol)) for symbol in inputs]
         return casadi.Function("adjoint", [*inputs, weights], gradients)
 
+    @builds_expressions
     def _evaluator(self, columns: Sequence[int] | None, backend: str) -> BatchFunction:
         key = (None if columns is None else tuple(int(c) for c in columns), backend)
         evaluators: dict[object, BatchFunction] = self.__dict__.setdefault("_evaluators", {})

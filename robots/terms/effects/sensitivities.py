@@ -10,7 +10,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.batch import BatchFunction, batch_function
+from robots.batch import BatchFunction, batch_function, builds_expressions
 from robots.common.errors import InputError
 from robots.geometry.chain import Chain
 from robots.geometry.symbolic import cleaned, symbolic_placement
@@ -44,6 +44,7 @@ def evaluate(kind: str, situation: Situation) -> Array:
 
 
 @lru_cache(maxsize=64)
+@builds_expressions
 def _evaluator(chain: Chain, kind: str) -> BatchFunction:
     n = chain.n
     inputs = [casadi.SX.sym(name, size) for name, size in (("q", n), ("dq", n), ("ddq", n), ("pi", 10 * n))]

@@ -10,7 +10,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.batch import BatchFunction, batch_function
+from robots.batch import BatchFunction, batch_function, builds_expressions
 from robots.terms.effects.base import Effect, JointEffect, Place
 from robots.terms.effects.situation import Situation
 
@@ -112,11 +112,13 @@ class StaticJointEffect(StaticEffect, JointEffect):
 
 # Numpy, not compiled C: a column is a handful of operations, and a catalogue of them would take minutes to compile.
 @lru_cache(maxsize=512)
+@builds_expressions
 def _evaluator(effect: StaticEffect, robot: Robot, joint: Place) -> BatchFunction:
     return batch_function(effect.function(robot, joint), "vectorised")
 
 
 @lru_cache(maxsize=512)
+@builds_expressions
 def _row_evaluator(effect: StaticJointEffect, robot: Robot, joint: int) -> BatchFunction:
     at = Instant.symbols(1, len(effect.shapes))
     row = effect.row(robot, joint, at)
