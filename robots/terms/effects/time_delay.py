@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SMALL = 1e-5  # [s]
-APART = 2.5
+APART = 1.6
 SHIFT = Shape("reversals_late", "s", -0.02, 0.02, "linear", (-0.003, -0.001, -0.0002, 0.0002, 0.001, 0.003, 0.008))
 
 
