@@ -96,19 +96,13 @@ class Member:
 
 
 def refine(
-    problem: Problem,
-    hypothesis: Hypothesis,
-    start: tuple[float, ...],
-    accepted: Accepted,
-    *,
-    effort: int = EFFORT,
-    likely: bool = True,
+    problem: Problem, hypothesis: Hypothesis, start: tuple[float, ...], accepted: Accepted, *, effort: int = EFFORT
 ) -> Member:
     """Searches the shape that explains most for its number of parameters, from a point of the grid.
 
     The linear coefficients and the base model are projected out at every step (variable projection, Golub and Pereyra
     1973), so that the search has as many dimensions as the effect has shape parameters. Shapes that machines are built
-    with, `likely` ones, are then tried, without a parameter to pay for.
+    with are then tried, without a parameter to pay for.
     """
     situation = problem.situation
     bounds = hypothesis.effect.bounds(situation, hypothesis.joint)
@@ -152,8 +146,7 @@ def refine(
                 [AGAIN * steps[k] if k in steps else None for k in free],
             )
         refined = best[0]
-        built = hypothesis.effect.likely(situation, hypothesis.joint, refined.shape, refined.coefficients)
-        for known in built if likely else ():
+        for known in hypothesis.effect.likely(situation, hypothesis.joint, refined.shape, refined.coefficients):
             shape = tuple(own if value is None else value for value, own in zip(known, refined.shape, strict=True))
             evaluate(shape, sum(known[k] is None for k in free))
     found = best[0]
