@@ -145,6 +145,11 @@ def all_patterns(robot: Robot) -> tuple[Pattern | Swinging, ...]:
     return (*own, *each, Swinging())
 
 
+def is_of_time(effect: object) -> bool:
+    """Whether a pattern's function knows nothing of the motion but, at most, its direction."""
+    return isinstance(effect, Pattern) and effect.kind == "time"
+
+
 def _angle(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     q = s.q[:, other - 1]
     return np.column_stack([f(h * q) for h in HARMONICS for f in (np.cos, np.sin)])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimation.diagnosis.patterns import is_of_time
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scan import Entry, scan
@@ -112,6 +113,12 @@ def _holds(
         return False
     if len(own) > 1 and not _thriftier(problem, own, others, free):
         return False
+    if any(member.hypothesis.effect.passing for member in own):
+        # What comes and goes follows nearly any torque: functions of the motion that do so with less refute it.
+        moving = [entry for entry in here if not is_of_time(entry.hypothesis.effect)]
+        free, _ = _patterns(problem, moving, others, false_alarm, rng)
+        if not _thriftier(problem, own, others, free):
+            return False
     whole = [member for member in others if member.hypothesis.joint is None]
     if not whole:
         return True

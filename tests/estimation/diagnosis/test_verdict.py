@@ -10,6 +10,7 @@ import pytest
 
 from estimation.diagnosis import verdict
 from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.patterns import Pattern
 from estimation.diagnosis.problem import Group
 from estimation.diagnosis.refinement import Member
 from robots.terms.effects import EFFECTS
@@ -50,3 +51,34 @@ def test_a_name_of_the_whole_robot_may_be_what_a_name_on_a_joint_left(
     problem = SimpleNamespace(rows=ROWS)
     assert verdict._holds(problem, 1, [ripple, push], [], [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
     assert (free - 8 * PRICE < 400.0 - 10 * PRICE) is (free == 310.0)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "of_time", "holds"),
+    [
+        (3, False, False),  # a function of the motion explains as much with three parameters as the drift with 16
+        (16, False, True),  # with as many parameters it is no better
+        (3, True, True),  # a function of time is what a drift is
+    ],
+)
+def test_a_drift_is_a_free_function_of_time(
+    degrees: int, of_time: bool, holds: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A zero that wanders over a gain of 220 beside a pattern of 219, of the joint's angle or of time."""
+    drift = _member("torque_sensor_drift", 2, 220.0, 16)
+    pattern = Hypothesis(Pattern("time" if of_time else "angle"), 2)
+    free = replace(_member("spring", 2, 219.0, degrees), hypothesis=pattern)
+    gains = {id(drift.group): 220.0, id(free.group): 219.0}
+    monkeypatch.setattr(
+        verdict, "accept", lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups))
+    )
+
+    def patterns(
+        problem: object, entries: list[SimpleNamespace], *rest: object, **kind: bool
+    ) -> tuple[list[Member], list[float]]:
+        return ([free] if entries else []), []
+
+    monkeypatch.setattr(verdict, "_patterns", patterns)
+    problem = SimpleNamespace(rows=ROWS)
+    entries = [SimpleNamespace(hypothesis=pattern)]
+    assert verdict._holds(problem, 2, [drift], entries, [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
