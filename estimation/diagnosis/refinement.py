@@ -137,14 +137,14 @@ def refine(
             _zoom(lambda value, k=k: evaluate((*at[:k], value, *at[k + 1 :])), at[k], step, bounds[k], looks)  # type: ignore[misc]
             at[:] = best[0].shape
         if len(steps) < len(free):
-            climb(
-                along,
-                tuple(at[k] for k in free),
-                tuple(bounds[k] for k in free),
-                [scales[k] for k in free],
-                effort,
-                [AGAIN * steps[k] if k in steps else None for k in free],
-            )
+            first = [AGAIN * steps[k] if k in steps else None for k in free]
+            limits, kinds = tuple(bounds[k] for k in free), [scales[k] for k in free]
+            climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)
+            summit = best[0]
+            others = hypothesis.effect.elsewhere(situation, hypothesis.joint, summit.shape, summit.coefficients)
+            for other in others:
+                at[:] = other
+                climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)
         refined = best[0]
         for known in hypothesis.effect.likely(situation, hypothesis.joint, refined.shape, refined.coefficients):
             shape = tuple(own if value is None else value for value, own in zip(known, refined.shape, strict=True))

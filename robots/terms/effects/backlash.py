@@ -87,11 +87,26 @@ class Backlash(Effect):
         # All but what was refined itself: each of the three as it should be, or not.
         return tuple((g, s, z) for z in (0.0, None) for s in (SLOWEST, None) for g in (gap, None))[:-1]
 
+    def elsewhere(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float, ...], ...]:
+        """Gives the gap that the size tells, crossed in as long as now: by the motor's time instead of free flight.
+
+        Free flight in the time that was seen asks for a smaller gap, and goes astray where loads change more slowly.
+        """
+        assert joint is not None
+        gap = float(np.clip(2.0 * coefficients[0], self.shapes[0].lower, self.shapes[0].upper))
+        _, _, quickness = _crossings(situation, joint, shape[2])
+        if gap <= shape[0] or not len(quickness):
+            return ()
+        now = float(np.median(_durations(situation, shape, quickness)))
+        return ((gap, max(now, self.shapes[1].lower), shape[2]),)
+
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per half play of one."""
         assert joint is not None
         times, ways, quickness = _crossings(situation, joint, shape[2])
-        durations = np.clip((6.0 * shape[0] / quickness) ** (1 / 3), max(QUICKEST, situation.period), shape[1])
+        durations = _durations(situation, shape, quickness)
         side, rate, curve = (np.zeros(len(situation)) for _ in range(3))
         load = situation.load[:, joint - 1] - shape[2]
         for run in situation.runs:
@@ -127,6 +142,11 @@ class Backlash(Effect):
         """Gives the gear's load."""
         assert joint is not None
         return f"load of joint {joint} [N m]", situation.load[:, joint - 1]
+
+
+def _durations(situation: Situation, shape: tuple[float, ...], quickness: Array) -> Array:
+    """Gives the times [s] that crossings take: of free flight, or the longest."""
+    return np.clip((6.0 * shape[0] / quickness) ** (1 / 3), max(QUICKEST, situation.period), shape[1])
 
 
 def _size(situation: Situation, joint: int) -> float:

@@ -164,6 +164,12 @@ class Effect(ABC):
         """
         return ()
 
+    def elsewhere(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float, ...], ...]:
+        """Lists shapes on other summits than a refined one's, which a search from there does not reach."""
+        return ()
+
     def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists shapes that a log may not tell apart though other motions do; the likeliest is taken of those."""
         return ()

@@ -8,13 +8,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from estimation.diagnosis import selection
+from estimation.diagnosis import refinement, selection
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Group
 from estimation.diagnosis.refinement import RARE, Member, agreed_gain
 from estimation.diagnosis.scan import Outcome
 from estimation.diagnosis.selection import _beyond, contenders
-from robots.terms.effects import EFFECTS
+from robots.terms.effects import EFFECTS, Shape
+from robots.terms.effects.stribeck import Stribeck
 
 ROWS, ACTING = 5000, 40
 GAIN, DEGREES = 300.0, 3
@@ -178,3 +179,40 @@ def test_what_all_joints_share_is_told_by_those_without_a_stronger_effect(
     situation = SimpleNamespace(runs=(slice(0, ROWS),), robot=None)
     problem = SimpleNamespace(situation=situation, recording=SimpleNamespace(tau=column), rows=ROWS)
     assert _beyond(problem, delay, [ripple]) is counts  # type: ignore[arg-type]
+
+
+class _Summits(Stribeck):
+    """One shape parameter, and what its search is told of other summits."""
+
+    shapes = (Shape("place", "rad", 1e-4, 1.0, "log", (0.08,)),)
+
+    def __init__(self, far: bool) -> None:
+        self.far = far
+
+    def likely(self, *_: object) -> tuple[tuple[float | None, ...], ...]:
+        return ()
+
+    def elsewhere(self, *_: object) -> tuple[tuple[float, ...], ...]:
+        return ((0.0013,),) if self.far else ()
+
+
+@pytest.mark.parametrize(("far", "expected"), [(False, 0.1), (True, 0.001)])
+def test_a_search_starts_again_from_other_summits(far: bool, expected: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Gains of 50 and 80 on summits a hundred times apart, a third of a decade wide each."""
+
+    def score(problem: object, shape: tuple[float, ...], accepted: object) -> SimpleNamespace:
+        at = float(np.log10(shape[0]))
+        gain = 50 * np.exp(-0.5 * ((at + 1) / 0.3) ** 2) + 80 * np.exp(-0.5 * ((at + 3) / 0.3) ** 2)
+        return SimpleNamespace(bounded=lambda *_: (float(gain), np.ones(1)), degrees=1, visible=1.0)
+
+    monkeypatch.setattr(refinement, "score", score)
+    monkeypatch.setattr(Hypothesis, "coefficient_bounds", lambda *_: ((-np.inf, np.inf),))
+    group = replace(_member("stribeck", 1, (np.ones((ROWS, 1)),)).group)
+
+    class _Shape(tuple):  # type: ignore[type-arg]
+        joints = group.joints
+
+    problem = SimpleNamespace(situation=SimpleNamespace(robot=None), rows=ROWS, measured=lambda _, shape: _Shape(shape))
+    effect = _Summits(far)
+    member = refinement.refine(problem, Hypothesis(effect, 1), (0.08,), None)  # type: ignore[arg-type]
+    assert member.shape[0] == pytest.approx(expected, rel=0.05)

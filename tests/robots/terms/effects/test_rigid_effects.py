@@ -264,6 +264,23 @@ def test_size_and_time_of_a_crossing_tell_one_play(seen):
     assert EFFECTS["joint_elasticity"].ranges(robot, 1, (10.0,)) == tuple((c.lower, c.upper) for c in described)
 
 
+def test_a_gap_too_large_for_its_time_may_be_crossed_with_the_motor(seen):
+    """Free flight in a time asks for a gap; where the torque tells a larger one, the motor may set the time."""
+    now = seen(5, seed=1)
+    effect, small, large = EFFECTS["backlash"], 1e-5, 4e-4
+    turns = [np.count_nonzero(np.diff(np.sign(now.load[:, joint - 1]))) for joint in range(1, 6)]
+    joint = 1 + int(np.argmax(turns))
+    ((gap, longest, zero),) = effect.elsewhere(now, joint, (small, 0.1, 0.0), np.array([large / 2]))
+    assert (gap, zero) == (pytest.approx(large), 0.0)
+    load = now.load[:, joint - 1]
+    i = np.flatnonzero((load[:-1] * load[1:] < 0) & (np.abs(np.diff(load)) > 1e-4 * np.abs(load).max()))
+    inertia = now.sensitivity("inertia")[i, joint - 1, joint - 1]
+    flights = (6 * small * inertia / (np.abs(load[i + 1] - load[i]) / 0.004)) ** (1 / 3)
+    assert longest == pytest.approx(float(np.clip(np.median(flights), 0.01, 0.1)), rel=1e-3)
+    # A gap that flight alone explains has no other summit.
+    assert effect.elsewhere(now, joint, (large, 0.1, 0.0), np.array([small / 2])) == ()
+
+
 def test_size_of_an_effect_tells_its_time(seen):
     """What follows from a coefficient is offered: the gap that is crossed, a delay's own reversals, a resonance."""
     now = seen(5, seed=1)
