@@ -23,6 +23,7 @@ from benchmarks.diagnosis_parts.statistics import (
     parameter_errors,
     share,
     spurious,
+    within_limits,
 )
 
 
@@ -44,6 +45,7 @@ def figures(rows: Sequence[Row]) -> str:
         share("detected at 1 % visible", one, detected, ""),
         share("first name right at 1 % visible", one, named_right, "95 %"),
         share("  nothing false named beside it", one, lambda row: not spurious(row), ""),
+        share("detected, of those above the limit that is stated", filter(within_limits, half + one), detected, "95 %"),
         share("two effects at 3 %: both named", of["two"], both, "95 %"),
         share("  a spurious one", of["two"], spurious, "2 % or less"),
         share(

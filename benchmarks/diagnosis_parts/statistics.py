@@ -86,6 +86,12 @@ def spurious(row: Row) -> bool:
     return any(_pair(finding) not in true and finding["effect"] != "unexplained" for finding in row["findings"])
 
 
+def within_limits(row: Row) -> bool:
+    """Whether the one hidden effect is as large as the smallest that its own report says it would have shown."""
+    stated = [limit["detectable"] for limit in row.get("limits") or () if _pair(limit) == _pair(row["truth"][0])]
+    return any(size is not None and row["truth"][0]["visible"] >= size for size in stated)
+
+
 def gain_ratios(rows: Iterable[Row]) -> np.ndarray:
     """Gain over the gain of the true effects' own model, where that is more than noise and the effect lasts.
 

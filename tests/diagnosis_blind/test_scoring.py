@@ -7,7 +7,15 @@ from typing import Any
 import pytest
 
 from benchmarks.diagnosis_parts.figures import figures
-from benchmarks.diagnosis_parts.statistics import both, detected, first_is_right, gain_ratios, interval, spurious
+from benchmarks.diagnosis_parts.statistics import (
+    both,
+    detected,
+    first_is_right,
+    gain_ratios,
+    interval,
+    spurious,
+    within_limits,
+)
 from benchmarks.diagnosis_parts.strata import STRATA, TUNING, tasks
 from tests.diagnosis_blind.judging import Truth, complaints
 from tests.truth.effects.friction import FrictionStep, Stribeck
@@ -63,6 +71,21 @@ def test_a_worse_base_model_keeps_its_gain_and_makes_none(before: float, after: 
     """An error with and without the effect is no part of the gain, and a base model's own that goes is no gain."""
     seen = row([("stribeck", 2)], [("stribeck", 2)], **AFTER | {"before": before, "after_extension": after})
     assert gain_ratios([seen]) == pytest.approx([ratio])
+
+
+def test_what_is_below_the_stated_limit_is_no_miss_of_it() -> None:
+    """An effect of 1 % is held to a limit that its report states for its own joint, where that is 1 % or less."""
+
+    def stated(size: float | None, joint: int = 2) -> dict[str, Any]:
+        return row([], [("stribeck", 2)], limits=[{"effect": "stribeck", "joint": joint, "detectable": size}])
+
+    assert within_limits(stated(0.008))
+    assert not within_limits(stated(0.012))
+    assert not within_limits(stated(None))
+    assert not within_limits(stated(0.008, joint=3))
+    seen = row([("stribeck", 2)], [("stribeck", 2)], limits=stated(0.008)["limits"], before=4e-3, **AFTER)
+    text = figures([seen, stated(0.008), stated(0.012)])
+    assert "1 of 2" in next(line for line in text.splitlines() if "limit that is stated" in line)
 
 
 def test_benchmark_seeds_are_not_the_tuners() -> None:
