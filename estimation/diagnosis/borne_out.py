@@ -98,18 +98,24 @@ def _instead(
     held_out: bool,
     forms: Callable[[Sequence[Member], int], Sequence[Member]],
 ) -> tuple[Found, Measured] | None:
-    """Finds another form or the closest rival of a name that unseen data bear out, and what all bring with it."""
+    """Finds another form or the closest rival of a name that unseen data bear out, and what all bring with it.
+
+    Where none is, the same cause may stay in a form that the log does not tell from the first and that does no harm.
+    """
+    harmless: list[tuple[Found, Measured]] = []
     for form in forms(members, place):
         seen = measure([*members[:place], form, *members[place + 1 :]])
-        if not _harms(seen, place, form, held_out) and seen.gains[place].ci95[0] > 0:
-            return Found(form, found.p_value, found.rivals), seen
+        if not _harms(seen, place, form, held_out):
+            harmless.append((Found(form, found.p_value, found.rivals), seen))
+            if seen.gains[place].ci95[0] > 0:
+                return harmless[-1]
     close = [(rival, worse) for rival, worse in found.rivals if worse < CLOSE]
     for k, (rival, worse) in enumerate(close):
         seen = measure([*members[:place], rival, *members[place + 1 :]])
         if not _harms(seen, place, rival, held_out) and seen.gains[place].ci95[0] > 0:
             rest = tuple((other, more - worse) for other, more in close[k + 1 :])
             return Found(rival, found.p_value, rest), seen
-    return None
+    return harmless[0] if harmless else None
 
 
 def _harms(seen: Measured, i: int, member: Member, held_out: bool) -> bool:

@@ -18,3 +18,7 @@ class HeatEffect(JointEffect):
         duration = float(situation.t[-1] - situation.t[0])
         values = [value for value in self.shapes[0].grid if value <= 3.0 * duration]
         return tuple((value,) for value in values) or ((self.shapes[0].grid[0],),)
+
+    def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists time constants: a log that is short beside them fits each as well, but what a pause leaves differs."""
+        return self.grid(situation, joint)

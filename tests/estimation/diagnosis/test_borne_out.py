@@ -118,6 +118,18 @@ def test_another_form_of_a_cause_goes_before_a_rival() -> None:
     assert _borne(bench, Found(SPRING, 1e-9, (rival,)), forms=levers).members[0] is PRESLIDING
 
 
+def test_a_form_that_does_no_harm_goes_after_a_rival_that_helps() -> None:
+    """Heat of another time constant that neither helps nor harms keeps a name that would be lost, no rival's place."""
+    rival, levers = (PRESLIDING, 2.0), [replace(SPRING, shape=(0.35, centre)) for centre in (0.0, 1.0)]
+    bench = _bench(spring=HARMS, presliding_hysteresis=HARMS)
+    bench.shows |= {_label(levers[0]): HARMS, _label(levers[1]): IDLE}
+    result = _borne(bench, Found(SPRING, 1e-9, (rival,)), forms=levers)
+    assert result.members == (levers[1],)
+    assert result.notes == ()
+    bench.shows[_label(PRESLIDING)] = HELPS
+    assert _borne(bench, Found(SPRING, 1e-9, (rival,)), forms=levers).members == (PRESLIDING,)
+
+
 def test_what_helps_stays_as_it_was_found() -> None:
     """Names and free functions that unseen data bear out, or do not speak against, are kept in order."""
     founds = (Found(SPRING, 1e-9, ((TILT, 3.0),)), Found(STRIBECK, 1e-5, ()))
