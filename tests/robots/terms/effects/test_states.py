@@ -173,7 +173,7 @@ def test_the_documentation_lists_every_effect():
 
 @pytest.mark.parametrize("name", ["thermal_friction", "torque_constant_heat", "load_heat"])
 def test_heat_has_forms_of_all_time_constants_that_a_log_may_show(seen, name):
-    """Two minutes and a half tell time constants up to three times that: of those, and no others, unseen data may choose."""
+    """Two minutes and a half tell time constants up to three times that: unseen data may choose of those."""
     now, effect = seen(2, times=0.1 * np.arange(1501)), EFFECTS[name]
     told = [value for (value,) in effect.forms(now, 2)]
     assert told == [value for value in effect.shapes[0].grid if value <= 450.0]
