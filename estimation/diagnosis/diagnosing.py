@@ -9,14 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.baseline import base_parameters, build_baseline, inertia_of
+from estimation.diagnosis.baseline import Baseline, base_parameters, build_baseline, inertia_of
 from estimation.diagnosis.carried import lightened
 from estimation.diagnosis.diagnosis import Diagnosis
 from estimation.diagnosis.excess import residual_shares
 from estimation.diagnosis.hopeless_logs import hopeless_logs
 from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.limits import find_limits
-from estimation.diagnosis.noise import estimate_whitening
+from estimation.diagnosis.noise import estimate_whitening, quiet_joints
 from estimation.diagnosis.patterns import all_patterns
 from estimation.diagnosis.posing import fit_values, pose
 from estimation.diagnosis.problem import Problem
@@ -175,10 +175,12 @@ def _search(
 ) -> Search:
     """Searches the catalogue; once more where what was found had been taken for noise."""
     hypotheses = all_hypotheses(base.model.robot, effects)
-    baseline = build_baseline(base, recording)
+    baseline, settled = _plain(base, recording)
+    # Rows at reversals count where neither direction nor acceleration is in doubt: the second takes a model to say.
+    quiet = quiet_joints(recording, settled.residual, inertia_of(baseline, recording, settled.values))
+    recording = recording.trusting(quiet)
+    baseline, settled = _plain(base, recording)
     tau = recording.tau
-    values = fit_values(baseline, tau.std(axis=0) + 1e-12, recording.unsure, tau, pull_of(baseline, recording))
-    settled = Settled(tau - baseline.regressor @ values, values)
     search: Search | None = None
     blurred = False
     for attempt in range(2):
@@ -215,6 +217,13 @@ def _search(
         blurred = any(found.member.hypothesis.effect.blurs for found in search.selection.found)
     assert search is not None
     return search
+
+
+def _plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Settled]:
+    """Fits the base model alone."""
+    baseline, tau = build_baseline(base, recording), recording.tau
+    values = fit_values(baseline, tau.std(axis=0) + 1e-12, recording.unsure, tau, pull_of(baseline, recording))
+    return baseline, Settled(tau - baseline.regressor @ values, values)
 
 
 def _searched(

@@ -151,6 +151,8 @@ def planned_problem(
         cycles=(None,) * len(motions),
         cutoff=0.5 / step,
         unsure=np.zeros(joined.q.shape, dtype=bool),
+        clear=np.zeros(joined.q.shape, dtype=bool),
+        jolts=np.zeros(joined.q.shape[1]),
         floor=np.zeros(joined.q.shape[1]),
         names=tuple(f"motion {i}" for i in range(1, len(motions) + 1)),
     )

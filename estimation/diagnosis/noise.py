@@ -37,6 +37,8 @@ QUIETEST = 1e-3
 LOWEST_ORDER = 4
 # White rows beyond so many standard deviations weigh as if they were there (Huber): kicks that no filter undoes.
 HUBER = 3.5
+# Kicks of which no more than this share of the noise is unknown drown in it: at each reversal they differ.
+DROWNED = 1.0
 # But not where rows stick out for so long [s] together and no reversal is nearer than this [s].
 TOGETHER, KICKED = 0.05, 0.15
 
@@ -207,6 +209,18 @@ def _covariance(power: Array, size: int, step: float, count: float, window: tupl
             a, variance = levinson(covariance(), count)
             power[~known] = variance / np.abs(1.0 - lags[:, : len(a)] @ a) ** 2
     return covariance()
+
+
+def quiet_joints(recording: Recording, residual: Array, inertia: Array) -> NDArray[np.bool_]:
+    """Tells of which joints (n,) the kicks at reversals, as far as their accelerations are not known, drown in noise.
+
+    Args:
+        recording: the data.
+        residual: torque less model (N, n) [N m or N].
+        inertia: torque on each joint per acceleration of each (n, n) [kg m2].
+    """
+    noise = np.sqrt(_density([residual[run] for run in recording.runs], recording.step) / (2 * recording.step))
+    return np.asarray(np.diag(inertia) * recording.jolts < DROWNED * noise)
 
 
 def _density(pieces: Sequence[Array], step: float) -> Array:

@@ -29,9 +29,12 @@ class Recording:
         cutoff: lowest frequency [Hz] above which positions are taken for noise.
         floor: power density of each joint's position noise (n,) [rad^2/Hz].
         unsure: rows (N, n) in which the direction of motion is not known: friction may have either sign there.
+        clear: those of them (N, n) in which the velocity tells the direction, if kicks at reversals do not show.
+        jolts: error of each joint's acceleration (n,) beside its reversals [rad/s2 or m/s2].
         names: of the logs.
         payloads: per log a known body at the flange (10,), in its frame; empty where no log has one.
         fields: per log gravity (3,) in the base frame [m/s2], None as the robot is described; empty where all are so.
+        trusted: joints (n,) whose clear rows count, and are `unsure` no more; None before that is known.
     """
 
     t: Array
@@ -45,9 +48,12 @@ class Recording:
     cutoff: float
     floor: Array
     unsure: NDArray[np.bool_]
+    clear: NDArray[np.bool_]
+    jolts: Array
     names: tuple[str, ...]
     payloads: tuple[Array, ...] = ()
     fields: tuple[Array | None, ...] = ()
+    trusted: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.t)
@@ -82,6 +88,12 @@ class Recording:
         """Whether every log repeats its motion."""
         return all(cycle is not None for cycle in self.cycles)
 
+    def trusting(self, joints: NDArray[np.bool_] | None) -> Recording:
+        """Lets the clear rows of some joints (n,) count too."""
+        if joints is None:
+            return self
+        return replace(self, unsure=self.unsure & ~(self.clear & joints), trusted=joints)
+
 
 def cut(whole: Recording, rows: slice) -> Recording:
     """Takes rows of a recording, and the logs that begin in them."""
@@ -97,6 +109,7 @@ def cut(whole: Recording, rows: slice) -> Recording:
         ddq=whole.ddq[rows],
         tau=whole.tau[rows],
         unsure=whole.unsure[rows],
+        clear=whole.clear[rows],
         cycles=(None,) * len(begins),
         names=whole.names[logs],
         payloads=whole.payloads[logs],
@@ -119,6 +132,7 @@ def following(first: Recording, second: Recording) -> Recording:
         ddq=both("ddq"),
         tau=both("tau"),
         unsure=both("unsure").astype(bool),
+        clear=both("clear").astype(bool),
         starts=starts,
         cycles=(*first.cycles, *second.cycles),
         names=(*first.names, *second.names),

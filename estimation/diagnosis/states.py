@@ -8,14 +8,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.ndimage import maximum_filter1d
 from scipy.signal import butter, sosfiltfilt, welch
 
 from estimation.diagnosis.believable import believable_cutoff
+from estimation.diagnosis.directions import ALIKE, Directions, directions
 from estimation.diagnosis.periods import Cycle, find_cycle, project
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.smoothed_motion import smoothed
-from estimation.preparation import SLOW, Prepared, prepare
+from estimation.preparation import Prepared, prepare
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log
@@ -37,19 +37,8 @@ DECAY, RINGING, MOST_LOST = 0.82, (4.0, 8.0), 0.02
 SHORTEST = 5.0  # [s] of log below which nothing can be told
 # Spectra are taken of this difference of the positions: the slow motion would leak over all of the band otherwise.
 DIFFERENCE = 3
-# Below so many standard errors of its velocity a joint's direction is not known.
-SURE = 4.0
-KICK = 0.3
-# Rows to either side of a reversal that count for nothing: those that a kick spreads to, in this share of a period of
-# the cut-off, so many at most. A kick below this share of the RMS acceleration is none.
-BESIDE, SPREAD, NO_KICK = 3, 0.25, 0.02
-# The largest jump, over the root mean square of all.
-LARGER = 3.0
 # A mean over repetitions is taken where it knows frequencies higher by this factor than a single pass.
 SHARPER = 1.2
-ALIKE = 0.02  # Share of a period within which two instants are one
-# A joint slower than this share of its RMS speed for so long [s] creeps: its friction may have any value.
-CREEP, CREEPING = 0.03, 0.15
 # At the ends of a log, rows in which all joints are slower than this share are left out, up to so long [s].
 SETTLED, ENDS = 0.15, 2.0
 
@@ -102,7 +91,9 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
         cycles=tuple(part[5] for part in parts),
         cutoff=min(part[6] for part in parts),
         floor=np.max([part[8] for part in parts], axis=0),
-        unsure=np.concatenate([part[7] for part in parts]),
+        unsure=np.concatenate([part[7].unsure for part in parts]),
+        clear=np.concatenate([part[7].clear for part in parts]),
+        jolts=np.max([part[7].jolts for part in parts], axis=0),
         names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
         payloads=_payloads(prepared),
         fields=_fields(prepared),
@@ -129,8 +120,8 @@ def _step(prepared: Sequence[Prepared]) -> float:
 
 def _part(
     log: Prepared, step: float, cap: float
-) -> tuple[Array, Array, Array, Array, Array, Cycle | None, float, NDArray[np.bool_], Array]:
-    """One log: t, q, dq, ddq, tau on the working grid, its cycle there, the lowest cut-off, unsure rows, noise.
+) -> tuple[Array, Array, Array, Array, Array, Cycle | None, float, Directions, Array]:
+    """One log: t, q, dq, ddq, tau on the working grid, its cycle there, the lowest cut-off, its directions, noise.
 
     Above `cap` [Hz], what the positions have is noise, whatever its power.
     """
@@ -173,10 +164,10 @@ def _part(
     ends = [float(np.interp(cutoff, f, density)) for cutoff, (f, density, _) in zip(cutoffs, spectra, strict=True)]
     beside = log.log.t[np.clip(np.searchsorted(log.log.t, t), 1, len(log.log.t) - 1) + np.array([[-1], [0]])]
     sampled = abs(step - period) < 1e-9 and bool(np.abs(beside - t).min(axis=0).max() < ALIKE * period)
-    unsure = _unsure(states[1], states[2], cutoffs, floor, np.maximum(ends, floor), step, sampled)
+    turns = directions(states[1], states[2], cutoffs, floor, np.maximum(ends, floor), step, sampled)
     cut = slice(None) if moved is not None else _moving(states[1], step)
     q, dq, ddq = (array[cut] for array in states)
-    return t[cut], q, dq, ddq, tau[cut], moved, float(cutoffs.min()), unsure[cut], floor
+    return t[cut], q, dq, ddq, tau[cut], moved, float(cutoffs.min()), turns.rows(cut), floor
 
 
 def _ringing(ddq: Array, cutoffs: Array, floor: Array) -> float:
@@ -252,46 +243,4 @@ def _moving(dq: Array, step: float) -> slice:
     return slice(min(int(active[0]), most), max(int(active[-1]) + 1, len(dq) - most))
 
 
-def _unsure(
-    dq: Array, ddq: Array, cutoffs: Array, floor: Array, ends: Array, step: float, sampled: bool
-) -> NDArray[np.bool_]:
-    """Flags the rows (N, n) in which a joint's direction is not known.
-
-    Friction that turns round kicks the joint: its acceleration jumps, and a velocity known up to a frequency f only is
-    wrong beside a jump J by some J / (2 pi f) times `KICK`. Jumps at a rate r give the position a power density of
-    2 r J^2 / (2 pi f)^6, so that the density at f (`ends`) bounds them. Encoder noise adds to that. The rows beside a
-    reversal are flagged in any case, for a sharp sign turns round between samples; `BESIDE` of them where torque was
-    not `sampled` at these rows, or where the acceleration of a kick is known no better than that.
-    """
-    rows = len(dq)
-    flags = np.zeros(dq.shape, dtype=bool)
-    for j, cutoff in enumerate(np.maximum(cutoffs, 1e-3)):
-        reach = max(1, round(0.5 / cutoff / step))
-        jump = np.zeros(rows)
-        if rows > 2 * reach:
-            jump[reach:-reach] = np.abs(ddq[2 * reach :, j] - ddq[: -2 * reach, j])
-        rate = max(float(np.sum(dq[1:, j] * dq[:-1, j] < 0)), 1.0) / (rows * step)
-        largest = float(LARGER * np.sqrt(ends[j] / (2 * rate)) * (2 * np.pi * cutoff) ** 3)
-        jump = np.minimum(jump, largest)
-        error = KICK * maximum_filter1d(jump, 2 * reach + 1) / (2 * np.pi * cutoff)
-        error = np.hypot(error, 2 * np.pi * np.sqrt(floor[j] * cutoff**3 / 3))
-        turned = np.concatenate([dq[1:, j] * dq[:-1, j] < 0, [False]])
-        kicked = largest > NO_KICK * float(np.sqrt(np.mean(ddq[:, j] ** 2)))
-        beside = int(np.clip(np.ceil(SPREAD / (cutoff * step)) if kicked else 1, 1, BESIDE)) if sampled else BESIDE
-        near = maximum_filter1d(turned.astype(np.int8), 2 * beside, origin=0) > 0
-        speed = float(np.sqrt(np.mean(dq[:, j] ** 2)))
-        flags[:, j] = (np.abs(dq[:, j]) < np.maximum(SURE * error, SLOW * speed)) | near
-        creeping = np.abs(dq[:, j]) < CREEP * speed
-        for start, stop in spans(creeping):
-            if (stop - start) * step > CREEPING:
-                flags[start:stop, j] = True
-    return flags
-
-
-def spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Lists the stretches [start, stop) of rows (N,) that are flagged."""
-    edges = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
-__all__ = ["Recording", "record", "spans"]
+__all__ = ["Recording", "record"]

@@ -243,6 +243,7 @@ def _on_logs(
 ) -> tuple[Unseen, Situation, Recording, int, list[Array]]:
     recording = problem.recording
     other = lightened(robot, record(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN))
+    other = other.trusting(recording.trusted)
     # One clock: where the unseen logs come later, the heat of the ones before is still there.
     later = bool(other.t[0] > recording.t[-1])
     whole = following(recording, other) if later else other

@@ -22,7 +22,7 @@ from robots.signals import Log
 from tests.diagnosis_blind.judging import Truth, complaints
 from tests.truth.cases import Case, draw_case, write_log
 from tests.truth.description import write_description
-from tests.truth.effects import friction, strangers, surroundings, transmission
+from tests.truth.effects import actuator, friction, strangers, surroundings, transmission
 from tests.truth.effects.base import Effect
 
 
@@ -63,6 +63,8 @@ SINGLE = (
     # Much of what Stribeck friction does is beside reversals, where a log does not tell the velocity well.
     Hide(seed=7001, effects=(friction.Stribeck,), joint=2, ratio=0.6),
     Hide(seed=7002, effects=(friction.FrictionStep,), joint=3, periodic=False),
+    # 0.43 ms: all of it is in the rows beside reversals, whose direction encoders of the motors tell.
+    Hide(seed=7054, effects=(actuator.Delay,), size=0.01, kind="panda", ratio=0.6),
 )
 PAIRS = (Hide(seed=7011, effects=(friction.PositionDependent, surroundings.Payload), joint=1),)
 STRANGE = (Hide(seed=7021, effects=(strangers.CrossWave,), joint=2, size=0.05),)

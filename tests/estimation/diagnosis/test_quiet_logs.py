@@ -69,6 +69,8 @@ def test_logs_have_levels_of_their_own():
         cutoff=50.0,
         floor=np.full(2, 1e-20),
         unsure=zero.astype(bool),
+        clear=zero.astype(bool),
+        jolts=np.zeros(2),
         names=("one", "two"),
     )
     whitening = estimate_whitening(recording, residual, 0, np.eye(2))

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from estimation.diagnosis.band import Band
 from estimation.diagnosis.excess import period_differences, period_mean
 from estimation.diagnosis.gaps import find_gaps
-from estimation.diagnosis.noise import estimate_whitening
+from estimation.diagnosis.noise import estimate_whitening, quiet_joints
 from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.states import Recording
 from estimation.diagnosis.whitening import Whitening
@@ -34,6 +34,8 @@ def _recording(rows: int = 10_000, n: int = 2, unsure: np.ndarray | None = None)
         cutoff=50.0,
         floor=np.full(n, 1e-20),
         unsure=np.zeros((rows, n), dtype=bool) if unsure is None else unsure,
+        clear=np.zeros((rows, n), dtype=bool),
+        jolts=np.zeros(n),
         names=("log",),
     )
 
@@ -217,3 +219,13 @@ def test_a_push_counts_and_a_kick_at_a_reversal_does_not() -> None:
     pushed, kicked = (whitening.weights[(at + 8) // stride : (at + 34) // stride] for at in (5_000, 12_008))
     assert np.mean(pushed == 1.0) > 0.8
     assert np.mean(kicked < 0.9) > 0.5
+
+
+def test_kicks_drown_where_their_torque_is_below_the_noise() -> None:
+    """Torque per acceleration times the accelerations' error, over a sample's noise: 0.9 drowns, 1.1 does not."""
+    residual = np.random.default_rng(0).standard_normal((10_000, 2)) * [3.0, 0.5]
+    slow = 100.0 * np.sin(0.5 * STEP * np.arange(10_000))[:, None]
+    recording = replace(_recording(), jolts=np.array([0.9 * 3.0 / 20.0, 1.1 * 0.5 / 2.0]))
+    # 10 000 samples tell the noise to 1 %.
+    assert quiet_joints(recording, residual + slow, np.diag([20.0, 2.0])).tolist() == [True, False]
+    assert quiet_joints(recording, 2.0 * residual + slow, np.diag([20.0, 2.0])).tolist() == [True, True]

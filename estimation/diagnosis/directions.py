@@ -1,0 +1,113 @@
+"""Rows of a log in which the direction of a joint's motion is not known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+
+from estimation.preparation import SLOW
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# Below so many standard errors of its velocity a joint's direction is not known.
+SURE = 4.0
+# A sign that is smooth over some velocity is wrong by 0.45 e / v at most, where the velocity v is wrong by e: whatever
+# its width, by less than what friction's share of noise hides from so many standard errors on.
+CLEAR = 12.0
+# Two clocks are one within this share of a sample period.
+ALIKE = 0.02
+# Of a jump J of acceleration, a velocity known up to a frequency f is wrong by this times J / (2 pi f).
+KICK = 0.3
+# Rows to either side of a reversal that count for nothing: those that a kick spreads to, in this share of a period of
+# the cut-off, so many at most. A kick below this share of the RMS acceleration is none.
+BESIDE, SPREAD, NO_KICK = 3, 0.25, 0.02
+# The largest jump, over the root mean square of all.
+LARGER = 3.0
+# A joint slower than this share of its RMS speed for so long [s] creeps: its friction may have any value.
+CREEP, CREEPING = 0.03, 0.15
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """What is known of the directions of a log's joints.
+
+    Attributes:
+        unsure: rows (N, n) in which a joint's direction is not known, or not to be relied on beside its reversals.
+        clear: those of them (N, n) in which the velocity tells it.
+        jolts: error of the accelerations (n,) beside reversals [rad/s2 or m/s2].
+    """
+
+    unsure: Flags
+    clear: Flags
+    jolts: Array
+
+    def rows(self, kept: slice) -> Directions:
+        """Gives what is known of some rows."""
+        return Directions(self.unsure[kept], self.clear[kept], self.jolts)
+
+
+def directions(
+    dq: Array, ddq: Array, cutoffs: Array, floor: Array, ends: Array, step: float, sampled: bool
+) -> Directions:
+    """Tells in which rows (N, n) of a log the direction of a joint's motion is known.
+
+    Rows beside a reversal are not relied on, for a sharp sign turns round between samples: as many as a kick spreads
+    to, and `BESIDE` of them where torque was not sampled at these rows. Clear are those where it was, and the velocity
+    changes from row to row by more than `CLEAR` errors and is itself as large: nearly all, with a fine encoder.
+
+    Args:
+        dq: velocities (N, n) [rad/s or m/s].
+        ddq: accelerations (N, n).
+        cutoffs: up to which they are known (n,) [Hz].
+        floor: power density (n,) of the encoders' noise.
+        ends: power density (n,) of the positions at the cut-offs.
+        step: sample period [s].
+        sampled: whether torque was measured at these rows, not between them.
+    """
+    unsure, clear, jolts = np.zeros(dq.shape, dtype=bool), np.zeros(dq.shape, dtype=bool), np.zeros(dq.shape[1])
+    for j, cutoff in enumerate(np.maximum(cutoffs, 1e-3)):
+        v, a = dq[:, j], ddq[:, j]
+        speed = float(np.sqrt(np.mean(v**2)))
+        turned = np.concatenate([v[1:] * v[:-1] < 0, [False]])
+        rate = max(float(turned.sum()), 1.0) / (len(v) * step)
+        largest = float(LARGER * np.sqrt(ends[j] / (2 * rate)) * (2 * np.pi * cutoff) ** 3)
+        error = _error(a, cutoff, floor[j], largest, step)
+        kicked = largest > NO_KICK * float(np.sqrt(np.mean(a**2)))
+        beside = int(np.clip(np.ceil(SPREAD / (cutoff * step)) if kicked else 1, 1, BESIDE)) if sampled else BESIDE
+        near = maximum_filter1d(turned.astype(np.int8), 2 * beside, origin=0) > 0
+        unsure[:, j] = (np.abs(v) < np.maximum(SURE * error, SLOW * speed)) | near
+        change = np.abs(a) * step
+        # A kick that does not stand out of the noise where it is looked for is still there; a joint at rest has none.
+        usual = float(np.sqrt(np.average(error**2, weights=np.where(turned, change, 0.0) + 1e-300)))
+        jolts[j] = 2 * np.pi * cutoff * usual
+        error = CLEAR * np.maximum(error, usual)
+        clear[:, j] = sampled & (error < change) & (np.abs(v) > np.maximum(error, ALIKE * change))
+        for start, stop in spans(np.abs(v) < CREEP * speed):
+            if (stop - start) * step > CREEPING:
+                unsure[start:stop, j], clear[start:stop, j] = True, False
+    return Directions(unsure, unsure & clear, jolts)
+
+
+def _error(ddq: Array, cutoff: float, floor: float, largest: float, step: float) -> Array:
+    """Gives the error of a joint's velocity (N,) that is known up to a frequency f only.
+
+    Friction that turns round kicks the joint: its acceleration (N,) jumps, and beside a jump J the velocity is wrong by
+    `KICK` J / (2 pi f). Jumps at a rate r give the position a power of 2 r J^2 / (2 pi f)^6 per hertz, so that what it
+    has at f bounds them: `largest`. Encoder noise of density `floor` adds to that.
+    """
+    reach = max(1, round(0.5 / cutoff / step))
+    jump = np.zeros(len(ddq))
+    if len(ddq) > 2 * reach:
+        jump[reach:-reach] = np.abs(ddq[2 * reach :] - ddq[: -2 * reach])
+    kick = KICK * maximum_filter1d(np.minimum(jump, largest), 2 * reach + 1) / (2 * np.pi * cutoff)
+    return np.hypot(kick, 2 * np.pi * np.sqrt(floor * cutoff**3 / 3))
+
+
+def spans(flags: Flags) -> list[tuple[int, int]]:
+    """Lists the stretches [start, stop) of rows (N,) that are flagged."""
+    edges = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
