@@ -82,6 +82,7 @@ def _parameters(rows: Sequence[Row]) -> list[str]:
     stated = [e for e in shapes + times if e["stated"]]
     return [
         share("change times within .2 s", times, lambda e: e["absolute"] <= CHANGE_TIME, "all"),
+        share("  within .2 s or told as less sure", times, lambda e: e["absolute"] <= CHANGE_TIME or e["marked"], ""),
         share("nonlinear parameters within 20 %, well determined", well, lambda e: e["relative"] <= NONLINEAR, "all"),
         share(
             "  within 20 % or marked as not determined", shapes, lambda e: e["relative"] <= NONLINEAR or e["marked"], ""

@@ -127,6 +127,7 @@ def parameter_errors(rows: Iterable[Row], wanted: dict[str, tuple[str, ...]]) ->
                         continue
                     low, high = match.get("ci95") or (None, None)
                     absolute = abs(float(match["value"]) - value)
+                    wide = 2 * CHANGE_TIME if name in TIMES else abs(value)
                     errors.append(
                         {
                             "key": row["key"],
@@ -138,7 +139,7 @@ def parameter_errors(rows: Iterable[Row], wanted: dict[str, tuple[str, ...]]) ->
                             "stated": low is not None and high is not None,
                             "inside": low is not None and high is not None and low <= value <= high,
                             # An open or wide interval is how a diagnosis marks what it cannot tell.
-                            "marked": low is None or high is None or (high - low) > abs(value),
+                            "marked": low is None or high is None or (high - low) > wide,
                         }
                     )
     return errors

@@ -8,11 +8,14 @@ import pytest
 
 from benchmarks.diagnosis_parts.figures import figures
 from benchmarks.diagnosis_parts.statistics import (
+    SHAPES,
+    TIMES,
     both,
     detected,
     first_is_right,
     gain_ratios,
     interval,
+    parameter_errors,
     spurious,
     within_limits,
 )
@@ -86,6 +89,29 @@ def test_what_is_below_the_stated_limit_is_no_miss_of_it() -> None:
     seen = row([("stribeck", 2)], [("stribeck", 2)], limits=stated(0.008)["limits"], before=4e-3, **AFTER)
     text = figures([seen, stated(0.008), stated(0.012)])
     assert "1 of 2" in next(line for line in text.splitlines() if "limit that is stated" in line)
+
+
+@pytest.mark.parametrize(
+    ("name", "true", "told", "ci95", "inside", "marked"),
+    [
+        ("change_time", 40.0, 40.3, [39.9, 40.7], True, True),
+        ("change_time", 40.0, 40.3, [40.15, 40.45], False, False),
+        ("stribeck_velocity", 0.1, 0.15, [0.07, 0.16], True, False),
+        ("stribeck_velocity", 0.1, 0.15, [0.02, 0.3], True, True),
+        ("stribeck_velocity", 0.1, 0.15, [None, None], False, True),
+    ],
+)
+def test_errors_of_parameters(
+    name: str, true: float, told: float, ci95: list[float | None], inside: bool, marked: bool
+) -> None:
+    """A moment is told as less sure by an interval of more than .2 s to either side, a shape by one of its own size."""
+    seen = row([("stribeck", 2)], [("stribeck", 2)])
+    seen["truth"][0]["parameters"] = {name: true}
+    seen["findings"][0]["parameters"] = [{"name": name, "value": told, "ci95": ci95}]
+    (error,) = parameter_errors([seen], TIMES | SHAPES)
+    assert error["absolute"] == pytest.approx(told - true)
+    assert error["relative"] == pytest.approx((told - true) / true)
+    assert (error["inside"], error["marked"]) == (inside, marked)
 
 
 def test_benchmark_seeds_are_not_the_tuners() -> None:
