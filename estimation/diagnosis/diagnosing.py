@@ -175,10 +175,7 @@ def _search(
 ) -> Search:
     """Searches the catalogue; once more where what was found had been taken for noise."""
     hypotheses = all_hypotheses(base.model.robot, effects)
-    baseline, settled = _plain(base, recording)
-    # Rows at reversals count where neither direction nor acceleration is in doubt: the second takes a model to say.
-    quiet = quiet_joints(recording, settled.residual, inertia_of(baseline, recording, settled.values))
-    recording = recording.trusting(quiet)
+    recording = _relied_on(base, recording)
     baseline, settled = _plain(base, recording)
     tau = recording.tau
     search: Search | None = None
@@ -217,6 +214,15 @@ def _search(
         blurred = any(found.member.hypothesis.effect.blurs for found in search.selection.found)
     assert search is not None
     return search
+
+
+def _relied_on(base: BaseParameters, recording: Recording) -> Recording:
+    """Lets rows at reversals count where neither direction nor acceleration is in doubt: a model tells the second."""
+    if not recording.clear.any():
+        return recording
+    baseline, settled = _plain(base, recording)
+    inertia = inertia_of(baseline, recording, settled.values)
+    return recording.trusting(quiet_joints(recording, settled.residual, inertia))
 
 
 def _plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Settled]:

@@ -37,10 +37,10 @@ QUIETEST = 1e-3
 LOWEST_ORDER = 4
 # White rows beyond so many standard deviations weigh as if they were there (Huber): kicks that no filter undoes.
 HUBER = 3.5
-# Kicks of which no more than this share of the noise is unknown drown in it: at each reversal they differ.
-DROWNED = 1.0
 # But not where rows stick out for so long [s] together and no reversal is nearer than this [s].
 TOGETHER, KICKED = 0.05, 0.15
+# What is not known of kicks drowns in the noise below this share of it: at each reversal it is different.
+DROWNED = 1.0
 
 
 def estimate_whitening(
