@@ -83,8 +83,16 @@ def judge(
         if len(strong) == len(kept):
             break
         kept = strong
-    if members:
-        return Judgement("unexplained", kept, tuple(members), tuple(p_values), float(share))
+    while members:
+        # A formula that reaches other joints may have been named for what is unexplained on them.
+        spread = [found for found in kept if len(found.member.group.joints) > 1]
+        borrowed = [f for f in spread if not _stays(problem, f, kept, patterns, false_alarm, rng)]
+        if not borrowed:
+            return Judgement("unexplained", kept, tuple(members), tuple(p_values), float(share))
+        weakest = min(borrowed, key=lambda found: found.member.gain)
+        kept = tuple(found for found in kept if found is not weakest)
+        beside = [found.member for found in kept]
+        members, p_values = _patterns(problem, patterns, beside, false_alarm, rng, alone=True)
     verdict = "none" if not kept else "ambiguous" if any(map(is_open, kept)) else "named"
     return Judgement(verdict, kept, (), (), float(share))
 
@@ -128,6 +136,21 @@ def _holds(
     beside = accept(problem, tuple(m.group for m in (*single, *free)))
     stays = all(score(problem, m.group, beside).gain > STAYS * m.gain for m in whole)
     return stays or _thriftier(problem, [*own, *whole], single, free)
+
+
+def _stays(
+    problem: Problem,
+    found: Found,
+    kept: Sequence[Found],
+    patterns: Sequence[Entry],
+    false_alarm: float,
+    rng: np.random.Generator,
+) -> bool:
+    """Whether a name keeps its gain beside free functions that were chosen without it."""
+    others = [other.member for other in kept if other is not found]
+    free, _ = _patterns(problem, patterns, others, false_alarm, rng, alone=True)
+    beside = accept(problem, tuple(m.group for m in (*others, *free)))
+    return score(problem, found.member.group, beside).gain > STAYS * found.member.gain
 
 
 def _thriftier(problem: Problem, names: Sequence[Member], others: Sequence[Member], free: Sequence[Member]) -> bool:

@@ -13,6 +13,7 @@ from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.patterns import Pattern
 from estimation.diagnosis.problem import Group
 from estimation.diagnosis.refinement import Member
+from estimation.diagnosis.selection import Found
 from robots.terms.effects import EFFECTS
 
 ROWS = 5000
@@ -82,3 +83,33 @@ def test_a_drift_is_a_free_function_of_time(
     problem = SimpleNamespace(rows=ROWS)
     entries = [SimpleNamespace(hypothesis=pattern)]
     assert verdict._holds(problem, 2, [drift], entries, [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("joints", "left", "kept"),
+    [
+        ((0, 1), 10.0, False),  # without it a free function on the other joint explains nearly all that it does
+        ((0, 1), 90.0, True),  # it explains something else
+        ((0,), 10.0, True),  # it does nothing on the other joint
+    ],
+)
+def test_a_formula_on_several_joints_is_not_named_for_what_is_unexplained_on_one(
+    joints: tuple[int, ...], left: float, kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An encoder's offset of a gain of 100 beside a pattern of 400 on joint 2."""
+    offset = _member("encoder_offset", 1, 100.0, 1)
+    offset = replace(offset, group=replace(offset.group, joints=joints))
+    free = replace(_member("spring", 2, 400.0, 15), hypothesis=Hypothesis(Pattern("angle"), 2))
+    gains = {id(offset.group): 100.0, id(free.group): 400.0}
+    monkeypatch.setattr(
+        verdict, "accept", lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups))
+    )
+    monkeypatch.setattr(verdict, "score", lambda problem, group, beside: SimpleNamespace(gain=left))
+    monkeypatch.setattr(verdict, "_patterns", lambda *arguments, **kind: ([free], [1e-30]))
+    monkeypatch.setattr(verdict, "_holds", lambda *arguments: True)
+    found = Found(offset, 1e-9, ())
+    selection = SimpleNamespace(found=(found,), accepted=SimpleNamespace(gain=100.0))
+    said = verdict.judge(SimpleNamespace(rows=ROWS), selection, [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
+    assert said.verdict == "unexplained"
+    assert said.patterns == (free,)
+    assert said.kept == ((found,) if kept else ())
