@@ -71,8 +71,8 @@ def judge(
     joints = {found.member.hypothesis.joint for found in kept} - {None}
     lost = {j for j in joints if not _holds(problem, j, named, patterns, left, false_alarm, rng)}
     # What acts on all joints at once goes before names of single joints that explain less than it does.
-    wide = max((_worth(m) for m in left if m.hypothesis.joint is None), default=0.0) if share < ENOUGH else 0.0
-    kept = tuple(f for f in kept if f.member.hypothesis.joint not in lost and f.member.gain > wide)
+    whole = max((_worth(m) for m in left if m.hypothesis.joint is None), default=0.0) if share < ENOUGH else 0.0
+    kept = tuple(f for f in kept if f.member.hypothesis.joint not in lost and f.member.gain > whole)
     members = left if share < ENOUGH else []
     while len(kept) < len(named):
         # Names that do not fit would only distort the patterns: those start anew, beside the names that hold.
@@ -84,8 +84,9 @@ def judge(
             break
         kept = strong
     while members:
-        # A formula that reaches other joints may have been named for what is unexplained on them.
-        spread = [found for found in kept if len(found.member.group.joints) > 1]
+        # A formula may have been named for what is unexplained on all joints, or on another one that it reaches.
+        wide = any(member.hypothesis.joint is None for member in members)
+        spread = [found for found in kept if wide or len(found.member.group.joints) > 1]
         borrowed = [f for f in spread if not _stays(problem, f, kept, patterns, false_alarm, rng)]
         if not borrowed:
             return Judgement("unexplained", kept, tuple(members), tuple(p_values), float(share))

@@ -86,21 +86,23 @@ def test_a_drift_is_a_free_function_of_time(
 
 
 @pytest.mark.parametrize(
-    ("joints", "left", "kept"),
+    ("joints", "where", "left", "kept"),
     [
-        ((0, 1), 10.0, False),  # without it a free function on the other joint explains nearly all that it does
-        ((0, 1), 90.0, True),  # it explains something else
-        ((0,), 10.0, True),  # it does nothing on the other joint
+        ((0, 1), 2, 10.0, False),  # without it a free function on the other joint explains nearly all that it does
+        ((0, 1), 2, 90.0, True),  # it explains something else
+        ((0,), 2, 10.0, True),  # it does nothing on the other joint
+        ((0,), None, 10.0, False),  # something swings, and moves all joints
+        ((0,), None, 90.0, True),
     ],
 )
-def test_a_formula_on_several_joints_is_not_named_for_what_is_unexplained_on_one(
-    joints: tuple[int, ...], left: float, kept: bool, monkeypatch: pytest.MonkeyPatch
+def test_a_formula_is_not_named_for_what_is_unexplained_on_joints_that_it_reaches(
+    joints: tuple[int, ...], where: int | None, left: float, kept: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An encoder's offset of a gain of 100 beside a pattern of 400 on joint 2."""
+    """An encoder's offset of a gain of 100 beside a pattern of 80 on joint 2, or on all."""
     offset = _member("encoder_offset", 1, 100.0, 1)
     offset = replace(offset, group=replace(offset.group, joints=joints))
-    free = replace(_member("spring", 2, 400.0, 15), hypothesis=Hypothesis(Pattern("angle"), 2))
-    gains = {id(offset.group): 100.0, id(free.group): 400.0}
+    free = replace(_member("spring", 2, 80.0, 15), hypothesis=Hypothesis(Pattern("angle"), where))
+    gains = {id(offset.group): 100.0, id(free.group): 80.0}
     monkeypatch.setattr(
         verdict, "accept", lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups))
     )
