@@ -27,6 +27,8 @@ KICK = 0.3
 BESIDE, SPREAD, NO_KICK = 3, 0.25, 0.02
 # The largest jump, over the root mean square of all.
 LARGER = 3.0
+# Up to such a frequency [Hz] a position loop undoes what kicks do to a joint, which has then most of it about there.
+LOOP = 25.0
 # A joint slower than this share of its RMS speed for so long [s] creeps: its friction may have any value.
 CREEP, CREEPING = 0.03, 0.15
 
@@ -83,7 +85,10 @@ def directions(
         change = np.abs(a) * step
         # A kick that does not stand out of the noise where it is looked for is still there; a joint at rest has none.
         usual = float(np.sqrt(np.average(error**2, weights=np.where(turned, change, 0.0) + 1e-300)))
-        jolts[j] = 2 * np.pi * cutoff * usual
+        if cutoff < LOOP:
+            # It may be as large as the noise hides where it has most power.
+            usual = max(usual, KICK * largest / (2 * np.pi * cutoff) * (LOOP / cutoff) ** 2)
+        jolts[j] = 2 * np.pi * max(cutoff, LOOP) * usual
         error = CLEAR * np.maximum(error, usual)
         clear[:, j] = sampled & (error < change) & (np.abs(v) > np.maximum(error, ALIKE * change))
         for start, stop in spans(np.abs(v) < CREEP * speed):
