@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from estimation.preparation import SLOW
+from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -110,9 +111,3 @@ def _error(ddq: Array, cutoff: float, floor: float, largest: float, step: float)
         jump[reach:-reach] = np.abs(ddq[2 * reach :] - ddq[: -2 * reach])
     kick = KICK * maximum_filter1d(np.minimum(jump, largest), 2 * reach + 1) / (2 * np.pi * cutoff)
     return np.hypot(kick, 2 * np.pi * np.sqrt(floor * cutoff**3 / 3))
-
-
-def spans(flags: Flags) -> list[tuple[int, int]]:
-    """Lists the stretches [start, stop) of rows (N,) that are flagged."""
-    edges = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

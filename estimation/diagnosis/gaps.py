@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 from scipy.sparse import csc_matrix
 
-from estimation.diagnosis.directions import spans
+from robots.common.stretches import spans
 
 if TYPE_CHECKING:
     from estimation.diagnosis.whitening import Whitening

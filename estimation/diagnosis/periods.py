@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from robots.common.stretches import spans
+
 Array = NDArray[np.float64]
 
 # Two passes of one motion by one controller differ by less than this share of the joint's spread.
@@ -132,12 +134,7 @@ def _sharp(x: Array, lag: int) -> float:
 
 
 def _longest(flags: NDArray[np.bool_]) -> tuple[int, int]:
-    edges = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
-    if not len(edges):
-        return 0, 0
-    lengths = edges[1::2] - edges[::2]
-    k = int(lengths.argmax())
-    return int(edges[2 * k]), int(edges[2 * k + 1])
+    return max(spans(flags), key=lambda span: span[1] - span[0], default=(0, 0))
 
 
 def project(q: Array, step: float, cycle: Cycle) -> tuple[tuple[Array, Array, Array], Array]:

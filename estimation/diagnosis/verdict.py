@@ -134,9 +134,7 @@ def _holds(
     # What acts on all joints may have been named for what the name on this one left.
     single = [member for member in others if member.hypothesis.joint is not None]
     free, _ = _patterns(problem, here, single, false_alarm, rng)
-    beside = accept(problem, tuple(m.group for m in (*single, *free)))
-    stays = all(score(problem, m.group, beside).gain > STAYS * m.gain for m in whole)
-    return stays or _thriftier(problem, [*own, *whole], single, free)
+    return _keep(problem, whole, [*single, *free]) or _thriftier(problem, [*own, *whole], single, free)
 
 
 def _stays(
@@ -150,8 +148,13 @@ def _stays(
     """Whether a name keeps its gain beside free functions that were chosen without it."""
     others = [other.member for other in kept if other is not found]
     free, _ = _patterns(problem, patterns, others, false_alarm, rng, alone=True)
-    beside = accept(problem, tuple(m.group for m in (*others, *free)))
-    return score(problem, found.member.group, beside).gain > STAYS * found.member.gain
+    return _keep(problem, [found.member], [*others, *free])
+
+
+def _keep(problem: Problem, names: Sequence[Member], beside: Sequence[Member]) -> bool:
+    """Whether names explain beside other functions most of what they do without them."""
+    accepted = accept(problem, tuple(member.group for member in beside))
+    return all(score(problem, name.group, accepted).gain > STAYS * name.gain for name in names)
 
 
 def _thriftier(problem: Problem, names: Sequence[Member], others: Sequence[Member], free: Sequence[Member]) -> bool:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from robots.common.errors import InputError
+from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
 
@@ -96,9 +97,8 @@ def stale_rows(t: Array, q: Array) -> NDArray[np.bool_]:
     line = np.column_stack([np.interp(t, t[~repeated], column[~repeated]) for column in q.T])
     off = (np.abs(q - line) > STALE_STEPS * np.maximum(_step(q), 1e-9)) & _passing(q, repeated)
     # Length of the run of repeats that each row belongs to.
-    edges = np.flatnonzero(np.diff(repeated.astype(int), prepend=0, append=0))
     length = np.zeros(len(t), dtype=int)
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+    for start, stop in spans(repeated):
         length[start:stop] = stop - start
     return repeated & (length <= LONGEST_HOLD) & off.any(axis=1)
 

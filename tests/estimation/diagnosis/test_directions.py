@@ -9,9 +9,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from estimation.diagnosis.directions import ALIKE, CLEAR, spans
+from estimation.diagnosis.directions import ALIKE, CLEAR
 from estimation.diagnosis.recording import Recording, cut
 from estimation.diagnosis.states import record
+from robots.common.stretches import spans
 from robots.robot import Robot
 from robots.signals import Log, Motion
 
@@ -158,8 +159,3 @@ def test_torque_between_samples_is_not_trusted_beside_a_reversal(arm: Robot, fou
     spline = CubicSpline(motion.t, motion.q)
     assert _beside(_counted(motion, motion.q, 2**40), arm) == 0
     assert _beside(Log(t=shaken, q=spline(shaken), tau=np.ones_like(motion.q)), arm) >= 6
-
-
-def test_stretches_are_listed() -> None:
-    """Half-open, in order, at the ends too."""
-    assert spans(np.array([1, 0, 1, 1, 0, 1], dtype=bool)) == [(0, 1), (2, 4), (5, 6)]
