@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
-from scipy.signal import firwin
+from scipy.signal import firwin, welch
 
 from estimation.diagnosis.states import Recording
 
@@ -16,6 +16,12 @@ Array = NDArray[np.float64]
 
 # The error of the acceleration may make this share of the torque noise's power; above, both are filtered away.
 SHARE = 0.2
+# Errors of accelerations make the inertia that is fitted too small: of its torque some stays, low-passed, and effects
+# are taken for it. On its own the column of an inertia leaves no more of that than this, in units of a squared standard
+# deviation; beside the other columns of a base model it is some ten times as much.
+BIAS = 0.1
+# Spectra are taken over so long [s]; a power density below this is none.
+WINDOW, QUIETEST = 8.0, 1e-100
 # Slowest low-pass [Hz], fastest as a share of the sampling rate: above, a sampled kick is no longer what it was.
 SLOWEST, FASTEST = 4.0, 0.2
 TRANSITION = 0.25  # of the low-pass, as a share of its cut-off
@@ -82,7 +88,9 @@ def _response(band: Band, rows: int, after: int) -> tuple[int, NDArray[np.comple
     return size, scipy.fft.fft(centred)
 
 
-def find_bands(recording: Recording, inertia: Array, torque_density: Array, share: float = SHARE) -> tuple[Band, ...]:
+def find_bands(
+    recording: Recording, inertia: Array, torque_density: Array, share: float = SHARE, highest: float | Array = np.inf
+) -> tuple[Band, ...]:
     """Finds each joint's band: up to where the error of all accelerations, as a torque, comes near the torque noise.
 
     Rows are thinned alike for all joints, by what the fastest band needs.
@@ -92,13 +100,40 @@ def find_bands(recording: Recording, inertia: Array, torque_density: Array, shar
         inertia: torque on each joint per acceleration of each (n, n) [kg m2].
         torque_density: power density of the torque noise at high frequency (n,) [(N m)^2/Hz].
         share: of the torque noise's power, what the error may have.
+        highest: that the bands may end at [Hz], a number or (n,).
     """
     rate = 1 / recording.step
     error = np.maximum(inertia**2 @ recording.floor, 1e-300)
-    limits = (share * torque_density / error) ** 0.25 / (2 * np.pi)
+    limits = np.minimum((share * torque_density / error) ** 0.25 / (2 * np.pi), highest)
     cutoffs = np.clip(limits, min(SLOWEST, FASTEST * rate), FASTEST * rate)
     stride = max(1, int(rate / (2.5 * cutoffs.max())))
     return tuple(low_pass(float(cutoff), rate, stride) for cutoff in cutoffs)
+
+
+def unbiased(recording: Recording, inertia: Array, residual: Array) -> Array:
+    """Finds up to which frequencies (n,) [Hz] the errors of accelerations bias no model by what shows.
+
+    An error of energy E in a column that has the energy G with it, both over the noise's, takes the share E / G off its
+    coefficient; what that leaves has this share squared of G - E.
+
+    Args:
+        recording: the data.
+        inertia: torque on each joint per acceleration of each (n, n) [kg m2].
+        residual: torque less model (N, n) [N m or N].
+    """
+    window = max(min(min(run.stop - run.start for run in recording.runs), round(WINDOW / recording.step)), 8)
+
+    def density(series: Array) -> tuple[Array, Array]:
+        spectra = [welch(series[run], 1 / recording.step, nperseg=window, axis=0) for run in recording.runs]
+        rows = [run.stop - run.start for run in recording.runs]
+        return spectra[0][0], np.average([power for _, power in spectra], axis=0, weights=rows)
+
+    f, noise = density(residual)
+    energies = 2 * recording.duration * f[1] / np.maximum(noise, QUIETEST)
+    column = np.cumsum(density(recording.ddq @ inertia.T)[1] * energies, axis=0)
+    error = np.cumsum((2 * np.pi * f[:, None]) ** 4 * (inertia**2 @ recording.floor) * energies, axis=0)
+    shown = np.minimum(error / np.maximum(column, QUIETEST), 1.0) ** 2 * (column - error) > BIAS
+    return np.where(shown.any(axis=0), f[np.argmax(shown, axis=0)], np.inf)
 
 
 def low_pass(cutoff: float, rate: float, stride: int) -> Band:

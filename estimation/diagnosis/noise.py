@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from estimation.diagnosis.band import SHARE, find_bands
+from estimation.diagnosis.band import SHARE, find_bands, unbiased
 from estimation.diagnosis.gaps import find_gaps, free_columns, long_gap
 from estimation.diagnosis.states import Recording
 from estimation.diagnosis.whitening import Whitening
@@ -65,7 +65,8 @@ def estimate_whitening(
     gaps = find_gaps(recording.unsure, recording.starts)
     bridged = np.column_stack([gaps.bridged(column, j) for j, column in enumerate(residual.T)])
     pieces = [bridged[run] for run in recording.runs]
-    bands = find_bands(recording, inertia, _density(pieces, recording.step), share)
+    highest = unbiased(recording, inertia, bridged) if share == SHARE else np.inf
+    bands = find_bands(recording, inertia, _density(pieces, recording.step), share, highest)
     pieces = [
         np.column_stack([band.passed(column) for band, column in zip(bands, piece.T, strict=True)]) for piece in pieces
     ]

@@ -137,7 +137,7 @@ def _longest(flags: NDArray[np.bool_]) -> tuple[int, int]:
     return max(spans(flags), key=lambda span: span[1] - span[0], default=(0, 0))
 
 
-def project(q: Array, step: float, cycle: Cycle) -> tuple[tuple[Array, Array, Array], Array]:
+def project(q: Array, step: float, cycle: Cycle) -> tuple[tuple[Array, Array, Array], Array, Array]:
     """Projects the repeated rows on the harmonics that stand out of what changes from period to period.
 
     Args:
@@ -146,7 +146,8 @@ def project(q: Array, step: float, cycle: Cycle) -> tuple[tuple[Array, Array, Ar
         cycle: where it repeats.
 
     Returns:
-        q, dq and ddq (stop - start, n) of the cycle's rows, free of noise; the highest frequency kept (n,) [Hz].
+        q, dq and ddq (stop - start, n) of the cycle's rows, free of noise; the highest frequency kept (n,) [Hz]; the
+        power density of the noise that the mean over repetitions still has there (n,).
     """
     rows = np.arange(cycle.start, cycle.stop)
     times = (rows - cycle.start) * step
@@ -161,7 +162,8 @@ def project(q: Array, step: float, cycle: Cycle) -> tuple[tuple[Array, Array, Ar
     # Neighbouring harmonics share a noise level: few periods tell little of one.
     scatter = _averaged(scatter)
     # An encoder that rounds each pass alike makes errors that repeat: what the top of the band holds is no motion.
-    scatter = np.maximum(scatter, np.median(np.abs(mean[-max(4, len(mean) // 4) :]) ** 2, axis=0))
+    top = slice(-max(4, len(mean) // 4), None)
+    scatter = np.maximum(scatter, np.median(np.abs(mean[top]) ** 2, axis=0))
     kept = mean * np.clip(1.0 - scatter / np.maximum(np.abs(mean) ** 2, 1e-300), 0.0, 1.0)
     lost = _first_lost(np.abs(mean) ** 2 > STANDS_OUT * scatter)
     kept[lost[None, :] <= np.arange(len(kept))[:, None]] = 0.0
@@ -171,7 +173,7 @@ def project(q: Array, step: float, cycle: Cycle) -> tuple[tuple[Array, Array, Ar
     knots = cycle.period / samples * np.arange(samples + 1)
     phase = np.mod(times, cycle.period)
     closed = [CubicSpline(knots, np.vstack([s, s[:1]]), bc_type="periodic")(phase) for s in signals]
-    return (closed[0], closed[1], closed[2]), lost / cycle.period
+    return (closed[0], closed[1], closed[2]), lost / cycle.period, 2 * cycle.period * np.median(scatter[top], axis=0)
 
 
 def _averaged(power: Array, width: int = 15) -> Array:

@@ -133,7 +133,7 @@ def _part(
     cycle = find_cycle(positions, period)
     if cycle is not None:
         rows = slice(cycle.start, cycle.stop)
-        exact, known = project(positions, period, cycle)
+        exact, known, repeated = project(positions, period, cycle)
         # One pass alone may be sharper, where the motion does not repeat as exactly as its encoder counts.
         better = (known > SHARPER * cutoffs) & (known <= cap)
         rest = positions[rows] - exact[0]
@@ -160,7 +160,7 @@ def _part(
         stop = min(count, int(np.floor((cycle.stop - first) * period / step)))
         moved = Cycle(start, stop, cycle.period, int((stop - start) * step / cycle.period + 0.1))
     if cycle is not None:
-        floor = np.where(better, floor / cycle.count, floor)
+        floor = np.where(better, np.clip(repeated, floor / cycle.count, floor), floor)
     ends = [float(np.interp(cutoff, f, density)) for cutoff, (f, density, _) in zip(cutoffs, spectra, strict=True)]
     beside = log.log.t[np.clip(np.searchsorted(log.log.t, t), 1, len(log.log.t) - 1) + np.array([[-1], [0]])]
     sampled = abs(step - period) < 1e-9 and bool(np.abs(beside - t).min(axis=0).max() < ALIKE * period)

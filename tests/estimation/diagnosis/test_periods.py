@@ -56,7 +56,7 @@ def test_the_projection_is_free_of_encoder_noise() -> None:
     counted = np.round(q / count) * count
     cycle = find_cycle(counted, STEP)
     assert cycle is not None
-    (found_q, found_dq, found_ddq), known = project(counted, STEP, cycle)
+    (found_q, found_dq, found_ddq), known, _ = project(counted, STEP, cycle)
     rows = slice(cycle.start, cycle.stop)
     # Rounding has a standard deviation of count / sqrt(12); the mean over six passes and few harmonics has far less.
     assert np.abs(found_q - q[rows]).max() < 0.3 * count
@@ -64,3 +64,19 @@ def test_the_projection_is_free_of_encoder_noise() -> None:
     differences = np.gradient(np.gradient(counted, STEP, axis=0), STEP, axis=0)
     assert np.std(found_ddq - ddq[rows]) < 0.01 * np.std(differences[rows] - ddq[rows])
     assert np.all(known >= 0.5)
+
+
+@pytest.mark.parametrize("period", [10.0, 7.3219])
+@pytest.mark.parametrize("rounded", [True, False])
+def test_the_noise_of_the_mean_over_repetitions_is_told(period: float, rounded: bool) -> None:
+    """Its density is that of the error, within a third: an eighth of a single one's, but rounded alike it stays."""
+    q, _, _ = _motion(period, 8 * period)
+    count = 2 * np.pi / 2**17
+    noise = count * np.random.default_rng(1).standard_normal(q.shape)
+    counted = np.round(q / count) * count if rounded else q + noise
+    cycle = find_cycle(counted, STEP)
+    assert cycle is not None
+    _, _, density = project(counted, STEP, cycle)
+    # Where repetitions begin between samples each is rounded anew.
+    repeats = 1 if rounded and period == 10.0 else cycle.count
+    assert density == pytest.approx(2 * STEP * (counted - q).var(axis=0) / repeats, rel=1 / 3)
