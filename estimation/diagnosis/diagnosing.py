@@ -186,7 +186,8 @@ def _search(
         fitted = baseline.base.size + settled.degrees
         whitening = estimate_whitening(recording, settled.residual, fitted, inertia)
         if search is not None:
-            if not (calmer(search.problem, whitening.scale) or moved(search.problem, settled.values)):
+            members = [found.member for found in search.selection.found]
+            if not (calmer(search.problem, whitening.scale) or moved(search.problem, settled.values, members)):
                 break
             # Its columns are most of what a diagnosis keeps in memory: they go before others come.
             search = None

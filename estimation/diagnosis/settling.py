@@ -23,6 +23,8 @@ ROUNDS = 3
 CALMER = 0.03
 # So is the base model's torque beside the effects where it is different by more than this share.
 MOVED = 0.02
+# Or the torque of an effect by more than this.
+OTHER = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,17 +77,25 @@ def calmer(problem: Problem, scale: Array) -> bool:
     return bool(np.max(np.log(problem.whitening.scale / scale)) > CALMER)
 
 
-def moved(problem: Problem, values: Array) -> bool:
+def moved(problem: Problem, values: Array, members: Sequence[Member]) -> bool:
     """Whether the base model's torque beside what was found differs from that without by a share that effects feel.
 
-    Effects that grow with load or friction were measured by a base model that had taken what it could of others.
+    Effects that grow with load or friction were measured by a base model that had taken what it could of others. The
+    torque beyond a limit is little of all: it differs by much where the base model does by little.
     """
     base = problem.baseline.base
     full = np.zeros(base.model.size)
     full[list(base.independent)] = values
     change = problem.baseline.regressor @ (full - unloaded(problem))[list(base.independent)]
     torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
-    return bool(np.max(np.sqrt(np.mean(change**2, axis=0)) / np.maximum(torque, 1e-12)) > MOVED)
+    if np.max(np.sqrt(np.mean(change**2, axis=0)) / np.maximum(torque, 1e-12)) > MOVED:
+        return True
+    now = _with_values(problem, values)
+    for member in members:
+        before, after = (dense(p, member.hypothesis, member.shape) @ member.coefficients for p in (problem, now))
+        if np.sum((after - before) ** 2) > OTHER**2 * np.sum(before**2):
+            return True
+    return False
 
 
 def _fit(problem: Problem, members: Sequence[Member], counted: NDArray[np.bool_]) -> tuple[Array, Array]:

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.diagnosis.carried import unloaded
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import refine
 from estimation.diagnosis.scoring import accept
-from estimation.diagnosis.settling import settle
+from estimation.diagnosis.settling import moved, settle
 from estimation.diagnosis.states import record
 from robots.robot import Robot
 from robots.signals import Log
@@ -52,3 +53,20 @@ def test_torque_that_is_cut_off_does_not_draw_the_base_model(
     np.testing.assert_allclose(settled.extra[:, 1], 0.0)
     kept = ~recording.unsure[:, 0]
     assert settled.residual[kept, 0].std() < whole.remainder[kept, 0].std() < problem.remainder[kept, 0].std() / 1.5
+
+
+def test_little_is_searched_anew_where_it_changes_what_was_found(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
+) -> None:
+    """Tops of the torque, cut off by a seventh, move the base model by less than counts, and the cut by more."""
+    recording = record(arm, [arm_log(torque_noise=0.05)])
+    limit = 0.85 * np.abs(recording.tau[:, 0]).max()
+    tau = recording.tau.copy()
+    tau[:, 0] = np.clip(tau[:, 0], -limit, limit)
+    problem = pose_arm(replace(recording, tau=tau))
+    level = 0.85 * 1.06 * float(np.abs(problem.situation.torque[:, 0]).max())
+    member = refine(problem, Hypothesis(EFFECTS["current_clipping"], 1), (level,), accept(problem, ()))
+    values = settle(problem, [member]).values
+    assert not moved(problem, values, [])
+    assert moved(problem, values, [member])
+    assert not moved(problem, unloaded(problem)[list(problem.baseline.base.independent)], [member])
