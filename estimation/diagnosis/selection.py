@@ -25,7 +25,7 @@ MOST = 4  # effects at once
 # What is reported must be worth its parameters by so much (Schwarz): strong evidence, beside a small p-value.
 LEAST = 10.0
 # But for a single effect whose p-value is below this share of the false-alarm chance: it must be worth them at all.
-SURE = 0.05
+SURE = 0.2
 SHOWN = 40  # outcomes whose p-values are computed
 
 
