@@ -112,6 +112,12 @@ def gain_ratios(rows: Iterable[Row]) -> np.ndarray:
     return np.array(ratios)
 
 
+def errors_left(rows: Iterable[Row]) -> np.ndarray:
+    """Squared unseen error with what was found over that of least squares with the true effects' own torque."""
+    able = (row for row in rows if detected(row) and row.get("oracle_after") is not None)
+    return np.array([row["after_extension"] / row["oracle_after"] for row in able])
+
+
 def parameter_errors(rows: Iterable[Row], wanted: dict[str, tuple[str, ...]]) -> list[dict[str, Any]]:
     """Errors of parameters of effects rightly found: absolute, relative, and whether the interval holds the truth."""
     errors = []

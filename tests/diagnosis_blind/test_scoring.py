@@ -12,6 +12,7 @@ from benchmarks.diagnosis_parts.statistics import (
     TIMES,
     both,
     detected,
+    errors_left,
     first_is_right,
     gain_ratios,
     interval,
@@ -54,6 +55,7 @@ def test_scores_of_known_rows() -> None:
     wrong = row([("stribeck", 3)], [("stribeck", 2)])
     two = row([("spring", 2), ("stribeck", 1), ("backlash", 4)], [("stribeck", 1), ("spring", 2)])
     silent = row([], [("stribeck", 2)])
+    assert errors_left([right, silent]) == pytest.approx([3.2 / 3])
     assert detected(right)
     assert not detected(silent)
     assert first_is_right(right)
