@@ -30,13 +30,19 @@ POINTS = 21
 
 
 def shape_errors(problem: Problem, member: Member, others: Accepted) -> list[float]:
-    """Finds each shape parameter's standard error by its profile; infinite where the likelihood hardly drops."""
+    """Finds each shape parameter's standard error by its profile; infinite where the likelihood hardly drops.
+
+    One whose bounds are equal is known.
+    """
     situation = problem.situation
     bounds = member.hypothesis.effect.bounds(situation, member.hypothesis.joint)
     steps = []
     for k, (value, (low, high), shape) in enumerate(
         zip(member.shape, bounds, member.hypothesis.effect.shapes, strict=True)
     ):
+        if low == high:
+            steps.append(0.0)
+            continue
         best = _gain(problem, member, member.shape, others)
         room = (high - low) if np.isfinite(high - low) else max(abs(value), 1.0)
         step = 0.05 * abs(value) if shape.scale == "log" else 1e-3 * room

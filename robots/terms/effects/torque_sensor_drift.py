@@ -17,9 +17,10 @@ Array = NDArray[np.float64]
 
 
 class TorqueSensorDrift(JointEffect):
-    """tau = sum_k b_k clip((t - t_0 - k d) / d, 0, 1): a zero that goes by b_k during the k-th stretch of length d.
+    """tau = sum_k b_k clip((t' - t_0 - k d) / d, 0, 1): a zero that goes by b_k during the k-th stretch of length d.
 
-    One stretch as long as the data is a straight line; more of them follow a zero that wanders. Then it stays.
+    One stretch as long as the data is a straight line; more of them follow a zero that wanders. It stays where the data
+    end, t' = min(t, t_1): nobody knows where it goes from there.
     """
 
     name: ClassVar[str] = "torque_sensor_drift"
@@ -29,6 +30,7 @@ class TorqueSensorDrift(JointEffect):
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("origin", "s", -np.inf, np.inf, "linear"),
         Shape("stretch", "s", 1e-3, 1e7, "log"),
+        Shape("end", "s", -np.inf, np.inf, "linear", default=np.inf),
     )
     rivals: ClassVar[tuple[str, ...]] = ("payload_change", "thermal_friction", "torque_constant_heat", "spring")
     experiments: ClassVar[tuple[str, ...]] = ("repeat", "static_hold")
@@ -40,19 +42,22 @@ class TorqueSensorDrift(JointEffect):
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists a line, and zeros that wander in more and more stretches."""
-        (origin, _), (shortest, longest) = self.bounds(situation, joint)
+        (origin, end), (shortest, longest) = (float(situation.t[0]), float(situation.t[-1])), self._stretches(situation)
         pieces = [count for count in (1, 2, 4, 8, STRETCHES) if longest / count >= shortest]
-        return tuple((origin, longest / count) for count in pieces)
+        return tuple((origin, longest / count, end) for count in pieces)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Fixes the origin, which only dates the drift; the stretches cover the data."""
-        origin = float(situation.t[0])
-        duration = max(float(situation.t[-1]) - origin, 1.0)
-        return (origin, origin), (min(max(duration / STRETCHES, SHORTEST), duration), duration)
+        """Fixes origin and end, which only date the drift; the stretches cover the data."""
+        origin, end = float(situation.t[0]), float(situation.t[-1])
+        return (origin, origin), self._stretches(situation), (end, end)
+
+    def _stretches(self, situation: Situation) -> tuple[float, float]:
+        duration = max(float(situation.t[-1] - situation.t[0]), 1.0)
+        return min(max(duration / STRETCHES, SHORTEST), duration), duration
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates a ramp per stretch; those that begin after the data are zero."""
-        elapsed = (situation.t - shape[0]) / shape[1]
+        elapsed = (np.minimum(situation.t, shape[2]) - shape[0]) / shape[1]
         return np.asarray(np.clip(elapsed[:, None] - np.arange(STRETCHES), 0.0, 1.0))
 
     def describe(

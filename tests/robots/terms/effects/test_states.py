@@ -155,13 +155,15 @@ def test_a_delay_is_near_that_of_the_reversals(name, shift, random_robot):
 
 
 def test_a_zero_that_wanders_is_followed(seen):
-    """Drifts of each stretch add up to straight lines between knots, constant after the last."""
+    """Drifts of each stretch add up to straight lines between knots, constant after the last, and after the data."""
     now = seen()
     duration = float(now.t[-1])
-    X = EFFECTS["torque_sensor_drift"].local(now, 1, (0.0, duration / 4))
+    X = EFFECTS["torque_sensor_drift"].local(now, 1, (0.0, duration / 4, duration))
     steps = np.array([1.0, -2.0, 0.5, 3.0, *[9.0] * 12])
     knots = np.linspace(0, duration, 5)
     np.testing.assert_allclose(X @ steps, np.interp(now.t, knots, [0, 1, -1, -0.5, 2.5]), atol=1e-9)
+    ended = EFFECTS["torque_sensor_drift"].local(now, 1, (0.0, duration / 4, duration / 8))
+    np.testing.assert_allclose(ended @ steps, np.interp(now.t, [0, duration / 8], [0, 0.5]), atol=1e-9)
 
 
 def test_the_documentation_lists_every_effect():
