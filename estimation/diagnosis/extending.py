@@ -23,6 +23,8 @@ from estimation.pulls import Pull
 Array = NDArray[np.float64]
 
 FAINT = 1e-7
+# A coefficient of which more than this lies in directions that the data do not determine is not determined.
+LOST = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +79,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
     # White rows tell what they are, not what coloured ones of their number would.
     pull = Pull(pull.precision / row_weight(white), pull.target)
     values[linear] = held(free.T @ free, free.T @ tau, pull)
-    covariance = _covariance(flat)
+    covariance, unseen = _covariance(flat)
     lower_upper = [m.hypothesis.coefficient_bounds(problem.situation.robot, m.shape) for m in members]
     extensions, known = [], []
     for member, (start, size, shapes), steps, (lower, upper) in zip(
@@ -90,6 +92,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         # What is not known at all stays so, whatever its slope's covariance.
         open_ = ~np.isfinite(scale)
         scale[open_] = 1.0
+        open_[:size] |= unseen[start : start + size]
         own = own * scale[:, None] * scale
         # The profile is no parabola, for a moment of change least of all: what it says is the least that is unknown.
         profile = np.concatenate([np.zeros(size), scale[size:]])
@@ -153,14 +156,18 @@ def _slope(problem: Problem, member: Member, k: int, step: float) -> Array:
     return ((above - below) @ member.coefficients * (h / (up - down)))[:, :, None]
 
 
-def _covariance(matrix: Array) -> Array:
-    """Covariance of least squares of least norm over unit columns: by the data alone, without the pull."""
+def _covariance(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Covariance of least squares of least norm over unit columns: by the data alone, without the pull.
+
+    With it come the coefficients (p,) that the data leave open: their errors there are those of a norm, not of data.
+    """
     norms = np.linalg.norm(matrix, axis=0)
     norms[norms == 0] = 1.0
     values, vectors = np.linalg.eigh((matrix.T @ matrix) / norms[:, None] / norms)
     kept = values > FAINT**1.5 * values[-1]
     inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
-    return np.asarray(inverse / norms[:, None] / norms)
+    lost = (vectors[:, ~kept] ** 2).sum(axis=1) > LOST
+    return np.asarray(inverse / norms[:, None] / norms), lost
 
 
 def _determined(problem: Problem, values: Array, errors: Array) -> NDArray[np.bool_]:

@@ -1,0 +1,68 @@
+"""Specification of the fit of base model and effects together: what is said to be known of their coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.extending import dense, fit_extended
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.recording import Recording
+from estimation.diagnosis.refinement import Member, refine
+from estimation.diagnosis.scoring import accept
+from estimation.diagnosis.states import record
+from robots.robot import Robot
+from robots.signals import Log
+from robots.terms.effects import EFFECTS
+
+MIDDLE = 10.0
+
+
+@pytest.fixture(scope="module")
+def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
+    """A log of the arm without effects."""
+    return record(arm, [arm_log(torque_noise=0.02)])
+
+
+def _estimable(problem: Problem, member: Member) -> np.ndarray:
+    """Which coefficients the rows determine: those whose unit row lies in the span of the scaled columns' rows."""
+    blocks = [problem.baseline.regressor, problem.baseline.nuisance]
+    known = np.concatenate([*blocks, dense(problem, member.hypothesis, member.shape)], axis=2)[::7]
+    flat = known.reshape(-1, known.shape[2])
+    norms = np.linalg.norm(flat, axis=0)
+    flat = flat / np.where(norms > 0, norms, 1.0)
+    _, sizes, rows = np.linalg.svd(flat, full_matrices=True)
+    null = rows[int(np.sum(sizes > 1e-6 * sizes[0])) :]
+    return np.linalg.norm(null, axis=0)[-len(member.coefficients) :] < 0.1
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "shape"),
+    [("payload_change", None, (MIDDLE,)), ("torque_sensor_drift", 1, None), ("friction_step", 2, (MIDDLE,))],
+)
+def test_what_a_log_leaves_open_has_no_interval(
+    recording: Recording,
+    pose_arm: Callable[..., Problem],
+    name: str,
+    joint: int | None,
+    shape: tuple[float, ...] | None,
+) -> None:
+    """An arm of parallel axes feels nothing of a moment along them, and a line's later stretches never begin."""
+    hypothesis = Hypothesis(EFFECTS[name], joint)
+    problem = pose_arm(recording)
+    point = shape or hypothesis.effect.grid(problem.situation, joint)[1]
+    columns = dense(problem, hypothesis, point)
+    posed = pose_arm(replace(recording, tau=recording.tau + 0.5 * columns[:, :, 0]))
+    member = refine(posed, hypothesis, point, accept(posed, ()))
+    fitted = fit_extended(posed, [member], {})
+    size = len(member.coefficients)
+    errors = np.sqrt(np.diag(fitted.model.extensions[0].covariance))[:size]
+    estimable = _estimable(posed, member)
+    np.testing.assert_array_equal(np.isfinite(errors), estimable)
+    assert errors[estimable].min() > 0
+    assert not fitted.effects[0][:size][~estimable].any()
+    assert estimable.sum() == {"payload_change": 4, "torque_sensor_drift": 2, "friction_step": 2}[name]
