@@ -42,7 +42,7 @@ class Baseline:
 
     def situation(self, recording: Recording, values: Array) -> Situation:
         """Gives what effects may depend on, with base parameters (b,)."""
-        return situation_on(recording, self.base.model, values, self.base.independent)
+        return replace(situation_on(recording, self.base.model, values, self.base.independent), measured=recording.tau)
 
 
 def base_parameters(

@@ -31,6 +31,7 @@ from estimation.provenance import describe_logs
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import EFFECTS
+from robots.terms.effects.current_clipping import CERTAIN, CurrentClipping
 from robots.version import VERSION
 
 Array = NDArray[np.float64]
@@ -38,6 +39,7 @@ Array = NDArray[np.float64]
 # Error on unseen data that is worth a word: so many times that of the fit, and more than this share of the torque.
 STRANGE, ODD = 3.0, 0.2
 SHOWN = 4000  # rows of the curves kept for pictures
+CLIPPING = CurrentClipping()
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +144,12 @@ def _next(problem: Problem, founds: Sequence[Found]) -> NextExperiment | None:
     return None
 
 
+_AT_LIMIT = (
+    "The torque of joint {} is at its largest, {:.4g}, in samples in a row, several times: its drive is at its limit "
+    "there. What that cuts off is too little to show."
+)
+
+
 def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array) -> tuple[str, ...]:
     recording = told.problem.recording
     notes = []
@@ -152,6 +160,10 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
             f"Joint{'s' if len(still) > 1 else ''} {names} hardly moved: their friction, gears and rotors cannot be "
             "judged; what gravity and the other joints ask of them can."
         )
+    told_of = {finding.joint for finding in findings if finding.effect == CLIPPING.name}
+    for j in sorted({*range(1, recording.n + 1)} - told_of):
+        if CLIPPING.chance(told.problem.situation, j, recording.tau) < CERTAIN:
+            notes.append(_AT_LIMIT.format(j, float(np.abs(recording.tau[:, j - 1]).max())))
     strange = _strange(told.problem, before)
     notes += strange.values()
     notes += [

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.quiet_logs import profile_gain
 from estimation.diagnosis.refinement import Member, agreed_gain, joint_by_joint, refine
@@ -70,8 +71,8 @@ def select(
     advance: Callable[[str], None] = lambda note: None,
 ) -> Selection:
     """Adds effects while the strongest is significant, refining and swapping before each next step."""
-    members: list[Member] = []
-    p_values: list[float] = []
+    members, p_values = _seen(problem, entries, false_alarm, rng)
+    seen = {member.hypothesis for member in members}
     first: Scan | None = None
     while True:
         accepted = accept(problem, tuple(member.group for member in members))
@@ -93,15 +94,43 @@ def select(
         members.append(best[0])
         p_values.append(chance[best[0].hypothesis])
         if len(members) > 1:
-            members, p_values = _polished(problem, entries, members, p_values, rng)
+            members, p_values = _polished(problem, entries, members, p_values, seen, rng)
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
     found = _found(problem, entries, members, p_values, rng)
     others, alone = members[1:], SURE * false_alarm if len(members) == 1 else 0.0
-    kept = [f for f in found if _worth_it(problem, f.member, others) or _sure(problem, f.member, f.p_value, alone)]
+    kept = [
+        f
+        for f in found
+        if f.member.hypothesis in seen
+        or _worth_it(problem, f.member, others)
+        or _sure(problem, f.member, f.p_value, alone)
+    ]
     order = sorted(kept, key=lambda f: -f.member.gain)
     last = result if members else first
     return Selection(tuple(order), first, last, accept(problem, tuple(f.member.group for f in order)))
+
+
+def _seen(
+    problem: Problem, entries: Sequence[Entry], false_alarm: float, rng: np.random.Generator
+) -> tuple[list[Member], list[float]]:
+    """Refines what the torque as logged shows by itself, beside each other, with the chance of it where it is not.
+
+    That is not a question of what it explains: a torque cut off at a few peaks explains little.
+    """
+    members: list[Member] = []
+    p_values: list[float] = []
+    for entry in entries:
+        hypothesis = entry.hypothesis
+        chance = hypothesis.effect.chance(problem.situation, hypothesis.joint, problem.recording.tau) * len(entries)
+        if chance < SURE * false_alarm:
+            beside = accept(problem, tuple(member.group for member in members))
+            (outcome,) = scan(problem, [entry], beside, rng, nulls=False).outcomes
+            member = refine(problem, hypothesis, outcome.shape, beside) if outcome.degrees else None
+            if member is not None and member.gain > 0:
+                members.append(member)
+                p_values.append(chance)
+    return members, p_values
 
 
 def contenders(problem: Problem, result: Scan, members: Sequence[Member] = ()) -> list[Outcome]:
@@ -185,15 +214,22 @@ def _polished(
     entries: Sequence[Entry],
     members: list[Member],
     p_values: list[float],
+    seen: Collection[Hypothesis],
     rng: np.random.Generator,
 ) -> tuple[list[Member], list[float]]:
-    """Refines each member beside the others, lets its rivals take its place, and drops what is no longer needed."""
+    """Refines each member beside the others, lets its rivals take its place, and drops what is no longer needed.
+
+    What was seen in the torque stays.
+    """
     for _ in range(2):
         changed = False
         for i in range(len(members)):
             others = [m for k, m in enumerate(members) if k != i]
             beside = accept(problem, tuple(m.group for m in others))
             own = refine(problem, members[i].hypothesis, members[i].shape, beside)
+            if own.hypothesis in seen:
+                members[i] = own
+                continue
             result = scan(problem, entries, beside, rng, nulls=False)
             rest = [o for o in contenders(problem, result, others) if o.hypothesis != own.hypothesis][:4]
             best = max([own, *_best(problem, rest, beside)], key=lambda m: m.bic(problem.rows))
@@ -201,7 +237,7 @@ def _polished(
             members[i] = best
         if not changed:
             break
-    keep = [i for i, m in enumerate(members) if m.worth(problem.rows) > LEAST]
+    keep = [i for i, m in enumerate(members) if m.hypothesis in seen or m.worth(problem.rows) > LEAST]
     return [members[i] for i in keep], [p_values[i] for i in keep]
 
 

@@ -205,6 +205,10 @@ class Effect(ABC):
         """
         return None
 
+    def chance(self, situation: Situation, joint: Place, measured: Array) -> float:
+        """Gives the chance that torque as logged (N, n) shows this effect by itself where it is not; 1 for most."""
+        return 1.0
+
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the axis on which the effect shows in a picture: its label with unit, and the values (N,)."""
         return "time [s]", situation.t

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.stretches import spans
 from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
 
 if TYPE_CHECKING:
@@ -34,17 +35,33 @@ class CurrentClipping(JointEffect):
         return (Coefficient("share_lost", "1", 0.0, 2.0),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists levels that 1 to 40 % of the samples exceed."""
+        """Lists levels that 1 to 40 % of the samples exceed; about the largest torque where that is a flat top."""
         assert joint is not None
         size = np.abs(situation.torque[:, joint - 1])
+        if self._flat(situation, joint):
+            ((low, high),) = self.bounds(situation, joint)
+            return tuple((float(level),) for level in np.linspace(low, high, 9)[:-1])
         levels = np.quantile(size, (0.6, 0.7, 0.8, 0.875, 0.925, 0.96, 0.98, 0.99))
         return tuple((float(level),) for level in np.unique(levels) if 1e-3 < level < size.max())
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the level below the largest torque."""
+        """Keeps the level below the largest torque, and near the largest of the log where that is a flat top.
+
+        A base model that was fitted to what is left may not come up to it.
+        """
         assert joint is not None
         top = float(np.abs(situation.torque[:, joint - 1]).max(initial=0.0))
+        if self._flat(situation, joint):
+            assert situation.measured is not None
+            level = float(np.abs(situation.measured[:, joint - 1]).max())
+            return ((NEAR * min(level, top), level),)
         return ((max(0.2 * top, 1e-3), max(top, 2e-3)),)
+
+    def _flat(self, situation: Situation, joint: int) -> bool:
+        measured = situation.measured
+        if measured is None:
+            return False
+        return situation.cached(("flat top", joint), lambda: self.chance(situation, joint, measured)) < CERTAIN
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates what the cut takes away."""
@@ -52,20 +69,30 @@ class CurrentClipping(JointEffect):
         return (np.clip(torque, -shape[0], shape[0]) - torque)[:, None]
 
     def gate(self, situation: Situation, joint: Place, measured: Array) -> NDArray[np.bool_]:
-        """Flags flat tops: three and more samples in a row at the largest torque of the log, thirty in all."""
+        """Flags flat tops: three and more samples in a row at the largest torque of the log.
+
+        They must be thirty in all, or such that chance does not make them.
+        """
         assert joint is not None
         flagged = np.zeros(measured.shape, dtype=bool)
         size = np.abs(measured[:, joint - 1])
-        at_top = size >= (1.0 - FLAT) * size.max(initial=0.0)
-        if at_top.sum() < FLAT_SAMPLES or not size.any():
-            return flagged
-        for run in situation.runs:
-            part = at_top[run]
-            edges = np.flatnonzero(np.diff(np.concatenate([[0], part.astype(int), [0]])))
-            for first, last in zip(edges[::2], edges[1::2], strict=True):
-                if last - first >= 3:
-                    flagged[run.start + first : run.start + last, joint - 1] = True
-        return flagged if flagged.sum() >= FLAT_SAMPLES else np.zeros_like(flagged)
+        for start, stop in _stretches(situation, size >= (1.0 - FLAT) * size.max(initial=0.0)):
+            flagged[start:stop, joint - 1] = True
+        certain = flagged.sum() >= FLAT_SAMPLES or self.chance(situation, joint, measured) < CERTAIN
+        return flagged if certain and size.any() else np.zeros_like(flagged)
+
+    def chance(self, situation: Situation, joint: Place, measured: Array) -> float:
+        """Gives the chance that the largest torque is logged in so many stretches of three samples and more.
+
+        As often as other samples are in stretches of one torque: where it is told in coarse steps, that says nothing.
+        """
+        assert joint is not None
+        torque = measured[:, joint - 1]
+        top = np.abs(torque) >= (1.0 - EQUAL) * np.abs(torque).max(initial=0.0)
+        alike = np.abs(np.diff(torque)) <= EQUAL * np.abs(torque).max(initial=0.0)
+        still = np.concatenate([[False], alike]) | np.concatenate([alike, [False]])
+        others = sum(stop - start for start, stop in _stretches(situation, still & ~top))
+        return float(((1.0 + others) / (1.0 + np.sum(~top))) ** len(_stretches(situation, still & top)))
 
     def describe(
         self,
@@ -88,3 +115,15 @@ class CurrentClipping(JointEffect):
 FLAT = 1e-4
 """Relative difference from the largest torque up to which a sample is at it."""
 FLAT_SAMPLES = 30
+EQUAL = 1e-6
+"""Share of the largest torque by which samples that are equal differ."""
+CERTAIN = 1e-6
+"""Chance below which flat tops are no chance."""
+NEAR = 0.9
+"""Share of such a top down to which the level may come out."""
+
+
+def _stretches(situation: Situation, flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Lists the stretches [start, stop) of three and more flagged rows (N,), of one log each."""
+    parts = ((run.start, spans(flags[run])) for run in situation.runs)
+    return [(first + a, first + b) for first, part in parts for a, b in part if b - a >= 3]

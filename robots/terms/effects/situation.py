@@ -40,6 +40,7 @@ class Situation:
         velocity_scale: (n,) v0 [rad/s or m/s] of the sign, tanh(dq / v0); 0 for the sharp sign.
         parts: where logs carry different payloads, or the base stands otherwise than the robot's description says, the
             situations that this one joins; `parameters` are the first's, and each has a model of its own gravity.
+        measured: torque as logged (N, n) [N m or N]; None where there is no log, and in models that are evaluated.
     """
 
     model: TorqueModel
@@ -54,6 +55,7 @@ class Situation:
     torque: Array
     velocity_scale: Array
     parts: tuple[Situation, ...] = ()
+    measured: Array | None = None
     _cache: dict[object, Any] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:

@@ -124,6 +124,33 @@ def test_a_cause_outside_the_candidates_is_not_forced_into_a_name(
     assert result.extended[0] < result.baseline[0]
 
 
+def test_peaks_that_are_cut_off_are_named_though_they_explain_little(
+    arm: Robot, arm_plant: Callable, fourier_motion: Callable
+) -> None:
+    """A few samples of one torque at its largest are no chance: nothing else of the log would show so small a cut."""
+    log = simulate(arm_plant(torque_noise=0.1), fourier_motion(arm, 0), seed=0)
+    some = ("current_clipping", "spring", "friction_step")
+
+    def cut(rows: int) -> tuple[float, Diagnosis]:
+        limit = float(np.sort(np.abs(log.tau[:, 0]))[-rows])
+        tau = np.column_stack([np.clip(log.tau[:, 0], -limit, limit), log.tau[:, 1]])
+        assert np.sum(np.abs(tau[:, 0]) == limit) == rows
+        return limit, diagnose(arm, replace(log, tau=tau), candidates=some, friction=SIMPLE)
+
+    limit, result = cut(120)
+    (finding,) = result.findings
+    assert (finding.effect, finding.joint) == ("current_clipping", 1)
+    assert finding.p_value < 1e-4
+    (level,) = (p for p in finding.parameters if p.name == "level")
+    assert level.value == pytest.approx(limit, rel=0.1)
+    limit, result = cut(40)
+    assert result.verdict == "none"
+    assert any(note.startswith(f"The torque of joint 1 is at its largest, {limit:.4g}, in") for note in result.notes)
+    whole = diagnose(arm, log, candidates=some, friction=SIMPLE)
+    assert whole.verdict == "none"
+    assert not any("at its largest" in note for note in whole.notes)
+
+
 def test_noise_that_is_a_third_of_the_torque_is_said(arm: Robot, fourier_motion: Callable, arm_plant: Callable) -> None:
     """Nothing is found in it, and a note says how much is left, joint by joint; quiet joints have none."""
     log = simulate(arm_plant(torque_noise=0.02), fourier_motion(arm, 0), seed=0)

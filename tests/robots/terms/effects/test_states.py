@@ -100,6 +100,29 @@ def test_flat_tops_are_flagged(seen):
     assert flagged[:, 1].sum() > 0.7 * np.sum(np.abs(torque[:, 1]) > level)  # all but tops of one or two samples
 
 
+def test_a_few_flat_tops_are_no_chance_where_torque_is_told_finely(seen):
+    """Two peaks that are cut off are; the same torque in coarse steps stays at its top as it does elsewhere."""
+    t = 0.004 * np.arange(5000)
+    now, clipping = seen(times=t), EFFECTS["current_clipping"]
+    torque = np.zeros(now.torque.shape)
+    between = (np.pi / 2 + 2 * np.pi * 12.5) / 8.0
+    size = 6.0 * np.exp(-0.1 * (t - between) ** 2)
+    torque[:, 1] = size * np.sin(8.0 * t) + 0.01 * np.random.default_rng(0).normal(size=len(t))
+    assert clipping.chance(now, 2, torque) > 1e-4
+    cut = np.minimum(torque, 0.99 * torque.max())
+    cut[:, 1] *= np.where(cut[:, 1] < 0, 0.9, 1.0)
+    top = cut == cut.max()
+    assert 6 <= np.sum(top) < 30
+    assert clipping.chance(now, 2, cut) < 1e-6
+    flagged = clipping.gate(now, 2, cut)
+    assert 6 <= flagged.sum() <= top.sum()
+    assert top[flagged].all()
+    coarse = np.round(torque / 0.2) * 0.2
+    assert clipping.chance(now, 2, coarse) > 1e-3
+    assert not clipping.gate(now, 2, np.round(torque / 0.05) * 0.05).any()
+    assert clipping.chance(now, 2, np.zeros(torque.shape)) == 1.0
+
+
 @pytest.mark.parametrize(("delay", "sharp"), [(0.003, 0.2), (0.008, 2e-3), (0.0003, 2e-3), (-0.001, 2e-3)])
 def test_a_delayed_torque_is_the_one_before(seen, motion, delay, sharp):
     """A delay changes the torque as taking it a moment earlier does, also where friction turns round in a sample."""
