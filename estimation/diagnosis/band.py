@@ -20,8 +20,8 @@ SHARE = 0.2
 # are taken for it. On its own the column of an inertia leaves no more of that than this, in units of a squared standard
 # deviation; beside the other columns of a base model it is some ten times as much.
 BIAS = 0.1
-# Spectra are taken over so long [s]; a power density below this is none.
-WINDOW, QUIETEST = 8.0, 1e-100
+# Spectra are taken over so long [s], of so many rows at least; a power density below this is none.
+WINDOW, FEWEST, QUIETEST = 8.0, 16, 1e-100
 # Slowest low-pass [Hz], fastest as a share of the sampling rate: above, a sampled kick is no longer what it was.
 SLOWEST, FASTEST = 4.0, 0.2
 TRANSITION = 0.25  # of the low-pass, as a share of its cut-off
@@ -121,12 +121,16 @@ def unbiased(recording: Recording, inertia: Array, residual: Array) -> Array:
         inertia: torque on each joint per acceleration of each (n, n) [kg m2].
         residual: torque less model (N, n) [N m or N].
     """
-    window = max(min(min(run.stop - run.start for run in recording.runs), round(WINDOW / recording.step)), 8)
+    lengths = [run.stop - run.start for run in recording.runs]
+    window = min(max(lengths), round(WINDOW / recording.step))
+    if window < FEWEST:
+        return np.full(recording.n, np.inf)
+    long = [run for run, length in zip(recording.runs, lengths, strict=True) if length >= window]
 
     def density(series: Array) -> tuple[Array, Array]:
-        spectra = [welch(series[run], 1 / recording.step, nperseg=window, axis=0) for run in recording.runs]
-        rows = [run.stop - run.start for run in recording.runs]
-        return spectra[0][0], np.average([power for _, power in spectra], axis=0, weights=rows)
+        spectra = [welch(series[run], 1 / recording.step, nperseg=window, axis=0) for run in long]
+        weights = [run.stop - run.start for run in long]
+        return spectra[0][0], np.average([power for _, power in spectra], axis=0, weights=weights)
 
     f, noise = density(residual)
     energies = 2 * recording.duration * f[1] / np.maximum(noise, QUIETEST)

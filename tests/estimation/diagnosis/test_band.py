@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import fftconvolve, firwin
 
 from estimation.diagnosis.band import BIAS, unbiased
-from estimation.diagnosis.recording import Recording
+from estimation.diagnosis.recording import Recording, cut
 
 STEP, ROWS = 0.004, 250_000
 COUNT, NOISE = 2 * np.pi / 2**14, 0.3
@@ -80,3 +80,13 @@ def test_without_encoder_noise_nothing_is_biased(counted: tuple[Recording, np.nd
     assert unbiased(replace(recording, floor=np.zeros(1)), np.eye(1), noise) == np.inf
     assert unbiased(recording, np.zeros((1, 1)), noise) == np.inf
     assert unbiased(replace(recording, ddq=np.zeros((ROWS, 1))), np.eye(1), np.zeros((ROWS, 1))) == np.inf
+
+
+def test_logs_of_any_length_count(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
+    """Cut into two halves and a few rows, a log says the same; a few rows alone say nothing."""
+    recording, _, noise = counted
+    whole = unbiased(recording, np.eye(1), noise)
+    pieces = replace(recording, starts=(0, ROWS // 2, ROWS - 10))
+    assert unbiased(pieces, np.eye(1), noise) == pytest.approx(whole, rel=0.05)
+    few = cut(recording, slice(0, 10))
+    assert unbiased(few, np.eye(1), noise[:10]) == np.inf
