@@ -45,23 +45,24 @@ class CurrentClipping(JointEffect):
         return tuple((float(level),) for level in np.unique(levels) if 1e-3 < level < size.max())
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the level below the largest torque, and near the largest of the log where that is a flat top.
-
-        A base model that was fitted to what is left may not come up to it.
-        """
+        """Keeps the level below the largest torque, and near the largest of the log where that is a flat top."""
         assert joint is not None
         top = float(np.abs(situation.torque[:, joint - 1]).max(initial=0.0))
-        if self._flat(situation, joint):
-            assert situation.measured is not None
-            level = float(np.abs(situation.measured[:, joint - 1]).max())
-            return ((NEAR * min(level, top), level),)
-        return ((max(0.2 * top, 1e-3), max(top, 2e-3)),)
+        flat = self._flat(situation, joint)
+        return ((NEAR * min(flat, top), flat),) if flat else ((max(0.2 * top, 1e-3), max(top, 2e-3)),)
 
-    def _flat(self, situation: Situation, joint: int) -> bool:
+    def _flat(self, situation: Situation, joint: int) -> float:
+        """The largest torque of the log where that is a flat top, and a base model comes near it; else zero.
+
+        One that does not leaves the most of the torque to other effects: the log's limit is none of its own torque.
+        """
         measured = situation.measured
         if measured is None:
-            return False
-        return situation.cached(("flat top", joint), lambda: self.chance(situation, joint, measured)) < CERTAIN
+            return 0.0
+        level = float(np.abs(measured[:, joint - 1]).max())
+        chance = situation.cached(("flat top", joint), lambda: self.chance(situation, joint, measured))
+        near = float(np.abs(situation.torque[:, joint - 1]).max()) > NEAR * level
+        return level if near and chance < CERTAIN else 0.0
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates what the cut takes away."""
