@@ -50,7 +50,7 @@ def pinocchio_torque(robot, motion):
 
 def test_the_torque_limit_decides(er3a):
     """Where the free design would pass the torque limit, the limited one stays below 90 % of it, by pinocchio."""
-    weak = weaker(er3a, 0.3)
+    weak = weaker(er3a, 0.35)
     free = design(weak, torque=False)
     kept = design(weak)
     bound = np.asarray(weak.limits.torque)
