@@ -37,10 +37,10 @@ class CurrentClipping(JointEffect):
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists levels that 1 to 40 % of the samples exceed; about the largest torque where that is a flat top."""
         assert joint is not None
-        size = np.abs(situation.torque[:, joint - 1])
         if self._flat(situation, joint):
             ((low, high),) = self.bounds(situation, joint)
             return tuple((float(level),) for level in np.linspace(low, high, 9)[:-1])
+        size = np.abs(situation.torque[:, joint - 1])
         levels = np.quantile(size, (0.6, 0.7, 0.8, 0.875, 0.925, 0.96, 0.98, 0.99))
         return tuple((float(level),) for level in np.unique(levels) if 1e-3 < level < size.max())
 

@@ -42,18 +42,15 @@ class TorqueSensorDrift(JointEffect):
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists a line, and zeros that wander in more and more stretches."""
-        (origin, end), (shortest, longest) = (float(situation.t[0]), float(situation.t[-1])), self._stretches(situation)
+        (origin, _), (shortest, longest), (end, _) = self.bounds(situation, joint)
         pieces = [count for count in (1, 2, 4, 8, STRETCHES) if longest / count >= shortest]
         return tuple((origin, longest / count, end) for count in pieces)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Fixes origin and end, which only date the drift; the stretches cover the data."""
         origin, end = float(situation.t[0]), float(situation.t[-1])
-        return (origin, origin), self._stretches(situation), (end, end)
-
-    def _stretches(self, situation: Situation) -> tuple[float, float]:
-        duration = max(float(situation.t[-1] - situation.t[0]), 1.0)
-        return min(max(duration / STRETCHES, SHORTEST), duration), duration
+        duration = max(end - origin, 1.0)
+        return (origin, origin), (min(max(duration / STRETCHES, SHORTEST), duration), duration), (end, end)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates a ramp per stretch; those that begin after the data are zero."""
