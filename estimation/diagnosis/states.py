@@ -30,10 +30,9 @@ STANDS_OUT = 3.0
 # Least and most of the cut-off [Hz, share of the sampling rate].
 LOWEST, HIGHEST = 2.0, 0.4
 ORDER = 8  # of the low-pass before thinning
-# At the ends of a log the low-pass of the positions rings, for what no log has before it begins: by a factor of e less
-# in so many periods of the cut-off. They are lost, until less is left of it than of the encoder's noise; so many
-# periods in any case, and so many at most, and no more than a share of the log.
-DECAY, RINGING, MOST_LOST = 0.82, (4.0, 8.0), 0.02
+# At its ends a log knows its derivatives less well, for nothing is known beyond: so many periods of the cut-off are
+# lost, and no more than a share of the log.
+LOST, MOST_LOST = 4.0, 0.02
 SHORTEST = 5.0  # [s] of log below which nothing can be told
 # Spectra are taken of this difference of the positions: the slow motion would leak over all of the band otherwise.
 DIFFERENCE = 3
@@ -143,7 +142,7 @@ def _part(
             whole[rows] = np.where(better, harmonic + other, whole[rows])
         cutoffs = np.where(better, known, cutoffs)
     floor = np.array([spectrum[2] if cap == np.inf else _density_at(cap, *spectrum) for spectrum in spectra])
-    edge = min(_ringing(ddq, cutoffs, floor), MOST_LOST * (grid[-1] - grid[0]))
+    edge = min(LOST / float(cutoffs.min()), MOST_LOST * (grid[-1] - grid[0]))
     # On a sample: between two of them nobody knows when a torque jumped.
     begin = grid[0] + np.ceil(edge / period - 1e-9) * period
     count = int(np.floor((grid[-1] - edge - begin) / step + 1e-6)) + 1
@@ -168,13 +167,6 @@ def _part(
     cut = slice(None) if moved is not None else _moving(states[1], step)
     q, dq, ddq = (array[cut] for array in states)
     return t[cut], q, dq, ddq, tau[cut], moved, float(cutoffs.min()), turns.rows(cut), floor
-
-
-def _ringing(ddq: Array, cutoffs: Array, floor: Array) -> float:
-    """The time [s] in which low-passes have rung out, to the noise that they leave to accelerations (N, n)."""
-    noise = (2 * np.pi * cutoffs) ** 2 * np.sqrt(np.maximum(floor, 0.0) * cutoffs / 5)
-    periods = DECAY * np.log(np.maximum(np.abs(ddq).max(axis=0), 1e-300) / np.maximum(noise, 1e-300))
-    return float(np.max(np.clip(periods, *RINGING) / cutoffs))
 
 
 def _cutoffs(positions: Array, period: float) -> Array:
