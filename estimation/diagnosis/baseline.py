@@ -18,8 +18,9 @@ from robots.terms.effects import Situation
 
 Array = NDArray[np.float64]
 
-# tanh(dq / v0) of the Coulomb friction: from sharp to the widest that is still a sign.
-SCALES = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.03, 0.06)
+# tanh(dq / v0) of the Coulomb friction: from sharp to the widest that is still a sign, a share of a fast joint's speed.
+SCALES = tuple(float(v0) for v0 in 0.0005 * 2.0 ** np.arange(0.0, 9.5, 0.5))
+WIDEST, SHARE = 0.065, 0.05
 ROUNDS = 3
 # Directions of the column-scaled regressor below this share of the largest are not determined by the log.
 FAINT = 1e-7
@@ -64,11 +65,19 @@ def build_baseline(base: BaseParameters, recording: Recording, residual_scale: A
         residual_scale: standard deviation of the noise (n,); by default a share of the torque.
     """
     scale = recording.tau.std(axis=0) if residual_scale is None else residual_scale
-    weights = 1.0 / np.maximum(scale, 1e-9 * max(1.0, float(np.abs(recording.tau).max())))
+    least = 1e-9 * max(1.0, float(np.abs(recording.tau).max()))
     Y = regressor_on(base, recording)
     signs = [i for i, column in enumerate(base.columns) if column.symbol == "f1"]
-    chosen = _sharpness(Y, signs, base, recording, weights) if signs else None
-    if chosen is not None:
+    chosen = None
+    if signs:
+        fit = _Signs(Y, signs, base, recording, 1.0 / np.maximum(scale, least))
+        narrow = np.full(recording.n, WIDEST)
+        chosen = fit.sharpness(narrow)
+        fast = np.maximum(narrow, SHARE * np.abs(recording.dq).max(axis=0))
+        if np.any((fast > narrow) & (np.array(chosen) == max(v0 for v0 in SCALES if v0 <= WIDEST))):
+            # A log that the base model does not describe at all would have any sign: each counts by what is left of it.
+            left = np.maximum(fit.left(chosen), least)
+            chosen = _Signs(Y, signs, base, recording, 1.0 / left).sharpness(fast)
         model = default_model(
             base.model.robot,
             friction="polynomial" if any(c.symbol == "f4" for c in base.model.columns) else "coulomb-viscous",
@@ -92,40 +101,71 @@ def _nuisance(recording: Recording, chosen: tuple[float, ...] | None) -> Array:
     return result
 
 
-def _sharpness(
-    Y: Array, signs: list[int], base: BaseParameters, recording: Recording, weights: Array
-) -> tuple[float, ...]:
-    """Picks the scales of all joints' signs together, one joint at a time with the others as they are."""
-    stride = max(1, len(recording) // 20_000)
-    n = recording.n
-    counts = ~recording.unsure[::stride] * weights
-    rest = np.delete(Y[::stride], signs, axis=2) * counts[:, :, None]
-    Q = orthonormal(rest.reshape(-1, rest.shape[2]), FAINT).reshape(len(rest), n, -1)
-    tau = recording.tau[::stride] * counts
-    along = np.einsum("njb,nj->b", Q, tau)
-    joints = [base.columns[i].joint - 1 for i in signs]
-    size = len(joints) * len(SCALES)
-    gram, cross, against = np.zeros((size, size)), np.zeros(size), np.zeros((size, Q.shape[2]))
-    for a, joint in enumerate(joints):
-        # A sign acts on its own joint's rows alone.
-        own = slice(a * len(SCALES), (a + 1) * len(SCALES))
-        columns = np.tanh(recording.dq[::stride, joint, None] / np.array(SCALES)) * counts[:, joint, None]
-        gram[own, own] = columns.T @ columns
-        cross[own] = columns.T @ tau[:, joint]
-        against[own] = columns.T @ Q[:, joint]
-    gram, cross = gram - against @ against.T, cross - against @ along
-    picked = [1] * len(joints)
-    for _ in range(ROUNDS):
-        for a in range(len(joints)):
-            gains = []
-            for k in range(len(SCALES)):
-                trial = [len(SCALES) * b + (k if b == a else picked[b]) for b in range(len(joints))]
-                gains.append(float(cross[trial] @ np.linalg.pinv(gram[np.ix_(trial, trial)], 1e-9) @ cross[trial]))
-            picked[a] = int(np.argmax(gains))
-    scales = [SCALES[0]] * n
-    for a, joint in enumerate(joints):
-        scales[joint] = SCALES[picked[a]]
-    return tuple(scales)
+class _Signs:
+    """Signs of all widths on trial beside the rest of the base model, in a weighted fit.
+
+    Args:
+        Y: columns (N, n, b).
+        signs: which of them are signs.
+        base: base parameters.
+        recording: the data.
+        weights: of each joint (n,), or of each row of it (N, n).
+    """
+
+    def __init__(self, Y: Array, signs: list[int], base: BaseParameters, recording: Recording, weights: Array) -> None:
+        self.recording, self.stride = recording, max(1, len(recording) // 20_000)
+        self.joints = [base.columns[i].joint - 1 for i in signs]
+        rows = slice(None, None, self.stride)
+        self.weights = np.broadcast_to(weights, recording.tau.shape)[rows]
+        self.counts = ~recording.unsure[rows] * self.weights
+        rest = np.delete(Y[rows], signs, axis=2) * self.counts[:, :, None]
+        self.Q = orthonormal(rest.reshape(-1, rest.shape[2]), FAINT).reshape(len(rest), recording.n, -1)
+        self.tau = recording.tau[rows] * self.counts
+        self.along = np.einsum("njb,nj->b", self.Q, self.tau)
+        size = len(self.joints) * len(SCALES)
+        gram, cross, against = np.zeros((size, size)), np.zeros(size), np.zeros((size, self.Q.shape[2]))
+        for a, joint in enumerate(self.joints):
+            # A sign acts on its own joint's rows alone.
+            own = slice(a * len(SCALES), (a + 1) * len(SCALES))
+            columns = np.tanh(recording.dq[rows, joint, None] / np.array(SCALES)) * self.counts[:, joint, None]
+            gram[own, own] = columns.T @ columns
+            cross[own] = columns.T @ self.tau[:, joint]
+            against[own] = columns.T @ self.Q[:, joint]
+        self.gram, self.cross, self.against = gram - against @ against.T, cross - against @ self.along, against
+
+    def sharpness(self, widest: Array) -> tuple[float, ...]:
+        """Picks all joints' scales (n,) together, up to the widest, one joint at a time with the others as they are."""
+        picked = [1] * len(self.joints)
+        for _ in range(ROUNDS):
+            for a, joint in enumerate(self.joints):
+                gains = []
+                for k in range(sum(v0 <= widest[joint] for v0 in SCALES)):
+                    trial = [len(SCALES) * b + (k if b == a else picked[b]) for b in range(len(self.joints))]
+                    gains.append(float(self.cross[trial] @ self._fitted(trial)))
+                picked[a] = int(np.argmax(gains))
+        scales = [SCALES[0]] * self.recording.n
+        for a, joint in enumerate(self.joints):
+            scales[joint] = SCALES[picked[a]]
+        return tuple(scales)
+
+    def left(self, scales: tuple[float, ...]) -> Array:
+        """Gives the RMS residual of each joint with some scales, log by log, for each row (N, n) [N m or N]."""
+        trial = [len(SCALES) * a + SCALES.index(scales[joint]) for a, joint in enumerate(self.joints)]
+        values = self._fitted(trial)
+        residual = self.tau - self.Q @ (self.along - self.against[trial].T @ values)
+        dq = self.recording.dq[:: self.stride]
+        for joint, value in zip(self.joints, values, strict=True):
+            residual[:, joint] -= value * np.tanh(dq[:, joint] / scales[joint]) * self.counts[:, joint]
+        result = np.zeros(self.recording.tau.shape)
+        for run in self.recording.runs:
+            rows = slice(-(-run.start // self.stride), -(-run.stop // self.stride))
+            counted = np.maximum((self.counts[rows] > 0).sum(axis=0), 1)
+            squares = np.sum((residual[rows] / self.weights[rows]) ** 2, axis=0) / counted
+            result[run] = np.sqrt(squares)
+        return result
+
+    def _fitted(self, trial: list[int]) -> Array:
+        return np.asarray(np.linalg.pinv(self.gram[np.ix_(trial, trial)], 1e-9) @ self.cross[trial])
 
 
 def inertia_of(baseline: Baseline, recording: Recording, values: Array) -> Array:

@@ -1,0 +1,27 @@
+"""Specification of the base model's sign: as sharp as the data say."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.baseline import base_parameters, build_baseline
+from estimation.diagnosis.states import record
+from robots.plants import simulate
+from robots.robot import Robot
+
+
+@pytest.mark.parametrize("share", [0.01, 0.02, 0.04])
+def test_a_sign_is_as_wide_as_the_friction_turns_round(
+    arm: Robot, arm_plant: Callable, fourier_motion: Callable, share: float
+) -> None:
+    """Up to a twentieth of a joint's largest speed, told to a factor of two."""
+    motion = fourier_motion(arm, 0)
+    width = share * float(np.abs(motion.dq).max(axis=0).min())
+    log = simulate(arm_plant(velocity_scale=width, torque_noise=0.01), motion, seed=0)
+    recording = record(arm, [log])
+    chosen = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
+    scales = chosen.situation(recording, np.zeros(chosen.base.size)).velocity_scale
+    assert np.all(np.abs(np.log(scales / width)) < np.log(2.0))
