@@ -145,6 +145,7 @@ def refine(
             for other in others:
                 at[:] = other
                 climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)
+    if effort:
         refined = best[0]
         for known in hypothesis.effect.likely(situation, hypothesis.joint, refined.shape, refined.coefficients):
             shape = tuple(own if value is None else value for value, own in zip(known, refined.shape, strict=True))

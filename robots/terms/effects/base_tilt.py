@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.effects.base import Coefficient, Effect, Place, Situation
+from robots.terms.base import force_unit
+from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -19,35 +20,55 @@ class BaseTilt(Effect):
     """tau = (d rigid/dg) (g x e1) a + (d rigid/dg) (g x e2) b: gravity turned by small angles about two level axes.
 
     The axes are level where the robot stands as described, and turn with the base where a log's base is tilted: the
-    base is set askew on its mount.
+    base is set askew on its mount. About an upright first axis a level robot has moments that no log of it shows, and
+    its base parameters lack: where `own_moments` is 1, they pull by c cos(q1) + s sin(q1) on the first joint besides.
     """
 
     name: ClassVar[str] = "base_tilt"
     title: ClassVar[str] = "a base that is not level"
     whole_robot: ClassVar[bool] = True
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("own_moments", "", 0.0, 1.0, "linear", (0.0,), default=0.0),)
     rivals: ClassVar[tuple[str, ...]] = ("spring", "encoder_offset", "torque_constant_error", "payload_change")
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "second_base_pose")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the base's rotations about its two level axes (x and y where gravity is along z)."""
-        return Coefficient("tilt_1", "rad", -0.5, 0.5), Coefficient("tilt_2", "rad", -0.5, 0.5)
+        """Describes the base's rotations about its two level axes (x and y where gravity is along z), and the rest."""
+        tilts = Coefficient("tilt_1", "rad", -0.5, 0.5), Coefficient("tilt_2", "rad", -0.5, 0.5)
+        unit = force_unit(robot, 0)
+        own = Coefficient("moment_cosine", unit), Coefficient("moment_sine", unit)
+        return (*tilts, *own) if _upright(robot) else tilts
+
+    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
+        """Leaves the moments of an upright axis to `likely`."""
+        return ((0.0, 0.0),)
+
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float | None, ...], ...]:
+        """Gives the moments of an upright first axis, none and free; a log from another base has shown them."""
+        level = np.asarray(situation.robot.chain.gravity, dtype=float)
+        alike = _upright(situation.robot) and bool(np.all(situation.gravity == level))
+        return ((0.0,), (1.0,)) if alike else ((0.0,),)
 
     def joints(self, robot: Robot) -> tuple[Place, ...]:
         """Names the whole robot, if there is gravity."""
         return (None,) if np.any(robot.chain.gravity) else ()
 
     def leaves(self, robot: Robot, joint: int) -> float:
-        """Gives half of it for a first axis along gravity: moments about it show tilted only, and are as described."""
-        first = robot.chain.joints[0]
-        down = np.asarray(robot.chain.gravity, dtype=float)
-        along = float(abs(first.rotation @ first.axis @ down)) > 0.99 * float(np.linalg.norm(down))
-        return 0.5 if joint == 0 and along else super().leaves(robot, joint)
+        """Gives half of it for an upright first axis: where its own moments are too small to be told, they show."""
+        return 0.5 if joint == 0 and _upright(robot) else super().leaves(robot, joint)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of all joints per angle."""
+        """Evaluates the torque of all joints per angle, and of the first joint per N m of its own moments."""
         axes = level_axes(np.asarray(situation.robot.chain.gravity, dtype=float))
         turned = np.cross(situation.gravity[:, None], axes)  # (N, 2, 3)
-        return situation.sensitivity("gravity") @ turned.transpose(0, 2, 1)
+        tilted = situation.sensitivity("gravity") @ turned.transpose(0, 2, 1)
+        if not _upright(situation.robot):
+            return tilted
+        own = np.zeros_like(tilted)
+        if shape and shape[0]:
+            own[:, 0, 0], own[:, 0, 1] = np.cos(situation.q[:, 0]), np.sin(situation.q[:, 0])
+        return np.concatenate([tilted, own], axis=2)
 
     def describe(
         self,
@@ -59,8 +80,15 @@ class BaseTilt(Effect):
         length: str = "rad",
     ) -> str:
         """Says what the values mean."""
-        angle = np.degrees(np.hypot(*coefficients))
+        angle = np.degrees(np.hypot(*coefficients[:2]))
         return f"The base is tilted by {angle:.3g} deg: gravity does not pull where the description says."
+
+
+def _upright(robot: Robot) -> bool:
+    """Whether the first joint turns about gravity."""
+    first, down = robot.chain.joints[0], np.asarray(robot.chain.gravity, dtype=float)
+    along = float(abs(first.rotation @ first.axis @ down)) > 0.99 * float(np.linalg.norm(down))
+    return first.kind == "revolute" and along
 
 
 def level_axes(gravity: Array) -> Array:

@@ -19,14 +19,18 @@ Array = NDArray[np.float64]
 class PayloadChange(Effect):
     """tau = Y_tool (m, m c, Ixx, Iyy, Izz) from the time t_c on: a body on the flange, in its frame.
 
-    Its products of inertia are left out: a tool's are small against what its distance makes of the others.
+    Its products of inertia are left out: a tool's are small against what its distance makes of the others. Where
+    `own_inertia` is 0, so are its moments of inertia: a small body's hardly show.
     """
 
     name: ClassVar[str] = "payload_change"
     title: ClassVar[str] = "a payload that changed at one moment"
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("change_time", "s", -np.inf, np.inf, "linear", inexact=0.03),)
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("change_time", "s", -np.inf, np.inf, "linear", inexact=0.03),
+        Shape("own_inertia", "", 0.0, 1.0, "linear", default=1.0),
+    )
     rivals: ClassVar[tuple[str, ...]] = ("torque_sensor_drift", "external_contact", "friction_step", "base_tilt")
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "repeat")
 
@@ -40,16 +44,24 @@ class PayloadChange(Effect):
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists times through the data, and the pauses between logs."""
-        return tuple((time,) for time in change_times(situation))
+        return tuple((time, 0.0) for time in change_times(situation))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the change within the data."""
-        return ((float(situation.t[0]), float(situation.t[-1])),)
+        """Keeps the change within the data, and leaves moments of inertia to `likely`."""
+        return (float(situation.t[0]), float(situation.t[-1])), (0.0, 0.0)
+
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float | None, ...], ...]:
+        """Gives a body with moments of inertia of its own."""
+        return ((None, 1.0),)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per kg, kg m and kg m2."""
-        after = (situation.t >= shape[0]).astype(float)
-        return situation.sensitivity("tool")[:, :, USED] * after[:, None, None]
+        X = situation.sensitivity("tool")[:, :, USED] * (situation.t >= shape[0]).astype(float)[:, None, None]
+        if not shape[1]:
+            X[:, :, 4:] = 0.0
+        return X
 
     def describe(
         self,

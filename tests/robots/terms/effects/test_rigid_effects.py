@@ -63,8 +63,9 @@ def test_an_elastic_gear_lets_its_link_lag(now, torque):
 
 def test_a_tilt_may_leave_more_on_an_axis_along_gravity(random_robot):
     """Moments about a vertical first axis are not known from a level base; formulas else leave eight per cent."""
-    robot = random_robot(3, 4)
+    robot = random_robot(4, 4)
     first = robot.chain.joints[0]
+    assert first.kind == "revolute"
     down = first.rotation @ first.axis
     upright = replace(robot, chain=replace(robot.chain, gravity=tuple(-9.81 * down)))
     across = np.cross(down, np.eye(3)[int(np.argmin(np.abs(down)))])
@@ -115,7 +116,7 @@ def test_a_payload_is_a_body_on_the_flange(now, twin, catalogue_robot, seen):
         tool = seen_by.sensitivity("tool")
         got = tool[SOME] @ body.toDynamicParameters()[ours]
         np.testing.assert_allclose(got, expected, atol=1e-9 * np.abs(expected).max())
-        X = EFFECTS["payload_change"].columns(seen_by, None, (3.0,))
+        X = EFFECTS["payload_change"].columns(seen_by, None, (3.0, 1.0))
         np.testing.assert_array_equal(
             X, np.where(seen_by.t[:, None, None] >= 3.0, tool[:, :, [0, 1, 2, 3, 4, 7, 9]], 0.0)
         )
