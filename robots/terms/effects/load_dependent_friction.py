@@ -18,20 +18,25 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-# A gear that loses as much when its load drives it as when it drives the load.
-ALIKE = (1.0,)
+# A gear that loses as much when its load drives it as when it drives the load; no rotor beside those that are known.
+ALIKE, KNOWN = 1.0, 0.0
 
 
 class LoadDependentFriction(StaticJointEffect):
     """tau = w |tau_L| (a sign(dq) + b dq), tau_L the torque that passes the gear (Hamon et al. 2010).
 
     w is 1 where the joint drives its load, and `driven_back` where the load drives it: a gear's two efficiencies. What
-    they differ in is a share of tau_L itself, as an error of the torque constant is.
+    they differ in is a share of tau_L itself, as an error of the torque constant is. Of the first joints' inertia no
+    log tells how much is the rotor's, which loads no gear: where the robot's description does not say it, this effect
+    does.
     """
 
     name: ClassVar[str] = "load_dependent_friction"
     title: ClassVar[str] = "friction that grows with the load"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("driven_back", "1", 0.0, 1.0, "linear", ALIKE, 0.05, default=1.0),)
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("driven_back", "1", 0.0, 1.0, "linear", (ALIKE,), 0.05, default=ALIKE),
+        Shape("rotor_inertia", "kg m2", 0.0, np.inf, "linear", (KNOWN,), default=KNOWN),
+    )
     rivals: ClassVar[tuple[str, ...]] = (
         "position_dependent_friction",
         "torque_constant_saturation",
@@ -47,17 +52,29 @@ class LoadDependentFriction(StaticJointEffect):
             "viscous_per_load", f"s/{length_unit(robot, joint - 1)}"
         )
 
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists a gear that loses alike both ways; where no rotor is known, with none and with half of the inertia."""
+        assert joint is not None
+        most = _unknown_rotor(situation, joint)
+        return ((ALIKE, KNOWN), (ALIKE, 0.5 * most)) if most else ((ALIKE, KNOWN),)
+
+    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
+        """Keeps a rotor that is not known within the joint's inertia."""
+        assert joint is not None
+        return (0.0, 1.0), (KNOWN, _unknown_rotor(situation, joint))
+
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the gear that loses alike both ways."""
-        return (ALIKE,)
+        """Gives the gear that loses alike both ways, with the rotor that is known or as fitted."""
+        return (ALIKE, KNOWN), (ALIKE, None), (None, KNOWN)
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds w |tau_L| sign(dq) and w |tau_L| dq."""
-        drives = at.load * at.dq > 0
-        load = (drives + (1.0 - drives) * at.shape[0]) * casadi.fabs(at.load)
-        return casadi.horzcat(load * at.sign, load * at.dq)
+        load = at.load - at.shape[1] * at.ddq
+        drives = load * at.dq > 0
+        size = (drives + (1.0 - drives) * at.shape[0]) * casadi.fabs(load)
+        return casadi.horzcat(size * at.sign, size * at.dq)
 
     def describe(
         self,
@@ -69,7 +86,9 @@ class LoadDependentFriction(StaticJointEffect):
         length: str = "rad",
     ) -> str:
         """Says what the values mean."""
-        back = "" if not shape or shape == ALIKE else f" Driven back by its load it loses {shape[0]:.2g} times as much."
+        back = (
+            "" if not shape or shape[0] == ALIKE else f" Driven back by its load it loses {shape[0]:.2g} times as much."
+        )
         return (
             f"The friction of joint {joint} grows with its load: {100 * coefficients[0]:.3g} % of it in Coulomb "
             f"friction, and {100 * coefficients[1]:.3g} % per {length}/s.{back}"
@@ -79,7 +98,16 @@ class LoadDependentFriction(StaticJointEffect):
         """Gives the load times the direction of motion."""
         assert joint is not None
         j = joint - 1
-        load = situation.load[:, j]
-        back = shape[0] if shape else 1.0
+        back, rotor = shape or (ALIKE, KNOWN)
+        load = situation.load[:, j] - rotor * situation.ddq[:, j]
         signed = np.where(load * situation.dq[:, j] > 0, 1.0, back) * np.abs(load) * situation.sign[:, j]
         return f"load of joint {joint}, signed by its direction [N m]", signed
+
+
+def _unknown_rotor(situation: Situation, joint: int) -> float:
+    """Gives the most that the rotor of a joint may have of its inertia, zero where the rotor is known."""
+    j = joint - 1
+    if situation.rotors[:, j].any():
+        return 0.0
+    least = situation.cached(("least inertia", j), lambda: float(situation.sensitivity("inertia")[:, j, j].min()))
+    return max(least, 0.0)

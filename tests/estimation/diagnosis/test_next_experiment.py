@@ -149,7 +149,7 @@ def test_the_experiment_starts_from_the_arm_itself(problem):
     laden = replace(problem, recording=carried, situation=now)
     assert np.abs(now.rigid - problem.situation.rigid).max() > 10.0
     causes = [
-        _guess(problem, "load_dependent_friction", 4, (1.0,), 0.02),
+        _guess(problem, "load_dependent_friction", 4, (1.0, 0.0), 0.02),
         _guess(problem, "stribeck", 4, (0.05, 1.0), 0.02),
     ]
     room = room_of(problem.situation.robot, problem.recording)

@@ -61,7 +61,7 @@ def test_a_score_is_the_fall_of_the_squared_residual(problem: Problem, name: str
 def test_accepted_effects_are_projected_out(problem: Problem) -> None:
     """Beside itself an effect explains nothing; beside another, the two explain what they explain together."""
     groups = []
-    for name, shape in (("asymmetric_friction", ()), ("load_dependent_friction", (1.0,))):
+    for name, shape in (("asymmetric_friction", ()), ("load_dependent_friction", (1.0, 0.0))):
         joints, columns = problem.columns_of(Hypothesis(EFFECTS[name], 1), shape)
         groups.append(problem.group(joints, columns))
     alone = accept(problem, (groups[0],))

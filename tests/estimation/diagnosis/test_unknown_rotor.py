@@ -1,0 +1,43 @@
+"""Specification of loads on a joint whose rotor the robot's description does not know."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis import diagnose
+from robots.plants import simulate
+from robots.robot import Robot
+
+SHARE = 0.08
+
+
+def test_friction_by_the_load_tells_the_rotor_that_loads_no_gear(
+    arm: Robot, arm_plant: Callable, fourier_motion: Callable, pinocchio_torque: Callable
+) -> None:
+    """The first joint's rotor, in one base parameter with its link, is told beside the friction that grows with load.
+
+    The load is pinocchio's. Intervals of 95 %: the chance that one of two misses the truth is 10 %, hence the seed.
+    """
+    motion = fourier_motion(arm, 0)
+    log = simulate(arm_plant(torque_noise=0.01), motion, seed=0)
+    load = pinocchio_torque(arm, motion)[:, 0]
+    tau = log.tau.copy()
+    tau[:, 0] += SHARE * np.abs(load) * np.sign(motion.dq[:, 0])
+    bare = replace(arm, rotor_inertia=np.zeros(2))
+    candidates = ("load_dependent_friction", "position_dependent_friction", "spring", "torque_constant_saturation")
+    result = diagnose(bare, replace(log, tau=tau), candidates=candidates, friction="coulomb-viscous")
+    (finding,) = result.findings
+    assert (finding.effect, finding.joint) == ("load_dependent_friction", 1)
+    told = {parameter.name: parameter for parameter in finding.parameters}
+    for name, truth in (("coulomb_per_load", SHARE), ("rotor_inertia", arm.rotor_inertia[0])):
+        low, high = told[name].ci95
+        assert low < truth < high
+    assert told["rotor_inertia"].value == pytest.approx(0.2, rel=0.2)
+    # What is described is known.
+    known = diagnose(arm, replace(log, tau=tau), candidates=candidates, friction="coulomb-viscous").findings
+    assert [(f.effect, f.joint) for f in known] == [("load_dependent_friction", 1)]
+    assert {p.name: p.value for p in known[0].parameters}["rotor_inertia"] == 0.0
