@@ -17,6 +17,7 @@ from estimation.diagnosis.hopeless_logs import hopeless_logs
 from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.limits import find_limits
 from estimation.diagnosis.noise import estimate_whitening, quiet_joints
+from estimation.diagnosis.own_functions import own_functions
 from estimation.diagnosis.patterns import all_patterns
 from estimation.diagnosis.posing import fit_values, pose
 from estimation.diagnosis.problem import Problem
@@ -184,7 +185,8 @@ def _search(
         share = 0.1 + 0.3 * attempt
         inertia = inertia_of(baseline, recording, settled.values)
         fitted = baseline.base.size + settled.degrees
-        whitening = estimate_whitening(recording, settled.residual, fitted, inertia)
+        spared = own_functions(recording, baseline, settled.residual)
+        whitening = estimate_whitening(recording, settled.residual, fitted, inertia, spared=spared)
         if search is not None:
             members = [found.member for found in search.selection.found]
             if not (calmer(search.problem, whitening.scale) or moved(search.problem, settled.values, members)):
@@ -196,7 +198,7 @@ def _search(
                 baseline = build_baseline(base, replace(recording, tau=settled.without_effects(tau)))
         upper = None
         if any(effect.fast for effect in effects):
-            wide = estimate_whitening(recording, settled.residual, fitted, inertia, WIDER)
+            wide = estimate_whitening(recording, settled.residual, fitted, inertia, WIDER, spared)
             remainder = tau - baseline.regressor @ settled.values
             upper = pose_upper(recording, baseline, remainder, settled.residual, whitening.bands, wide)
         rng = np.random.default_rng(seed)

@@ -12,6 +12,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from estimation.diagnosis.band import SHARE, find_bands, unbiased
 from estimation.diagnosis.gaps import find_gaps, free_columns, long_gap
+from estimation.diagnosis.own_functions import Beside
 from estimation.diagnosis.states import Recording
 from estimation.diagnosis.whitening import Whitening
 from estimation.uncertainty.autoregressive import HIGHEST_ORDER, Noise, fit_noise, levinson
@@ -39,12 +40,19 @@ LOWEST_ORDER = 4
 HUBER = 3.5
 # But not where rows stick out for so long [s] together and no reversal is nearer than this [s].
 TOGETHER, KICKED = 0.05, 0.15
+# Bridges of so many rows are short in any case; where fewer than this share of the rows remain, all bridges stay.
+SHORT, ENOUGH = 8, 0.3
 # What is not known of kicks drowns in the noise below this share of it: at each reversal it is different.
 DROWNED = 1.0
 
 
 def estimate_whitening(
-    recording: Recording, residual: Array, parameters: int, inertia: Array, share: float = SHARE
+    recording: Recording,
+    residual: Array,
+    parameters: int,
+    inertia: Array,
+    share: float = SHARE,
+    spared: Sequence[Array] = (),
 ) -> Whitening:
     """Estimates the noise.
 
@@ -58,6 +66,7 @@ def estimate_whitening(
         parameters: how many were fitted to it: they have taken some of the noise.
         inertia: torque on each joint per acceleration of each (n, n) [kg m2], for what their errors make.
         share: of the torque noise, what those may make in the bands.
+        spared: for each joint columns (N, k) on which no noise is measured.
     """
     longest = long_gap(recording.step)
     rests = find_gaps(recording.unsure, recording.starts, longest)
@@ -75,15 +84,18 @@ def estimate_whitening(
     cutoffs = np.array([band.cutoff for band in bands])
     widths = 1 / (2 * cutoffs * recording.step)
     resting = rests.resting(recording.starts, len(residual), stride, int(np.ceil(1.5 * widths.max())) + 2)
-    counts = np.maximum((~resting).sum(axis=0), 1).astype(float)
+    measured = _measured(recording, stride, widths, ~resting)
+    counts = np.maximum(measured.sum(axis=0), 1).astype(float)
+    beside = Beside([gaps.bridged(X, j) for j, X in enumerate(spared)], bands, recording.runs, measured)
+    pieces = beside.left(pieces)
     tells = sum(map(len, pieces)) * step * FLAT >= FEWEST
     slowest, fastest = FLAT if tells else 0.0, INSIDE * cutoffs
-    noise = _colour(pieces, step, counts, parameters, slowest, fastest)
+    noise = _colour(pieces, step, counts, parameters, slowest, fastest, beside)
     levels = None
     if len(pieces) > 1:
         levels = _levels([noise.whitened(piece) for piece in pieces], step, slowest, fastest)
         pieces = [piece / level for piece, level in zip(pieces, levels, strict=True)]
-        noise = _colour(pieces, step, counts, parameters, slowest, fastest)
+        noise = _colour(pieces, step, counts, parameters, slowest, fastest, beside)
     trimmed = max(len(a) for a in noise.coefficients)
     innovations = np.concatenate([noise.whitened(piece)[min(trimmed, len(piece) // 2) :] for piece in pieces])
     # White noise has as much power at each frequency: what effects add to the slow ones is left out, and above the band
@@ -92,7 +104,8 @@ def estimate_whitening(
     f = np.fft.rfftfreq(len(innovations), step)
     inside = (f[:, None] >= slowest) & (f[:, None] < fastest)
     spectrum[~inside] = 0.0
-    scale = np.maximum(np.sqrt((np.abs(spectrum) ** 2).sum(axis=0) / np.maximum(inside.sum(axis=0), 1) / counts), 1e-12)
+    power = np.abs(spectrum) ** 2 / beside.kept(len(innovations), counts)
+    scale = np.maximum(np.sqrt(power.sum(axis=0) / np.maximum(inside.sum(axis=0), 1) / counts), 1e-12)
     white = _unit(spectrum, len(innovations))
     # Joints correlate in the frequencies that all of them know.
     spectrum[~inside.all(axis=1)] = 0.0
@@ -117,6 +130,20 @@ def estimate_whitening(
     weights = np.minimum(1.0, HUBER * np.maximum(level, 0.1) / np.maximum(left, 1e-12))
     weights[_pushed(weights < 1.0, recording, stride, cutoffs)] = 1.0
     return replace(plain, weights=np.where(resting, 0.0, weights))
+
+
+def _measured(recording: Recording, stride: int, widths: Array, moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Marks thinned rows (M, n) that show the noise: not where a bridge is longer than what the band lets through.
+
+    A bridge holds two samples, with all of the noise beyond the band, for as long as it is.
+    """
+    result = moving.copy()
+    for j, width in enumerate(widths):
+        bridges = find_gaps(recording.unsure[:, [j]], recording.starts, max(SHORT, round(width)))
+        held = bridges.resting(recording.starts, len(recording), stride, int(np.ceil(width)))[:, 0]
+        if np.sum(moving[:, j] & ~held) > ENOUGH * np.sum(moving[:, j]):
+            result[:, j] &= ~held
+    return result
 
 
 def _pushed(outside: NDArray[np.bool_], recording: Recording, stride: int, cutoffs: Array) -> NDArray[np.bool_]:
@@ -162,7 +189,13 @@ def _unit(spectrum: NDArray[np.complex128], rows: int) -> Array:
 
 
 def _colour(
-    pieces: Sequence[Array], step: float, counts: Array, parameters: int, slowest: float, fastest: Array
+    pieces: Sequence[Array],
+    step: float,
+    counts: Array,
+    parameters: int,
+    slowest: float,
+    fastest: Array,
+    beside: Beside,
 ) -> Noise:
     """Fits the noise by its spectrum within a window, and lets the model say what is outside.
 
@@ -177,11 +210,13 @@ def _colour(
         parameters: how many were fitted to the residual: they have taken some of the noise.
         slowest: lowest frequency of the windows [Hz].
         fastest: highest of each joint's (n,) [Hz].
+        beside: what was taken out of the pieces.
     """
     rows, joints = sum(map(len, pieces)), pieces[0].shape[1]
     highest = int(np.clip(round(MEMORY / step), LOWEST_ORDER, HIGHEST_ORDER))
     size = next_fast_len(max(map(len, pieces)) + highest + 1, real=True)
     power = sum(np.abs(np.fft.rfft(piece, size, axis=0)) ** 2 for piece in pieces) / counts
+    power = power / beside.kept(size, counts)
     power = power * rows * joints / max(rows * joints - parameters, 0.5 * rows * joints)
     covariances = np.empty((joints, highest + 1))
     for j in range(joints):
