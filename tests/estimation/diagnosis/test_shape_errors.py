@@ -23,7 +23,7 @@ SPEED, EXPONENT = 0.25, 1.5
 BOUND = 3.84  # of twice the logarithm of the likelihood ratio: 95 %
 
 
-@pytest.mark.parametrize("size", [1.0, 2.5])
+@pytest.mark.parametrize("size", [1.6, 2.5])
 def test_a_velocity_is_as_uncertain_as_its_exponent_lets_it_be(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], size: float
 ) -> None:
