@@ -77,24 +77,26 @@ def own_functions(recording: Recording, baseline: Baseline, residual: Array) -> 
     Returns:
         For each joint, columns (N, k) on its rows.
     """
-    n = recording.n
     known = ~recording.unsure
     weights = known / np.maximum(recording.tau.std(axis=0), 1e-12)
-    base = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
-    flat = (base * weights[:, :, None]).reshape(-1, base.shape[2])
-    gram = flat.T @ flat
+    sign = baseline.situation(recording, np.zeros(baseline.base.size)).sign
+    size = baseline.regressor.shape[2] + baseline.nuisance.shape[2]
+    gram, shown = np.zeros((size, size)), []
+    for j in range(recording.n):
+        own = np.hstack([baseline.regressor[:, j], baseline.nuisance[:, j]])
+        weighted = own * weights[:, j, None]
+        columns = _functions(recording, sign, recording.tau - residual, j)
+        gram += weighted.T @ weighted
+        shown.append((columns, weighted.T @ (columns * weights[:, j, None])))
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     values, vectors = np.linalg.eigh(gram / scale[:, None] / scale)
     kept = values > FAINT**2 * values[-1]
     root = vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
-    sign = baseline.situation(recording, np.zeros(baseline.base.size)).sign
-    result = []
-    for j in range(n):
-        columns = _functions(recording, sign, recording.tau - residual, j)
-        own = base[:, j]
-        coefficients = root @ (root.T @ (own.T @ (columns * weights[:, j, None] ** 2)))
-        result.append(columns - own @ coefficients)
-    return tuple(result)
+    for j, (columns, cross) in enumerate(shown):
+        made = root @ (root.T @ cross)
+        edge = baseline.regressor.shape[2]
+        columns -= baseline.regressor[:, j] @ made[:edge] + baseline.nuisance[:, j] @ made[edge:]
+    return tuple(columns for columns, _ in shown)
 
 
 def _functions(recording: Recording, sign: Array, torque: Array, joint: int) -> Array:
