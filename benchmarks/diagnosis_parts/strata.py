@@ -16,7 +16,10 @@ TUNING = 1000
 
 @dataclass(frozen=True)
 class Stratum:
-    """A kind of case: how many the full benchmark has, how many effects each hides, and their visible size."""
+    """A kind of case: how many the full benchmark has, how many effects each hides, and their visible size.
+
+    `moves`: point to point with pauses between, instead of motion throughout.
+    """
 
     name: str
     count: int
@@ -24,6 +27,7 @@ class Stratum:
     size: float
     strange: bool = False
     durations: tuple[float, ...] = (60.0,)
+    moves: bool = False
 
 
 STRATA: dict[str, Stratum] = {
@@ -34,6 +38,8 @@ STRATA: dict[str, Stratum] = {
         Stratum("one", 220, 1, 0.01, durations=(60.0, 60.0, 60.0, 120.0)),
         Stratum("two", 100, 2, 0.03),
         Stratum("stranger", 100, 1, 0.01, strange=True),
+        Stratum("idle_moves", 100, 0, 0.0, moves=True),
+        Stratum("moves", 100, 1, 0.01, moves=True),
     )
 }
 
@@ -73,7 +79,7 @@ def draw(task: Task) -> Case | None:
     """
     stratum = STRATA[task.stratum]
     stream = 1 + list(STRATA).index(task.stratum)
-    options = {"size": stratum.size, "periodic": task.seed % 2 == 0, "stream": stream}
+    options = {"size": stratum.size, "periodic": task.seed % 2 == 0, "stream": stream, "moves": stratum.moves}
     duration = stratum.durations[task.seed // 2 % len(stratum.durations)]
     kinds = [KINDS[(task.seed // 2 + k) % len(KINDS)] for k in range(len(KINDS))]
     pool: tuple[type[Effect], ...] = STRANGERS if stratum.strange else KNOWN

@@ -14,7 +14,7 @@ from tests.truth.effects import KNOWN, STRANGERS, Effect
 from tests.truth.machines import KINDS, Machine, draw_machine
 from tests.truth.noise import Noise, draw_noise
 from tests.truth.plant import Record, open_loop, parts_links, play, projection_of
-from tests.truth.references import Reference, draw_aperiodic, draw_periodic
+from tests.truth.references import Reference, draw_aperiodic, draw_moves, draw_periodic
 
 SEARCH_STEP = 0.008
 SEARCHES = 12
@@ -123,6 +123,7 @@ def draw_case(
     unseen: float = 30.0,
     noise_level: float = 0.025,
     stream: int = 0,
+    moves: bool = False,
 ) -> Case:
     """Draws a case.
 
@@ -137,6 +138,7 @@ def draw_case(
         unseen: length of the log of another motion [s]; 0 for none.
         noise_level: torque noise, as a share of the torque's RMS.
         stream: another case of the same seed.
+        moves: moves with pauses between instead of motion throughout.
 
     Raises:
         Hidden: when no effect that is asked for can reach the size.
@@ -144,7 +146,7 @@ def draw_case(
     rng = np.random.default_rng([seed, stream] if stream else seed)
     machine = draw_machine(kind or KINDS[int(rng.integers(len(KINDS)))], rng)
     periodic = bool(rng.random() < 0.5) if periodic is None else periodic
-    references = [_reference(machine, rng, periodic, length) for length in (duration, unseen) if length > 0]
+    references = [_reference(machine, rng, periodic, length, moves) for length in (duration, unseen) if length > 0]
     base = open_loop(machine, references[:1], [], step=SEARCH_STEP)
     level = np.sqrt((base.base_torque() ** 2).mean(axis=0))
     projection = projection_of(base, level)
@@ -207,7 +209,9 @@ def write_log(record: Record, path: Path) -> None:
     np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.9g")
 
 
-def _reference(machine: Machine, rng: np.random.Generator, periodic: bool, duration: float) -> Reference:
+def _reference(machine: Machine, rng: np.random.Generator, periodic: bool, duration: float, moves: bool) -> Reference:
+    if moves:
+        return draw_moves(machine, rng, duration=duration)
     if not periodic:
         return draw_aperiodic(machine, rng, duration=duration)
     period = 10.0 if duration >= 20.0 else duration / 2

@@ -105,6 +105,30 @@ def draw_aperiodic(machine: Machine, rng: np.random.Generator, *, duration: floa
     )
 
 
+def draw_moves(machine: Machine, rng: np.random.Generator, *, duration: float = 60.0) -> Reference:
+    """Draws moves between random points, of .8 to 2.5 s each, with pauses of up to a second: a robot at its work."""
+    times, points = [0.0, rng.uniform(0.3, 1.0)], [rng.normal(size=machine.n)] * 2
+    while times[-1] < duration:
+        times.append(times[-1] + rng.uniform(0.8, 2.5))
+        points.append(rng.normal(size=machine.n))
+        times.append(times[-1] + rng.uniform(0.02, 1.0))
+        points.append(points[-1])
+    begin, q = np.array(times), np.array(points)
+    width, span = np.diff(begin)[:, None], np.diff(q, axis=0)
+    # 10 u^3 - 15 u^4 + 6 u^5 of each stretch's own time, highest power first.
+    powers = np.zeros((6, *span.shape))
+    powers[0], powers[1], powers[2] = 6 * span / width**5, -15 * span / width**4, 10 * span / width**3
+    powers[5] = q[:-1]
+    shape = Spline(curve=PPoly(powers, begin), start=0.0, end=duration)
+    scale = _scale(machine, *shape.at(np.arange(0.0, duration, 0.01)), rng)
+    reach = q * scale
+    middle = (machine.lower + machine.upper) / 2 - (reach.max(axis=0) + reach.min(axis=0)) / 2
+    powers = powers * scale
+    powers[5] += middle
+    curve = Spline(curve=PPoly(powers, begin), start=0.0, end=duration)
+    return Reference(duration=duration, period=None, kind="moves", curve=curve)
+
+
 def _scale(machine: Machine, q: np.ndarray, v: np.ndarray, a: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     span = (machine.upper - machine.lower) / np.ptp(q, axis=0)
     speed, acceleration = machine.speed / np.abs(v).max(axis=0), machine.acceleration / np.abs(a).max(axis=0)

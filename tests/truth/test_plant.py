@@ -21,7 +21,7 @@ from tests.truth.effects.surroundings import Payload
 from tests.truth.effects.transmission import Elastic
 from tests.truth.machines import KINDS, draw_machine
 from tests.truth.plant import measure, open_loop
-from tests.truth.references import draw_aperiodic, draw_periodic
+from tests.truth.references import draw_aperiodic, draw_moves, draw_periodic
 
 ALLOWED = {"numpy", "scipy", "pinocchio", "tests"} | set(sys.stdlib_module_names)
 
@@ -58,7 +58,7 @@ def test_description_is_the_known_robot_and_not_the_true_one(kind: str, tmp_path
     assert 0.005 < np.sqrt((off**2).mean() / (told**2).mean()) < 0.15
 
 
-@pytest.mark.parametrize("draw", [draw_periodic, draw_aperiodic])
+@pytest.mark.parametrize("draw", [draw_periodic, draw_aperiodic, draw_moves])
 def test_references_are_smooth_and_within_limits(draw: object) -> None:
     """A reference's velocity and acceleration are its derivatives, and it stays within the robot's limits."""
     machine = draw_machine("er3a", np.random.default_rng(3))
@@ -67,7 +67,8 @@ def test_references_are_smooth_and_within_limits(draw: object) -> None:
     q, v, a = reference.at(t)
     # Central differences err by h^2/6 times the third derivative, below 1e3 here.
     np.testing.assert_allclose(np.gradient(q, t, axis=0)[1:-1], v[1:-1], atol=1e-3)
-    np.testing.assert_allclose(np.gradient(v, t, axis=0)[1:-1], a[1:-1], atol=1e-2)
+    # Where a move begins or ends its jerk jumps, by some 50 rad/s3 here: half a step of it.
+    np.testing.assert_allclose(np.gradient(v, t, axis=0)[1:-1], a[1:-1], atol=5e-2 if draw is draw_moves else 1e-2)
     assert (np.abs(v) < machine.speed).all()
     assert (q > machine.lower - 0.1).all()
     assert (q < machine.upper + 0.1).all()
