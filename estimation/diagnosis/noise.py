@@ -84,7 +84,7 @@ def estimate_whitening(
     cutoffs = np.array([band.cutoff for band in bands])
     widths = 1 / (2 * cutoffs * recording.step)
     resting = rests.resting(recording.starts, len(residual), stride, int(np.ceil(1.5 * widths.max())) + 2)
-    measured = _measured(recording, stride, widths, ~resting)
+    measured = _measured(recording, stride, widths, ~resting) if len(spared) else ~resting
     counts = np.maximum(measured.sum(axis=0), 1).astype(float)
     beside = Beside([gaps.bridged(X, j) for j, X in enumerate(spared)], bands, recording.runs, measured)
     pieces = beside.left(pieces)

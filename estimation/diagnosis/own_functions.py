@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 # Knots of the functions: of the position over its range, of the speed as shares of its largest.
 POSITIONS = 8
 SPEEDS = (0.0, 0.03, 0.1, 0.3, 0.6, 1.0)
+# Of a shorter log [s] they would take most of the noise at the frequencies of the motion.
+SHORTEST = 20.0
 RANGE = 1e-3  # [rad or m] a joint that moves less than this has none
 # Directions of columns below this share of the largest are none.
 FAINT = 1e-6
@@ -75,8 +77,10 @@ def own_functions(recording: Recording, baseline: Baseline, residual: Array) -> 
         residual: torque less model (N, n) [N m or N].
 
     Returns:
-        For each joint, columns (N, k) on its rows.
+        For each joint, columns (N, k) on its rows; nothing of a log that is too short.
     """
+    if recording.duration < SHORTEST:
+        return ()
     known = ~recording.unsure
     weights = known / np.maximum(recording.tau.std(axis=0), 1e-12)
     sign = baseline.situation(recording, np.zeros(baseline.base.size)).sign

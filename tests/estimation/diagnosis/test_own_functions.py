@@ -75,3 +75,12 @@ def test_neither_rests_nor_effects_colour_the_noise(arm: Robot, arm_plant: Calla
     if stiffness:
         naive = estimate_whitening(recording, residual, baseline.base.size, np.eye(2))
         assert _density(naive, recording, 0)[1] > 10 * true[1]
+
+
+def test_a_short_log_has_no_free_functions(arm: Robot, arm_plant: Callable) -> None:
+    """Of ten seconds they would take the noise itself."""
+    log = simulate(arm_plant(torque_noise=0.01), _moves(0), seed=0)
+    short = replace(log, t=log.t[:2500], q=log.q[:2500], tau=log.tau[:2500])
+    recording = record(arm, [short])
+    baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
+    assert own_functions(recording, baseline, recording.tau) == ()
