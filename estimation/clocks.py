@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
 
 from robots.common.errors import InputError
 from robots.signals import Log
@@ -34,3 +37,80 @@ def on_one_clock(logs: Sequence[Log], pause: float = PAUSE) -> list[Log]:
         start = float(result[-1].t[-1]) + pause if result else float(log.t[0])
         result.append(replace(log, t=log.t - log.t[0] + start))
     return result
+
+
+def are_apart(logs: Sequence[Log]) -> bool:
+    """Whether logs can be on one clock: none begins before another has ended."""
+    ordered = sorted(logs, key=lambda log: float(log.t[0]))
+    return all(before.t[-1] < after.t[0] for before, after in pairwise(ordered))
+
+
+@dataclass(frozen=True, eq=False)
+class Clocked:
+    """Logs on one clock.
+
+    Attributes:
+        logs: to fit to.
+        held_out: unseen ones.
+        dated: whether it is known when the unseen ones were recorded.
+        notes: what was taken for granted.
+    """
+
+    logs: tuple[Log, ...]
+    held_out: tuple[Log, ...]
+    dated: bool = True
+    notes: tuple[str, ...] = ()
+
+
+def clocked(logs: Sequence[Log], held_out: Sequence[Log]) -> Clocked:
+    """Puts logs on one clock where their own times say that they are on none.
+
+    Two recordings of one robot cannot overlap: where they do, each began its clock anew. Held-out logs that overlap the
+    others count as recorded after them.
+
+    Args:
+        logs: to fit to, in the order in which they were recorded where they overlap.
+        held_out: unseen ones, likewise.
+
+    Raises:
+        InputError: one log given twice.
+    """
+    _refuse_copies(logs, held_out)
+    notes = []
+    if not are_apart(logs):
+        logs = on_one_clock(logs)
+        notes.append(_OVERLAP.format(PAUSE))
+    dated = not held_out or are_apart([*logs, *held_out])
+    if not dated:
+        latest = max(logs, key=lambda log: float(log.t[-1]))
+        held_out = on_one_clock([latest, *held_out])[1:]
+        notes.append(_UNDATED.format(PAUSE))
+    return Clocked(tuple(logs), tuple(held_out), dated, tuple(notes))
+
+
+_OVERLAP = (
+    "The logs overlap in time: each began its clock anew. They count one after the other in the order given, {:.0f} s "
+    "apart; what heats, drifts or happens between them is known as well as that is."
+)
+_UNDATED = (
+    "The held-out logs overlap the others in time: they count as recorded {:.0f} s after them. What changes with time "
+    "may be otherwise there: where they speak against it, it is kept all the same."
+)
+
+
+def _refuse_copies(logs: Sequence[Log], held_out: Sequence[Log]) -> None:
+    every = [*logs, *held_out]
+    for k, log in enumerate(every):
+        for i, other in enumerate(every[:k]):
+            if _same(log, other):
+                unseen = i < len(logs) <= k
+                raise InputError(
+                    "the held-out log is one of the logs that are fitted to" if unseen else "the log is given twice",
+                    file=log.metadata.get("file", log.name or None),
+                    remedy="hold out a log of another motion" if unseen else "name it once: it would count double",
+                )
+
+
+def _same(one: Log, other: Log) -> bool:
+    pairs = ((one.q, other.q), (one.tau, other.tau), (one.current, other.current))
+    return all(np.array_equal(a, b) if a is not None and b is not None else a is b for a, b in pairs)

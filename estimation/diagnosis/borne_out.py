@@ -11,6 +11,7 @@ from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found
 from estimation.diagnosis.unseen import Measured
 from estimation.diagnosis.verdict import CLOSE, Judgement
+from robots.terms.effects import Effect
 
 LEFT = 0.2  # share of an effect's gain that stretches left out must show
 HARM = 1.05  # times the unseen error: an effect that makes it so much larger is left out, sure or not
@@ -40,7 +41,7 @@ class BorneOut:
 def bear_out(
     judgement: Judgement,
     measure: Callable[[Sequence[Member]], Measured],
-    held_out: bool,
+    beyond: Callable[[Effect], bool],
     forms: Callable[[Sequence[Member], int], Sequence[Member]],
 ) -> BorneOut:
     """Leaves out what makes unseen errors larger, one after the other, the surest first.
@@ -51,7 +52,7 @@ def bear_out(
     Args:
         judgement: what was found.
         measure: measures members on unseen data.
-        held_out: whether those are logs of their own.
+        beyond: tells of which effects those data can say nothing.
         forms: lists other forms of one of some members, the likeliest first.
     """
     founds = list(judgement.kept)
@@ -60,13 +61,13 @@ def bear_out(
     spoiling: list[tuple[Member, float, Gain]] = []
     notes: list[str] = []
     seen = measure(members)
-    while harmful := [i for i, member in enumerate(members) if _harms(seen, i, member, held_out)]:
+    while harmful := [i for i, member in enumerate(members) if _harms(seen, i, member, beyond)]:
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         label = members[worst].hypothesis.label
         if worst >= len(founds):
             # A free function that errs elsewhere is no model; that something is unexplained is as true as before.
             spoiling.append((members.pop(worst), p_values.pop(worst), seen.gains[worst]))
-        elif instead := _instead(founds[worst], worst, members, measure, held_out, forms):
+        elif instead := _instead(founds[worst], worst, members, measure, beyond, forms):
             founds[worst], seen = instead
             members[worst] = founds[worst].member
             if members[worst].hypothesis.label != label:
@@ -95,7 +96,7 @@ def _instead(
     place: int,
     members: Sequence[Member],
     measure: Callable[[Sequence[Member]], Measured],
-    held_out: bool,
+    beyond: Callable[[Effect], bool],
     forms: Callable[[Sequence[Member], int], Sequence[Member]],
 ) -> tuple[Found, Measured] | None:
     """Finds another form or the closest rival of a name that unseen data bear out, and what all bring with it.
@@ -105,28 +106,27 @@ def _instead(
     harmless: list[tuple[Found, Measured]] = []
     for form in forms(members, place):
         seen = measure([*members[:place], form, *members[place + 1 :]])
-        if not _harms(seen, place, form, held_out):
+        if not _harms(seen, place, form, beyond):
             harmless.append((Found(form, found.p_value, found.rivals), seen))
             if seen.gains[place].ci95[0] > 0:
                 return harmless[-1]
     close = [(rival, worse) for rival, worse in found.rivals if worse < CLOSE]
     for k, (rival, worse) in enumerate(close):
         seen = measure([*members[:place], rival, *members[place + 1 :]])
-        if not _harms(seen, place, rival, held_out) and seen.gains[place].ci95[0] > 0:
+        if not _harms(seen, place, rival, beyond) and seen.gains[place].ci95[0] > 0:
             rest = tuple((other, more - worse) for other, more in close[k + 1 :])
             return Found(rival, found.p_value, rest), seen
     return harmless[0] if harmless else None
 
 
-def _harms(seen: Measured, i: int, member: Member, held_out: bool) -> bool:
+def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bool]) -> bool:
     """Whether unseen errors are surely larger with a member, or larger by so much that it is no gain to have it.
 
     A cause that acts at all times must also leave on stretches left out some of what it does where it was fitted, and
-    of a joint whose base model the logs do not tell nothing can be named. Logs of their own say nothing of an effect
-    that belongs to the logs of the fit: a contact, a drift.
+    of a joint whose base model the logs do not tell nothing can be named.
     """
     effect, joint = member.hypothesis.effect, member.hypothesis.joint
-    if held_out and effect.passing:
+    if beyond(effect):
         return False
     if effect.depends_on == "state" and seen.kept[i] < LEFT:
         return True

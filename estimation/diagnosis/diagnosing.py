@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.clocks import clocked
 from estimation.diagnosis.baseline import Baseline, base_parameters, build_baseline, inertia_of
 from estimation.diagnosis.carried import lightened
 from estimation.diagnosis.diagnosis import Diagnosis
@@ -74,8 +75,8 @@ def diagnose(
 
     Args:
         robot: the robot.
-        logs: one or several, of t, q and tau or current; t is one clock. A log that says so carries a known payload,
-            or was recorded under another gravity.
+        logs: one or several, of t, q and tau or current; t is one clock. Logs that overlap count one after the other,
+            in the order given. A log that says so carries a known payload, or was recorded under another gravity.
         held_out: logs of other motions to measure the gain on; without, runs or stretches are kept apart.
         candidates: effects to look for, by name; all by default.
         friction: of the base model: ``polynomial`` or ``coulomb-viscous``.
@@ -88,7 +89,7 @@ def diagnose(
         The diagnosis.
 
     Raises:
-        InputError: logs of another robot, without torque, too short or overlapping; an unknown effect or option.
+        InputError: logs of another robot, without torque, too short or given twice; an unknown effect or option.
         NotIdentifiableError: no joint moves.
     """
     data = [logs] if isinstance(logs, Log) else list(logs)
@@ -101,7 +102,8 @@ def diagnose(
     bar = progress or SILENT
     bar.start("diagnosing", 1.0)
     try:
-        data.sort(key=lambda log: float(log.t[0]))
+        on_clock = clocked(data, other)
+        data, other = sorted(on_clock.logs, key=lambda log: float(log.t[0])), list(on_clock.held_out)
         recording = lightened(robot, record(robot, data))
         if not (np.ptp(recording.q, axis=0) > 0).any():
             raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
@@ -132,9 +134,10 @@ def diagnose(
             excess=residual_shares(problem),
             logs=tuple(data),
             held_out=tuple(other),
+            dated=on_clock.dated,
             false_alarm=false_alarm,
             seed=seed,
-            notes=notes,
+            notes=(*on_clock.notes, *notes),
         )
         return assemble(robot, told)
     finally:

@@ -30,7 +30,7 @@ from estimation.diagnosis.wording import word_finding
 from estimation.provenance import describe_logs
 from robots.robot import Robot
 from robots.signals import Log
-from robots.terms.effects import EFFECTS
+from robots.terms.effects import EFFECTS, Effect
 from robots.terms.effects.current_clipping import CERTAIN, CurrentClipping
 from robots.version import VERSION
 
@@ -55,6 +55,7 @@ class Told:
     held_out: tuple[Log, ...]
     false_alarm: float
     seed: int
+    dated: bool = True
     notes: tuple[str, ...] = ()
 
 
@@ -64,7 +65,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     held = bear_out(
         judgement,
         lambda members: measure_unseen(robot, problem, members, told.held_out, told.seed + 3),
-        bool(told.held_out),
+        partial(_is_beyond, told),
         partial(alike_forms, problem),
     )
     members, founds, seen, spoiling = held.members, held.founds, held.seen, held.spoiling
@@ -118,6 +119,16 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         trace=_trace(unseen, seen.coordinates, twisted),
         simulation=simulation,
     )
+
+
+def _is_beyond(told: Told, effect: Effect) -> bool:
+    """Whether unseen logs say nothing of an effect that belongs to the logs of the fit: a contact, a drift.
+
+    Where it is not known when they were recorded, they say nothing of what comes with time.
+    """
+    if not told.held_out:
+        return False
+    return effect.passing or (not told.dated and effect.depends_on == "time")
 
 
 _LOST = "Simulated forward, the fitted robot ran away from the position loop: its fit suits no simulation."

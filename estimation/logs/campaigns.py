@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 
+from estimation.clocks import are_apart
 from estimation.logs.formats import SUFFIXES, is_bag_folder
 from robots.common.errors import InputError
 from robots.signals import Log
@@ -47,6 +47,4 @@ def in_order(logs: Sequence[Log]) -> tuple[Log, ...]:
     Args:
         logs: of one folder.
     """
-    ordered = sorted(logs, key=lambda log: float(log.t[0]))
-    apart = all(before.t[-1] < after.t[0] for before, after in pairwise(ordered))
-    return tuple(ordered) if apart else tuple(logs)
+    return tuple(sorted(logs, key=lambda log: float(log.t[0]))) if are_apart(logs) else tuple(logs)

@@ -173,7 +173,7 @@ def test_a_finding_that_is_no_part_of_the_model_is_shown(stepped: tuple[Diagnosi
 
 
 def test_bad_input_is_named(arm: Robot, hidden: Callable[..., tuple[Log, Log]]) -> None:
-    """An unknown effect, no log, an impossible false-alarm level, logs at one time, a short log, an arm that stands."""
+    """An unknown effect, no log, an impossible level, a log given twice, a short one, an arm that stands."""
     log, _ = hidden(None)
     with pytest.raises(InputError, match="unknown effect"):
         diagnose(arm, log, candidates=("stribek",))
@@ -181,8 +181,10 @@ def test_bad_input_is_named(arm: Robot, hidden: Callable[..., tuple[Log, Log]]) 
         diagnose(arm, [])
     with pytest.raises(InputError, match="false-alarm"):
         diagnose(arm, log, false_alarm=2.0)
-    with pytest.raises(InputError, match="overlaps"):
+    with pytest.raises(InputError, match="given twice"):
         diagnose(arm, [log, log])
+    with pytest.raises(InputError, match="one of the logs"):
+        diagnose(arm, log, held_out=log)
     with pytest.raises(InputError, match=r"s of logs"):
         diagnose(arm, log.rows(slice(0, 200)))
     still = replace(log, q=np.zeros_like(log.q))

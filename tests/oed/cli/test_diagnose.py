@@ -160,17 +160,22 @@ def test_bad_use_is_told(arguments, message, run, robot: Path, tmp_path: Path) -
 
 
 def test_logs_with_clocks_of_their_own(data: Callable[[str], Path], run: Callable[..., Any], tmp_path: Path) -> None:
-    """Logs that overlap are refused with what to do; put one after the other, they are diagnosed.
+    """Logs that overlap are put one after the other as --own-clocks does, and that is said; one log twice is refused.
 
     One of the folder's four rings in saturation and tells nothing of the arm: it is left out, and that is said.
     """
     folder = data("simple_pendulum_dfki")
-    line = ["diagnose", "--robot", folder / "simple_pendulum.urdf", "--out", tmp_path / "out", "--log", folder]
-    refused = run(*line)
-    assert refused.code == 2
-    assert "--own-clocks" in refused.err
-    assert not (tmp_path / "out").exists()
-    done = run(*line, "--own-clocks")
-    assert done.code == 0, done.err
-    assert "hand_guiding" in done.out
-    assert "Log 4 (sysid) is left out" in done.out
+    line = ["diagnose", "--robot", folder / "simple_pendulum.urdf", "--log", folder]
+    texts = []
+    for name, clocks in (("alone", ()), ("told", ("--own-clocks",))):
+        done = run(*line, "--out", tmp_path / name, *clocks)
+        assert done.code == 0, done.err
+        assert "hand_guiding" in done.out
+        assert "Log 4 (sysid) is left out" in done.out
+        texts.append(done.out.replace("\n", " "))
+    assert "The logs overlap in time" in texts[0]
+    assert "overlap" not in texts[1]
+    copied = run(*line, "--held-out", sorted(folder.glob("*.parquet"))[0], "--out", tmp_path / "copy")
+    assert copied.code == 2
+    assert "one of the logs" in copied.err.replace("\n", " ")
+    assert not (tmp_path / "copy").exists()
