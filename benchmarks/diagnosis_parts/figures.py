@@ -41,6 +41,10 @@ def figures(rows: Sequence[Row]) -> str:
         share("  periodic", [r for r in of["none"] if r["motion"] == "periodic"], detected, ""),
         share("  aperiodic", [r for r in of["none"] if r["motion"] != "periodic"], detected, ""),
         share("detected at 0.5 % visible", half, detected, "98 %"),
+        *(
+            share(f"  in logs of {duration:.0f} s", [r for r in half if r["duration"] == duration], detected, "")
+            for duration in sorted({row["duration"] for row in half})
+        ),
         share("effect and joint right among detected, .5 and 1 %", found, first_is_right, "97 %"),
         share("  truth first or among the rivals", found, in_the_set, ""),
         share("detected at 1 % visible", one, detected, ""),

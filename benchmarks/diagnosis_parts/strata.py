@@ -30,14 +30,17 @@ class Stratum:
     moves: bool = False
 
 
+# Most as short as a log may be, some up to four minutes.
+LENGTHS = (60.0, 60.0, 120.0, 240.0)
+
 STRATA: dict[str, Stratum] = {
     stratum.name: stratum
     for stratum in (
-        Stratum("none", 300, 0, 0.0, durations=(60.0, 60.0, 60.0, 120.0)),
-        Stratum("half", 220, 1, 0.005),
-        Stratum("one", 220, 1, 0.01, durations=(60.0, 60.0, 60.0, 120.0)),
-        Stratum("two", 100, 2, 0.03),
-        Stratum("stranger", 100, 1, 0.01, strange=True),
+        Stratum("none", 300, 0, 0.0, durations=LENGTHS),
+        Stratum("half", 220, 1, 0.005, durations=LENGTHS),
+        Stratum("one", 220, 1, 0.01, durations=LENGTHS),
+        Stratum("two", 100, 2, 0.03, durations=LENGTHS),
+        Stratum("stranger", 100, 1, 0.01, strange=True, durations=LENGTHS),
         Stratum("idle_moves", 100, 0, 0.0, moves=True),
         Stratum("moves", 100, 1, 0.01, moves=True),
     )
@@ -80,7 +83,8 @@ def draw(task: Task) -> Case | None:
     stratum = STRATA[task.stratum]
     stream = 1 + list(STRATA).index(task.stratum)
     options = {"size": stratum.size, "periodic": task.seed % 2 == 0, "stream": stream, "moves": stratum.moves}
-    duration = stratum.durations[task.seed // 2 % len(stratum.durations)]
+    # Robots take turns faster than lengths do: each has logs of every length.
+    duration = stratum.durations[task.seed // (2 * len(KINDS)) % len(stratum.durations)]
     kinds = [KINDS[(task.seed // 2 + k) % len(KINDS)] for k in range(len(KINDS))]
     pool: tuple[type[Effect], ...] = STRANGERS if stratum.strange else KNOWN
     hide: list[type[Effect]] | int = stratum.hidden
