@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.diagnosis_parts.followups import follow
-from benchmarks.diagnosis_parts.strata import Task, draw
+from benchmarks.diagnosis_parts.strata import STRATA, Task, draw
 from robots import load_robot
 from robots.common.errors import AssumedValueWarning, OedError
 from robots.robot import Robot
@@ -33,7 +33,7 @@ def run(task: Task) -> dict[str, Any]:
     if case is None:
         return {**row, "status": "hidden"}
     row |= truth_of(case)
-    with described(case) as robot:
+    with described(case, STRATA[task.stratum].drives) as robot:
         try:
             diagnosis, told = diagnose_case(case, robot)
             row |= told
@@ -62,10 +62,10 @@ def peak_memory() -> float:
 
 
 @contextlib.contextmanager
-def described(case: Case) -> Iterator[Robot]:
+def described(case: Case, drives: bool = True) -> Iterator[Robot]:
     """The robot as its maker describes it, read from files as a user has them."""
     with tempfile.TemporaryDirectory() as folder:
-        yield load_robot(write_description(case.machine, Path(folder)))
+        yield load_robot(write_description(case.machine, Path(folder), drives=drives))
 
 
 def logs_of(records: Sequence[Record]) -> list[Log]:

@@ -18,7 +18,8 @@ TUNING = 1000
 class Stratum:
     """A kind of case: how many the full benchmark has, how many effects each hides, and their visible size.
 
-    `moves`: point to point with pauses between, instead of motion throughout.
+    `moves`: point to point with pauses between, instead of motion throughout. `drives`: whether the robot's description
+    states gear ratios and rotor inertias, which a URDF cannot.
     """
 
     name: str
@@ -28,6 +29,7 @@ class Stratum:
     strange: bool = False
     durations: tuple[float, ...] = (60.0,)
     moves: bool = False
+    drives: bool = True
 
 
 # Most as short as a log may be, some up to four minutes.
@@ -43,6 +45,7 @@ STRATA: dict[str, Stratum] = {
         Stratum("stranger", 100, 1, 0.01, strange=True, durations=LENGTHS),
         Stratum("idle_moves", 100, 0, 0.0, moves=True),
         Stratum("moves", 100, 1, 0.01, moves=True),
+        Stratum("bare", 100, 1, 0.01, drives=False),
     )
 }
 
