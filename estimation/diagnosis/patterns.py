@@ -24,6 +24,9 @@ KNOTS = 8
 RINGING = tuple(float(f) for f in np.geomspace(0.5, 8.0, 13))
 TURNS = tuple(float(h) for h in (*range(5, 33), 40, 48, 64))
 SLOWEST = 0.6
+# Swings of a torque that goes to and fro by itself: fewer than so many in the data are a drift.
+SWINGS = 5.0
+SWAYING = ("vibration", "sway")
 
 
 @dataclass(frozen=True)
@@ -55,8 +58,8 @@ class Pattern(JointEffect):
         """A frequency or an order where the family has one."""
         if self.kind == "ringing":
             return (Shape("frequency", "Hz", 0.3, 12.0, "log", RINGING),)
-        if self.kind == "vibration":
-            return (Shape("frequency", "Hz", 0.3, 50.0, "linear"),)
+        if self.kind in SWAYING:
+            return (Shape("frequency", "Hz", 1e-3 if self.kind == "sway" else 0.3, 50.0, "linear"),)
         if self.kind == "turns":
             return (Shape("order", "periods per turn", 4.0, 80.0, "linear", TURNS),)
         return ()
@@ -66,15 +69,19 @@ class Pattern(JointEffect):
         return tuple(Coefficient(f"function_{i + 1}", "") for i in range(_COUNTS[self.kind]))
 
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
-        """Lists the frequencies of a vibration half a resolution apart; else the family's own points."""
-        if self.kind != "vibration":
+        """Lists the frequencies of what goes to and fro half a resolution apart; else the family's own points."""
+        if self.kind not in SWAYING:
             return super().grid(situation, joint)
-        duration = float(situation.t[-1] - situation.t[0])
-        top = min(0.15 / max(situation.period, 1e-6), 30.0)
-        return tuple((float(f),) for f in np.arange(SLOWEST, top, 0.5 / max(duration, 1.0)))
+        duration = max(float(situation.t[-1] - situation.t[0]), 1.0)
+        bottom, top = SLOWEST, min(0.15 / max(situation.period, 1e-6), 30.0)
+        if self.kind == "sway":
+            bottom, top = SWINGS / duration, SLOWEST
+        return tuple((float(f),) for f in np.arange(bottom, top, 0.5 / duration))
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
-        """Keeps a vibration's frequency below what the samples resolve."""
+        """Keeps a vibration's frequency below what the samples resolve, and a swing's where it is one."""
+        if self.kind == "sway":
+            return ((SWINGS / max(float(situation.t[-1] - situation.t[0]), 1.0), 2 * SLOWEST),)
         if self.kind == "vibration":
             return ((0.5 * SLOWEST, min(0.2 / max(situation.period, 1e-6), 50.0)),)
         return super().bounds(situation, joint)
@@ -84,7 +91,7 @@ class Pattern(JointEffect):
     ) -> tuple[tuple[float, ...], ...]:
         """Ranks the frequencies of a vibration by the residual's spectrum over that of its surroundings."""
         grid = self.grid(situation, joint)
-        if self.kind != "vibration" or len(grid) <= count:
+        if self.kind not in SWAYING or len(grid) <= count:
             return grid
         assert joint is not None
         rows = len(situation)
@@ -137,8 +144,8 @@ def all_patterns(robot: Robot) -> tuple[Pattern | Swinging, ...]:
     """Lists the patterns to look for on every joint, and on the robot as a whole."""
     joints = range(1, robot.n + 1)
     own = [Pattern("speed"), Pattern("speed", odd=True), Pattern("load"), Pattern("load", odd=True)]
-    own += [Pattern("memory"), Pattern("time"), Pattern("time", odd=True)]
-    own += [Pattern("ringing"), Pattern("vibration"), Pattern("turns")]
+    own += [Pattern("acceleration"), Pattern("memory"), Pattern("time"), Pattern("time", odd=True)]
+    own += [Pattern("ringing"), Pattern("vibration"), Pattern("sway"), Pattern("turns")]
     each = [Pattern("angle", k, odd) for k in joints for odd in (False, True)]
     each += [Pattern("angles", k) for k in joints] if robot.n > 1 else []
     each += [Pattern("motion", k) for k in joints] if robot.n > 1 else []
@@ -186,6 +193,12 @@ def _load(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Arr
     return np.column_stack([x, np.abs(x), x * np.abs(x), x**2, np.abs(x) ** 3])
 
 
+def _acceleration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    a = s.ddq[:, joint - 1]
+    x = a / max(float(np.abs(a).max()), 1e-9)
+    return np.column_stack([np.abs(x), x * np.abs(x), x**3])
+
+
 def _memory(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     columns = []
     for memory in MEMORIES:
@@ -223,6 +236,11 @@ def _vibration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -
     return np.column_stack(columns)
 
 
+def _sway(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    phase = 2 * np.pi * shape[0] * (s.t - s.t[0])
+    return np.column_stack([np.cos(phase), np.sin(phase)])
+
+
 def _turns(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     q, v, a = (x[:, joint - 1] for x in (s.q, s.dq, s.ddq))
     waves = (np.cos(shape[0] * q), np.sin(shape[0] * q))
@@ -236,10 +254,12 @@ _FAMILIES: dict[str, Callable[[Situation, int, int, tuple[float, ...]], Array]] 
     "motion": _motion,
     "speed": _speed,
     "load": _load,
+    "acceleration": _acceleration,
     "memory": _memory,
     "time": _time,
     "ringing": _ringing,
     "vibration": _vibration,
+    "sway": _sway,
     "turns": _turns,
 }
 _COUNTS = {
@@ -248,10 +268,12 @@ _COUNTS = {
     "motion": 5,
     "speed": 6,
     "load": 5,
+    "acceleration": 3,
     "memory": 4,
     "time": KNOTS,
     "ringing": 4,
     "vibration": 6,
+    "sway": 2,
     "turns": 8,
 }
 _WORDS = {
@@ -260,9 +282,11 @@ _WORDS = {
     "motion": "depends on the velocity of {who}",
     "speed": "depends on the speed of the joint",
     "load": "depends on the load of the joint",
+    "acceleration": "depends on the acceleration of the joint, not in proportion",
     "memory": "remembers the velocity of the joint for a while",
     "time": "changes slowly with time",
     "ringing": "rings at {point} Hz after the motion",
     "vibration": "vibrates at {point} Hz whatever the motion",
+    "sway": "swings to and fro at {point} Hz whatever the motion",
     "turns": "repeats {point} times a turn of the joint and grows with its speed",
 }

@@ -1,0 +1,49 @@
+"""Torques that no effect makes: told by what they depend on, not forced into a name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation import diagnose
+from robots.plants import simulate
+from robots.robot import Robot
+from robots.signals import Motion
+
+
+def _swing(motion: Motion, size: float) -> np.ndarray:
+    return size * np.sin(2 * np.pi * 0.27 * np.asarray(motion.t) + 1.0)
+
+
+def _bend(motion: Motion, size: float) -> np.ndarray:
+    ddq = np.asarray(motion.ddq)[:, 1]
+    return size * (ddq / np.abs(ddq).max()) ** 3
+
+
+@pytest.mark.parametrize(
+    ("stranger", "share", "pattern"),
+    [(_swing, 0.1, "pattern:sway:0:even"), (_bend, 0.2, "pattern:acceleration:0:even")],
+)
+def test_a_stranger_is_told_by_what_it_depends_on(
+    stranger: Callable[[Motion, float], np.ndarray],
+    share: float,
+    pattern: str,
+    arm: Robot,
+    arm_plant: Callable,
+    fourier_motion: Callable,
+) -> None:
+    """A torque that swings by itself is no drift, and one that grows with the cube of the acceleration no spring."""
+    motion = fourier_motion(arm, duration=30.0)
+    log = simulate(arm_plant(torque_noise=0.02), motion, seed=0)
+    assert log.tau is not None
+    size = share * np.sqrt(np.mean(log.tau[:, 1] ** 2))
+    tau = log.tau + np.column_stack([np.zeros(len(log.t)), stranger(motion, size)])
+    result = diagnose(arm, replace(log, tau=tau))
+    assert result.verdict == "unexplained"
+    assert (result.findings[0].joint, result.findings[0].pattern) == (2, pattern)
+    if "sway" in pattern:
+        values = {parameter.name: parameter.value for parameter in result.findings[0].parameters}
+        assert values["frequency"] == pytest.approx(0.27, abs=0.01)
