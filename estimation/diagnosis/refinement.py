@@ -142,8 +142,9 @@ def refine(
             climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)
             summit = best[0]
             others = hypothesis.effect.elsewhere(situation, hypothesis.joint, summit.shape, summit.coefficients)
-            for other in others:
-                at[:] = other
+            for slopes in others:
+                worths = [evaluate(slope) for slope in slopes]
+                at[:] = slopes[int(np.argmax(worths))]
                 climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)
     if effort:
         refined = best[0]

@@ -38,6 +38,7 @@ class Hide:
     periodic: bool = True
     ratio: float = 0.7  # of the true effect's gain
     duration: float = 40.0  # [s]
+    drives: bool = True  # in the robot's description, which a URDF alone has not
 
     @property
     def name(self) -> str:
@@ -65,6 +66,9 @@ SINGLE = (
     Hide(seed=7002, effects=(friction.FrictionStep,), joint=3, periodic=False),
     # 0.43 ms: all of it is in the rows beside reversals, whose direction encoders of the motors tell.
     Hide(seed=7054, effects=(actuator.Delay,), size=0.01, kind="panda", ratio=0.6),
+    # When the load changes sign only one knows who knows the rotor, told roughly or not at all.
+    Hide(seed=7062, effects=(transmission.Backlash,), size=0.015, kind="panda", joint=1),
+    Hide(seed=7060, effects=(transmission.Backlash,), size=0.015, kind="panda", joint=1, drives=False),
 )
 PAIRS = (Hide(seed=7011, effects=(friction.PositionDependent, surroundings.Payload), joint=1),)
 STRANGE = (Hide(seed=7021, effects=(strangers.CrossWave,), joint=2, size=0.05),)
@@ -91,7 +95,7 @@ def examined(hide: Hide) -> tuple[Truth, dict[str, Any]]:
     """The truth of a case and what the diagnosis says of its logs."""
     case = hide.draw()
     with TemporaryDirectory() as folder:
-        robot = load_robot(write_description(case.machine, Path(folder)))
+        robot = load_robot(write_description(case.machine, Path(folder), drives=hide.drives))
     said = diagnose(robot, logs_of(case.logs), held_out=logs_of(case.unseen) or None).to_dict()
     return truth_of(case), said
 

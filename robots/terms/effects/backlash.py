@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from robots.terms.base import length_unit
 from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effects.joint_elasticity import link_inertia, windup
+from robots.terms.effects.unknown_rotor import KNOWN, ROTOR, is_sure, rotor_bounds, rotor_grid, rotors_between
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -44,6 +45,7 @@ class Backlash(Effect):
         Shape("gap_crossed", "rad", 1e-7, 0.2, "log"),
         Shape("longest", "s", 0.01, SLOWEST, "log", (SLOWEST,), default=SLOWEST),
         Shape("crossed_at", "N m", -np.inf, np.inf, "linear", (0.0,), default=0.0),
+        ROTOR,
     )
     rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "presliding_hysteresis", "load_dependent_friction")
     fast: ClassVar[bool] = True
@@ -62,53 +64,68 @@ class Backlash(Effect):
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists gaps that take 6 to 50 ms, at loads near zero; none for a load that hardly ever changes sign."""
         assert joint is not None
-        crossings = _crossings(situation, joint, 0.0)
-        if len(crossings[0]) < 2:
-            return ()
-        _, _, quickness = crossings
-        middle = float(np.median(quickness))
-        gaps = [time**3 * middle / 6.0 for time in SCANNED]
+        points = []
         size = _size(situation, joint)
-        able = [gap for gap in gaps if self.shapes[0].lower <= gap <= self.shapes[0].upper]
-        return tuple((gap, SLOWEST, aside * size) for gap in able for aside in ASIDE)
+        for rotor in rotor_grid(situation, joint):
+            times, _, quickness = _crossings(situation, joint, 0.0, rotor)
+            if len(times) < 2:
+                continue
+            gaps = [time**3 * float(np.median(quickness)) / 6.0 for time in SCANNED]
+            able = [gap for gap in gaps if self.shapes[0].lower <= gap <= self.shapes[0].upper]
+            points += [(gap, SLOWEST, aside * size, rotor) for gap in able for aside in ASIDE]
+        return tuple(points)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the load at which sides change near zero."""
+        """Keeps the load at which sides change near zero, and the rotor near what is known of it."""
         assert joint is not None
-        gap, longest, _ = self.shapes
+        gap, longest, *_ = self.shapes
         most = FARTHEST * _size(situation, joint)
-        return (gap.lower, gap.upper), (longest.lower, longest.upper), (-most, most)
+        return (
+            (gap.lower, gap.upper),
+            (longest.lower, longest.upper),
+            (-most, most),
+            rotor_bounds(situation, joint),
+        )
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
         """Gives the gap that the size of the torque tells, free flight however long, and the base model's zero."""
         gap = float(np.clip(2.0 * coefficients[0], self.shapes[0].lower, self.shapes[0].upper))
-        # All but what was refined itself: each of the three as it should be, or not.
-        return tuple((g, s, z) for z in (0.0, None) for s in (SLOWEST, None) for g in (gap, None))[:-1]
+        # All but what was refined itself: each as it should be, or not.
+        assert joint is not None
+        rotors = (KNOWN,) if is_sure(situation, joint) else (KNOWN, None)
+        likely = ((g, s, z, r) for r in rotors for z in (0.0, None) for s in (SLOWEST, None) for g in (gap, None))
+        return tuple(likely)[:-1]
 
     def elsewhere(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
-    ) -> tuple[tuple[float, ...], ...]:
+    ) -> tuple[tuple[tuple[float, ...], ...], ...]:
         """Gives the gap that the size tells, crossed in as long as now: by the motor's time instead of free flight.
 
         Free flight in the time that was seen asks for a smaller gap, and goes astray where loads change more slowly.
+        Another rotor, where it is not sure, makes the load change sign at other times: a narrow summit on the right
+        one, which a search along rotor and load together misses.
         """
         assert joint is not None
         gap = float(np.clip(2.0 * coefficients[0], self.shapes[0].lower, self.shapes[0].upper))
-        _, _, quickness = _crossings(situation, joint, shape[2])
-        if gap <= shape[0] or not len(quickness):
+        _, _, quickness = _crossings(situation, joint, *shape[2:])
+        if not len(quickness):
             return ()
         now = float(np.median(_durations(situation, shape, quickness)))
-        return ((gap, max(now, self.shapes[1].lower), shape[2]),)
+        slower = ((gap, max(now, self.shapes[1].lower), *shape[2:]),) if gap > shape[0] else ()
+        rotors = rotors_between(situation, joint)
+        turned = tuple((size * shape[0], SLOWEST, 0.0, rotor) for size in (1.0, 2.0) for rotor in rotors)
+        return tuple(starts for starts in (slower, turned) if starts)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per half play of one."""
         assert joint is not None
-        times, ways, quickness = _crossings(situation, joint, shape[2])
+        _, _, at, rotor = shape
+        times, ways, quickness = _crossings(situation, joint, at, rotor)
         durations = _durations(situation, shape, quickness)
         side, rate, curve = (np.zeros(len(situation)) for _ in range(3))
-        load = situation.load[:, joint - 1] - shape[2]
+        load = _load(situation, joint, rotor) - at
         for run in situation.runs:
             t = situation.t[run]
             side[run] = np.sign(load[run.start])
@@ -121,7 +138,7 @@ class Backlash(Effect):
                 rate[during] += 2 * way * (30 * s**2 - 60 * s**3 + 30 * s**4) / duration
                 curve[during] += 2 * way * (60 * s - 180 * s**2 + 120 * s**3) / duration**2
                 side[run.start + last : run.stop] += 2 * way
-        return windup(situation, joint, side, rate, curve)[:, :, None]
+        return windup(situation, joint, side, rate, curve, rotor)[:, :, None]
 
     def describe(
         self,
@@ -141,7 +158,7 @@ class Backlash(Effect):
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the gear's load."""
         assert joint is not None
-        return f"load of joint {joint} [N m]", situation.load[:, joint - 1]
+        return f"load of joint {joint} [N m]", _load(situation, joint, shape[3] if len(shape) > 3 else KNOWN)
 
 
 def _durations(situation: Situation, shape: tuple[float, ...], quickness: Array) -> Array:
@@ -153,10 +170,15 @@ def _size(situation: Situation, joint: int) -> float:
     return float(np.sqrt(np.mean(situation.load[:, joint - 1] ** 2)))
 
 
-def _crossings(situation: Situation, joint: int, at: float) -> tuple[Array, Array, Array]:
+def _load(situation: Situation, joint: int, rotor: float) -> Array:
+    """Gives what passes the gear: without what turns a rotor that is not known."""
+    return np.asarray(situation.load[:, joint - 1] - rotor * situation.ddq[:, joint - 1])
+
+
+def _crossings(situation: Situation, joint: int, at: float, rotor: float) -> tuple[Array, Array, Array]:
     """Finds where the load passes a value: times [s], the new side, and its rate over the link's inertia [rad/s3]."""
-    load = situation.load[:, joint - 1] - at
-    inertia = np.maximum(link_inertia(situation, joint)[:, joint - 1], 1e-12)
+    load = _load(situation, joint, rotor) - at
+    inertia = np.maximum(link_inertia(situation, joint, rotor)[:, joint - 1], 1e-12)
     small = 1e-4 * float(np.abs(load).max(initial=0.0))
     found = []
     for run in situation.runs:

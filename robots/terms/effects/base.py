@@ -166,8 +166,11 @@ class Effect(ABC):
 
     def elsewhere(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
-    ) -> tuple[tuple[float, ...], ...]:
-        """Lists shapes on other summits than a refined one's, which a search from there does not reach."""
+    ) -> tuple[tuple[tuple[float, ...], ...], ...]:
+        """Lists other summits than a refined shape's, which a search from there does not reach.
+
+        Each by shapes on its slopes, from the best of which it is climbed.
+        """
         return ()
 
     def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:

@@ -10,6 +10,7 @@ from scipy.linalg import solve_banded
 
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effects.unknown_rotor import KNOWN, ROTOR, is_sure, rotor_bounds, rotor_grid
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -31,12 +32,13 @@ class JointElasticity(Effect):
 
     c is the gear's compliance, and w the load of the link: M_jj w'' / K + w = tau_L, tau_L the load by the motor's
     motion. From the resonance sqrt(K / M_jj) on, which changes with the arm's pose, the link follows the motor no more.
-    K, the stiffness by the dynamics, is 1 / c where the base model has the link's inertia right.
+    K, the stiffness by the dynamics, is 1 / c where the base model has the link's inertia right. A rotor that the
+    robot's description does not tell is part of neither M nor tau_L.
     """
 
     name: ClassVar[str] = "joint_elasticity"
     title: ClassVar[str] = "a gear that winds up under load (elasticity)"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("dynamic_stiffness", "N m/rad", 1e-6, 1e12, "log"),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("dynamic_stiffness", "N m/rad", 1e-6, 1e12, "log"), ROTOR)
     rivals: ClassVar[tuple[str, ...]] = ("backlash", "time_delay", "current_lag", "encoder_offset")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "payload")
 
@@ -47,28 +49,36 @@ class JointElasticity(Effect):
         return (Coefficient("compliance", f"{length}/({force})", 0.0, 0.1),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists the stiffnesses of some resonances."""
+        """Lists the stiffnesses of some resonances, of the link without a rotor that is not known, too."""
         assert joint is not None
-        return tuple((_stiffness(situation, joint, resonance),) for resonance in SCANNED)
+        rotors = rotor_grid(situation, joint)
+        return tuple((_stiffness(situation, joint, f, rotor), rotor) for rotor in rotors for f in SCANNED)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the resonance within what gears have."""
+        """Keeps the resonance within what gears have, and the rotor near what is known of it."""
         assert joint is not None
-        return ((_stiffness(situation, joint, LOWEST), _stiffness(situation, joint, HIGHEST)),)
+        rotor = rotor_bounds(situation, joint)
+        softest = _stiffness(situation, joint, LOWEST, rotor[1])
+        return (softest, _stiffness(situation, joint, HIGHEST, rotor[0])), rotor
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the stiffness that the compliance says."""
+        """Gives the stiffness that the compliance says, and the rotor that is known, or either alone."""
+        assert joint is not None
+        plain: tuple[tuple[float | None, ...], ...] = () if is_sure(situation, joint) else ((None, KNOWN),)
         if coefficients[0] <= 0:
-            return ()
-        return ((float(np.clip(1.0 / coefficients[0], *self.bounds(situation, joint)[0])),),)
+            return plain
+        stiffness = float(np.clip(1.0 / coefficients[0], *self.bounds(situation, joint)[0]))
+        return (stiffness, KNOWN), *plain, *((stiffness, None) for _ in plain)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per compliance of one."""
         assert joint is not None
-        load = followed(situation, situation.load[:, joint - 1], shape[0], _inertia(situation, joint))
-        return windup(situation, joint, load, *situation.derivatives(load))[:, :, None]
+        stiffness, rotor = shape
+        own = situation.load[:, joint - 1] - rotor * situation.ddq[:, joint - 1]
+        load = followed(situation, own, stiffness, _inertia(situation, joint, rotor))
+        return windup(situation, joint, load, *situation.derivatives(load), rotor)[:, :, None]
 
     def describe(
         self,
@@ -88,7 +98,9 @@ class JointElasticity(Effect):
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the second derivative of the load."""
         assert joint is not None
-        curve = situation.derivatives(situation.load[:, joint - 1])[1]
+        rotor = shape[1] if len(shape) > 1 else KNOWN
+        load = situation.load[:, joint - 1] - rotor * situation.ddq[:, joint - 1]
+        curve = situation.derivatives(load)[1]
         return f"second derivative of the load of joint {joint} [N m/s2]", curve
 
 
@@ -116,28 +128,28 @@ def followed(situation: Situation, load: Array, stiffness: float, inertia: Array
     return result
 
 
-def _inertia(situation: Situation, joint: int) -> Array:
+def _inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Array:
     """Gives the inertia (N,) that swings on a joint's gear, no less than a share of its largest.
 
     A wrist's is so small that its fit may be negative: the link would then not swing but run away.
     """
-    own = link_inertia(situation, joint)[:, joint - 1]
+    own = link_inertia(situation, joint, rotor)[:, joint - 1]
     return np.asarray(np.maximum(own, LIGHTEST * max(float(np.abs(own).max(initial=0.0)), 1e-9)))
 
 
-def _stiffness(situation: Situation, joint: int, resonance: float) -> float:
+def _stiffness(situation: Situation, joint: int, resonance: float, rotor: float = KNOWN) -> float:
     """Gives the stiffness on which the log's mean inertia has a resonance [Hz]."""
-    return float((2 * np.pi * resonance) ** 2 * np.mean(_inertia(situation, joint)))
+    return float((2 * np.pi * resonance) ** 2 * np.mean(_inertia(situation, joint, rotor)))
 
 
-def link_inertia(situation: Situation, joint: int) -> Array:
-    """Gives a joint's column of the links' inertia matrix (N, n), without its rotor."""
+def link_inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Array:
+    """Gives a joint's column of the links' inertia matrix (N, n), without its rotor, known or not."""
     column = situation.sensitivity("inertia")[:, :, joint - 1].copy()
-    column[:, joint - 1] -= situation.rotors[1, joint - 1]
+    column[:, joint - 1] -= situation.rotors[1, joint - 1] + rotor
     return column
 
 
-def windup(situation: Situation, joint: int, lag: Array, rate: Array, curve: Array) -> Array:
+def windup(situation: Situation, joint: int, lag: Array, rate: Array, curve: Array, rotor: float = KNOWN) -> Array:
     """Gives the torque (N, n) by which all joints change when a link lags its encoder, to first order.
 
     Args:
@@ -146,10 +158,11 @@ def windup(situation: Situation, joint: int, lag: Array, rate: Array, curve: Arr
         lag: by which the link lags (N,), with its two derivatives.
         rate: first derivative (N,).
         curve: second derivative (N,).
+        rotor: inertia of the joint that is a rotor's, beside what is known.
     """
     j = joint - 1
     return np.asarray(
         -situation.sensitivity("position")[:, :, j] * lag[:, None]
         - situation.sensitivity("velocity")[:, :, j] * rate[:, None]
-        - link_inertia(situation, joint) * curve[:, None]
+        - link_inertia(situation, joint, rotor) * curve[:, None]
     )

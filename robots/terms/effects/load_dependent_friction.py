@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from robots.terms.base import length_unit
 from robots.terms.effects.base import Coefficient, Place, Shape, Situation
 from robots.terms.effects.static import Instant, StaticJointEffect
+from robots.terms.effects.unknown_rotor import KNOWN, ROTOR, rotor_bounds, rotor_grid
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -18,24 +19,23 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-# A gear that loses as much when its load drives it as when it drives the load; no rotor beside those that are known.
-ALIKE, KNOWN = 1.0, 0.0
+# A gear that loses as much when its load drives it as when it drives the load.
+ALIKE = 1.0
 
 
 class LoadDependentFriction(StaticJointEffect):
     """tau = w |tau_L| (a sign(dq) + b dq), tau_L the torque that passes the gear (Hamon et al. 2010).
 
     w is 1 where the joint drives its load, and `driven_back` where the load drives it: a gear's two efficiencies. What
-    they differ in is a share of tau_L itself, as an error of the torque constant is. Of the first joints' inertia no
-    log tells how much is the rotor's, which loads no gear: where the robot's description does not say it, this effect
-    does.
+    they differ in is a share of tau_L itself, as an error of the torque constant is. How much of the first joints'
+    inertia is the rotor's, which loads no gear, this effect tells where the robot's description does not.
     """
 
     name: ClassVar[str] = "load_dependent_friction"
     title: ClassVar[str] = "friction that grows with the load"
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("driven_back", "1", 0.0, 1.0, "linear", (ALIKE,), 0.05, default=ALIKE),
-        Shape("rotor_inertia", "kg m2", 0.0, np.inf, "linear", (KNOWN,), default=KNOWN),
+        ROTOR,
     )
     rivals: ClassVar[tuple[str, ...]] = (
         "position_dependent_friction",
@@ -55,13 +55,12 @@ class LoadDependentFriction(StaticJointEffect):
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists a gear that loses alike both ways; where no rotor is known, with none and with half of the inertia."""
         assert joint is not None
-        most = _unknown_rotor(situation, joint)
-        return ((ALIKE, KNOWN), (ALIKE, 0.5 * most)) if most else ((ALIKE, KNOWN),)
+        return tuple((ALIKE, rotor) for rotor in rotor_grid(situation, joint))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps a rotor that is not known within the joint's inertia."""
+        """Keeps the rotor near what is known of it."""
         assert joint is not None
-        return (0.0, 1.0), (KNOWN, _unknown_rotor(situation, joint))
+        return (0.0, 1.0), rotor_bounds(situation, joint)
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
@@ -102,12 +101,3 @@ class LoadDependentFriction(StaticJointEffect):
         load = situation.load[:, j] - rotor * situation.ddq[:, j]
         signed = np.where(load * situation.dq[:, j] > 0, 1.0, back) * np.abs(load) * situation.sign[:, j]
         return f"load of joint {joint}, signed by its direction [N m]", signed
-
-
-def _unknown_rotor(situation: Situation, joint: int) -> float:
-    """Gives the most that the rotor of a joint may have of its inertia, zero where the rotor is known."""
-    j = joint - 1
-    if situation.rotors[:, j].any():
-        return 0.0
-    least = situation.cached(("least inertia", j), lambda: float(situation.sensitivity("inertia")[:, j, j].min()))
-    return max(least, 0.0)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from robots.geometry.chain import Chain
 from robots.robot import Robot
-from robots.terms.effects import EFFECTS, situation
+from robots.terms.effects import EFFECTS
 from robots.terms.effects.base_tilt import level_axes
 from robots.terms.effects.joint_elasticity import followed
 
@@ -56,7 +56,7 @@ def test_an_elastic_gear_lets_its_link_lag(now, torque):
         # Large lags (c = 1) would leave the difference's range: it is scaled to the largest.
         size = max(float(np.abs(part).max()) for part in change)
         expected = _slope(torque, now, [part / size for part in change]) * size
-        X = EFFECTS["joint_elasticity"].columns(now, joint, (1e9,))[SOME, :, 0]
+        X = EFFECTS["joint_elasticity"].columns(now, joint, (1e9, 0.0))[SOME, :, 0]
         # A spline's second derivative is of second order: (2 pi 4 Hz 4 ms)^2 / 12 at the motion's fastest products.
         assert np.abs(X - expected).max() < 2e-3 * np.abs(expected).max()
 
@@ -187,7 +187,7 @@ def test_a_loose_gear_lets_its_link_cross(seen, free, longest):
     i = int(np.flatnonzero(np.diff(np.sign(load)))[0])
     quickness = abs(load[i + 1] - load[i]) / 0.004 / inertia[i]
     gap = free**3 * quickness / 6  # crossed in 50 ms, or in 80 ms
-    X = EFFECTS["backlash"].columns(now, joint, (gap, longest, 0.0))[:, joint - 1, 0]
+    X = EFFECTS["backlash"].columns(now, joint, (gap, longest, 0.0, 0.0))[:, joint - 1, 0]
     start = now.t[i] - load[i] / (load[i + 1] - load[i]) * 0.004
     s = (now.t - start) / 0.05
     during = (s > 0) & (s < 1)
@@ -203,7 +203,7 @@ def test_sides_change_at_the_load_that_is_said(seen):
     joint = 1 + int(np.argmax([np.count_nonzero(np.diff(np.sign(now.load[:, j]))) for j in range(5)]))
     aside = 0.05 * sizes[joint - 1]
     gap = 0.01**3 / 6  # crossed within some samples
-    X = EFFECTS["backlash"].columns(now, joint, (gap, 0.012, aside))[:, joint - 1, 0]
+    X = EFFECTS["backlash"].columns(now, joint, (gap, 0.012, aside, 0.0))[:, joint - 1, 0]
     burst = np.abs(X) > 0.2 * np.abs(X).max()
     passed = np.flatnonzero(np.diff(np.sign(now.load[:, joint - 1] - aside)))
     near = np.zeros(len(burst), dtype=bool)
@@ -211,23 +211,8 @@ def test_sides_change_at_the_load_that_is_said(seen):
         near[i : i + 6] = True
     assert burst.sum() >= 2
     assert not burst[~near].any()
-    plain = EFFECTS["backlash"].columns(now, joint, (gap, 0.012, 0.0))[:, joint - 1, 0]
+    plain = EFFECTS["backlash"].columns(now, joint, (gap, 0.012, 0.0, 0.0))[:, joint - 1, 0]
     assert (np.abs(plain) > 0.2 * np.abs(plain).max())[~near].any()
-
-
-def test_a_rotor_within_its_link_is_told_from_it(seen):
-    """Where one base parameter holds rotor and link, the gear's load is without the rotor that the maker describes."""
-    now = seen(4, seed=1)
-    rotor = float(now.robot.rotor_inertia[0])
-    names = list(now.model.names)
-    parameters = now.parameters.copy()
-    parameters[names.index("Im_1")] = 0.0
-    merged = situation(now.model, parameters, now.t, now.q, now.dq, now.ddq)
-    # As a fit does, the link's own torque takes the rotor's on.
-    merged = replace(merged, rigid=merged.rigid + np.outer(now.ddq[:, 0], np.eye(4)[0] * rotor))
-    np.testing.assert_allclose(merged.load[:, 0], now.load[:, 0], atol=1e-9)
-    np.testing.assert_array_equal(now.rotors[:, 0], [rotor, 0.0])
-    np.testing.assert_array_equal(merged.rotors[:, 0], [0.0, rotor])
 
 
 @pytest.mark.parametrize("swing", [0.0, 0.5])
@@ -257,12 +242,12 @@ def test_a_stiff_gear_follows_at_once(seen):
 
 def test_size_and_time_of_a_crossing_tell_one_play(seen):
     """Half the play lies within a factor of eight of what the crossing's time says; other effects are as described."""
-    robot = seen(5, seed=1).robot
-    assert EFFECTS["backlash"].ranges(robot, 1, (2e-3, 0.1, 0.0)) == ((0.125e-3, 8e-3),)
+    robot = seen(5, seed=4).robot
+    assert EFFECTS["backlash"].ranges(robot, 1, (2e-3, 0.1, 0.0, 0.0)) == ((0.125e-3, 8e-3),)
     # No play is larger than a twentieth of a radian each way, whatever its time.
-    assert EFFECTS["backlash"].ranges(robot, 1, (0.2, 0.1, 0.0)) == ((0.0125, 0.05),)
+    assert EFFECTS["backlash"].ranges(robot, 1, (0.2, 0.1, 0.0, 0.0)) == ((0.0125, 0.05),)
     described = EFFECTS["joint_elasticity"].parameters(robot, 1)
-    assert EFFECTS["joint_elasticity"].ranges(robot, 1, (10.0,)) == tuple((c.lower, c.upper) for c in described)
+    assert EFFECTS["joint_elasticity"].ranges(robot, 1, (10.0, 0.0)) == tuple((c.lower, c.upper) for c in described)
 
 
 def test_a_gap_too_large_for_its_time_may_be_crossed_with_the_motor(seen):
@@ -271,39 +256,53 @@ def test_a_gap_too_large_for_its_time_may_be_crossed_with_the_motor(seen):
     effect, small, large = EFFECTS["backlash"], 1e-5, 4e-4
     turns = [np.count_nonzero(np.diff(np.sign(now.load[:, joint - 1]))) for joint in range(1, 6)]
     joint = 1 + int(np.argmax(turns))
-    ((gap, longest, zero),) = effect.elsewhere(now, joint, (small, 0.1, 0.0), np.array([large / 2]))
-    assert (gap, zero) == (pytest.approx(large), 0.0)
+    (((gap, longest, *rest),),) = effect.elsewhere(now, joint, (small, 0.1, 0.0, 0.0), np.array([large / 2]))
+    assert (gap, rest) == (pytest.approx(large), [0.0, 0.0])
     load = now.load[:, joint - 1]
     i = np.flatnonzero((load[:-1] * load[1:] < 0) & (np.abs(np.diff(load)) > 1e-4 * np.abs(load).max()))
     inertia = now.sensitivity("inertia")[i, joint - 1, joint - 1]
     flights = (6 * small * inertia / (np.abs(load[i + 1] - load[i]) / 0.004)) ** (1 / 3)
     assert longest == pytest.approx(float(np.clip(np.median(flights), 0.01, 0.1)), rel=1e-3)
     # A gap that flight alone explains has no other summit.
-    assert effect.elsewhere(now, joint, (large, 0.1, 0.0), np.array([small / 2])) == ()
+    assert effect.elsewhere(now, joint, (large, 0.1, 0.0, 0.0), np.array([small / 2])) == ()
 
 
 def test_size_of_an_effect_tells_its_time(seen):
     """What follows from a coefficient is offered: the gap that is crossed, a delay's own reversals, a resonance."""
     now = seen(5, seed=1)
-    crossings = EFFECTS["backlash"].likely(now, 2, (1e-3, 0.07, 0.2), np.array([2e-4]))
-    assert crossings[0] == (4e-4, 0.1, 0.0)
-    assert len(set(crossings)) == 7
-    assert (None, None, None) not in crossings
+    bare = seen(5, seed=1, robot=replace(now.robot, rotor_inertia=np.zeros(5)))
+    for known, at, count in ((True, now, 7), (False, bare, 15)):
+        crossings = EFFECTS["backlash"].likely(at, 2, (1e-3, 0.07, 0.2, 0.0), np.array([2e-4]))
+        assert crossings[0] == (4e-4, 0.1, 0.0, 0.0)
+        assert len(set(crossings)) == count
+        assert (None,) * 4 not in crossings
+        assert ((None, None, None, 0.0) in crossings) is not known
     for name, joint in (("time_delay", None), ("current_lag", 2)):
         assert EFFECTS[name].likely(now, joint, (1e-3,), np.array([-3e-3])) == ((-3e-3,),)
         assert EFFECTS[name].likely(now, joint, (1e-3,), np.array([0.04])) == ((0.02,),)
 
 
-def test_a_gear_of_known_compliance_has_a_resonance(now, twin):
-    """A link on a gear of compliance c has the stiffness 1 / c; those of a scan are of its inertia, by pinocchio."""
-    elastic = EFFECTS["joint_elasticity"]
+def test_a_gear_of_known_compliance_has_a_resonance(now, seen, twin):
+    """A link on a gear of compliance c has the stiffness 1 / c; those of a scan are of its inertia, by pinocchio.
+
+    Of a rotor that the robot's description does not know half of that may be.
+    """
+    elastic, robot = EFFECTS["joint_elasticity"], now.robot
+    bare = seen(5, robot=replace(robot, rotor_inertia=np.zeros(5)))
     for joint in (1, 3, 5):
         faster = now.ddq + np.eye(5)[joint - 1]
         more, less = (twin(now.robot).torque(now.q, now.dq, ddq, now.robot.inertia) for ddq in (faster, now.ddq))
-        inertia = float((more - less)[:, joint - 1].mean())
-        scanned = [stiffness for (stiffness,) in elastic.grid(now, joint)]
-        wanted = inertia * (2 * np.pi * np.array([8.0, 12.0, 18.0, 30.0, 60.0, 300.0])) ** 2
-        np.testing.assert_allclose(scanned, wanted, rtol=0.01)
-        assert elastic.likely(now, joint, (1.0,), np.array([1 / wanted[2]])) == ((pytest.approx(wanted[2], rel=0.01),),)
-        assert elastic.likely(now, joint, (1.0,), np.array([1e9])) == ((elastic.bounds(now, joint)[0][0],),)
-    assert elastic.likely(now, 1, (60.0,), np.zeros(1)) == ()
+        inertia = (more - less)[:, joint - 1]
+        scanned = elastic.grid(bare, joint)
+        assert elastic.grid(now, joint) == pytest.approx(np.array(scanned[:6]))
+        resonances = (2 * np.pi * np.array([8.0, 12.0, 18.0, 30.0, 60.0, 300.0])) ** 2
+        half = 0.5 * inertia.min()
+        wanted = [*(inertia.mean() * resonances), *((inertia.mean() - half) * resonances)]
+        np.testing.assert_allclose([stiffness for stiffness, _ in scanned], wanted, rtol=0.01)
+        np.testing.assert_allclose([rotor for _, rotor in scanned], [0.0] * 6 + [half] * 6, rtol=0.01)
+        stiff = pytest.approx(wanted[2], rel=0.01)
+        likely = elastic.likely(bare, joint, (1.0, 0.0), np.array([1 / wanted[2]]))
+        assert likely == ((stiff, 0.0), (None, 0.0), (stiff, None))
+        assert elastic.likely(now, joint, (1.0, 0.0), np.array([1 / wanted[2]])) == ((stiff, 0.0),)
+        assert elastic.likely(now, joint, (1.0, 0.0), np.array([1e9]))[0] == (elastic.bounds(now, joint)[0][0], 0.0)
+    assert elastic.likely(now, 1, (60.0, 0.0), np.zeros(1)) == ()
