@@ -87,11 +87,6 @@ def read_extension(data: Mapping[str, Any], robot: Robot) -> Extension:
     rows = [[np.inf if value is None else float(value) for value in row] for row in data["covariance"]]
     covariance = np.array(rows, dtype=float).reshape(len(rows), len(rows))
     count = len(effect.parameters(robot, joint))
-    if len(shape) != len(effect.shapes) or coefficients.shape != (count,) or len(rows) != count + len(shape):
-        raise InputError(
-            f"extension {effect.name} has {len(coefficients)} coefficients and {len(shape)} shape values",
-            allowed=f"{count} and {len(effect.shapes)}",
-        )
     names = [str(parameter["name"]) for parameter in data.get("parameters", ())]
     known = [name for name, _ in _described(effect, robot, joint)]
     if names and names != known:
@@ -99,6 +94,11 @@ def read_extension(data: Mapping[str, Any], robot: Robot) -> Extension:
             f"extension {effect.name} has the parameters {', '.join(names)}",
             allowed=", ".join(known),
             remedy="it was written by another version: diagnose the logs again",
+        )
+    if len(shape) != len(effect.shapes) or coefficients.shape != (count,) or len(rows) != count + len(shape):
+        raise InputError(
+            f"extension {effect.name} has {len(coefficients)} coefficients and {len(shape)} shape values",
+            allowed=f"{count} and {len(effect.shapes)}",
         )
     if not (np.isfinite(coefficients).all() and np.isfinite(shape).all()):
         raise InputError(f"extension {effect.name} has values that are not finite")

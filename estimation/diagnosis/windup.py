@@ -18,6 +18,7 @@ from robots.signals import Log
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effects import EFFECTS
 from robots.terms.effects.situation import Situation
+from robots.terms.effects.unknown_rotor import KNOWN
 
 Array = NDArray[np.float64]
 
@@ -234,14 +235,15 @@ def _parameter(name: str, value: float, error: float, unit: str, quantile: float
 
 
 def _extension(now: Situation, joint: int, compliance: float, error: float) -> Extension:
-    """The effect of the catalogue; its dynamics have the same stiffness."""
+    """The effect of the catalogue; its dynamics have the same stiffness, its rotor is the one that is known."""
     low, high = EFFECTS[EFFECT].bounds(now, joint)[0]
+    stiffness = float(np.clip(1.0 / compliance, low, high)) if compliance > 0 else high
     return Extension(
         effect=EFFECT,
         joint=joint,
-        shape=(float(np.clip(1.0 / compliance, low, high)) if compliance > 0 else high,),
+        shape=(stiffness, KNOWN),
         coefficients=np.array([compliance]),
-        covariance=np.diag([error**2, np.inf]),
+        covariance=np.diag([error**2, np.inf, np.inf]),
     )
 
 

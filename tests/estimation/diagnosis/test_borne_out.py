@@ -17,6 +17,7 @@ from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found
 from estimation.diagnosis.verdict import CLOSE, Judgement
 from robots.terms.effects import EFFECTS
+from robots.terms.effects.base import Effect
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,11 @@ def _borne(
     forms: Sequence[Member] = (),
 ) -> BorneOut:
     judgement = Judgement("named", founds, tuple(free), tuple(p_values), 1.0)
-    return bear_out(judgement, bench, held_out, lambda members, i: forms if members[i] is SPRING else ())  # type: ignore[arg-type]
+
+    def beyond(effect: Effect) -> bool:
+        return held_out and effect.passing
+
+    return bear_out(judgement, bench, beyond, lambda members, i: forms if members[i] is SPRING else ())  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("rise", "stays"), [(HARM - 0.03, True), (HARM + 0.01, False)])

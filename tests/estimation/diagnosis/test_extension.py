@@ -16,8 +16,8 @@ from robots.terms.effects import Situation, situation
 
 @pytest.fixture(scope="module")
 def state(arm: Robot) -> Situation:
-    """Three hundred samples of a smooth motion of the arm."""
-    t = 0.01 * np.arange(300)
+    """Three hundred samples of a smooth motion of the arm, long enough for slow swings."""
+    t = 0.04 * np.arange(300)
     q = np.column_stack([np.sin(2 * t), np.cos(3 * t)])
     dq, ddq = np.column_stack([2 * np.cos(2 * t), -3 * np.sin(3 * t)]), -q * [4.0, 9.0]
     model = default_model(arm, velocity_scale=1e-3)
@@ -102,11 +102,16 @@ def test_a_damaged_extension_is_refused(arm: Robot) -> None:
     old = {
         "effect": "joint_elasticity",
         "joint": 1,
-        "shape": [30.0],
+        "shape": [30.0, 0.0],
         "coefficients": [1e-4],
-        "covariance": [[1, 0], [0, 1]],
+        "covariance": np.eye(3).tolist(),
     }
     named = [{"name": name, "value": 1.0} for name in ("compliance", "resonance")]
     with pytest.raises(InputError, match="resonance"):
         read_extension({**old, "parameters": named}, arm)
-    assert read_extension(old, arm).shape == (30.0,)
+    assert read_extension(old, arm).shape == (30.0, 0.0)
+    shorter = {**old, "shape": [30.0], "covariance": np.eye(2).tolist()}
+    with pytest.raises(InputError, match="1 coefficients and 1 shape values"):
+        read_extension(shorter, arm)
+    with pytest.raises(InputError, match="another version"):
+        read_extension({**shorter, "parameters": [{"name": "compliance"}, {"name": "dynamic_stiffness"}]}, arm)

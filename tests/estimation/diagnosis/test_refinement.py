@@ -192,8 +192,9 @@ class _Summits(Stribeck):
     def likely(self, *_: object) -> tuple[tuple[float | None, ...], ...]:
         return ()
 
-    def elsewhere(self, *_: object) -> tuple[tuple[float, ...], ...]:
-        return ((0.0013,),) if self.far else ()
+    def elsewhere(self, *_: object) -> tuple[tuple[tuple[float, ...], ...], ...]:
+        # Too far from the other summit, and near it.
+        return (((0.02,), (0.0013,)),) if self.far else ()
 
 
 @pytest.mark.parametrize(("far", "expected"), [(False, 0.1), (True, 0.001)])
