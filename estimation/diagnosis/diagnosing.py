@@ -17,6 +17,7 @@ from estimation.diagnosis.excess import residual_shares
 from estimation.diagnosis.hopeless_logs import hopeless_logs
 from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.limits import find_limits
+from estimation.diagnosis.mended import mended
 from estimation.diagnosis.noise import estimate_whitening, quiet_joints
 from estimation.diagnosis.own_functions import own_functions
 from estimation.diagnosis.patterns import all_patterns
@@ -62,6 +63,7 @@ def diagnose(
     candidates: Sequence[str | Effect] | None = None,
     friction: str = "polynomial",
     false_alarm: float = 0.01,
+    check: bool = True,
     seed: int = 0,
     progress: Progress | None = None,
     executor: Executor | None = None,
@@ -81,6 +83,8 @@ def diagnose(
         candidates: effects to look for, by name; all by default.
         friction: of the base model: ``polynomial`` or ``coulomb-viscous``.
         false_alarm: chance of finding an effect in logs that have none.
+        check: whether each log passes the gate first, which refuses what would be diagnosed wrongly; rows that stick
+            out of their neighbours are filled in, and logs are cut at gaps.
         seed: of the noise that is drawn.
         progress: is told how far it is.
         executor: not needed so far: the work is in threads.
@@ -89,7 +93,8 @@ def diagnose(
         The diagnosis.
 
     Raises:
-        InputError: logs of another robot, without torque, too short or given twice; an unknown effect or option.
+        InputError: logs of another robot, without torque, too short, given twice or refused by the gate; an unknown
+            effect or option.
         NotIdentifiableError: no joint moves.
     """
     data = [logs] if isinstance(logs, Log) else list(logs)
@@ -104,6 +109,14 @@ def diagnose(
     try:
         on_clock = clocked(data, other)
         data, other = sorted(on_clock.logs, key=lambda log: float(log.t[0])), list(on_clock.held_out)
+        found: list[str] = []
+        if check:
+            bar.update(0.0, "checking the logs")
+            (data, told_of_logs), (other, told_of_others) = (
+                _mended(robot, data, "Log"),
+                _mended(robot, other, "Held out"),
+            )
+            found = [*told_of_logs, *told_of_others]
         recording = lightened(robot, record(robot, data))
         if not (np.ptp(recording.q, axis=0) > 0).any():
             raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
@@ -137,7 +150,7 @@ def diagnose(
             dated=on_clock.dated,
             false_alarm=false_alarm,
             seed=seed,
-            notes=(*on_clock.notes, *notes),
+            notes=(*on_clock.notes, *found, *notes),
         )
         return assemble(robot, told)
     finally:
@@ -148,6 +161,12 @@ _HOPELESS = (
     "Log {}{} is left out: fitted to it alone, the base model still leaves {:.0f} % of the torque on every joint. It "
     "says nothing of what the arm is like; look at its torque."
 )
+
+
+def _mended(robot: Robot, logs: Sequence[Log], kind: str) -> tuple[list[Log], list[str]]:
+    """The stretches of logs that can be used, and what is to be told of them."""
+    several = [mended(robot, log, f"{kind} {k}{_named(log.name)}") for k, log in enumerate(logs, start=1)]
+    return [part for one in several for part in one.logs], [note for one in several for note in one.notes]
 
 
 def _named(name: str) -> str:

@@ -62,6 +62,29 @@ def dropouts(values: Array, q: Array) -> NDArray[np.intp]:
     return rows
 
 
+def stray_rows(columns: Columns) -> dict[tuple[str, int], NDArray[np.intp]]:
+    """Finds the rows that stick out of each column of position and of torque or current.
+
+    Args:
+        columns: of the log.
+
+    Returns:
+        Rows by the column's prefix and joint, counted from 0; only columns that have some.
+    """
+    found: dict[tuple[str, int], NDArray[np.intp]] = {}
+    for joint, column in enumerate(columns.q):
+        found["q", joint] = spike_rows(column, SHARE_OF_POSITION, noisy=False)
+    for joint, column in enumerate(() if columns.signal is None else columns.signal):
+        lost = dropouts(column, columns.q[joint])
+        found[columns.prefix, joint] = np.union1d(spike_rows(column, SHARE_OF_SIGNAL, noisy=True), lost)
+    return {place: rows for place, rows in found.items() if len(rows)}
+
+
+def are_accidents(rows: NDArray[np.intp], samples: int) -> bool:
+    """Tells whether rows that stick out are few enough to be left out of a column of so many."""
+    return len(rows) <= MANY * samples
+
+
 def check_spikes(columns: Columns) -> tuple[list[Finding], NDArray[np.intp]]:
     """Finds spikes of position and of torque or current.
 
@@ -73,31 +96,25 @@ def check_spikes(columns: Columns) -> tuple[list[Finding], NDArray[np.intp]]:
     """
     findings: list[Finding] = []
     rows: list[NDArray[np.intp]] = []
-    for prefix, values in (("q", columns.q), (columns.prefix, columns.signal)):
-        for joint, column in enumerate(() if values is None else values):
-            if prefix == "q":
-                found = spike_rows(column, SHARE_OF_POSITION, noisy=False)
-            else:
-                found = np.union1d(spike_rows(column, SHARE_OF_SIGNAL, noisy=True), dropouts(column, columns.q[joint]))
-            if not len(found):
-                continue
-            many = len(found) > MANY * len(column)
-            if not many:
-                rows.append(found)
-            findings.append(
-                Finding(
-                    name="spikes",
-                    severity="refuse" if many and prefix == "q" else "warning",
-                    text=f"{len(found)} row{'s stick' if len(found) > 1 else ' sticks'} out of "
-                    f"{'their' if len(found) > 1 else 'its'} neighbours, the first with "
-                    f"{float(column[found[0]]):.6g} between {float(column[found[0] - 1]):.6g} and "
-                    f"{float(column[found[0] + 1]):.6g}",
-                    action="repair the logger: too many to leave out" if many else "these rows are left out",
-                    value=float(len(found)),
-                    unit="rows",
-                    column=f"{prefix}{joint + 1}",
-                    joint=joint + 1,
-                    row=int(found[0]) + 1,
-                )
+    for (prefix, joint), found in stray_rows(columns).items():
+        column = (columns.q if prefix == "q" or columns.signal is None else columns.signal)[joint]
+        many = not are_accidents(found, len(column))
+        if not many:
+            rows.append(found)
+        findings.append(
+            Finding(
+                name="spikes",
+                severity="refuse" if many and prefix == "q" else "warning",
+                text=f"{len(found)} row{'s stick' if len(found) > 1 else ' sticks'} out of "
+                f"{'their' if len(found) > 1 else 'its'} neighbours, the first with "
+                f"{float(column[found[0]]):.6g} between {float(column[found[0] - 1]):.6g} and "
+                f"{float(column[found[0] + 1]):.6g}",
+                action="repair the logger: too many to leave out" if many else "these rows are left out",
+                value=float(len(found)),
+                unit="rows",
+                column=f"{prefix}{joint + 1}",
+                joint=joint + 1,
+                row=int(found[0]) + 1,
             )
+        )
     return findings, np.unique(np.concatenate(rows)) if rows else np.empty(0, dtype=np.intp)

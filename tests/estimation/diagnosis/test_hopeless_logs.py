@@ -57,6 +57,6 @@ def test_a_diagnosis_says_what_it_left_out(arm: Robot, logs: list[Log]) -> None:
     """Given in any order, the other two are diagnosed as if the third were not there."""
     spoiled = diagnose(arm, [_ringing(logs[2], [0, 1]), logs[0], logs[1]], candidates=["stribeck"])
     alone = diagnose(arm, logs[:2], candidates=["stribeck"])
-    assert "Log 3 (run2) is left out" in spoiled.notes[0]
+    assert any("Log 3 (run2) is left out" in note for note in spoiled.notes)
     assert spoiled.verdict == alone.verdict
     assert spoiled.baseline == pytest.approx(alone.baseline)

@@ -1,0 +1,111 @@
+"""Logs as a diagnosis may take them: rows of lost messages filled in, cut at gaps, and what the gate says of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from estimation.gate import GateReport, check_log
+from estimation.gate.columns import Columns
+from estimation.gate.finding import Finding
+from estimation.gate.report import FEWEST
+from estimation.gate.spikes import are_accidents, stray_rows
+from robots.robot import Robot
+from robots.signals import Log
+
+Array = NDArray[np.float64]
+
+# What an effect may look like to the quick fit of the gate, or what a diagnosis says itself, with its own reason.
+TOLD = frozenset(
+    {
+        "badly_excited",
+        "jump",
+        "moved_by_others",
+        "negative_friction",
+        "no_motion",
+        "position_sign",
+        "short",
+        "torque_sign",
+        "unit_of_torque",
+    }
+)
+# Warnings of what a diagnosis looks at more closely.
+OWN = frozenset({"badly_excited", "clipped", "delay", "hardly_moves", "poorly_explained", "unit_of_torque"})
+# A stretch between gaps that is shorter than this [s] tells nothing that its ends do not spoil.
+SHORTEST = 2.0
+
+_BY_FIT = ", by a quick look at rigid body and friction alone"
+
+
+@dataclass(frozen=True)
+class Mended:
+    """A log without what would be taken for an effect of the robot.
+
+    Attributes:
+        logs: its stretches between gaps.
+        notes: what was wrong with it, and what was done.
+    """
+
+    logs: tuple[Log, ...]
+    notes: tuple[str, ...]
+
+
+def mended(robot: Robot, log: Log, which: str) -> Mended:
+    """Fills rows that stick out of their neighbours, and cuts the log at its gaps.
+
+    A lost message is a torque of a thousandth of a second, and a bridge over a gap a motion that never was: both would
+    be named, as a contact, with any certainty.
+
+    Args:
+        robot: the robot.
+        log: as it was recorded.
+        which: what notes call it.
+
+    Raises:
+        InputError: a log that says nothing of the robot: positions in degrees, times in milliseconds, absurd values.
+    """
+    gate = check_log(robot, log)
+    replace(gate, findings=tuple(f for f in gate.findings if f.name not in TOLD)).raise_if_refused()
+    notes = [
+        f"{which}{_BY_FIT if finding.name in TOLD else ''}: {finding}."
+        for finding in gate.findings
+        if _is_told(finding)
+    ]
+    return Mended(_stretches(_filled(log), gate), tuple(notes))
+
+
+def _is_told(finding: Finding) -> bool:
+    if finding.severity == "refuse":
+        return finding.name not in ("no_motion", "short")
+    return finding.severity == "warning" and finding.name not in OWN
+
+
+def _filled(log: Log) -> Log:
+    """Puts what lies between its neighbours where a column sticks out: rows stay where they are in time."""
+    values: dict[str, Array] = {}
+    for (prefix, joint), rows in stray_rows(Columns.of(log)).items():
+        name = {"q": "q", "tau": "tau", "i": "current"}[prefix]
+        known = np.setdiff1d(np.arange(len(log)), rows)
+        if not are_accidents(rows, len(log)) or len(known) < FEWEST:
+            continue
+        column = values.setdefault(name, np.array(getattr(log, name)))[:, joint]
+        if prefix == "q":
+            # A straight line would cut the motion's corner, by more than an encoder's step.
+            column[rows] = CubicSpline(log.t[known], column[known])(log.t[rows])
+        else:
+            column[rows] = np.interp(log.t[rows], log.t[known], column[known])
+    return replace(log, **values) if values else log  # type: ignore[arg-type]
+
+
+def _stretches(log: Log, gate: GateReport) -> tuple[Log, ...]:
+    """Cuts a log at its gaps; it is left whole where no stretch is long enough to stand alone."""
+    spans = [(first, stop) for first, stop in gate.parts if log.t[stop - 1] - log.t[first] >= SHORTEST]
+    if len(gate.parts) == 1 or not spans:
+        return (log,)
+    parts = (log.rows(slice(first, stop)) for first, stop in spans)
+    return tuple(
+        replace(part, name=f"{log.name or 'log'} from {part.t[0]:.4g} to {part.t[-1]:.4g} s") for part in parts
+    )

@@ -1,0 +1,102 @@
+"""Specification of logs with lost messages, gaps, and other faults of their recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation import diagnose
+from estimation.diagnosis.mended import mended
+from robots.common.errors import InputError
+from robots.robot import Robot
+from robots.signals import Log
+
+FEW = ("external_contact", "friction_step", "payload_change", "spring", "stribeck", "torque_sensor_drift")
+
+
+@pytest.fixture(scope="module")
+def log(arm_log: Callable[..., Log]) -> Log:
+    """Twenty seconds of the arm, with noise of torque and nothing else."""
+    return arm_log(torque_noise=0.02)
+
+
+def _glitched(log: Log, rows: tuple[int, ...]) -> Log:
+    """The log with a garbled torque of the second joint in some rows, three times its range."""
+    tau = np.array(log.tau)
+    for row in rows:
+        tau[row, 1] += 3.0 * np.ptp(tau[:, 1])
+    return replace(log, tau=tau)
+
+
+def _holed(log: Log, *holes: tuple[float, float]) -> Log:
+    """The log without what lies within some times."""
+    t = log.t - log.t[0]
+    return log.rows(np.flatnonzero(~np.any([(t > low) & (t < high) for low, high in holes], axis=0)))
+
+
+def test_a_sound_log_is_left_alone(arm: Robot, log: Log) -> None:
+    """It is the same object, and nothing is said of it."""
+    result = mended(arm, log, "Log 1")
+    assert result.logs == (log,)
+    assert result.notes == ()
+
+
+def test_rows_that_stick_out_lie_between_their_neighbours(arm: Robot, log: Log) -> None:
+    """The torque is interpolated, the position by a cubic, all other rows are as they were; the note has the place."""
+    rows = (1200, 3000)
+    q = np.array(log.q)
+    q[3000, 0] += 0.5 * np.ptp(q[:, 0])
+    ((found,), notes) = (lambda m: (m.logs, m.notes))(mended(arm, replace(_glitched(log, rows), q=q), "Log 1"))
+    others = np.delete(np.arange(len(log)), rows)
+    for name in ("t", "q", "tau"):
+        np.testing.assert_array_equal(getattr(found, name)[others], getattr(log, name)[others])
+    for row in rows:
+        np.testing.assert_allclose(found.tau[row, 1], 0.5 * (log.tau[row - 1, 1] + log.tau[row + 1, 1]))
+        # The other joint's torque was right.
+        assert found.tau[row, 0] == log.tau[row, 0]
+    # A cubic errs by h^4 q'''' / 24, an even smaller number than 4 ms squared by the acceleration.
+    np.testing.assert_allclose(found.q[3000], log.q[3000], atol=2e-5)
+    assert any("Log 1: joint 2" in note and "1201" in note for note in notes)
+
+
+def test_a_log_is_cut_at_its_gaps(arm: Robot, log: Log) -> None:
+    """Stretches keep their times and say which they are; one of less than two seconds is no stretch."""
+    result = mended(arm, _holed(log, (6.0, 9.0), (10.5, 11.0)), "Log 1")
+    spans = [(part.t[0] - log.t[0], part.t[-1] - log.t[0]) for part in result.logs]
+    np.testing.assert_allclose(spans, [(0.0, 6.0), (11.0, log.duration)], atol=0.0041)
+    assert "from 0 to 6 s" in result.logs[0].name
+    assert any("gap" in note for note in result.notes)
+    # A network that hiccups is no gap.
+    assert len(mended(arm, _holed(log, (6.0, 6.05)), "Log 1").logs) == 1
+
+
+def test_faults_of_a_recording_are_no_effects(arm: Robot, log: Log) -> None:
+    """Garbled rows and a gap leave a verdict of none, where unchecked they are something, with any certainty.
+
+    A false alarm has a chance of 1 %, for these seeds once and for all.
+    """
+    faulty = _holed(_glitched(log, (900, 3900)), (10.0, 12.0))
+    checked = diagnose(arm, faulty, candidates=FEW, friction="coulomb-viscous")
+    assert checked.verdict == "none"
+    assert any("stick out" in note for note in checked.notes)
+    taken = diagnose(arm, faulty, candidates=FEW, friction="coulomb-viscous", check=False)
+    assert taken.verdict != "none"
+
+
+@pytest.mark.parametrize("field", ["held_out", "logs"])
+def test_a_log_in_other_units_is_refused(arm: Robot, log: Log, field: str) -> None:
+    """Times in milliseconds, of either kind of log: what the gate refuses for identification."""
+    wrong = replace(log.rows(slice(500, None)), t=1000.0 * (log.t[500:] + 100.0))
+    logs = {"logs": log, "held_out": None, field: wrong}
+    with pytest.raises(InputError, match="milliseconds"):
+        diagnose(arm, logs["logs"], held_out=logs["held_out"])
+
+
+def test_what_an_effect_may_look_like_is_told_and_not_refused(arm: Robot, log: Log) -> None:
+    """A torque of the wrong sign is a note: the quick fit of the gate knows no effect."""
+    result = mended(arm, replace(log, tau=-np.asarray(log.tau)), "Log 1")
+    assert len(result.logs) == 1
+    assert any("sign" in note for note in result.notes)
