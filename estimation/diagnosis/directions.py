@@ -52,6 +52,21 @@ class Directions:
         """Gives what is known of some rows."""
         return Directions(self.unsure[kept], self.clear[kept], self.jolts)
 
+    def spread(self, between: NDArray[np.intp]) -> Directions:
+        """Takes no row as sure whose torque comes of two samples between which a joint may have turned round.
+
+        Args:
+            between: which two samples each row (N,) lies between, in order; -1 for one that is a sample itself.
+        """
+        inner = np.flatnonzero(between >= 0)
+        if not len(inner):
+            return self
+        unsure = self.unsure.copy()
+        begins = np.flatnonzero(np.diff(between[inner], prepend=-1))
+        found = np.logical_or.reduceat(unsure[inner], begins, axis=0)
+        unsure[inner] = np.repeat(found, np.diff([*begins, len(inner)]), axis=0)
+        return Directions(unsure, self.clear & ~(unsure & ~self.unsure), self.jolts)
+
 
 def directions(
     dq: Array, ddq: Array, cutoffs: Array, floor: Array, ends: Array, step: float, sampled: bool

@@ -8,11 +8,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt, welch
+from scipy.signal import butter, sosfiltfilt
 
 from estimation.diagnosis.believable import believable_cutoff
 from estimation.diagnosis.directions import ALIKE, Directions, directions
 from estimation.diagnosis.periods import Cycle, find_cycle, project
+from estimation.diagnosis.position_spectra import Spectra, cutoffs_of
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.smoothed_motion import smoothed
 from estimation.preparation import Prepared, prepare
@@ -25,17 +26,11 @@ Array = NDArray[np.float64]
 # More rows than this only cost time: the logs are then thinned by a whole number, torque low-passed before.
 MOST_ROWS = 40_000
 FASTEST = 260.0  # [Hz] sampling beyond which no effect of the catalogue gains
-# A frequency of a position is kept where its power is this much above the encoder's noise.
-STANDS_OUT = 3.0
-# Least and most of the cut-off [Hz, share of the sampling rate].
-LOWEST, HIGHEST = 2.0, 0.4
 ORDER = 8  # of the low-pass before thinning
 # At its ends a log knows its derivatives less well, for nothing is known beyond: so many periods of the cut-off are
 # lost, and no more than a share of the log.
 LOST, MOST_LOST = 4.0, 0.02
 SHORTEST = 5.0  # [s] of log below which nothing can be told
-# Spectra are taken of this difference of the positions: the slow motion would leak over all of the band otherwise.
-DIFFERENCE = 3
 # A mean over repetitions is taken where it knows frequencies higher by this factor than a single pass.
 SHARPER = 1.2
 # At the ends of a log, rows in which all joints are slower than this share are left out, up to so long [s].
@@ -71,7 +66,7 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
             )
     if step is None:
         step = _step(prepared)
-    highest = np.max([_cutoffs(log.positions.q, log.positions.period) for log in prepared], axis=0)
+    highest = np.max([cutoffs_of(log.positions) for log in prepared], axis=0)
     cap = believable_cutoff(robot, prepared, highest)
     parts = [_part(log, step, cap) for log in prepared]
     lengths = [len(part[0]) for part in parts]
@@ -126,8 +121,9 @@ def _part(
     """
     period, grid = log.positions.period, log.positions.t
     positions = log.positions.q
-    spectra = [_spectrum(column, period) for column in positions.T]
-    cutoffs = np.minimum([_cutoff(*spectrum, period) for spectrum in spectra], cap)
+    spectra = Spectra.of(log.positions)
+    found = [spectra.of_positions(column) for column in positions.T]
+    cutoffs = np.minimum([spectrum.cutoff() for spectrum in found], cap)
     q, dq, ddq = smoothed(positions, period, cutoffs)
     cycle = find_cycle(positions, period)
     if cycle is not None:
@@ -136,12 +132,12 @@ def _part(
         # One pass alone may be sharper, where the motion does not repeat as exactly as its encoder counts.
         better = (known > SHARPER * cutoffs) & (known <= cap)
         rest = positions[rows] - exact[0]
-        slow = smoothed(rest, period, np.array([_cutoff(*_spectrum(x, period), period, none=0.0) for x in rest.T]))
+        slow = smoothed(rest, period, np.array([spectra.of_positions(x).cutoff(none=0.0) for x in rest.T]))
         for whole, harmonic, other in zip((q, dq, ddq), exact, slow, strict=True):
             # What does not repeat is motion too, where it stands out of the noise.
             whole[rows] = np.where(better, harmonic + other, whole[rows])
         cutoffs = np.where(better, known, cutoffs)
-    floor = np.array([spectrum[2] if cap == np.inf else _density_at(cap, *spectrum) for spectrum in spectra])
+    floor = np.array([spectrum.floor if cap == np.inf else spectrum.noise_at(cap) for spectrum in found])
     edge = min(LOST / float(cutoffs.min()), MOST_LOST * (grid[-1] - grid[0]))
     # On a sample: between two of them nobody knows when a torque jumped.
     begin = grid[0] + np.ceil(edge / period - 1e-9) * period
@@ -160,22 +156,21 @@ def _part(
         moved = Cycle(start, stop, cycle.period, int((stop - start) * step / cycle.period + 0.1))
     if cycle is not None:
         floor = np.where(better, np.clip(repeated, floor / cycle.count, floor), floor)
-    ends = [float(np.interp(cutoff, f, density)) for cutoff, (f, density, _) in zip(cutoffs, spectra, strict=True)]
+    ends = [spectrum.at(float(cutoff)) for cutoff, spectrum in zip(cutoffs, found, strict=True)]
     beside = log.log.t[np.clip(np.searchsorted(log.log.t, t), 1, len(log.log.t) - 1) + np.array([[-1], [0]])]
     sampled = abs(step - period) < 1e-9 and bool(np.abs(beside - t).min(axis=0).max() < ALIKE * period)
     turns = directions(states[1], states[2], cutoffs, floor, np.maximum(ends, floor), step, sampled)
+    turns = turns.spread(_between(log.log.t, t, period))
     cut = slice(None) if moved is not None else _moving(states[1], step)
     q, dq, ddq = (array[cut] for array in states)
     return t[cut], q, dq, ddq, tau[cut], moved, float(cutoffs.min()), turns.rows(cut), floor
 
 
-def _cutoffs(positions: Array, period: float) -> Array:
-    """The frequency at which each position's spectrum meets its noise (n,) [Hz]."""
-    return np.array([_cutoff(*_spectrum(column, period), period) for column in positions.T])
-
-
-def _density_at(frequency: float, f: Array, density: Array, floor: float) -> float:
-    return max(float(np.interp(frequency, f, density)), floor)
+def _between(own: Array, t: Array, period: float) -> NDArray[np.intp]:
+    """Numbers the pairs of a log's samples that the rows (N,) of a grid lie between; -1 on a sample."""
+    after = np.clip(np.searchsorted(own, t, side="right"), 1, len(own) - 1)
+    on = np.minimum(np.abs(own[after] - t), np.abs(t - own[after - 1])) < ALIKE * period
+    return np.where(on, -1, after)
 
 
 def _torque(log: Prepared, step: float) -> _Interpolation:
@@ -198,31 +193,6 @@ class _Interpolation:
 
     def __call__(self, at: Array) -> Array:
         return np.column_stack([np.interp(at, self.t, column) for column in self.values.T])
-
-
-def _spectrum(x: Array, period: float) -> tuple[Array, Array, float]:
-    """Gives a position's frequencies [Hz], power density, and the density of its white noise."""
-    rate = 1 / period
-    length = min(len(x) - DIFFERENCE, max(64, round(8 / period)))
-    f, power = welch(np.diff(x, DIFFERENCE), rate, "blackmanharris", length, detrend=False)
-    shape = (2 * np.sin(np.pi * f * period)) ** (2 * DIFFERENCE)
-    density = np.divide(power, shape, out=np.zeros_like(power), where=shape > 0)
-    density[0] = density[1]
-    # The encoder's noise is what the end of the band holds.
-    floor = float(np.median(density[f > 0.4 * rate]))
-    return f, np.convolve(np.pad(density, 2, mode="edge"), np.ones(5) / 5, mode="valid"), floor
-
-
-def _cutoff(f: Array, density: Array, floor: float, period: float, none: float = LOWEST) -> float:
-    """The frequency at which a position's spectrum meets its noise [Hz]; `none` where nothing stands out."""
-    rate = 1 / period
-    if floor <= 0:
-        return none if not density.any() else HIGHEST * rate
-    lost = np.flatnonzero((density < STANDS_OUT * floor) & (f > 4 * f[1]))
-    cutoff = float(f[lost[0]]) if len(lost) else HIGHEST * rate
-    if none == 0.0 and cutoff <= 5 * f[1]:
-        return 0.0
-    return float(np.clip(cutoff, min(LOWEST, HIGHEST * rate), HIGHEST * rate))
 
 
 def _moving(dq: Array, step: float) -> slice:

@@ -2,7 +2,7 @@
 
 from estimation.preprocessing.base import Smoother
 from estimation.preprocessing.harmonics import Harmonics, period_of
-from estimation.preprocessing.resampling import Resampled, resample, stale_rows
+from estimation.preprocessing.resampling import Resampled, between_rows, resample, stale_rows
 from estimation.preprocessing.smoothing import LowPass, smooth
 from estimation.preprocessing.spline import SmoothingSpline
 
@@ -12,6 +12,7 @@ __all__ = [
     "Resampled",
     "Smoother",
     "SmoothingSpline",
+    "between_rows",
     "period_of",
     "resample",
     "smooth",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from robots.common.errors import InputError
 from robots.common.stretches import spans
@@ -19,6 +19,8 @@ LONGEST_HOLD = 3
 STALE_STEPS = 2.0
 # Relative jitter of the time stamps above which straight lines between samples would leave kinks.
 EVEN = 0.02
+# Rows nearer than the first share of a period are one; steps above so many periods are holes.
+CROWD, HOLE = 0.1, 8.0
 
 
 @dataclass(frozen=True)
@@ -67,14 +69,48 @@ def resample(t: Array, q: Array) -> Resampled:
     period = float(np.mean(steps) if even else np.median(steps))
     grid = t[0] + period * np.arange(int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1)
     if stale.any() or not even:
-        # Positions that differ by denormal numbers have slopes whose harmonic mean overflows on its way to zero.
-        with np.errstate(over="ignore"):
-            values = PchipInterpolator(kept_t, kept_q)(np.minimum(grid, kept_t[-1]))
+        values = between_rows(kept_t, kept_q, np.minimum(grid, kept_t[-1]), period)
     elif len(grid) == len(t) and np.abs(grid - t).max() <= 1e-6 * period:
         values = q
     else:
         values = np.column_stack([np.interp(grid, kept_t, column) for column in kept_q.T])
     return Resampled(grid, values, period, int(stale.sum()), t, kept_t, kept_q)
+
+
+def between_rows(t: Array, q: Array, at: Array, period: float) -> Array:
+    """Interpolates positions (N, n) by a cubic spline, and across holes by a cubic that does not overshoot.
+
+    The latter everywhere (Fritsch and Butland 1984) would have slopes too small about turning points: of a fast joint
+    that is sampled with a jitter of a fifth of the period it errs by ten steps of an encoder, the spline by none.
+
+    Args:
+        t: increasing times (N,) [s].
+        q: positions (N, n) [rad or m].
+        at: times (M,) [s] within them.
+        period: usual step of time [s].
+    """
+    t, q = _merged(t, q, CROWD * period)
+    values = np.asarray(CubicSpline(t, q)(at))
+    holes = np.flatnonzero(np.diff(t) > HOLE * period)
+    inside = np.isin(np.searchsorted(t, at, side="right") - 1, holes)
+    if inside.any():
+        # Positions that differ by denormal numbers have slopes whose harmonic mean overflows on its way to zero.
+        with np.errstate(over="ignore"):
+            values[inside] = PchipInterpolator(t, q)(at[inside])
+    return values
+
+
+def _merged(t: Array, q: Array, nearest: float) -> tuple[Array, Array]:
+    """Takes the mean of rows that crowd: noise of two at nearly the same time would be a slope of any size."""
+    if np.diff(t).min() >= nearest:
+        return t, q
+    begins, first = [0], float(t[0])
+    for i, time in enumerate(t.tolist()):
+        if time - first >= nearest:
+            begins.append(i)
+            first = time
+    counts = np.diff([*begins, len(t)])
+    return np.add.reduceat(t, begins) / counts, np.add.reduceat(q, begins) / counts[:, None]
 
 
 def stale_rows(t: Array, q: Array) -> NDArray[np.bool_]:

@@ -10,8 +10,9 @@ import pytest
 from scipy.signal import lfilter
 
 from estimation.diagnosis.believable import CAPS, believable_cutoff
+from estimation.diagnosis.position_spectra import cutoffs_of
 from estimation.diagnosis.smoothed_motion import smoothed
-from estimation.diagnosis.states import _cutoffs, record
+from estimation.diagnosis.states import record
 from estimation.preparation import prepare
 from robots.plants import simulate
 from robots.robot import Robot
@@ -36,7 +37,7 @@ def test_coloured_noise_is_kept_out_of_the_acceleration(arm: Robot, logs: tuple[
     """The acceleration's error is less than a third of what the spectrum's floor alone lets it be."""
     noisy = logs[1]
     prepared = prepare(arm, noisy)
-    given = _cutoffs(prepared.positions.q, prepared.positions.period)
+    given = cutoffs_of(prepared.positions)
     assert believable_cutoff(arm, [prepared], given) in CAPS
     truth = fourier_motion(arm, 4)
 
