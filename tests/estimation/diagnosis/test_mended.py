@@ -74,16 +74,19 @@ def test_a_log_is_cut_at_its_gaps(arm: Robot, log: Log) -> None:
 
 
 def test_faults_of_a_recording_are_no_effects(arm: Robot, log: Log) -> None:
-    """Garbled rows and a gap leave a verdict of none, where unchecked they are something, with any certainty.
+    """Garbled rows and a gap leave a verdict of none and the errors of a sound log; unchecked rows spoil them.
 
     A false alarm has a chance of 1 %, for these seeds once and for all.
     """
     faulty = _holed(_glitched(log, (900, 3900)), (10.0, 12.0))
-    checked = diagnose(arm, faulty, candidates=FEW, friction="coulomb-viscous")
-    assert checked.verdict == "none"
+    sound, checked, taken = (
+        diagnose(arm, given, candidates=FEW, friction="coulomb-viscous", check=check)
+        for given, check in ((log, True), (faulty, True), (faulty, False))
+    )
+    assert sound.verdict == checked.verdict == "none"
     assert any("stick out" in note for note in checked.notes)
-    taken = diagnose(arm, faulty, candidates=FEW, friction="coulomb-viscous", check=False)
-    assert taken.verdict != "none"
+    assert checked.baseline == pytest.approx(sound.baseline, rel=0.3)
+    assert taken.baseline[1] > 3 * sound.baseline[1]
 
 
 @pytest.mark.parametrize("field", ["held_out", "logs"])
