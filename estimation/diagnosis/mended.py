@@ -56,8 +56,8 @@ class Mended:
 def mended(robot: Robot, log: Log, which: str) -> Mended:
     """Fills rows that stick out of their neighbours, and cuts the log at its gaps.
 
-    A lost message is a torque of a thousandth of a second, and a bridge over a gap a motion that never was: both would
-    be named, as a contact, with any certainty.
+    A lost message is a torque of a thousandth of a second, which would be named a contact with any certainty, and a
+    bridge over a gap is a motion that never was.
 
     Args:
         robot: the robot.
@@ -74,7 +74,7 @@ def mended(robot: Robot, log: Log, which: str) -> Mended:
         for finding in gate.findings
         if _is_told(finding)
     ]
-    return Mended(_stretches(_filled(log), gate), tuple(notes))
+    return Mended(_stretches(_filled(log) if len(gate.spikes) else log, gate), tuple(notes))
 
 
 def _is_told(finding: Finding) -> bool:

@@ -72,7 +72,7 @@ class Pattern(JointEffect):
         """Lists the frequencies of what goes to and fro half a resolution apart; else the family's own points."""
         if self.kind not in SWAYING:
             return super().grid(situation, joint)
-        duration = max(float(situation.t[-1] - situation.t[0]), 1.0)
+        duration = _duration(situation)
         bottom, top = SLOWEST, min(0.15 / max(situation.period, 1e-6), 30.0)
         if self.kind == "sway":
             bottom, top = SWINGS / duration, SLOWEST
@@ -81,7 +81,7 @@ class Pattern(JointEffect):
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
         """Keeps a vibration's frequency below what the samples resolve, and a swing's where it is one."""
         if self.kind == "sway":
-            return ((SWINGS / max(float(situation.t[-1] - situation.t[0]), 1.0), 2 * SLOWEST),)
+            return ((SWINGS / _duration(situation), 2 * SLOWEST),)
         if self.kind == "vibration":
             return ((0.5 * SLOWEST, min(0.2 / max(situation.period, 1e-6), 50.0)),)
         return super().bounds(situation, joint)
@@ -169,6 +169,10 @@ def _angles(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> A
     first = [f(h * a) for h in (1, 2) for f in (np.cos, np.sin)]
     second = [f(h * b) for h in (1, 2) for f in (np.cos, np.sin)]
     return np.column_stack([x * y for x in first for y in second])
+
+
+def _duration(s: Situation) -> float:
+    return max(float(s.t[-1] - s.t[0]), 1.0)
 
 
 def _motion(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:

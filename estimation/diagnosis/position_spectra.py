@@ -99,12 +99,6 @@ class Spectra:
         return Spectrum(f, smooth, floor, 1 / self.period)
 
 
-def cutoffs_of(positions: Resampled) -> Array:
-    """Gives the frequency at which each position's spectrum meets its noise (n,) [Hz]."""
-    spectra = Spectra.of(positions)
-    return np.array([spectra.of_positions(column).cutoff() for column in positions.q.T])
-
-
 def _density(x: Array, period: float) -> tuple[Array, Array]:
     length = min(len(x) - DIFFERENCE, max(64, round(8 / period)))
     f, power = welch(np.diff(x, DIFFERENCE), 1 / period, "blackmanharris", length, detrend=False)

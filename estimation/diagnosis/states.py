@@ -13,7 +13,7 @@ from scipy.signal import butter, sosfiltfilt
 from estimation.diagnosis.believable import believable_cutoff
 from estimation.diagnosis.directions import ALIKE, Directions, directions
 from estimation.diagnosis.periods import Cycle, find_cycle, project
-from estimation.diagnosis.position_spectra import Spectra, cutoffs_of
+from estimation.diagnosis.position_spectra import Spectra, Spectrum
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.smoothed_motion import smoothed
 from estimation.preparation import Prepared, prepare
@@ -66,9 +66,11 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
             )
     if step is None:
         step = _step(prepared)
-    highest = np.max([cutoffs_of(log.positions) for log in prepared], axis=0)
+    spectra = [Spectra.of(log.positions) for log in prepared]
+    found = [[of.of_positions(x) for x in log.positions.q.T] for of, log in zip(spectra, prepared, strict=True)]
+    highest = np.max([[spectrum.cutoff() for spectrum in own] for own in found], axis=0)
     cap = believable_cutoff(robot, prepared, highest)
-    parts = [_part(log, step, cap) for log in prepared]
+    parts = [_part(log, step, cap, of, own) for log, of, own in zip(prepared, spectra, found, strict=True)]
     lengths = [len(part[0]) for part in parts]
     total = sum(lengths) * step
     if total < shortest:
@@ -113,16 +115,14 @@ def _step(prepared: Sequence[Prepared]) -> float:
 
 
 def _part(
-    log: Prepared, step: float, cap: float
+    log: Prepared, step: float, cap: float, spectra: Spectra, found: Sequence[Spectrum]
 ) -> tuple[Array, Array, Array, Array, Array, Cycle | None, float, Directions, Array]:
     """One log: t, q, dq, ddq, tau on the working grid, its cycle there, the lowest cut-off, its directions, noise.
 
-    Above `cap` [Hz], what the positions have is noise, whatever its power.
+    Above `cap` [Hz], what the positions have is noise, whatever its power; `found` are the positions' own spectra.
     """
     period, grid = log.positions.period, log.positions.t
     positions = log.positions.q
-    spectra = Spectra.of(log.positions)
-    found = [spectra.of_positions(column) for column in positions.T]
     cutoffs = np.minimum([spectrum.cutoff() for spectrum in found], cap)
     q, dq, ddq = smoothed(positions, period, cutoffs)
     cycle = find_cycle(positions, period)

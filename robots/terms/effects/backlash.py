@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from robots.terms.base import length_unit
 from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effects.joint_elasticity import link_inertia, windup
-from robots.terms.effects.unknown_rotor import KNOWN, ROTOR, is_sure, rotor_bounds, rotor_grid, rotors_between
+from robots.terms.effects.unknown_rotor import (
+    KNOWN,
+    ROTOR,
+    is_sure,
+    load_beside,
+    rotor_bounds,
+    rotor_grid,
+    rotors_between,
+)
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -125,7 +133,7 @@ class Backlash(Effect):
         times, ways, quickness = _crossings(situation, joint, at, rotor)
         durations = _durations(situation, shape, quickness)
         side, rate, curve = (np.zeros(len(situation)) for _ in range(3))
-        load = _load(situation, joint, rotor) - at
+        load = load_beside(situation, joint, rotor) - at
         for run in situation.runs:
             t = situation.t[run]
             side[run] = np.sign(load[run.start])
@@ -158,7 +166,7 @@ class Backlash(Effect):
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the gear's load."""
         assert joint is not None
-        return f"load of joint {joint} [N m]", _load(situation, joint, shape[3] if len(shape) > 3 else KNOWN)
+        return f"load of joint {joint} [N m]", load_beside(situation, joint, shape[3] if len(shape) > 3 else KNOWN)
 
 
 def _durations(situation: Situation, shape: tuple[float, ...], quickness: Array) -> Array:
@@ -170,14 +178,9 @@ def _size(situation: Situation, joint: int) -> float:
     return float(np.sqrt(np.mean(situation.load[:, joint - 1] ** 2)))
 
 
-def _load(situation: Situation, joint: int, rotor: float) -> Array:
-    """Gives what passes the gear: without what turns a rotor that is not known."""
-    return np.asarray(situation.load[:, joint - 1] - rotor * situation.ddq[:, joint - 1])
-
-
 def _crossings(situation: Situation, joint: int, at: float, rotor: float) -> tuple[Array, Array, Array]:
     """Finds where the load passes a value: times [s], the new side, and its rate over the link's inertia [rad/s3]."""
-    load = _load(situation, joint, rotor) - at
+    load = load_beside(situation, joint, rotor) - at
     inertia = np.maximum(link_inertia(situation, joint, rotor)[:, joint - 1], 1e-12)
     small = 1e-4 * float(np.abs(load).max(initial=0.0))
     found = []

@@ -10,7 +10,7 @@ from scipy.linalg import solve_banded
 
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
-from robots.terms.effects.unknown_rotor import KNOWN, ROTOR, is_sure, rotor_bounds, rotor_grid
+from robots.terms.effects.unknown_rotor import KNOWN, ROTOR, is_sure, load_beside, rotor_bounds, rotor_grid
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -76,8 +76,7 @@ class JointElasticity(Effect):
         """Evaluates the torque of all joints per compliance of one."""
         assert joint is not None
         stiffness, rotor = shape
-        own = situation.load[:, joint - 1] - rotor * situation.ddq[:, joint - 1]
-        load = followed(situation, own, stiffness, _inertia(situation, joint, rotor))
+        load = followed(situation, load_beside(situation, joint, rotor), stiffness, _inertia(situation, joint, rotor))
         return windup(situation, joint, load, *situation.derivatives(load), rotor)[:, :, None]
 
     def describe(
@@ -99,8 +98,7 @@ class JointElasticity(Effect):
         """Gives the second derivative of the load."""
         assert joint is not None
         rotor = shape[1] if len(shape) > 1 else KNOWN
-        load = situation.load[:, joint - 1] - rotor * situation.ddq[:, joint - 1]
-        curve = situation.derivatives(load)[1]
+        curve = situation.derivatives(load_beside(situation, joint, rotor))[1]
         return f"second derivative of the load of joint {joint} [N m/s2]", curve
 
 

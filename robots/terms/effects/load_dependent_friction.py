@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from robots.terms.base import length_unit
 from robots.terms.effects.base import Coefficient, Place, Shape, Situation
 from robots.terms.effects.static import Instant, StaticJointEffect
-from robots.terms.effects.unknown_rotor import KNOWN, ROTOR, rotor_bounds, rotor_grid
+from robots.terms.effects.unknown_rotor import KNOWN, ROTOR, load_beside, rotor_bounds, rotor_grid
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -98,6 +98,6 @@ class LoadDependentFriction(StaticJointEffect):
         assert joint is not None
         j = joint - 1
         back, rotor = shape or (ALIKE, KNOWN)
-        load = situation.load[:, j] - rotor * situation.ddq[:, j]
+        load = load_beside(situation, joint, rotor)
         signed = np.where(load * situation.dq[:, j] > 0, 1.0, back) * np.abs(load) * situation.sign[:, j]
         return f"load of joint {joint}, signed by its direction [N m]", signed

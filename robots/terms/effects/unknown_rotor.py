@@ -6,8 +6,11 @@ Where a robot's description does not say it, or says it as datasheets do, what g
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robots.terms.effects.base import Shape, Situation
+
+Array = NDArray[np.float64]
 
 KNOWN = 0.0
 """No rotor beside those that are known."""
@@ -49,6 +52,11 @@ def is_sure(situation: Situation, joint: int) -> bool:
     """Tells whether a joint's rotor can be no other than the one that is known."""
     low, high = rotor_bounds(situation, joint)
     return low == high
+
+
+def load_beside(situation: Situation, joint: int, rotor: float) -> Array:
+    """Gives the torque (N,) that passes a joint's gear: without what turns a rotor beside the one that is known."""
+    return np.asarray(situation.load[:, joint - 1] - rotor * situation.ddq[:, joint - 1])
 
 
 def _least_inertia(situation: Situation, joint: int) -> float:

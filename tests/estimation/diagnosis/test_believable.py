@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from estimation.diagnosis.believable import CAPS, believable_cutoff
-from estimation.diagnosis.position_spectra import cutoffs_of
+from estimation.diagnosis.position_spectra import Spectra
 from estimation.diagnosis.smoothed_motion import smoothed
 from estimation.diagnosis.states import record
 from estimation.preparation import prepare
@@ -37,7 +37,8 @@ def test_coloured_noise_is_kept_out_of_the_acceleration(arm: Robot, logs: tuple[
     """The acceleration's error is less than a third of what the spectrum's floor alone lets it be."""
     noisy = logs[1]
     prepared = prepare(arm, noisy)
-    given = cutoffs_of(prepared.positions)
+    spectra = Spectra.of(prepared.positions)
+    given = np.array([spectra.of_positions(x).cutoff() for x in prepared.positions.q.T])
     assert believable_cutoff(arm, [prepared], given) in CAPS
     truth = fourier_motion(arm, 4)
 

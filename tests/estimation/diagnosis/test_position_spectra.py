@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.directions import Directions
-from estimation.diagnosis.position_spectra import Spectra, cutoffs_of
+from estimation.diagnosis.position_spectra import Spectra
 from estimation.preprocessing import Resampled, resample
 
 NOISE = 5e-6  # [rad]
@@ -34,7 +34,6 @@ def test_lost_rows_and_jitter_make_no_motion_of_noise(lost: float, jitter: float
     positions = _logged(lost, jitter)
     spectrum = Spectra.of(positions).of_positions(positions.q[:, 0])
     assert 8.0 < spectrum.cutoff() < 16.0
-    assert cutoffs_of(positions) == pytest.approx([spectrum.cutoff()])
     # White noise of a standard deviation has 2 s^2 T up to half of the rate; fewer rows have as much up to less.
     assert spectrum.floor == pytest.approx(2 * NOISE**2 * PERIOD / (1 - lost), rel=0.3, abs=0.0)
 
