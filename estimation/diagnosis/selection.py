@@ -70,9 +70,15 @@ def select(
     rng: np.random.Generator,
     advance: Callable[[str], None] = lambda note: None,
 ) -> Selection:
-    """Adds effects while the strongest is significant, refining and swapping before each next step."""
+    """Adds effects while the strongest is significant, refining and swapping before each next step.
+
+    One that the others make unnecessary once they are refined beside it is not tried again, and no set of effects is
+    built on twice: the search would go round in a circle.
+    """
     members, p_values = _seen(problem, entries, false_alarm, rng)
     seen = {member.hypothesis for member in members}
+    spurned: set[Hypothesis] = set()
+    visited = [seen]
     first: Scan | None = None
     while True:
         accepted = accept(problem, tuple(member.group for member in members))
@@ -86,7 +92,7 @@ def select(
         advance(f"{result.outcomes[0].hypothesis.label}")
         refined = _best(problem, contenders(problem, result, members), accepted)
         chance = {member.hypothesis: chances.get(member.hypothesis, 1.0) for member in refined}
-        able = [member for member in refined if chance[member.hypothesis] <= false_alarm]
+        able = [m for m in refined if chance[m.hypothesis] <= false_alarm and m.hypothesis not in spurned]
         alone = SURE * false_alarm if not members else 0.0
         best = [m for m in able if _worth_it(problem, m, members) or _sure(problem, m, chance[m.hypothesis], alone)]
         if not best or not _beyond(problem, best[0], members):
@@ -97,6 +103,12 @@ def select(
             members, p_values = _polished(problem, entries, members, p_values, seen, rng)
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
+        now = {member.hypothesis for member in members}
+        if best[0].hypothesis not in now:
+            spurned.add(best[0].hypothesis)
+        elif now in visited:
+            break
+        visited.append(now)
     found = _found(problem, entries, members, p_values, rng)
     others, alone = members[1:], SURE * false_alarm if len(members) == 1 else 0.0
     kept = [

@@ -1,0 +1,81 @@
+"""Specification of the search for several effects: it ends, whatever refining makes of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis import selection
+from estimation.diagnosis.hypotheses import Hypothesis
+from robots.terms.effects import EFFECTS
+
+A, B, C = (Hypothesis(EFFECTS[name], 1) for name in ("stribeck", "spring", "time_delay"))
+Members = list[SimpleNamespace]
+MOST_SCANS = 40
+
+
+def _searching(
+    monkeypatch: pytest.MonkeyPatch, polished: Callable[[Members], Members], *, showing: Sequence[Hypothesis]
+) -> list[set[Hypothesis]]:
+    """Replaces all that is measured: hypotheses that are not in the model show, the first listed most of all.
+
+    Returns what each scan is given; more than `MOST_SCANS` are taken for a circle.
+    """
+    scans: list[set[Hypothesis]] = []
+
+    def scan(problem, entries, accepted, rng):
+        scans.append(set(accepted))
+        assert len(scans) < MOST_SCANS, "goes round in a circle"
+        outcomes = [SimpleNamespace(hypothesis=h, evidence=1.0) for h in showing if h not in accepted]
+        return SimpleNamespace(outcomes=outcomes, p_value=lambda evidence: 1e-9)
+
+    def replace(name: str, value: Callable) -> None:
+        monkeypatch.setattr(selection, name, value)
+
+    replace("_seen", lambda *args: ([], []))
+    replace("accept", lambda problem, groups: groups)
+    replace("scan", scan)
+    replace("contenders", lambda problem, result, members: result.outcomes)
+    replace(
+        "_best",
+        lambda problem, outcomes, accepted: [
+            SimpleNamespace(hypothesis=o.hypothesis, group=o.hypothesis, gain=1.0) for o in outcomes
+        ],
+    )
+    for name in ("_worth_it", "_sure", "_beyond"):
+        replace(name, lambda *args: True)
+    replace("_polished", lambda problem, entries, members, p_values, seen, rng: (polished(members), p_values))
+    replace("_found", lambda problem, entries, members, p_values, rng: [SimpleNamespace(member=m) for m in members])
+    return scans
+
+
+def _selected() -> set[Hypothesis]:
+    result = selection.select(None, [], false_alarm=0.01, rng=np.random.default_rng(0))  # type: ignore[arg-type]
+    return {found.member.hypothesis for found in result.found}
+
+
+def test_effects_are_added_while_they_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where refining drops none, all that show are found."""
+    _searching(monkeypatch, lambda members: members, showing=(A, B, C))
+    assert _selected() == {A, B, C}
+
+
+def test_what_the_others_make_unnecessary_is_not_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """B goes as soon as A is refined beside it, shows again, and does not keep C from being found."""
+
+    def without_b(members: Members) -> Members:
+        return [m for m in members if m.hypothesis != B]
+
+    scans = _searching(monkeypatch, without_b, showing=(A, B, C))
+    assert _selected() == {A, C}
+    assert len(scans) == 4
+
+
+def test_two_that_drop_each_other_end_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whichever comes last takes the place of the other: one is found, in as many scans as there are sets."""
+    scans = _searching(monkeypatch, lambda members: members[-1:], showing=(A, B))
+    assert len(_selected()) == 1
+    assert len(scans) <= 4
