@@ -32,6 +32,8 @@ from robots.terms.effects import EFFECTS
 Array = NDArray[np.float64]
 
 HIDDEN = "the base model absorbs it: no size shows in this motion"
+UNSURE = "nearly all of it is at rest or beside reversals, where friction may have either sign: no size shows"
+FEW = "of {} kinds of it that were tried only {} show, from {:.2g} % of the torque on"
 SHAPES = 3
 """Shapes of an effect that its limit is the median of."""
 RIVAL_SHAPES = 4
@@ -206,15 +208,15 @@ def _limit(
     named: list[tuple[float, str | None]] = []
     shares: list[float] = []
     resolving = resolving_energy()
-    for at in _spread(len(entry.groups), SHAPES):
-        group, shape = entry.groups[at], entry.shapes[at]
-        root = visible_root(group.gram, group.raw)
+    roots = [visible_root(group.gram, group.raw) for group in entry.groups]
+    showing = [at for at, root in enumerate(roots) if len(root) and len(unit_mixtures(entry.sizes[at]))]
+    if not showing:
+        unsure = all(np.isinf(group.raw).all() for group in entry.groups)
+        return _none(hypothesis, UNSURE if unsure else HIDDEN)
+    for at in (showing[k] for k in _spread(len(showing), SHAPES)):
+        group, shape, root = entry.groups[at], entry.shapes[at], roots[at]
         mixtures = unit_mixtures(entry.sizes[at])
         shares.append(float(np.max(np.diag(group.gram) / np.maximum(group.raw, 1e-300))))
-        if not len(root) or not len(mixtures):
-            found.append(np.inf)
-            named.append((np.inf, None))
-            continue
         assumed = hypothesis.effect.likely(problem.situation, hypothesis.joint, shape, np.abs(mixtures[0]))
         fitted = min((sum(value is None for value in known) for known in assumed), default=len(shape))
         penalty = (len(root) + fitted) * float(np.log(problem.rows * len(group.joints)))
@@ -233,6 +235,8 @@ def _limit(
     middle = sorted(range(len(found)), key=lambda i: named[i][0])[len(found) // 2]
     detectable = float(np.median(found))
     visible = float(np.median(shares))
+    if 2 * len(showing) < len(entry.groups):
+        return _none(hypothesis, FEW.format(len(entry.groups), len(showing), 100 * detectable))
     return Limit(
         effect=hypothesis.name,
         joint=hypothesis.joint,
