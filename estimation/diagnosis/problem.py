@@ -12,7 +12,7 @@ from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.baseline import Baseline
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.states import Recording
+from estimation.diagnosis.recording import BESIDE, Recording
 from estimation.diagnosis.upper import Upper
 from estimation.diagnosis.whitening import Whitening
 from estimation.pulls import Pull
@@ -23,8 +23,8 @@ Small = NDArray[np.float32]
 
 # A column must have this share of its energy in rows whose direction of motion is known: what leaks from the others is
 # mostly the error of the motion there. One that is far larger in those, and on which all joints must agree (a late
-# torque, at reversals), must owe this share of what counts to rows farther than this [s] from them.
-COUNTED, KNOWN, BESIDE = 0.02, 0.5, 0.05
+# torque, at reversals), must owe this share of what counts to rows that are not beside them.
+COUNTED, KNOWN = 0.02, 0.5
 FAINT = 1e-5
 
 
@@ -136,19 +136,10 @@ class Problem:
         if effect is not None and effect.alike and len(doubtful):
             known = self._known(joints, [part[:, doubtful] for part in columns])
             raw[doubtful] = np.where(known > KNOWN * power[0][doubtful], power[0][doubtful], np.inf)
-        against, cross = np.zeros((total, self.mixed.shape[2])), np.zeros(total)
-        gram = np.zeros((count, k, k))
-        split = [part.T.reshape(count, k, -1) for part in white]
-        for a, j in enumerate(joints):
-            against += white[a].T @ self.mixed[j]
-            cross += white[a].T @ self.residual[:, j]
-            gram += P[j, j] * (split[a] @ split[a].transpose(0, 2, 1))
-            for b in range(a):
-                part = P[j, joints[b]] * (split[a] @ split[b].transpose(0, 2, 1))
-                gram += part + part.transpose(0, 2, 1)
+        against, cross, gram = self._products(joints, white, count)
         above: list[Array] = []
         if self.upper is not None and effect is not None and effect.fast:
-            above = [self.upper.columns(part, j) for j, part in zip(joints, columns, strict=True)]
+            above = [self.upper.columns(part, j, calm=effect.kicks) for j, part in zip(joints, columns, strict=True)]
             above = above if any(map(len, above)) else []
         for j, part in zip(joints, above, strict=False):
             assert self.upper is not None
@@ -170,6 +161,34 @@ class Problem:
             )
             for i, own in enumerate(slice(i * k, (i + 1) * k) for i in range(count))
         ]
+
+    def _products(self, joints: tuple[int, ...], white: Sequence[Array], count: int) -> tuple[Array, Array, Array]:
+        """Products of white columns (N, count k) with base model (count k, b), residual, each other (count, k, k)."""
+        total = white[0].shape[1]
+        against, cross = np.zeros((total, self.mixed.shape[2])), np.zeros(total)
+        gram = np.zeros((count, total // count, total // count))
+        split = [part.T.reshape(count, total // count, -1) for part in white]
+        for a, j in enumerate(joints):
+            against += white[a].T @ self.mixed[j]
+            cross += white[a].T @ self.residual[:, j]
+            gram += self.whitening.precision[j, j] * (split[a] @ split[a].transpose(0, 2, 1))
+            for b in range(a):
+                part = self.whitening.precision[j, joints[b]] * (split[a] @ split[b].transpose(0, 2, 1))
+                gram += part + part.transpose(0, 2, 1)
+        return against, cross, gram
+
+    def split(self, group: Group, coefficients: Array, rows: NDArray[np.bool_]) -> Group:
+        """Makes two columns of a torque: what it is in some white rows (N,) of its joints' bands, and the rest."""
+        torques = [part.astype(np.float64) @ coefficients for part in group.columns]
+        white = [np.column_stack([np.where(rows, x, 0.0), np.where(rows, 0.0, x)]) for x in torques]
+        against, cross, (gram,) = self._products(group.joints, white, 1)
+        small = tuple(np.asfortranarray(part, dtype=np.float32) for part in white)
+        return Group(group.joints, small, against, gram - against @ against.T, np.diag(gram).copy(), cross)
+
+    @cached_property
+    def calm(self) -> NDArray[np.bool_]:
+        """Marks white rows (N,) in which no joint has turned round, come to rest or left it, nor is about to."""
+        return self.recording.calm(self.whitening.stride)
 
     def _known(self, joints: tuple[int, ...], columns: Sequence[Array]) -> Array:
         """Energy (k,) of whitened columns (N, k) of some joints that is not from beside rows of unknown direction."""

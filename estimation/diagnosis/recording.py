@@ -7,10 +7,16 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
+from estimation.diagnosis.gaps import long_gap
 from estimation.diagnosis.periods import Cycle
+from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
+
+BESIDE = 0.05
+"""Time [s] about a row of unknown direction in which accelerations are not known to all of their kicks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +93,19 @@ class Recording:
     def periodic(self) -> bool:
         """Whether every log repeats its motion."""
         return all(cycle is not None for cycle in self.cycles)
+
+    def calm(self, stride: int = 1) -> NDArray[np.bool_]:
+        """Marks every `stride`-th row of each log in which no joint turns round, comes to rest, or has just done so."""
+        reach = 2 * round(BESIDE / self.step) + 1
+        parts = []
+        for run in self.runs:
+            flags = np.zeros(run.stop - run.start, dtype=np.int8)
+            for column in self.unsure[run].T:
+                for start, stop in spans(column):
+                    at_rest = stop - start > long_gap(self.step)
+                    flags[[start, stop - 1] if at_rest else slice(start, stop)] = 1
+            parts.append(maximum_filter1d(flags, reach)[::stride] == 0)
+        return np.concatenate(parts)
 
     def trusting(self, joints: NDArray[np.bool_] | None) -> Recording:
         """Lets the clear rows of some joints (n,) count too."""

@@ -28,6 +28,10 @@ FACTOR, SHARE = 1.5, 0.04
 ACTS = 0.02
 # Share of a coefficient that all joints have alike by which each may differ: so far its formula is true.
 ROUGH = 0.25
+# What an effect is beside reversals and elsewhere may differ by this share, for its formula is no better where it is
+# large, and by so many squared standard errors; at so much of twice the log of the odds that there is none elsewhere it
+# is none: one that is there has this in 2 % of logs at most.
+FORMULA, AGREES, ABSENT = 0.35, 2.0, 4.0
 # Twice the log of the odds against an effect that robots seldom have.
 RARE = 6.0
 
@@ -44,8 +48,9 @@ class Member:
         coefficients: (k,) beside the others.
         degrees: coefficients that show, and shape parameters that are free: one whose bounds are equal is known.
         visible: largest share of a column's energy that the model before leaves.
-        scatter: of what each joint says of a coefficient that all have alike, as a variance over that of the noise and
-            of the formula (Birge ratio, one at least): the gain counts for so much less.
+        scatter: of what each joint says of a coefficient that all have alike, or rows beside reversals and others, as a
+            variance over that of the noise and of the formula (Birge ratio, one at least): the gain counts for so much
+            less.
     """
 
     hypothesis: Hypothesis
@@ -152,7 +157,9 @@ def refine(
             shape = tuple(own if value is None else value for value, own in zip(known, refined.shape, strict=True))
             evaluate(shape, sum(known[k] is None for k in free))
     found = best[0]
-    return replace(found, scatter=_scatter(problem, found, accepted)) if hypothesis.effect.alike else found
+    if hypothesis.effect.alike:
+        return replace(found, scatter=_scatter(problem, found, accepted))
+    return replace(found, scatter=_borne_out(problem, found, accepted)) if hypothesis.effect.kicks else found
 
 
 def _scatter(problem: Problem, member: Member, accepted: Accepted) -> float:
@@ -161,6 +168,24 @@ def _scatter(problem: Problem, member: Member, accepted: Accepted) -> float:
     told = gram > 0
     gram, cross = gram[told], cross[told]
     return max(1.0, float(cross.sum() ** 2 / gram.sum()) / agreed_gain(gram, cross)) if len(gram) > 1 else 1.0
+
+
+def _borne_out(problem: Problem, member: Member, accepted: Accepted) -> float:
+    """How much more what an effect is beside reversals and elsewhere differ than they may by chance.
+
+    Beside reversals accelerations are not known to all of their kicks. What is missing of them looks like an effect of
+    the changes of acceleration, on every joint that feels them, and is the same at each.
+    """
+    parts = score(problem, problem.split(member.group, member.coefficients, problem.calm), accepted)
+    # What each part says of the whole, were it as large as it is: the base model may take of one what the other has.
+    expected = parts.gram.sum(axis=1)
+    if (expected <= 0).any():
+        return 1.0
+    told = parts.cross / expected
+    if (1.0 - 2.0 * told[0]) / (parts.gram[0, 0] / expected[0] ** 2 + FORMULA**2) > ABSENT:
+        return np.inf
+    difference = np.array([1.0, -1.0]) / expected
+    return max(1.0, float((told[0] - told[1]) ** 2 / (difference @ parts.gram @ difference + FORMULA**2)) / AGREES)
 
 
 def joint_by_joint(problem: Problem, member: Member, accepted: Accepted) -> tuple[Array, Array]:

@@ -58,17 +58,23 @@ class Upper:
     Attributes:
         whitening: makes the noise white in a band that is far wider.
         joints: each joint's; None where its band leaves nothing above it.
+        calm: white rows (N',) in which no joint turns round.
     """
 
     whitening: Whitening
     joints: tuple[Above | None, ...]
+    calm: NDArray[np.bool_]
 
-    def columns(self, series: Array, joint: int) -> Array:
-        """Whitens columns (N, k) of a joint, from 0, above its band and projects the base model out (N', k)."""
+    def columns(self, series: Array, joint: int, *, calm: bool = False) -> Array:
+        """Whitens columns (N, k) of a joint, from 0, above its band and projects the base model out (N', k).
+
+        Those that are to be `calm` count where no joint turns round: all feel what is not known of its acceleration.
+        """
         above = self.joints[joint]
         if above is None:
             return np.zeros((0, series.shape[1]))
-        white = _passed(self.whitening, series, joint, above.passing) * above.counts[:, None]
+        counts = above.counts * self.calm if calm else above.counts
+        white = _passed(self.whitening, series, joint, above.passing) * counts[:, None]
         return np.asarray(white - above.base @ (above.base.T @ white))
 
     def cross(self, columns: Array, joint: int) -> Array:
@@ -115,7 +121,7 @@ def pose_upper(
         base = orthonormal(_passed(wide, own[:, own.any(axis=0)], j, passing) * counts[:, None], FAINT)
         white = _passed(wide, remainder[:, j, None], j, passing)[:, 0] * counts
         joints.append(Above(passing, counts, base, white - base @ (base.T @ white)))
-    return Upper(wide, tuple(joints))
+    return Upper(wide, tuple(joints), recording.calm(wide.stride))
 
 
 def _levelling(

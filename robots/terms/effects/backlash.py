@@ -49,6 +49,7 @@ class Backlash(Effect):
 
     name: ClassVar[str] = "backlash"
     title: ClassVar[str] = "play in the gear (backlash)"
+    kicks: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("gap_crossed", "rad", 1e-7, 0.2, "log"),
         Shape("longest", "s", 0.01, SLOWEST, "log", (SLOWEST,), default=SLOWEST),

@@ -78,6 +78,7 @@ class Effect(ABC):
         depends_on: ``state`` where one and the same motion always meets it, ``time`` where it comes, goes or builds up.
         passing: whether it belongs to the logs it is found in, and may be gone or different in others.
         alike: whether it has one coefficient, that all joints share: each joint tells it, and they must agree.
+        kicks: whether it acts by changes of acceleration: they are largest, and least known, where a joint turns round.
         fast: whether its torque owes nothing to accelerations: it is looked for above the frequencies of those, too.
         blurs: whether it lets friction turn round later or over some time: how sharp its sign is shows beside it only.
         shapes: the parameters that the columns are not linear in.
@@ -92,6 +93,7 @@ class Effect(ABC):
     depends_on: ClassVar[Literal["state", "time"]] = "state"
     passing: ClassVar[bool] = False
     alike: ClassVar[bool] = False
+    kicks: ClassVar[bool] = False
     fast: ClassVar[bool] = False
     blurs: ClassVar[bool] = False
     shapes: ClassVar[tuple[Shape, ...]] = ()

@@ -38,6 +38,7 @@ class JointElasticity(Effect):
 
     name: ClassVar[str] = "joint_elasticity"
     title: ClassVar[str] = "a gear that winds up under load (elasticity)"
+    kicks: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("dynamic_stiffness", "N m/rad", 1e-6, 1e12, "log"), ROTOR)
     rivals: ClassVar[tuple[str, ...]] = ("backlash", "time_delay", "current_lag", "encoder_offset")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "payload")

@@ -1,0 +1,107 @@
+"""Specification of what changes of acceleration tell: beside reversals, where they are not known, and elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.recording import BESIDE, Recording
+from estimation.diagnosis.refinement import Member, _borne_out
+from estimation.diagnosis.scoring import accept, score
+from estimation.diagnosis.states import record
+from estimation.diagnosis.upper import WIDER
+from robots.robot import Robot
+from robots.signals import Log
+from robots.terms.effects import EFFECTS
+
+ELASTIC, PLAY = Hypothesis(EFFECTS["joint_elasticity"], 2), Hypothesis(EFFECTS["backlash"], 2)
+
+
+@pytest.fixture(scope="module")
+def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
+    """A log of the arm without effects."""
+    return record(arm, [arm_log(torque_noise=0.02)])
+
+
+@pytest.fixture(scope="module")
+def problem(recording: Recording, pose_arm: Callable[..., Problem]) -> Problem:
+    """The same, white, with the frequencies above its bands."""
+    return pose_arm(replace(recording, floor=np.full(2, 1e-11), cycles=(None,)), wider=WIDER)
+
+
+def _elastic(problem: Problem) -> Member:
+    shape = ELASTIC.effect.grid(problem.situation, 2)[-1]
+    group = problem.measured(ELASTIC, shape)
+    return Member(ELASTIC, shape, group, 100.0, np.array([10.0 / np.sqrt(group.gram[0, 0])]), 1, 1.0)
+
+
+def _with(problem: Problem, member: Member, calm: float, beside: float) -> Problem:
+    """The same data with so many times an effect's torque in calm rows and beside reversals, and nothing else."""
+    white = np.zeros_like(problem.white)
+    for j, part in zip(member.group.joints, member.group.columns, strict=True):
+        white[:, j] = np.where(problem.calm, calm, beside) * (part @ member.coefficients)
+    own = white @ problem.whitening.precision
+    base = sum(problem.mixed[j].T @ white[:, j] for j in range(problem.n))
+    # Less what the base model takes of it: <Q, r> is zero for a residual.
+    return replace(problem, residual=own - np.einsum("jnb,b->nj", problem.mixed, base))
+
+
+def test_rows_beside_reversals_and_the_ends_of_rests_are_not_calm(recording: Recording) -> None:
+    """All joints are disturbed by one that turns round, for 50 ms before and after; while one rests, none is."""
+    unsure = np.zeros_like(recording.unsure)
+    unsure[300:304, 0] = True
+    unsure[1000:1400, 1] = True
+    reach = round(BESIDE / recording.step)
+    disturbed = np.zeros(len(recording), dtype=bool)
+    for first, last in ((300, 303), (1000, 1000), (1399, 1399)):
+        disturbed[first - reach : last + reach + 1] = True
+    known = replace(recording, unsure=unsure)
+    np.testing.assert_array_equal(known.calm(), ~disturbed)
+    np.testing.assert_array_equal(known.calm(3), ~disturbed[::3])
+
+
+def test_the_parts_of_a_torque_are_the_whole(problem: Problem) -> None:
+    """Calm rows and others have the products of the group together, beside the base model."""
+    member = _elastic(problem)
+    parts = problem.split(member.group, member.coefficients, problem.calm)
+    assert parts.cross.sum() == pytest.approx(float(member.coefficients @ member.group.cross), rel=1e-4)
+    energy = float(member.coefficients @ member.group.gram @ member.coefficients)
+    assert parts.gram.sum() == pytest.approx(energy, rel=1e-4)
+    assert (np.diag(parts.gram) > 0).all()
+
+
+@pytest.mark.parametrize("size", [0.5, 1.0, 1.3])
+def test_an_effect_that_is_alike_everywhere_counts_whole(problem: Problem, size: float) -> None:
+    """Whatever the base model takes of its parts, each tells the same size of the whole."""
+    member = _elastic(problem)
+    assert _borne_out(_with(problem, member, size, size), member, accept(problem, ())) == 1.0
+
+
+def test_kicks_without_the_rest_are_no_effect(problem: Problem) -> None:
+    """What is there beside reversals alone is dropped where calm rows would show it; a part of it counts for less."""
+    member = _elastic(problem)
+    nothing = accept(problem, ())
+    parts = score(problem, problem.split(member.group, member.coefficients, problem.calm), nothing)
+    assert parts.gram.sum(axis=1)[0] ** 2 / parts.gram[0, 0] > 20, "calm rows tell too little for this test"
+    assert _borne_out(_with(problem, member, -0.2, 1.0), member, nothing) == np.inf
+    assert 1.0 < _borne_out(_with(problem, member, 0.55, 2.0), member, nothing) < np.inf
+
+
+def test_above_the_bands_play_counts_in_calm_rows(problem: Problem) -> None:
+    """Its columns are zero where a joint turns round, before the base model is projected out."""
+    assert problem.upper is not None
+    upper = problem.upper
+    series = problem.columns_of(PLAY, PLAY.effect.grid(problem.situation, 2)[0])[1][1]
+    whole, calm = upper.columns(series, 1), upper.columns(series, 1, calm=True)
+    own = upper.joints[1]
+    assert own is not None
+    assert not upper.calm.all()
+    outside = calm[~upper.calm]
+    # What is left there is the base model's share, which is orthogonal to what it was taken from.
+    np.testing.assert_allclose(own.base.T @ calm, 0.0, atol=1e-9 * np.linalg.norm(whole))
+    assert np.linalg.norm(outside) < 0.3 * np.linalg.norm(whole[~upper.calm])
