@@ -61,12 +61,13 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         deviations.append(steps)
         at += X.shape[2] + len(member.shape)
     columns = np.concatenate(blocks, axis=2)
-    fast = np.zeros(columns.shape[2], dtype=bool)
+    fast, kicks = np.zeros((2, columns.shape[2]), dtype=bool)
     for member, (start, size, shapes) in zip(members, slices, strict=True):
-        fast[start : start + size + shapes] = member.hypothesis.effect.fast
+        rows, effect = slice(start, start + size + shapes), member.hypothesis.effect
+        fast[rows], kicks[rows] = effect.fast, effect.kicks
     flat, tau = white.independent(columns), white.independent(problem.recording.tau)
     if problem.upper is not None and fast.any():
-        above, beyond = problem.upper.regression(columns[:, :, fast])
+        above, beyond = problem.upper.regression(columns[:, :, fast], calm=kicks[fast])
         higher = np.zeros((len(above), len(fast)))
         higher[:, fast] = above
         flat, tau = np.concatenate([flat, higher]), np.concatenate([tau, beyond])

@@ -16,7 +16,7 @@ from estimation.diagnosis.gaps import Gaps
 from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.posing import pose
 from estimation.diagnosis.power import beside, detectable_energy, resolving_energy, size_per_energy, unit_mixtures
-from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.problem import Group, Problem
 from estimation.diagnosis.scan import Entry, measure
 from estimation.diagnosis.scoring import visible_root
 from estimation.diagnosis.states import Recording
@@ -204,48 +204,55 @@ def _limit(
     false_alarm: float,
 ) -> Limit:
     hypothesis = entry.hypothesis
-    found: list[float] = []
-    named: list[tuple[float, str | None]] = []
-    shares: list[float] = []
-    resolving = resolving_energy()
     roots = [visible_root(group.gram, group.raw) for group in entry.groups]
-    showing = [at for at, root in enumerate(roots) if len(root) and len(unit_mixtures(entry.sizes[at]))]
+    mixtures = [unit_mixtures(sizes) for sizes in entry.sizes]
+    showing = [at for at, (own, root) in enumerate(zip(mixtures, roots, strict=True)) if len(own) and len(root)]
     if not showing:
         unsure = all(np.isinf(group.raw).all() for group in entry.groups)
         return _none(hypothesis, UNSURE if unsure else HIDDEN)
-    for at in (showing[k] for k in _spread(len(showing), SHAPES)):
+    picked = [showing[k] for k in _spread(len(showing), SHAPES)]
+    found: list[float] = []
+    for at in picked:
         group, shape, root = entry.groups[at], entry.shapes[at], roots[at]
-        mixtures = unit_mixtures(entry.sizes[at])
-        shares.append(float(np.max(np.diag(group.gram) / np.maximum(group.raw, 1e-300))))
-        assumed = hypothesis.effect.likely(problem.situation, hypothesis.joint, shape, np.abs(mixtures[0]))
+        assumed = hypothesis.effect.likely(problem.situation, hypothesis.joint, shape, np.abs(mixtures[at][0]))
         fitted = min((sum(value is None for value in known) for known in assumed), default=len(shape))
         penalty = (len(root) + fitted) * float(np.log(problem.rows * len(group.joints)))
         needed = detectable_energy(len(root), tries, false_alarm=false_alarm, penalty=penalty)
-        smallest = size_per_energy(mixtures, group.gram) * np.sqrt(needed)
-        found.append(smallest)
-        worst: tuple[float, str | None] = (smallest, None)
-        for name, rival in _rivals(problem, hypothesis, known):
-            per_energy = max(
-                size_per_energy(mixtures, beside(group.gram, problem.product(group, other), other.gram, other.raw))
-                for other in (rival.groups[k] for k in _spread(len(rival.groups), RIVAL_SHAPES))
-            )
-            if per_energy * np.sqrt(resolving) > worst[0] or worst[1] is None:
-                worst = (max(per_energy * np.sqrt(resolving), smallest), name)
-        named.append(worst)
-    middle = sorted(range(len(found)), key=lambda i: named[i][0])[len(found) // 2]
+        found.append(size_per_energy(mixtures[at], group.gram) * np.sqrt(needed))
     detectable = float(np.median(found))
-    visible = float(np.median(shares))
     if 2 * len(showing) < len(entry.groups):
         return _none(hypothesis, FEW.format(len(entry.groups), len(showing), 100 * detectable))
+    rivals = _rivals(problem, hypothesis, known)
+    named = [
+        _toughest(problem, entry.groups[at], mixtures[at], rivals, size) for at, size in zip(picked, found, strict=True)
+    ]
+    attributable, toughest = sorted(named, key=lambda one: one[0])[len(named) // 2]
+    shares = [float(np.max(np.diag(g.gram) / np.maximum(g.raw, 1e-300))) for g in (entry.groups[at] for at in picked)]
     return Limit(
         effect=hypothesis.name,
         joint=hypothesis.joint,
         detectable=detectable,
-        attributable=max(named[middle][0], detectable),
-        toughest=named[middle][1],
-        visible=visible,
+        attributable=max(attributable, detectable),
+        toughest=toughest,
+        visible=float(np.median(shares)),
         note=_note(problem, hypothesis) if np.isfinite(detectable) else HIDDEN,
     )
+
+
+def _toughest(
+    problem: Problem, group: Group, mixtures: Array, rivals: Sequence[tuple[str, Entry]], smallest: float
+) -> tuple[float, str | None]:
+    """Gives the size, `smallest` at least, from which an effect is told from all rivals, and the one that asks most."""
+    worst: tuple[float, str | None] = (smallest, None)
+    for name, rival in rivals:
+        per_energy = max(
+            size_per_energy(mixtures, beside(group.gram, problem.product(group, other), other.gram, other.raw))
+            for other in (rival.groups[k] for k in _spread(len(rival.groups), RIVAL_SHAPES))
+        )
+        size = per_energy * np.sqrt(resolving_energy())
+        if size > worst[0] or worst[1] is None:
+            worst = (max(size, smallest), name)
+    return worst
 
 
 def _note(problem: Problem, hypothesis: Hypothesis) -> str:

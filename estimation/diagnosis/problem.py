@@ -8,11 +8,10 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.baseline import Baseline
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.recording import BESIDE, Recording
+from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.upper import Upper
 from estimation.diagnosis.whitening import Whitening
 from estimation.pulls import Pull
@@ -200,10 +199,8 @@ class Problem:
 
     @cached_property
     def _away(self) -> NDArray[np.bool_]:
-        """Marks rows (N, n) farther than `BESIDE` from those of unknown direction."""
-        reach = 2 * round(BESIDE / self.recording.step) + 1
-        runs = (self.recording.unsure[run].astype(np.int8) for run in self.recording.runs)
-        return np.asarray(np.concatenate([maximum_filter1d(flags, reach, axis=0) for flags in runs]) == 0)
+        """Marks rows (N, n) away from those of unknown direction."""
+        return self.recording.away(self.recording.unsure)
 
     def null_cross(self, group: Group) -> Array:
         """Products (k, draws) of a group with noise that the base model was fitted to."""

@@ -96,16 +96,20 @@ class Recording:
 
     def calm(self, stride: int = 1) -> NDArray[np.bool_]:
         """Marks every `stride`-th row of each log in which no joint turns round, comes to rest, or has just done so."""
-        reach = 2 * round(BESIDE / self.step) + 1
-        parts = []
+        turns = np.zeros((len(self), 1), dtype=bool)
         for run in self.runs:
-            flags = np.zeros(run.stop - run.start, dtype=np.int8)
             for column in self.unsure[run].T:
                 for start, stop in spans(column):
                     at_rest = stop - start > long_gap(self.step)
-                    flags[[start, stop - 1] if at_rest else slice(start, stop)] = 1
-            parts.append(maximum_filter1d(flags, reach)[::stride] == 0)
-        return np.concatenate(parts)
+                    rows = [start, stop - 1] if at_rest else slice(start, stop)
+                    turns[run][rows] = True
+        away = self.away(turns)[:, 0]
+        return np.concatenate([away[run][::stride] for run in self.runs])
+
+    def away(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Marks rows of each log farther than `BESIDE` from marked ones, both (N, k)."""
+        reach = 2 * round(BESIDE / self.step) + 1
+        return np.concatenate([maximum_filter1d(rows[run].astype(np.int8), reach, axis=0) == 0 for run in self.runs])
 
     def trusting(self, joints: NDArray[np.bool_] | None) -> Recording:
         """Lets the clear rows of some joints (n,) count too."""

@@ -82,12 +82,18 @@ class Upper:
         above = self.joints[joint]
         return np.zeros(columns.shape[1]) if above is None else np.asarray(columns.T @ above.residual)
 
-    def regression(self, columns: Array) -> tuple[Array, Array]:
-        """Gives the rows (R, k) of columns (N, n, k) above the bands of joints that they act on, and torque (R,)."""
+    def regression(self, columns: Array, *, calm: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Gives the rows (R, k) of columns (N, n, k) above the bands of joints that they act on, and torque (R,).
+
+        Those marked in `calm` (k,) count where no joint turns round.
+        """
         rows, torque = [np.zeros((0, columns.shape[2]))], [np.zeros(0)]
         for j, above in enumerate(self.joints):
             if above is not None and columns[:, j].any():
-                rows.append(self.columns(columns[:, j], j))
+                white = np.empty((len(above.residual), columns.shape[2]))
+                for kind in np.unique(calm):
+                    white[:, calm == kind] = self.columns(columns[:, j, calm == kind], j, calm=bool(kind))
+                rows.append(white)
                 torque.append(above.residual)
         return np.concatenate(rows), np.concatenate(torque)
 

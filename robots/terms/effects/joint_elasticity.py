@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 DAMPING = 0.05
 """Of the resonance, of its critical one."""
-SCANNED = (3.5, 4.2, 5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 18.0, 30.0, 60.0, 300.0)
+SCANNED = (3.5, 4.2, 5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 18.0, 30.0, 300.0)
 """Resonances [Hz] of a scan, at the log's mean inertia: dense where a motion may excite them, for they are narrow."""
 LIGHTEST = 0.02
 """Of a joint's largest inertia, the least that an arm makes it in any pose."""

@@ -105,3 +105,16 @@ def test_above_the_bands_play_counts_in_calm_rows(problem: Problem) -> None:
     # What is left there is the base model's share, which is orthogonal to what it was taken from.
     np.testing.assert_allclose(own.base.T @ calm, 0.0, atol=1e-9 * np.linalg.norm(whole))
     assert np.linalg.norm(outside) < 0.3 * np.linalg.norm(whole[~upper.calm])
+
+
+def test_an_extension_is_fitted_in_the_rows_it_was_found_in(problem: Problem) -> None:
+    """Above the bands, the fit takes play in calm rows too, and a ripple beside it in all."""
+    assert problem.upper is not None
+    play = problem.columns_of(PLAY, PLAY.effect.grid(problem.situation, 2)[0])[1][1]
+    ripple = np.cos(40.0 * problem.recording.q[:, 1:])
+    columns = np.zeros((len(play), 2, 2))
+    columns[:, 1] = np.column_stack([play[:, 0], ripple[:, 0]])
+    rows, torque = problem.upper.regression(columns, calm=np.array([True, False]))
+    np.testing.assert_array_equal(rows[:, :1], problem.upper.columns(play[:, :1], 1, calm=True))
+    np.testing.assert_array_equal(rows[:, 1:], problem.upper.columns(ripple, 1))
+    assert len(torque) == len(rows)
