@@ -9,7 +9,6 @@ import numpy as np
 
 from benchmarks.diagnosis_parts.statistics import (
     CHANGE_TIME,
-    DETERMINED,
     NONLINEAR,
     SHAPES,
     TIMES,
@@ -95,12 +94,12 @@ def _gains(rows: Sequence[Row]) -> list[str]:
 
 def _parameters(rows: Sequence[Row]) -> list[str]:
     times, shapes = parameter_errors(rows, TIMES), parameter_errors(rows, SHAPES)
-    well = [e for e in shapes if e["energy"] >= DETERMINED]
+    well = [e for e in shapes if not e["marked"]]
     stated = [e for e in shapes + times if e["stated"]]
     return [
         share("change times within .2 s", times, lambda e: e["absolute"] <= CHANGE_TIME, "all"),
         share("  within .2 s or told as less sure", times, lambda e: e["absolute"] <= CHANGE_TIME or e["marked"], ""),
-        share("nonlinear parameters within 20 %, well determined", well, lambda e: e["relative"] <= NONLINEAR, "all"),
+        share("nonlinear parameters within 20 %, if determined", well, lambda e: e["relative"] <= NONLINEAR, "all"),
         share(
             "  within 20 % or marked as not determined", shapes, lambda e: e["relative"] <= NONLINEAR or e["marked"], ""
         ),

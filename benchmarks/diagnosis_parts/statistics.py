@@ -15,7 +15,6 @@ LEVEL = 0.95
 LEAST_GAIN = 0.01
 ALIKE = 0.1
 CHANGE_TIME, NONLINEAR = 0.2, 0.2
-DETERMINED = 100.0
 # Names of the truth's parameters, and those a diagnosis gives them.
 TIMES = {"change_time": ("change_time",), "start": ("start", "change_time")}
 SHAPES = {
@@ -133,7 +132,6 @@ def parameter_errors(rows: Iterable[Row], wanted: dict[str, tuple[str, ...]]) ->
                         continue
                     low, high = match.get("ci95") or (None, None)
                     absolute = abs(float(match["value"]) - value)
-                    wide = 2 * CHANGE_TIME if name in TIMES else abs(value)
                     errors.append(
                         {
                             "key": row["key"],
@@ -141,11 +139,9 @@ def parameter_errors(rows: Iterable[Row], wanted: dict[str, tuple[str, ...]]) ->
                             "name": name,
                             "absolute": absolute,
                             "relative": absolute / max(abs(value), 1e-12),
-                            "energy": float(finding.get("delta_bic") or 0.0),
                             "stated": low is not None and high is not None,
                             "inside": low is not None and high is not None and low <= value <= high,
-                            # An open or wide interval is how a diagnosis marks what it cannot tell.
-                            "marked": low is None or high is None or (high - low) > wide,
+                            "marked": not match["determined"],
                         }
                     )
     return errors

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.findings import Finding, finite, number, read_finding
+from estimation.diagnosis.findings import Finding, Parameter, finite, number, read_finding
 from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment
 from estimation.diagnosis.simulation import Simulation, read_simulation
@@ -105,9 +105,9 @@ class Diagnosis:
                 f"    unseen error {100 * gain.nrmse_before:.2f} % -> {100 * gain.nrmse_after:.2f} % of the {of} "
                 f"(fall {100 * gain.ci95[0]:.2f} to {100 * gain.ci95[1]:.2f} %)"
             )
-            open_ = [parameter.name for parameter in finding.parameters if not parameter.determined]
+            open_ = [_open(parameter) for parameter in finding.parameters if not parameter.determined]
             if open_:
-                lines.append(f"    not determined by these logs: {', '.join(open_)}")
+                lines.append(f"    not well determined by these logs: {', '.join(open_)}")
             close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]
             if close:
                 lines.append(f"    not told apart from: {', '.join(close)}")
@@ -259,6 +259,12 @@ _VERDICTS = {
     "ambiguous": "the model lacks a cause, and more than one fits",
     "unexplained": "the model lacks something that no effect of the catalogue explains",
 }
+
+
+def _open(parameter: Parameter) -> str:
+    """Names a parameter that is not determined, with its interval where it has one."""
+    low, high = parameter.ci95
+    return f"{parameter.name} ({low:.3g} to {high:.3g})" if np.isfinite([low, high]).all() else parameter.name
 
 
 def _p(value: float) -> str:

@@ -13,6 +13,11 @@ from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found
 from robots.robot import Robot
 from robots.terms.base import force_unit, length_unit
+from robots.terms.effects.base import Coefficient, Shape
+
+# A parameter that an effect is not linear in is determined where its interval reaches no farther than this share of it;
+# a moment, so many seconds.
+WITHIN, MOMENT = 0.2, 0.2
 
 
 def word_finding(
@@ -69,24 +74,33 @@ def _parameters(
 ) -> tuple[Parameter, ...]:
     extension = fitted.model.extensions[i]
     effect = member.hypothesis.effect
-    described = [(c.name, c.unit, "linear") for c in effect.parameters(robot, extension.joint)]
-    described += [(s.name, s.unit, s.scale) for s in effect.shapes]
+    described: list[Coefficient | Shape] = [*effect.parameters(robot, extension.joint), *effect.shapes]
     values = [*extension.coefficients.tolist(), *extension.shape]
     errors = np.sqrt(np.maximum(np.diag(extension.covariance), 0.0))
     result = []
-    for (name, unit, scale), value, error, sure in zip(described, values, errors, known, strict=True):
+    for own, value, error, sure in zip(described, values, errors, known, strict=True):
         interval = (value - 1.96 * error, value + 1.96 * error)
-        if scale == "log" and np.isfinite(error) and value > 0:
+        if isinstance(own, Shape) and own.scale == "log" and np.isfinite(error) and value > 0:
             factor = float(np.exp(1.96 * error / value))
             interval = (value / factor, value * factor)
         result.append(
             Parameter(
-                name=name,
+                name=own.name,
                 value=float(value),
-                unit=unit,
+                unit=own.unit,
                 standard_error=float(error) if np.isfinite(error) else float("nan"),
                 ci95=(float(interval[0]), float(interval[1])) if np.isfinite(error) else (-np.inf, np.inf),
-                determined=bool(sure),
+                determined=bool(sure) and not (isinstance(own, Shape) and _roughly(own, value, interval)),
             )
         )
     return tuple(result)
+
+
+def _roughly(shape: Shape, value: float, interval: tuple[float, float]) -> bool:
+    """Whether a value is known but roughly; of a place, such as a dead centre, that may have either sign, never."""
+    half = 0.5 * (interval[1] - interval[0])
+    if not np.isfinite(half):
+        return False
+    if shape.unit == "s" and shape.lower == -np.inf:
+        return bool(half > MOMENT)
+    return bool(shape.lower >= 0 and half > WITHIN * abs(value))

@@ -24,7 +24,7 @@ class FindingView:
         title: what it is, in words.
         sentence: what its values mean.
         joint: counted from 1; None for the whole robot.
-        parameters: name, value, unit, lower and upper end of the 95 % interval (NaN where not determined).
+        parameters: name, value, unit, lower and upper end of the 95 % interval (not finite where not determined).
         p_value: chance that noise alone has an effect this strong.
         delta_bic: how much better the model is with it.
         before: error over torque RMS without it, on unseen data.
@@ -176,9 +176,7 @@ def _finding(finding: Finding, trace: Trace, coordinate: Array) -> FindingView:
         title=title,
         sentence=finding.sentence,
         joint=finding.joint,
-        parameters=tuple(
-            (p.name, p.value, p.unit, *(p.ci95 if p.determined else (np.nan, np.nan))) for p in finding.parameters
-        ),
+        parameters=tuple((p.name, p.value, p.unit, *p.ci95) for p in finding.parameters),
         p_value=finding.p_value,
         delta_bic=finding.delta_bic,
         before=finding.gain.nrmse_before,
