@@ -211,11 +211,13 @@ def _limit(
         unsure = all(np.isinf(group.raw).all() for group in entry.groups)
         return _none(hypothesis, UNSURE if unsure else HIDDEN)
     picked = [showing[k] for k in _spread(len(showing), SHAPES)]
+    bounds = hypothesis.effect.bounds(problem.situation, hypothesis.joint)
+    free = [k for k, (low, high) in enumerate(bounds) if high > low]
     found: list[float] = []
     for at in picked:
         group, shape, root = entry.groups[at], entry.shapes[at], roots[at]
         assumed = hypothesis.effect.likely(problem.situation, hypothesis.joint, shape, np.abs(mixtures[at][0]))
-        fitted = min((sum(value is None for value in known) for known in assumed), default=len(shape))
+        fitted = min((sum(known[k] is None for k in free) for known in assumed), default=len(free))
         penalty = (len(root) + fitted) * float(np.log(problem.rows * len(group.joints)))
         needed = detectable_energy(len(root), tries, false_alarm=false_alarm, penalty=penalty)
         found.append(size_per_energy(mixtures[at], group.gram) * np.sqrt(needed))

@@ -30,9 +30,9 @@ class PreslidingHysteresis(JointEffect):
     experiments: ClassVar[tuple[str, ...]] = ("micro_reversals", "sweep")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the part of Coulomb friction that turns round gradually."""
+        """Describes the part of Coulomb friction that turns round gradually; none does so beforehand."""
         assert joint is not None
-        return (Coefficient("presliding_torque", force_unit(robot, joint - 1)),)
+        return (Coefficient("presliding_torque", force_unit(robot, joint - 1), 0.0),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists travels, by factors of 2.5, between what the samples resolve and a tenth of the range."""

@@ -21,22 +21,38 @@ Array = NDArray[np.float64]
 class TorqueConstantSaturation(StaticJointEffect):
     """tau = c tau |tau / tau_r|^p: the logged torque, current times a constant, outgrows the true one.
 
-    tau_r is the joint's torque limit (100 N m where it has none), so that c is the error at the limit.
+    c is the error at the torque tau_r, the largest of the logs that it was found in: what happens beyond they do not
+    say. Of zero, tau_r is the joint's torque limit (100 N m where it has none).
     """
 
     name: ClassVar[str] = "torque_constant_saturation"
     title: ClassVar[str] = "a torque constant that falls at high torque (saturation)"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("exponent", "1", 1.0, 8.0, "linear", (1.0, 2.0, 4.0)),)
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("exponent", "1", 1.0, 8.0, "linear", (1.0, 2.0, 4.0)),
+        Shape("at_torque", "N m", 0.0, np.inf, "linear", default=0.0),
+    )
     rivals: ClassVar[tuple[str, ...]] = ("current_clipping", "load_dependent_friction", "torque_constant_error")
     experiments: ClassVar[tuple[str, ...]] = ("payload", "static_hold")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the relative error at the torque limit."""
-        return (Coefficient("error_at_limit", "1"),)
+        """Describes the relative error at that torque."""
+        return (Coefficient("error", "1"),)
+
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists exponents, at the largest torque."""
+        assert joint is not None
+        return tuple((exponent, _largest(situation, joint)) for exponent in self.shapes[0].grid)
+
+    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
+        """Keeps to the largest torque."""
+        assert joint is not None
+        exponent, _ = self.shapes
+        return (exponent.lower, exponent.upper), (_largest(situation, joint),) * 2
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds tau |tau / tau_r|^p."""
-        ratio = casadi.sqrt((at.torque / torque_reference(robot, joint)) ** 2 + 1e-12)
+        reference = casadi.if_else(at.shape[1] > 0, at.shape[1], torque_reference(robot, joint))
+        ratio = casadi.sqrt((at.torque / reference) ** 2 + 1e-12)
         return at.torque * ratio ** at.shape[0]
 
     def describe(
@@ -49,12 +65,19 @@ class TorqueConstantSaturation(StaticJointEffect):
         length: str = "rad",
     ) -> str:
         """Says what the values mean."""
+        exponent, torque = shape
+        at = f"{torque:.3g} {force}" if torque > 0 else "the torque limit"
         return (
             f"The torque per current of joint {joint} is not constant: the logged torque is "
-            f"{100 * coefficients[0]:+.3g} % off at the torque limit, by the power {shape[0]:.2g} of the torque."
+            f"{100 * coefficients[0]:+.3g} % off at {at}, by the power {exponent:.2g} of the torque."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the base model's torque."""
         assert joint is not None
         return f"torque of joint {joint} by the base model [N m]", situation.torque[:, joint - 1]
+
+
+def _largest(situation: Situation, joint: int) -> float:
+    """Gives the largest torque of a joint, by the base model."""
+    return float(np.abs(situation.torque[:, joint - 1]).max(initial=0.0))

@@ -25,19 +25,24 @@ class TorqueConstant(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Saturation(Effect):
-    """Iron that saturates: at the largest torque the motor gives the share amount less than its current says."""
+    """Iron that saturates: at the torque `top` the motor gives the share amount less than its current says.
+
+    That is the largest of the first log: the iron is the same in all others.
+    """
+
+    top: float = np.nan
 
     name = "torque_constant_saturation"
     largest = 0.35
 
     def signal(self, ride: Ride, torque: np.ndarray) -> np.ndarray:
-        top = np.abs(torque[:, self.j]).max()
-        x = torque[:, self.j] / top
-        # x = y (1 - amount y^2), solved for y, the logged torque, by Newton's method.
-        y = x.copy()
-        for _ in range(8):
-            y -= (y - self.amount * y**3 - x) / np.maximum(1 - 3 * self.amount * y**2, 0.1)
-        return torque + self.on_joint(ride, top * (y - x))
+        if np.isnan(self.top):
+            object.__setattr__(self, "top", float(np.abs(torque[ride.runs[0], self.j]).max()))
+        x = torque[:, self.j] / self.top
+        # x = y / (1 + b y^2)^(1/4), of which the root y is the logged torque; less than y by the amount at y = 1.
+        b = (1 - self.amount) ** -4 - 1
+        y = np.sign(x) * np.sqrt(0.5 * (b * x**4 + np.sqrt(b**2 * x**8 + 4 * x**4)))
+        return torque + self.on_joint(ride, self.top * (y - x))
 
 
 @dataclass(frozen=True, kw_only=True)
