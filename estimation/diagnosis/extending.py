@@ -101,8 +101,8 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         own = own * wider[:, None] * wider
         own[range(len(own)), range(len(own))] = np.maximum(np.diag(own), profile**2)
         own[open_, open_] = np.inf
-        own[range(size, size + shapes), range(size, size + shapes)] += inexact(member) ** 2
         coefficients = np.clip(values[start : start + size], lower, upper)
+        own[range(len(own)), range(len(own))] += inexact(problem, member, coefficients) ** 2
         errors = np.sqrt(np.maximum(np.diag(own), 0.0))
         determined = np.concatenate(
             [

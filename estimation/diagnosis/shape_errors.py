@@ -160,10 +160,13 @@ def _along_ridge(problem: Problem, member: Member, k: int, others: Accepted, ste
     return farthest
 
 
-def inexact(member: Member) -> Array:
-    """Standard errors (s,) that the formula adds to those of the data."""
-    described = zip(member.hypothesis.effect.shapes, member.shape, strict=True)
-    return np.array([s.inexact * (abs(value) if s.scale == "log" else 1.0) for s, value in described])
+def inexact(problem: Problem, member: Member, coefficients: Array) -> Array:
+    """Standard errors (k + s,) of coefficients (k,) and shapes that the formula adds to those of the data."""
+    effect, robot = member.hypothesis.effect, problem.situation.robot
+    described = zip(effect.shapes, member.shape, strict=True)
+    shapes = [s.inexact * (abs(value) if s.scale == "log" else 1.0) for s, value in described]
+    own = [c.inexact for c in effect.parameters(robot, member.hypothesis.joint)]
+    return np.array([*(np.array(own) * np.abs(coefficients)), *shapes])
 
 
 def _gain(problem: Problem, member: Member, shape: tuple[float, ...], others: Accepted) -> float:

@@ -59,12 +59,14 @@ class Coefficient:
         unit: its unit, in which the column is N m (or N) per one.
         lower: the least value that is physically possible.
         upper: the largest.
+        inexact: standard error that the formula itself has, beside that of the data, as a share of the value.
     """
 
     name: str
     unit: str
     lower: float = -np.inf
     upper: float = np.inf
+    inexact: float = 0.0
 
 
 class Effect(ABC):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
-from robots.terms.effects.time_delay import SHIFT, SMALL, as_late, lateness, near
+from robots.terms.effects.time_delay import INEXACT, SHIFT, SMALL, as_late, lateness, near
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -30,7 +30,7 @@ class CurrentLag(JointEffect):
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the lag: a filter has no other sign, and more than 50 ms is no drive's."""
-        return (Coefficient("lag", "s", 0.0, 0.05),)
+        return (Coefficient("lag", "s", 0.0, 0.05, INEXACT),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
         """Keeps the lag near that of the reversals, and positive."""

@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 SMALL = 1e-5  # [s]
 APART = 1.6
+# What motion has above the frequencies that are known of it is late, too: a delay is told short by some per cent.
+INEXACT = 0.05
 SHIFT = Shape("reversals_late", "s", -0.02, 0.02, "linear", (-0.003, -0.001, -0.0002, 0.0002, 0.001, 0.003, 0.008))
 
 
@@ -40,7 +42,7 @@ class TimeDelay(Effect):
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the delay; more than 50 ms is no sensor's."""
-        return (Coefficient("delay", "s", -0.05, 0.05),)
+        return (Coefficient("delay", "s", -0.05, 0.05, INEXACT),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
         """Keeps the delay near that of the reversals, of which the torque's own is a difference quotient."""

@@ -66,3 +66,21 @@ def test_what_a_log_leaves_open_has_no_interval(
     assert errors[estimable].min() > 0
     assert not fitted.effects[0][:size][~estimable].any()
     assert estimable.sum() == {"payload_change": 4, "torque_sensor_drift": 2, "friction_step": 2}[name]
+
+
+def test_no_log_knows_a_delay_better_than_its_formula(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
+) -> None:
+    """A delay of 10 ms that the noise tells to three per cent is stated to the formula's 5 % and the noise's own."""
+    recording = record(arm, [arm_log(torque_noise=0.002)])
+    hypothesis = Hypothesis(EFFECTS["time_delay"], None)
+    delay = 0.01
+    problem = pose_arm(recording)
+    columns = dense(problem, hypothesis, (delay,))
+    posed = pose_arm(replace(recording, tau=recording.tau + delay * columns[:, :, 0]))
+    member = refine(posed, hypothesis, (0.008,), accept(posed, ()))
+    extension = fit_extended(posed, [member], {}).model.extensions[0]
+    (value,), error = extension.coefficients, float(np.sqrt(extension.covariance[0, 0]))
+    by_noise = np.sqrt(member.scatter / member.group.gram[0, 0])
+    assert by_noise < 0.04 * delay
+    assert (0.05 * value) ** 2 + (0.5 * by_noise) ** 2 < error**2 < (0.05 * value) ** 2 + (2 * by_noise) ** 2
