@@ -68,7 +68,7 @@ def figures(rows: Sequence[Row]) -> str:
         share("  nothing false named beside it", of["bare"], lambda row: not spurious(row), ""),
         *_gains(half + one + of["two"]),
         *_parameters(half + one + of["two"]),
-        *_followed(half + one),
+        *_followed(half + one + of["brief"]),
         *_cost([row for rows_of in of.values() for row in rows_of]),
     ]
     bad = [row for row in rows if row["status"] in ("failed", "refused")]
@@ -118,7 +118,7 @@ def _followed(rows: Sequence[Row]) -> list[str]:
         return after["verdict"] == "named" and bool(first) and first[0] in truth
 
     return [
-        share("ambiguous at .5 and 1 %", rows, lambda row: row["verdict"] == "ambiguous", ""),
+        share("ambiguous at .5 and 1 %, short logs too", rows, lambda row: row["verdict"] == "ambiguous", ""),
         share("  resolved, and rightly, after the one experiment", tried, resolved, "90 %"),
     ]
 

@@ -37,7 +37,7 @@ def run(task: Task) -> dict[str, Any]:
         try:
             diagnosis, told = diagnose_case(case, robot)
             row |= told
-            if row["verdict"] == "ambiguous" and row["stratum"] in ("half", "one"):
+            if row["verdict"] == "ambiguous" and row["stratum"] in ("half", "one", "brief"):
                 row["after"] = follow(case, robot, diagnosis)
         except OedError as error:
             return {**row, "status": "refused", "error": str(error)}

@@ -46,6 +46,8 @@ STRATA: dict[str, Stratum] = {
         Stratum("idle_moves", 100, 0, 0.0, moves=True),
         Stratum("moves", 100, 1, 0.01, moves=True),
         Stratum("bare", 100, 1, 0.01, drives=False),
+        # So short and so little that several causes are left more often: what the one experiment resolves.
+        Stratum("brief", 100, 1, 0.005, durations=(15.0,)),
     )
 }
 

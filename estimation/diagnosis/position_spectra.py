@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
+from estimation.diagnosis.smoothed_motion import passed
 from estimation.preprocessing import Resampled, between_rows
 
 Array = NDArray[np.float64]
@@ -16,6 +17,8 @@ Array = NDArray[np.float64]
 STANDS_OUT = 3.0
 # Least and most of the cut-off [Hz, share of the sampling rate].
 LOWEST, HIGHEST = 2.0, 0.4
+# Cut-offs that are tried, over the frequency at which motion meets noise.
+HIGHER = np.geomspace(1.0, 2.0, 11)
 # Spectra are taken of this difference of the positions: the slow motion would leak over all of the band otherwise.
 DIFFERENCE = 3
 # Encoders that are drawn to see what interpolation makes of their noise, and shares of the rate between which all of it
@@ -55,7 +58,22 @@ class Spectrum:
         cutoff = float(self.f[lost[0]]) if len(lost) else HIGHEST * self.rate
         if none == 0.0 and cutoff <= 5 * self.f[1]:
             return 0.0
-        return float(np.clip(cutoff, min(LOWEST, HIGHEST * self.rate), HIGHEST * self.rate))
+        cutoff = float(np.clip(cutoff, min(LOWEST, HIGHEST * self.rate), HIGHEST * self.rate))
+        return min(self._spared(cutoff), HIGHEST * self.rate)
+
+    def _spared(self, meets: float) -> float:
+        """Raises the frequency at which a position meets its noise, where a low-pass there would cut more than noise.
+
+        A motion of a few sines ends at its last as at an edge, which a low-pass that ends there bends. What the
+        acceleration loses of the motion below it must be no more power than the noise that it keeps.
+        """
+        motion = np.where(self.f < meets, np.maximum(self.density - self.floor, 0.0), 0.0)
+        for cutoff in meets * HIGHER:
+            kept = passed(self.f, cutoff)
+            weight = self.f**4
+            if np.sum(weight * motion * (1 - kept) ** 2) <= np.sum(weight * self.floor * kept**2):
+                return float(cutoff)
+        return float(meets * HIGHER[-1])
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,6 +53,11 @@ def smoothed(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array, Arr
     return states
 
 
+def passed(f: Array, cutoff: float) -> Array:
+    """Gives the share that passes of positions of some frequencies [Hz]: that of the filter, forward and backward."""
+    return np.asarray(1.0 / (1.0 + (f / cutoff) ** (2 * ORDER)))
+
+
 def differentiated(x: Array, period: float) -> tuple[Array, Array]:
     """Gives the first and second derivative (N, n) by central differences of sixth order, lower at the ends.
 
