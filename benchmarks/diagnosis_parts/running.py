@@ -29,7 +29,10 @@ def run(task: Task) -> dict[str, Any]:
     """Draws a case, diagnoses it, follows its advice where it is ambiguous; a failure is kept as a row, too."""
     warnings.simplefilter("ignore", AssumedValueWarning)
     row: dict[str, Any] = {"key": task.key, "stratum": task.stratum, "seed": task.seed}
-    case = draw(task)
+    try:
+        case = draw(task)
+    except Exception:
+        return {**row, "status": "failed", "error": traceback.format_exc()}
     if case is None:
         return {**row, "status": "hidden"}
     row |= truth_of(case)

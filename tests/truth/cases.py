@@ -189,7 +189,10 @@ def draw_case(
             records=tuple(play(machine, references, effects, noise, np.random.default_rng([seed, 1]))),
         )
         # A closed loop moves more sharply than its reference, which some effects show more in.
-        ratios = [size / share for share in case.visible()]
+        shares = case.visible()
+        if any(share <= 0 for share in shares):
+            raise Hidden("nothing of it shows once the loop is closed")
+        ratios = [size / share for share in shares]
         if all(abs(ratio - 1) < AGREED for ratio in ratios):
             return case
         effects = [
