@@ -113,7 +113,7 @@ def refine(
     bounds = hypothesis.effect.bounds(situation, hypothesis.joint)
     scales = [shape.scale for shape in hypothesis.effect.shapes]
     free = [k for k, (low, high) in enumerate(bounds) if high > low]
-    moments = [shape.unit == "s" and shape.lower == -np.inf for shape in hypothesis.effect.shapes]
+    moments = [shape.moment for shape in hypothesis.effect.shapes]
     best: list[Member] = []
 
     def evaluate(shape: tuple[float, ...], fitted: int = len(free)) -> float:

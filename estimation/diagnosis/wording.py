@@ -101,6 +101,6 @@ def _roughly(shape: Shape, value: float, interval: tuple[float, float]) -> bool:
     half = 0.5 * (interval[1] - interval[0])
     if not np.isfinite(half):
         return False
-    if shape.unit == "s" and shape.lower == -np.inf:
+    if shape.moment:
         return bool(half > MOMENT)
     return bool(shape.lower >= 0 and half > WITHIN * abs(value))

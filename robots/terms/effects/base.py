@@ -49,6 +49,11 @@ class Shape:
     inexact: float = 0.0
     default: float | None = None
 
+    @property
+    def moment(self) -> bool:
+        """Whether it is a moment of the logs' clock."""
+        return self.unit == "s" and self.lower == -np.inf
+
 
 @dataclass(frozen=True)
 class Coefficient:
