@@ -235,6 +235,8 @@ def _limit(item: dict[str, Any]) -> Limit:
         effect=item["effect"],
         joint=item["joint"],
         detectable=number(item["detectable"], np.inf),
+        # Older files have none.
+        at_worst=number(item.get("at_worst"), np.inf),
         attributable=number(item["attributable"], np.inf),
         toughest=item["toughest_rival"],
         visible=float(item["visible"]),

@@ -190,3 +190,9 @@ def _short(start: int, stop: int, longest: int, beside: int, rows: int) -> list[
         return [(start, stop)]
     ends = [(max(edge - beside, 0), min(edge + beside, rows)) for edge in (start, stop) if 0 < edge < rows]
     return ends
+
+
+def no_gaps(joints: int) -> Gaps:
+    """Builds the gaps of a motion whose direction is known throughout."""
+    none = np.zeros(0, dtype=np.intp)
+    return Gaps(((none, none, none, np.zeros(0)),) * joints, ())

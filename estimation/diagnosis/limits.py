@@ -8,25 +8,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_toeplitz
 
-from estimation.diagnosis.band import Band
-from estimation.diagnosis.baseline import build_baseline
-from estimation.diagnosis.gaps import Gaps
 from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
-from estimation.diagnosis.posing import pose
 from estimation.diagnosis.power import beside, detectable_energy, resolving_energy, size_per_energy, unit_mixtures
 from estimation.diagnosis.problem import Group, Problem
-from estimation.diagnosis.scan import Entry, measure
+from estimation.diagnosis.scan import Entry
 from estimation.diagnosis.scoring import visible_root
-from estimation.diagnosis.states import Recording
-from estimation.diagnosis.whitening import Whitening
-from estimation.pulls import Pull
-from robots.base_parameters import find_base_parameters
-from robots.common.errors import InputError
-from robots.plants.sensors import Sensors
-from robots.regressor import TorqueModel
-from robots.signals import Motion
 from robots.terms.effects import EFFECTS
 
 Array = NDArray[np.float64]
@@ -38,8 +25,6 @@ SHAPES = 3
 """Shapes of an effect that its limit is the median of."""
 RIVAL_SHAPES = 4
 """Shapes with which a rival may imitate it."""
-ORDER = 12
-"""Of the prediction filter of noise that is a sum of white and first-order noise, which has no finite one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +36,8 @@ class Limit:
         joint: counted from 1; None for the whole robot.
         detectable: smallest size that is found with 95 % chance, as a share of the joint's torque RMS (of a robot's
             effect: of the joint where it shows most); infinite where no size shows.
+        at_worst: that size of the kind of it (its time constants, speeds, travels) that shows least, of those that a
+            scan tries; infinite where one of them shows at no size. `detectable` is of a kind in the middle.
         attributable: smallest that is also told from every rival; infinite where none is.
         toughest: the rival that is hardest to tell from it; None without.
         visible: share of its energy that the base model does not absorb.
@@ -60,6 +47,7 @@ class Limit:
     effect: str
     joint: int | None
     detectable: float
+    at_worst: float
     attributable: float
     toughest: str | None
     visible: float
@@ -71,6 +59,7 @@ class Limit:
             "effect": self.effect,
             "joint": self.joint,
             "detectable": _finite(self.detectable),
+            "at_worst": _finite(self.at_worst),
             "attributable": _finite(self.attributable),
             "toughest_rival": self.toughest,
             "visible": self.visible,
@@ -102,100 +91,6 @@ def find_limits(problem: Problem, entries: Sequence[Entry], *, false_alarm: floa
     return tuple(limits)
 
 
-def planned_limits(
-    model: TorqueModel, parameters: Array, motions: Sequence[Motion], *, noise: Sensors | None = None
-) -> tuple[Limit, ...]:
-    """Finds the limits of an experiment that has not been made.
-
-    Args:
-        model: the torque model.
-        parameters: its standard parameters (p,).
-        motions: the planned motions, one after the other on one clock.
-        noise: the torque noise expected.
-
-    Raises:
-        InputError: parameters that are not known.
-    """
-    problem = planned_problem(model, parameters, motions, noise=noise or Sensors())
-    return find_limits(problem, measure(problem, all_hypotheses(model.robot, list(EFFECTS.values()))))
-
-
-def planned_problem(
-    model: TorqueModel,
-    parameters: Array,
-    motions: Sequence[Motion],
-    *,
-    noise: Sensors,
-    level: Array | None = None,
-) -> Problem:
-    """Poses the diagnosis of an experiment that has not been made: its torque is the model's.
-
-    `level` (n,) [N m or N] is the noise's standard deviation where it is known, else the share that `noise` says.
-    """
-    if not np.isfinite(parameters).all():
-        missing = model.columns[int(np.argmin(np.isfinite(parameters)))]
-        raise InputError(
-            f"{model.robot.name}: {missing.name} is not known",
-            joint=missing.joint,
-            remedy="identify the robot first, and give its model.json",
-        )
-    joined = Motion.concatenate(motions)
-    starts = tuple(int(s) for s in np.cumsum([0, *(len(motion) for motion in motions[:-1])]))
-    step = float(np.median(np.diff(joined.t)))
-    recording = Recording(
-        t=joined.t,
-        starts=starts,
-        q=joined.q,
-        dq=joined.dq,
-        ddq=joined.ddq,
-        tau=model.torque(joined.q, joined.dq, joined.ddq, parameters),
-        step=step,
-        cycles=(None,) * len(motions),
-        cutoff=0.5 / step,
-        unsure=np.zeros(joined.q.shape, dtype=bool),
-        clear=np.zeros(joined.q.shape, dtype=bool),
-        jolts=np.zeros(joined.q.shape[1]),
-        floor=np.zeros(joined.q.shape[1]),
-        names=tuple(f"motion {i}" for i in range(1, len(motions) + 1)),
-    )
-    whitening = expected_whitening(recording, noise, level)
-    baseline = build_baseline(find_base_parameters(model), recording, whitening.scale)
-    # The parameters are known: the motion's own torque gives them back, and nothing is to hold them elsewhere.
-    size = baseline.base.size + baseline.nuisance.shape[2]
-    free = Pull(np.zeros((size, size)), np.zeros(size))
-    return pose(recording, baseline, whitening, draws=0, rng=np.random.default_rng(0), pull=free)
-
-
-def expected_whitening(recording: Recording, noise: Sensors, level: Array | None = None) -> Whitening:
-    """Whitens the noise that sensors are expected to have: white and first-order coloured, a share of the torque.
-
-    `level` (n,) [N m or N] is its standard deviation where that is known.
-    """
-    size = noise.torque_noise * np.sqrt(np.mean(recording.tau**2, axis=0)) if level is None else level
-    size = np.maximum(size, 1e-3 * max(float(size.max()), 1e-9))
-    rho = float(np.exp(-recording.step / noise.correlation_time)) if noise.correlation_time else 0.0
-    lags = noise.coloured_share * rho ** np.arange(ORDER + 1)
-    lags[0] = 1.0
-    taps = solve_toeplitz(lags[:-1], lags[1:])
-    innovation = float(np.sqrt(lags[0] - taps @ lags[1:]))
-    n = recording.n
-    return Whitening(
-        coefficients=(taps,) * n,
-        scale=size * innovation,
-        precision=np.eye(n),
-        starts=recording.starts,
-        gaps=no_gaps(n),
-        bands=(Band(np.zeros(0), 1, 0.5 / recording.step),) * recording.n,
-        innovations=np.random.default_rng(0).standard_normal((1024, n)),
-    )
-
-
-def no_gaps(joints: int) -> Gaps:
-    """Builds the gaps of a motion whose direction is known throughout."""
-    none = np.zeros(0, dtype=np.intp)
-    return Gaps(((none, none, none, np.zeros(0)),) * joints, ())
-
-
 def _limit(
     problem: Problem,
     entry: Entry,
@@ -213,14 +108,18 @@ def _limit(
     picked = [showing[k] for k in _spread(len(showing), SHAPES)]
     bounds = hypothesis.effect.bounds(problem.situation, hypothesis.joint)
     free = [k for k, (low, high) in enumerate(bounds) if high > low]
-    found: list[float] = []
-    for at in picked:
-        group, shape, root = entry.groups[at], entry.shapes[at], roots[at]
-        assumed = hypothesis.effect.likely(problem.situation, hypothesis.joint, shape, np.abs(mixtures[at][0]))
+
+    def size(at: int) -> float:
+        assumed = hypothesis.effect.likely(
+            problem.situation, hypothesis.joint, entry.shapes[at], np.abs(mixtures[at][0])
+        )
         fitted = min((sum(known[k] is None for k in free) for known in assumed), default=len(free))
-        penalty = (len(root) + fitted) * float(np.log(problem.rows * len(group.joints)))
-        needed = detectable_energy(len(root), tries, false_alarm=false_alarm, penalty=penalty)
-        found.append(size_per_energy(mixtures[at], group.gram) * np.sqrt(needed))
+        penalty = (len(roots[at]) + fitted) * float(np.log(problem.rows * len(entry.groups[at].joints)))
+        needed = detectable_energy(len(roots[at]), tries, false_alarm=false_alarm, penalty=penalty)
+        return float(size_per_energy(mixtures[at], entry.groups[at].gram) * np.sqrt(needed))
+
+    sizes = {at: size(at) for at in showing}
+    found = [sizes[at] for at in picked]
     detectable = float(np.median(found))
     if 2 * len(showing) < len(entry.groups):
         return _none(hypothesis, FEW.format(len(entry.groups), len(showing), 100 * detectable))
@@ -234,6 +133,7 @@ def _limit(
         effect=hypothesis.name,
         joint=hypothesis.joint,
         detectable=detectable,
+        at_worst=max(sizes.values()) if len(showing) == len(entry.groups) else np.inf,
         attributable=max(attributable, detectable),
         toughest=toughest,
         visible=float(np.median(shares)),
@@ -289,6 +189,7 @@ def _none(hypothesis: Hypothesis, note: str) -> Limit:
         effect=hypothesis.name,
         joint=hypothesis.joint,
         detectable=np.inf,
+        at_worst=np.inf,
         attributable=np.inf,
         toughest=None,
         visible=0.0,

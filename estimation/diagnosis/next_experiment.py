@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.carried import point_mass, regressor_on, unloaded, with_body
+from estimation.diagnosis.gaps import no_gaps
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.limits import no_gaps
 from estimation.diagnosis.next_experiment_motions import MAKERS, VARIED, Stage, room_of
 from estimation.diagnosis.power import chance_to_resolve
 from estimation.diagnosis.problem import Problem

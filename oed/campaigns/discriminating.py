@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.limits import planned_problem
 from estimation.diagnosis.next_experiment import VARIANTS
 from estimation.diagnosis.next_experiment_motions import MAKERS, VARIED
+from estimation.diagnosis.planned import planned_problem
 from estimation.diagnosis.problem import Problem
 from oed.campaigns.discrimination import Discrimination, Judged
 from oed.campaigns.judging import STEP, Judge, require_separable

@@ -111,7 +111,7 @@ def _limits(
     import numpy as np
 
     from estimation import load_model
-    from estimation.diagnosis.limits import planned_limits
+    from estimation.diagnosis.planned import planned_limits
     from oed.exports import read_trajectory
     from oed.reports import save_limits_report
     from robots.common.errors import InputError
@@ -153,11 +153,11 @@ def _limits(
     summary = [
         f"{len(found)} effects and places: {named} would be seen and named at 2 % of the joint's torque, "
         f"{hidden} are hidden in this motion",
-        "  effect                       joint   found [%]   named [%]   toughest rival",
+        "  effect                       joint   found [%]   at worst   named [%]   toughest rival",
     ]
     summary += [
         f"  {limit.effect:28} {limit.joint or 'all':>5} {_percent(limit.detectable):>11} "
-        f"{_percent(limit.attributable):>11}   {limit.toughest or ''}".rstrip()
+        f"{_percent(limit.at_worst):>10} {_percent(limit.attributable):>11}   {limit.toughest or ''}".rstrip()
         for limit in found
     ]
     if beyond:

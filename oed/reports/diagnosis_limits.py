@@ -14,6 +14,8 @@ from robots.terms.effects import EFFECTS
 
 CLEAR = 0.02
 """Share of the torque below which a limit counts as small: what robot models commonly leave."""
+MUCH = 2.0
+"""Times a limit from which the one of the kind that shows least is told beside it."""
 
 
 def save_limits_report(limits: Sequence[Limit], robot: str, folder: ResultFolder) -> None:
@@ -58,7 +60,9 @@ def limits_section(limits: Sequence[Limit], *, folded: bool = False) -> Section:
             headings=("effect", *(f"joint {joint}" for joint in joints)),
             rows=tuple(rows),
             caption="Smallest size that would be found with 95 % chance / that would also be told from its rivals, in "
-            "per cent of the joint's torque RMS. A dash: cannot act there; hidden: no size shows in this motion.",
+            "per cent of the joint's torque RMS. In brackets, where it is much more: from what size on it would be "
+            "found whatever its speed, time constant or travel. A dash: cannot act there; hidden: no size shows in "
+            "this motion.",
             align=("left", *("right" for _ in joints)),
         )
     ]
@@ -105,4 +109,11 @@ def _cell(limit: Limit | None) -> Cell:
     if not np.isfinite(limit.detectable):
         return "hidden"
     named = f"{100 * limit.attributable:.2g}" if np.isfinite(limit.attributable) else "never"
-    return f"{100 * limit.detectable:.2g} / {named}"
+    return f"{100 * limit.detectable:.2g}{_worst(limit)} / {named}"
+
+
+def _worst(limit: Limit) -> str:
+    """Says from what size on the kind of it that shows least would be found, where that is much more."""
+    if limit.at_worst <= MUCH * limit.detectable:
+        return ""
+    return f" ({100 * limit.at_worst:.2g})" if np.isfinite(limit.at_worst) else " (never)"

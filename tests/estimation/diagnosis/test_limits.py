@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.limits import find_limits, planned_limits, planned_problem
+from estimation.diagnosis.limits import find_limits
+from estimation.diagnosis.planned import planned_limits, planned_problem
 from estimation.diagnosis.power import detectable_energy
 from estimation.diagnosis.scan import measure
 from robots.common.errors import InputError
@@ -72,6 +73,27 @@ def test_an_effect_of_the_limits_size_has_the_energy_to_be_found(planned):
     error = limit.detectable * rms[joint] / np.sqrt(np.mean(column**2))
     needed = detectable_energy(1, tries, penalty=np.log(problem.rows))
     assert error**2 * entry.groups[0].gram[0, 0] == pytest.approx(needed)
+
+
+def test_the_worst_limit_is_enough_for_each_kind_of_an_effect(planned, ur10):
+    """At that size, each exponent of a saturation has the energy that is asked for, and one has just that."""
+    problem, _ = planned
+    effect = EFFECTS["torque_constant_saturation"]
+    entries = measure(problem, [Hypothesis(effect, joint) for joint in effect.joints(ur10)])
+    limits = {limit.joint: limit for limit in find_limits(problem, entries) if limit.effect == effect.name}
+    rms = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
+    needed = detectable_energy(1, sum(entry.tries for entry in entries), penalty=2 * np.log(problem.rows))
+    shown = [entry for entry in entries if np.isfinite(limits[entry.hypothesis.joint].at_worst)]
+    assert len(shown) >= 3
+    for entry in shown:
+        limit = limits[entry.hypothesis.joint]
+        energies = []
+        for shape, group in zip(entry.shapes, entry.groups, strict=True):
+            (joint,), (column,) = problem.columns_of(entry.hypothesis, shape)
+            error = limit.at_worst * rms[joint] / np.sqrt(np.mean(column**2))
+            energies.append(error**2 * group.gram[0, 0])
+        assert min(energies) == pytest.approx(needed)
+        assert limit.detectable < limit.at_worst
 
 
 def test_what_the_base_model_absorbs_is_hidden(planned):

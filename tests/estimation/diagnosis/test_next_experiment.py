@@ -9,9 +9,9 @@ import pytest
 
 from estimation.diagnosis.carried import point_mass, situation_on
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.limits import planned_problem
 from estimation.diagnosis.next_experiment import Grams, plan_next
 from estimation.diagnosis.next_experiment_motions import MADE, MAKERS, room_of
+from estimation.diagnosis.planned import planned_problem
 from robots.loading import load_robot
 from robots.plants import Sensors
 from robots.regressor import default_model

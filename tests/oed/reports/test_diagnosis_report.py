@@ -19,12 +19,14 @@ from robots.plants.closed_loop import Loop
 
 N = 400
 LIMITS = tuple(
-    Limit(effect=name, joint=joint, detectable=size, attributable=2 * size, toughest="spring", visible=0.3, note="")
-    for name, joint, size in (
-        ("stribeck", 1, 0.01),
-        ("stribeck", 2, np.inf),
-        ("encoder_offset", 2, 0.004),
-        ("base_tilt", None, 0.02),
+    Limit(
+        effect=name, joint=joint, detectable=size, at_worst=worst, attributable=2 * size, toughest="spring", visible=0.3
+    )
+    for name, joint, size, worst in (
+        ("stribeck", 1, 0.01, 0.07),
+        ("stribeck", 2, np.inf, np.inf),
+        ("encoder_offset", 2, 0.004, 0.004),
+        ("base_tilt", None, 0.02, np.inf),
     )
 )
 
@@ -175,7 +177,9 @@ def test_the_page_of_a_plan():
     page = limits_page((*LIMITS, replace(LIMITS[0], joint=3, note="joint hardly moves")), "two")
     text = render(page)
     assert "Of 5 effects and places, 3 would be seen and named at 2 %" in page.verdict
-    assert "1 / 2" in text
+    assert "1 (7) / 2" in text
+    assert "2 (never) / 4" in text
+    assert "0.4 / 0.8" in text
     assert "on joint 3: joint hardly moves." in text
     assert "hidden" in text
     assert "more friction at low speed" in page.warnings[0]
