@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,8 @@ BESIDE, SPREAD, NO_KICK = 3, 0.25, 0.02
 LARGER = 3.0
 # Up to such a frequency [Hz] a position loop undoes what kicks do to a joint, which has then most of it about there.
 LOOP = 25.0
+# The slowest reversals have the most rows in which friction turns round: their moments count, and are known worst.
+SLOWEST = 0.1
 # A joint slower than this share of its RMS speed for so long [s] creeps: its friction may have any value.
 CREEP, CREEPING = 0.03, 0.15
 
@@ -42,15 +44,17 @@ class Directions:
         unsure: rows (N, n) in which a joint's direction is not known, or not to be relied on beside its reversals.
         clear: those of them (N, n) in which the velocity tells it.
         jolts: error of the accelerations (n,) beside reversals [rad/s2 or m/s2].
+        moments: error of the moments (n,) of reversals [s]: kicks make the velocity change its sign late.
     """
 
     unsure: Flags
     clear: Flags
     jolts: Array
+    moments: Array
 
     def rows(self, kept: slice) -> Directions:
         """Gives what is known of some rows."""
-        return Directions(self.unsure[kept], self.clear[kept], self.jolts)
+        return replace(self, unsure=self.unsure[kept], clear=self.clear[kept])
 
     def spread(self, between: NDArray[np.intp]) -> Directions:
         """Takes no row as sure whose torque comes of two samples between which a joint may have turned round.
@@ -65,7 +69,7 @@ class Directions:
         begins = np.flatnonzero(np.diff(between[inner], prepend=-1))
         found = np.logical_or.reduceat(unsure[inner], begins, axis=0)
         unsure[inner] = np.repeat(found, np.diff([*begins, len(inner)]), axis=0)
-        return Directions(unsure, self.clear & ~(unsure & ~self.unsure), self.jolts)
+        return replace(self, unsure=unsure, clear=self.clear & ~(unsure & ~self.unsure))
 
 
 def directions(
@@ -86,7 +90,8 @@ def directions(
         step: sample period [s].
         sampled: whether torque was measured at these rows, not between them.
     """
-    unsure, clear, jolts = np.zeros(dq.shape, dtype=bool), np.zeros(dq.shape, dtype=bool), np.zeros(dq.shape[1])
+    unsure, clear = np.zeros(dq.shape, dtype=bool), np.zeros(dq.shape, dtype=bool)
+    jolts, moments = np.zeros(dq.shape[1]), np.zeros(dq.shape[1])
     for j, cutoff in enumerate(np.maximum(cutoffs, 1e-3)):
         v, a = dq[:, j], ddq[:, j]
         speed = float(np.sqrt(np.mean(v**2)))
@@ -107,10 +112,12 @@ def directions(
         jolts[j] = 2 * np.pi * max(cutoff, LOOP) * usual
         error = CLEAR * np.maximum(error, usual)
         clear[:, j] = sampled & (error < change) & (np.abs(v) > np.maximum(error, ALIKE * change))
+        if (turned & (error < change)).any():
+            moments[j] = usual / float(np.quantile(np.abs(a[turned & (error < change)]), SLOWEST))
         for start, stop in spans(np.abs(v) < CREEP * speed):
             if (stop - start) * step > CREEPING:
                 unsure[start:stop, j], clear[start:stop, j] = True, False
-    return Directions(unsure, unsure & clear, jolts)
+    return Directions(unsure, unsure & clear, jolts, moments)
 
 
 def _error(ddq: Array, cutoff: float, floor: float, largest: float, step: float) -> Array:

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.agreement import joint_by_joint
 from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.power import beside, detectable_energy, resolving_energy, size_per_energy, unit_mixtures
 from estimation.diagnosis.problem import Group, Problem
 from estimation.diagnosis.scan import Entry
-from estimation.diagnosis.scoring import visible_root
+from estimation.diagnosis.scoring import accept, visible_root
 from robots.terms.effects import EFFECTS
 
 Array = NDArray[np.float64]
@@ -116,7 +117,8 @@ def _limit(
         fitted = min((sum(known[k] is None for k in free) for known in assumed), default=len(free))
         penalty = (len(roots[at]) + fitted) * float(np.log(problem.rows * len(entry.groups[at].joints)))
         needed = detectable_energy(len(roots[at]), tries, false_alarm=false_alarm, penalty=penalty)
-        return float(size_per_energy(mixtures[at], entry.groups[at].gram) * np.sqrt(needed))
+        sure = _sure(problem, hypothesis, entry.shapes[at]) if hypothesis.effect.alike else 1.0
+        return float(size_per_energy(mixtures[at], entry.groups[at].gram) * np.sqrt(needed / sure))
 
     sizes = {at: size(at) for at in showing}
     found = [sizes[at] for at in picked]
@@ -139,6 +141,12 @@ def _limit(
         visible=float(np.median(shares)),
         note=_note(problem, hypothesis) if np.isfinite(detectable) else HIDDEN,
     )
+
+
+def _sure(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> float:
+    """Gives the share of an effect's energy that counts, where joints tell it by reversals."""
+    gram, _, sure = joint_by_joint(problem, hypothesis, shape, accept(problem, ()))
+    return float(np.sum(sure * gram) / np.sum(gram)) if gram.any() else 1.0
 
 
 def _toughest(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Group, Problem
 from estimation.diagnosis.scoring import Accepted, score
@@ -26,8 +27,6 @@ WIDE = (101, 6.0)
 FACTOR, SHARE = 1.5, 0.04
 # An effect acts where its torque is more than this share of its largest.
 ACTS = 0.02
-# Share of a coefficient that all joints have alike by which each may differ: so far its formula is true.
-ROUGH = 0.25
 # What an effect is beside reversals and elsewhere may differ by this share, for its formula is no better where it is
 # large, and by so many squared standard errors; at so much of twice the log of the odds that there is none elsewhere it
 # is none: one that is there has this in 2 % of logs at most.
@@ -51,6 +50,8 @@ class Member:
         scatter: of what each joint says of a coefficient that all have alike, or rows beside reversals and others, as a
             variance over that of the noise and of the formula (Birge ratio, one at least): the gain counts for so much
             less.
+        doubt: of the gain so counted, what errors of the motion may make: another cause would owe it to them, too, but
+            whether there is one at all is told by the rest.
     """
 
     hypothesis: Hypothesis
@@ -61,6 +62,7 @@ class Member:
     degrees: int
     visible: float
     scatter: float = 1.0
+    doubt: float = 0.0
 
     def bic(self, rows: int) -> float:
         """Gain less what its parameters are worth: Schwarz's criterion, larger is better."""
@@ -72,7 +74,7 @@ class Member:
         What acts for a moment is told by the rows of that moment: the other ones are not data of its parameters.
         """
         told = self._acting() if self.hypothesis.effect.passing else np.inf
-        return self._less(min(rows * len(self.group.joints), told))
+        return self._less(min(rows * len(self.group.joints), told)) - self.doubt
 
     def _less(self, rows: float) -> float:
         prior = RARE if self.hypothesis.effect.rare else 0.0
@@ -158,16 +160,20 @@ def refine(
             evaluate(shape, sum(known[k] is None for k in free))
     found = best[0]
     if hypothesis.effect.alike:
-        return replace(found, scatter=_scatter(problem, found, accepted))
+        return _agreed(problem, found, accepted)
     return replace(found, scatter=_borne_out(problem, found, accepted)) if hypothesis.effect.kicks else found
 
 
-def _scatter(problem: Problem, member: Member, accepted: Accepted) -> float:
-    """How much more the joints differ in the one coefficient that they share than they may (Birge 1932)."""
-    gram, cross = joint_by_joint(problem, member, accepted)
+def _agreed(problem: Problem, member: Member, accepted: Accepted) -> Member:
+    """Says how much less its gain counts where joints differ in what they share (Birge 1932), or tell by reversals."""
+    gram, cross, sure = joint_by_joint(problem, member.hypothesis, member.shape, accepted)
     told = gram > 0
-    gram, cross = gram[told], cross[told]
-    return max(1.0, float(cross.sum() ** 2 / gram.sum()) / agreed_gain(gram, cross)) if len(gram) > 1 else 1.0
+    if not told.any():
+        return member
+    gram, cross, sure = gram[told], cross[told], sure[told]
+    agreed = agreed_gain(gram, cross)
+    scatter = max(1.0, float(cross.sum() ** 2 / gram.sum()) / agreed)
+    return replace(member, scatter=scatter, doubt=max(0.0, agreed - agreed_gain(sure * gram, sure * cross)))
 
 
 def _borne_out(problem: Problem, member: Member, accepted: Accepted) -> float:
@@ -186,40 +192,6 @@ def _borne_out(problem: Problem, member: Member, accepted: Accepted) -> float:
         return np.inf
     difference = np.array([1.0, -1.0]) / expected
     return max(1.0, float((told[0] - told[1]) ** 2 / (difference @ parts.gram @ difference + FORMULA**2)) / AGREES)
-
-
-def joint_by_joint(problem: Problem, member: Member, accepted: Accepted) -> tuple[Array, Array]:
-    """Squares of an effect's one column on each of its joints (m,), beside others, and products with the residual."""
-    joints, columns = problem.columns_of(member.hypothesis, member.shape)
-    scores = [
-        score(problem, problem.group((j,), (X,), effect=member.hypothesis.effect), accepted)
-        for j, X in zip(joints, columns, strict=True)
-    ]
-    gram, cross = (
-        np.array([float(np.ravel(part)[0]) for part in parts])
-        for parts in zip(*((s.gram, s.cross) for s in scores), strict=True)
-    )
-    return gram, cross
-
-
-def agreed_gain(gram: Array, cross: Array) -> float:
-    """What one coefficient of all joints explains, over their Birge ratio.
-
-    One joint may be at odds with the rest, where something else is left on it: it then counts for nothing.
-
-    Args:
-        gram: squares of each joint's column (m,), two or more, of noise one.
-        cross: each one's product with the residual (m,).
-    """
-    everyone = np.ones((1, len(gram)), dtype=bool)
-    sets = np.vstack([everyone, ~np.eye(len(gram), dtype=bool)]) if len(gram) > 2 else everyone
-    return max(_over_scatter(gram[chosen], cross[chosen]) for chosen in sets)
-
-
-def _over_scatter(gram: Array, cross: Array) -> float:
-    mean = cross.sum() / gram.sum()
-    squares = np.sum((cross / gram - mean) ** 2 / (1.0 / gram + (ROUGH * mean) ** 2))
-    return max(float(cross.sum() ** 2 / gram.sum() / max(1.0, squares / (len(gram) - 1))), 1e-300)
 
 
 def _spacing(grid: Sequence[tuple[float, ...]], k: int, start: tuple[float, ...]) -> float:

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.quiet_logs import profile_gain
-from estimation.diagnosis.refinement import Member, agreed_gain, joint_by_joint, refine
+from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scan import Entry, Outcome, Scan, scan
 from estimation.diagnosis.scoring import Accepted, accept, score
 from robots.common.parallel import available_cores
@@ -169,7 +170,7 @@ def _best(problem: Problem, outcomes: Sequence[Outcome], accepted: Accepted) -> 
 
 
 def _worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
-    worth = candidate.bic(problem.rows) if members else candidate.worth(problem.rows)
+    worth = candidate.bic(problem.rows) - candidate.doubt if members else candidate.worth(problem.rows)
     if worth <= LEAST and not members and len(problem.recording.runs) > 1:
         worth += profile_gain(problem, candidate) - candidate.gain
     return worth > LEAST
@@ -177,7 +178,7 @@ def _worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) ->
 
 def _sure(problem: Problem, candidate: Member, p_value: float, chance: float) -> bool:
     """Whether an effect has a p-value below a chance, and is worth its parameters at all."""
-    return p_value < chance and candidate.bic(problem.rows) > 0
+    return p_value < chance and candidate.bic(problem.rows) - candidate.doubt > 0
 
 
 def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
@@ -208,7 +209,9 @@ def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> b
 
 def _agreed(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
     """Whether joints on which no effect of theirs explains more tell a common coefficient by themselves."""
-    gram, cross = joint_by_joint(problem, candidate, accept(problem, tuple(m.group for m in members)))
+    beside = accept(problem, tuple(m.group for m in members))
+    gram, cross, sure = joint_by_joint(problem, candidate.hypothesis, candidate.shape, beside)
+    gram, cross = sure * gram, sure * cross
     others = [
         max((m.gain_on([j]) for m in members if m.hypothesis.joint == j + 1), default=0.0)
         for j in candidate.group.joints
@@ -217,8 +220,7 @@ def _agreed(problem: Problem, candidate: Member, members: Sequence[Member]) -> b
     if not told.any():
         return False
     gram, cross = gram[told], cross[told]
-    gain = agreed_gain(gram, cross) if len(gram) > 1 else float(cross[0] ** 2 / gram[0])
-    return gain - candidate.degrees * float(np.log(problem.rows * len(gram))) > LEAST
+    return agreed_gain(gram, cross) - candidate.degrees * float(np.log(problem.rows * len(gram))) > LEAST
 
 
 def _polished(

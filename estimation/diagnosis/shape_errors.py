@@ -165,8 +165,11 @@ def inexact(problem: Problem, member: Member, coefficients: Array) -> Array:
     effect, robot = member.hypothesis.effect, problem.situation.robot
     described = zip(effect.shapes, member.shape, strict=True)
     shapes = [s.inexact * (abs(value) if s.scale == "log" else 1.0) for s, value in described]
-    own = [c.inexact for c in effect.parameters(robot, member.hypothesis.joint)]
-    return np.array([*(np.array(own) * np.abs(coefficients)), *shapes])
+    own = np.array([c.inexact for c in effect.parameters(robot, member.hypothesis.joint)])
+    agreed = member.gain / member.scatter
+    if 0 < member.doubt < agreed:
+        own = np.hypot(own, np.sqrt(1.0 / (agreed - member.doubt) - 1.0 / agreed))
+    return np.array([*(own * np.abs(coefficients)), *shapes])
 
 
 def _gain(problem: Problem, member: Member, shape: tuple[float, ...], others: Accepted) -> float:

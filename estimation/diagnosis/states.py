@@ -90,6 +90,7 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
         unsure=np.concatenate([part[7].unsure for part in parts]),
         clear=np.concatenate([part[7].clear for part in parts]),
         jolts=np.max([part[7].jolts for part in parts], axis=0),
+        moments=np.max([part[7].moments for part in parts], axis=0),
         names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
         payloads=_payloads(prepared),
         fields=_fields(prepared),

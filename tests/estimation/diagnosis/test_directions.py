@@ -152,6 +152,26 @@ def test_a_jolt_is_what_a_kick_may_leave_of_the_acceleration(
     assert smooth.jolts[0] < recording.jolts[0] / 30
 
 
+@pytest.mark.parametrize("counts", [2.0**26, 2.0**30, 2.0**40])
+def test_moments_of_reversals_are_as_wrong_as_is_said(arm: Robot, fourier_motion: Callable, counts: float) -> None:
+    """Where kicks make a velocity change its sign late, by how much is told within a factor of three."""
+    motion = _aperiodic(fourier_motion, arm)
+    q, dq, _ = _kicked(motion)
+    recording = record(arm, [_counted(motion, q, counts)])
+    first = int(np.argmin(np.abs(motion.t - recording.t[0])))
+    errors = _crossings(recording.dq[:, 0]) - _crossings(dq[first : first + len(recording), 0])
+    assert len(errors) >= 5
+    assert recording.moments is not None
+    usual = STEP * float(np.median(np.abs(errors)))
+    assert usual / 3 < recording.moments[0] < 3 * usual
+
+
+def _crossings(v: np.ndarray) -> np.ndarray:
+    """Rows, and parts of them, at which a velocity (N,) changes its sign."""
+    at = np.flatnonzero(v[1:] * v[:-1] < 0)
+    return at + v[at] / (v[at] - v[at + 1])
+
+
 def test_torque_between_samples_is_not_trusted_beside_a_reversal(arm: Robot, fourier_motion: Callable) -> None:
     """Sampled at uneven times it is read off straight lines, across the sign's jump."""
     motion = _aperiodic(fourier_motion, arm)

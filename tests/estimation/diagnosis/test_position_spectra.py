@@ -48,7 +48,7 @@ def test_between_two_samples_a_joint_may_have_turned_round() -> None:
     """Rows between the same two samples are as unsure as the least sure of them; samples stay as they are."""
     unsure = np.zeros((8, 2), dtype=bool)
     unsure[2, 0] = unsure[5, 1] = True
-    known = Directions(unsure, unsure.copy(), np.zeros(2))
+    known = Directions(unsure, unsure.copy(), np.zeros(2), np.zeros(2))
     # Rows 1 to 3 lie between samples 0 and 4, row 6 between 5 and 7.
     spread = known.spread(np.array([-1, 1, 1, 1, -1, -1, 2, -1]))
     assert np.flatnonzero(spread.unsure[:, 0]).tolist() == [1, 2, 3]

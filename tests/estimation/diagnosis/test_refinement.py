@@ -11,9 +11,9 @@ import pytest
 from estimation.diagnosis import refinement, selection
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Group
-from estimation.diagnosis.refinement import RARE, Member, agreed_gain
+from estimation.diagnosis.refinement import RARE, Member
 from estimation.diagnosis.scan import Outcome
-from estimation.diagnosis.selection import _beyond, contenders
+from estimation.diagnosis.selection import _beyond, _worth_it, contenders
 from robots.terms.effects import EFFECTS, Shape
 from robots.terms.effects.stribeck import Stribeck
 
@@ -87,34 +87,16 @@ def test_a_push_leaves_other_rows_alone() -> None:
     assert push.share_beside(_member("spring", 1, _boxes()[:1]), 1) == 0.0
 
 
-def _shared(*coefficients: float, error: float = 0.01) -> tuple[float, float]:
-    """What a shared coefficient explains, and what of it counts, where joints tell these values to an error."""
-    gram = np.full(len(coefficients), error**-2)
-    cross = gram * coefficients
-    return float(cross.sum() ** 2 / gram.sum()), agreed_gain(gram, cross)
-
-
-def test_joints_that_agree_within_the_formula_count_in_full() -> None:
-    """Values a fifth apart, each known to a hundredth, are one: no delay is so exact as the noise is low."""
-    gain, agreed = _shared(0.9, 1.0, 1.1, 1.05)
-    assert agreed == pytest.approx(gain)
-    few, count = _shared(0.9, 1.1)
-    assert count == pytest.approx(few)
-
-
-def test_one_joint_at_odds_counts_for_nothing_and_the_rest_in_full() -> None:
-    """Where another effect is left on one of four joints, three still tell the coefficient."""
-    _, agreed = _shared(1.0, 1.0, 1.0, -4.0)
-    rest, _ = _shared(1.0, 1.0, 1.0)
-    assert agreed == pytest.approx(rest)
-
-
-def test_what_one_joint_alone_tells_is_no_common_coefficient() -> None:
-    """A value on one joint, and none on the others that would have told it, hardly counts."""
-    gain, agreed = _shared(1.0, 0.0, 0.0, 0.0)
-    assert agreed < 0.1 * gain
-    _, agreed = _shared(1.0, -1.0, 1.0, -1.0)
-    assert agreed < 0.01 * _shared(1.0, 1.0, 1.0, 1.0)[0]
+def test_what_errors_of_the_motion_may_make_of_a_gain_says_nothing_of_its_being_there() -> None:
+    """It is not counted to say whether an effect is there, alone or beside others, but against what may be instead."""
+    delay = _member("time_delay", None, _boxes())
+    doubted = replace(delay, doubt=GAIN - 40.0)
+    assert doubted.bic(ROWS) == delay.bic(ROWS)
+    assert doubted.worth(ROWS) == pytest.approx(delay.worth(ROWS) - GAIN + 40.0)
+    problem = SimpleNamespace(rows=ROWS, recording=SimpleNamespace(runs=(slice(0, ROWS),)))
+    for others in ([], [_member("spring", 1, _boxes()[:1])]):
+        assert _worth_it(problem, delay, others)  # type: ignore[arg-type]
+        assert not _worth_it(problem, replace(doubted, degrees=4), others)  # type: ignore[arg-type]
 
 
 def test_a_contact_that_cannot_win_is_not_searched() -> None:
@@ -175,7 +157,7 @@ def test_what_all_joints_share_is_told_by_those_without_a_stronger_effect(
     ripple = replace(_member("torque_ripple", 1, (column,)), gain=other)
     gram = np.array([1e4, 1e4])
     monkeypatch.setattr(selection, "accept", lambda problem, groups: None)
-    monkeypatch.setattr(selection, "joint_by_joint", lambda *_: (gram, np.sqrt(np.array(gains) * gram)))
+    monkeypatch.setattr(selection, "joint_by_joint", lambda *_: (gram, np.sqrt(np.array(gains) * gram), np.ones(2)))
     situation = SimpleNamespace(runs=(slice(0, ROWS),), robot=None)
     problem = SimpleNamespace(situation=situation, recording=SimpleNamespace(tau=column), rows=ROWS)
     assert _beyond(problem, delay, [ripple]) is counts  # type: ignore[arg-type]

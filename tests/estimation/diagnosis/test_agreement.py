@@ -1,0 +1,76 @@
+"""A coefficient that all joints have alike: how much they agree on it, and what each says counts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.planned import planned_problem
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.scoring import accept
+from robots.loading import load_robot
+from robots.plants import Sensors
+from robots.regressor import default_model
+from robots.signals import Motion
+from robots.terms.effects import EFFECTS
+
+
+def _shared(*coefficients: float, error: float = 0.01) -> tuple[float, float]:
+    """What a shared coefficient explains, and what of it counts, where joints tell these values to an error."""
+    gram = np.full(len(coefficients), error**-2)
+    cross = gram * coefficients
+    return float(cross.sum() ** 2 / gram.sum()), agreed_gain(gram, cross)
+
+
+def test_joints_that_agree_within_the_formula_count_in_full() -> None:
+    """Values a fifth apart, each known to a hundredth, are one: no delay is so exact as the noise is low."""
+    gain, agreed = _shared(0.9, 1.0, 1.1, 1.05)
+    assert agreed == pytest.approx(gain)
+    few, count = _shared(0.9, 1.1)
+    assert count == pytest.approx(few)
+
+
+def test_one_joint_at_odds_counts_for_nothing_and_the_rest_in_full() -> None:
+    """Where another effect is left on one of four joints, three still tell the coefficient."""
+    _, agreed = _shared(1.0, 1.0, 1.0, -4.0)
+    rest, _ = _shared(1.0, 1.0, 1.0)
+    assert agreed == pytest.approx(rest)
+
+
+def test_what_one_joint_alone_tells_is_no_common_coefficient() -> None:
+    """A value on one joint, and none on the others that would have told it, hardly counts."""
+    gain, agreed = _shared(1.0, 0.0, 0.0, 0.0)
+    assert agreed < 0.1 * gain
+    _, agreed = _shared(1.0, -1.0, 1.0, -1.0)
+    assert agreed < 0.01 * _shared(1.0, 1.0, 1.0, 1.0)[0]
+
+
+def test_reversals_tell_a_delay_no_better_than_their_moments_are_known() -> None:
+    """Of information g beside them, 1 / (1 / g + m^2) is sure; what other rows tell is so in full."""
+    robot = load_robot("ur10")
+    t = 0.004 * np.arange(3000)
+    phase = 2 * np.pi * 0.3 * t[:, None] * (1 + 0.1 * np.arange(6))
+    rate = phase[-1] / t[-1]
+    motion = Motion(t, np.sin(phase), rate * np.cos(phase), -(rate**2) * np.sin(phase))
+    model = default_model(replace(robot, friction=np.full((6, 4), 3.0)), velocity_scale=2e-3)
+    problem = planned_problem(model, model.nominal, [motion], noise=Sensors(torque_noise=0.025))
+
+    def measured(clear: np.ndarray, moment: float) -> tuple[np.ndarray, np.ndarray]:
+        trusted = np.arange(6) < 4
+        known = replace(problem.recording, clear=clear, trusted=trusted, moments=np.full(6, moment))
+        seen: Problem = replace(problem, recording=known)
+        gram, _, sure = joint_by_joint(seen, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accept(seen, ()))
+        return gram, sure
+
+    everywhere, nowhere = np.ones(motion.q.shape, dtype=bool), np.zeros(motion.q.shape, dtype=bool)
+    gram, sure = measured(everywhere, 1e-4)
+    assert (gram[:4] > 0).all()
+    np.testing.assert_allclose(sure[:4], 1.0 / (1.0 + 1e-8 * gram[:4]), rtol=1e-4)
+    assert (sure[:4] < 1.0).all()
+    np.testing.assert_array_equal(sure[4:], 1.0)
+    np.testing.assert_allclose(measured(nowhere, 1e-4)[1], 1.0)
+    np.testing.assert_array_equal(measured(everywhere, 0.0)[1], 1.0)
