@@ -252,6 +252,8 @@ def _next(item: dict[str, Any]) -> NextExperiment:
         resolves=float(item["resolves"]),
         stages=(),
         ranking=(),
+        # Older files have none.
+        times=int(item.get("times", 1)),
     )
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.baseline import FAINT
+from estimation.diagnosis.experiment_grams import Grams
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.next_experiment import Grams
 from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.power import chance_to_resolve
 from estimation.diagnosis.problem import Problem

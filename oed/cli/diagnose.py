@@ -202,9 +202,11 @@ def _diagnosis(
         result.save(folder.path("diagnosis.json").parent)
         following = result.next_experiment
         if following is not None and following.kind in MADE:
-            for number, stage in enumerate(following.stages, start=1):
+            # A motion that is made several times is written once.
+            motions = dict.fromkeys(stage.motion for stage in following.stages)
+            for number, made in enumerate(motions, start=1):
                 path = folder.path(f"next_experiment_{number}.csv")
-                motion = at_rate(stage.motion, robot.period)
+                motion = at_rate(made, robot.period)
                 write_trajectory(path, motion, {"robot": robot.name, "experiment": following.kind})
         save_diagnosis_report(result, folder, png=png)
     return result.summary(), result.to_dict()

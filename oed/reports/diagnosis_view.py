@@ -132,16 +132,21 @@ def view_of(diagnosis: Diagnosis) -> DiagnosisView:
         nrmse_after=diagnosis.extended,
         unseen=diagnosis.how_unseen,
         limits=diagnosis.limits,
-        next_kind="" if following is None else EXPERIMENTS.get(following.kind, following.kind.replace("_", " ")),
+        next_kind="" if following is None else _experiment(following.kind, following.times),
         next_why="" if following is None else following.why,
         next_resolves=np.nan if following is None else following.resolves,
         next_ranking=()
         if following is None
-        else tuple((EXPERIMENTS.get(p.kind, p.kind), p.resolves, p.duration) for p in following.ranking),
+        else tuple((_experiment(p.kind, p.times), p.resolves, p.duration) for p in following.ranking),
         unexplained=tuple(f"{f.sentence}" for f in left),
         warnings=diagnosis.notes,
         simulation=diagnosis.simulation,
     )
+
+
+def _experiment(kind: str, times: int) -> str:
+    """Describes a kind of experiment, and how often its motions are made."""
+    return EXPERIMENTS.get(kind, kind.replace("_", " ")) + (f", {times} times over" if times > 1 else "")
 
 
 def _findings(diagnosis: Diagnosis, trace: Trace) -> tuple[FindingView, ...]:

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.carried import point_mass, situation_on
+from estimation.diagnosis.experiment_grams import Grams
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.next_experiment import Grams, plan_next
+from estimation.diagnosis.next_experiment import LONGEST, plan_next, repeated
 from estimation.diagnosis.next_experiment_motions import MADE, MAKERS, room_of
 from estimation.diagnosis.planned import planned_problem
 from robots.loading import load_robot
@@ -112,6 +113,31 @@ def test_the_least_trouble_is_proposed_where_several_would_do(problem):
         _guess(problem, "presliding_hysteresis", 4, (0.003,), 0.02),
     ]
     assert plan_next(problem, causes).kind == "repeat"
+
+
+def test_what_once_does_not_tell_is_made_several_times(problem):
+    """Of an effect that hardly shows, motions are repeated until the chance is enough, and told as it is then."""
+    names = (("stribeck", (0.05, 1.0)), ("presliding_hysteresis", (0.003,)))
+    causes = [_guess(problem, name, 4, shape, 0.002) for name, shape in names]
+    plan = plan_next(problem, causes)
+    grams = Grams(problem, causes)
+    assert plan.times > 1
+    assert plan.resolves >= 0.95
+    assert plan.resolves == pytest.approx(grams.chance(plan.stages))
+    assert grams.chance(plan.stages[: len(plan.stages) // plan.times]) < 0.95
+    assert f"({plan.times} times over)" in plan.why
+    assert plan.to_dict()["times"] == plan.times
+    assert plan.ranking[0].duration == pytest.approx(sum(s.pause + s.motion.duration for s in plan.stages))
+    assert plan.ranking[0].duration <= LONGEST
+
+
+def test_a_payload_is_mounted_once_however_often_the_motion_is_made(problem):
+    """Stages come in a row with what is changed before them; the pause for it is made once."""
+    stages = MAKERS["payload"](room_of(problem.situation.robot, problem.recording), 0, 0)
+    four = repeated(stages, 4)
+    assert [stage.payload for stage in four] == [0.0] * 4 + [stages[1].payload] * 4
+    assert [stage.pause for stage in four] == [2.0] * 4 + [60.0] + [2.0] * 3
+    assert repeated(stages, 1) == stages
 
 
 def test_one_cause_needs_no_experiment(problem):

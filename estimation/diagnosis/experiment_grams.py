@@ -1,0 +1,182 @@
+"""What experiments tell of causes: Gram matrices of base model and causes, of logs and of motions to come."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.carried import point_mass, regressor_on, unloaded, with_body
+from estimation.diagnosis.gaps import no_gaps
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.next_experiment_motions import Stage
+from estimation.diagnosis.power import chance_to_resolve
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.whitening import Whitening
+from robots.base_parameters import find_base_parameters
+from robots.regressor import TorqueModel
+from robots.signals import Motion
+from robots.terms.effects import situation
+from robots.terms.effects.base_tilt import level_axes
+from robots.terms.effects.situation import joined
+
+Array = NDArray[np.float64]
+
+LATER = 3600.0
+"""Time from the logs to the experiment [s]: the robot has cooled."""
+ARM = 0.1
+"""Distance of a payload's centre from the flange [m]."""
+
+
+class Cause(Protocol):
+    """A possible cause: an effect with its fitted shape and coefficients."""
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        """Effect and joint."""
+
+    @property
+    def shape(self) -> tuple[float, ...]:
+        """Its shape parameters."""
+
+    @property
+    def coefficients(self) -> Array:
+        """Its coefficients (k,)."""
+
+
+class Grams:
+    """Gram matrices of base columns and all causes' columns, whitened: of the logs, and of any experiment."""
+
+    def __init__(self, problem: Problem, causes: Sequence[Cause]) -> None:
+        self.problem = problem
+        self.causes = causes
+        self.model: TorqueModel = problem.situation.model
+        # A base that is tilted shows parameters that the logs do not: they take a part of what it shows of a cause.
+        gravity = np.asarray(self.model.robot.chain.gravity, dtype=float)
+        fields = [field for field in problem.recording.fields if field is not None]
+        tilted = [gravity + np.linalg.norm(gravity) * axis for axis in level_axes(gravity)] if gravity.any() else []
+        self.base = find_base_parameters(self.model, gravities=[*fields, *tilted])
+        self.columns = self.base.independent
+        self.sizes = [len(c.coefficients) for c in causes]
+
+    @cached_property
+    def old(self) -> Array:
+        """Of the logs that there are."""
+        now = self.problem.situation
+        effects = [c.hypothesis.effect.columns(now, c.hypothesis.joint, c.shape) for c in self.causes]
+        return self._gram(regressor_on(self.base, self.problem.recording), effects, self.problem.whitening)
+
+    def chance(self, stages: Sequence[Stage]) -> float:
+        """Gives the chance that each cause, were it true, would be told from every other."""
+        return self.chance_of(self.later(stages))
+
+    def later(self, stages: Sequence[Stage]) -> Array:
+        """Does what `of` does for an experiment made after the logs."""
+        return self.of(stages, float(self.problem.recording.t[-1]) + LATER)
+
+    def chance_of(self, new: Array) -> float:
+        """Does what `chance` does, by the Gram matrix of the experiment."""
+        total = self.old + new
+        return min(
+            chance_to_resolve(self._left(total, true, rival))
+            for true in range(len(self.causes))
+            for rival in range(len(self.causes))
+            if true != rival
+        )
+
+    def of(self, stages: Sequence[Stage], begin: float = 0.0) -> Array:
+        """Evaluates an experiment that begins at a time [s] of the logs' clock: the Gram matrix of all columns."""
+        bases: list[Array] = []
+        effects: list[list[Array]] = [[] for _ in self.causes]
+        starts: list[int] = []
+        t0, rows = begin, 0
+        for part in _joined(stages):
+            model = self.model.under(self.problem.recording.gravities[-1] if part.gravity is None else part.gravity)
+            motion = (part.motion.q, part.motion.dq, part.motion.ddq)
+            carried = self._parameters(part.payload)
+            played = situation(model, carried, t0 + part.motion.t, *motion, starts=part.starts)
+            now = joined([played], self.model)
+            bases.append(model.regressor(now.q, now.dq, now.ddq, columns=self.columns))
+            for columns, cause in zip(effects, self.causes, strict=True):
+                columns.append(cause.hypothesis.effect.columns(now, cause.hypothesis.joint, cause.shape))
+            starts += [rows + s for s in part.starts]
+            rows += len(part.motion)
+            t0 = float(now.t[-1]) + 60.0
+        base = np.concatenate(bases)
+        plain = replace(self.problem.whitening, gaps=no_gaps(base.shape[1]), weights=None, levels=None)
+        whitening = replace(plain, starts=tuple(starts))
+        return self._gram(base, [np.concatenate(parts) for parts in effects], whitening)
+
+    def block(self, gram: Array, cause: int) -> Array:
+        """The energy of a cause's columns (k, k), nothing projected out."""
+        edges = len(self.columns) + np.concatenate([[0], np.cumsum(self.sizes)])
+        own = slice(int(edges[cause]), int(edges[cause + 1]))
+        return gram[own, own]
+
+    def _parameters(self, payload: float) -> Array:
+        return with_body(self.model, unloaded(self.problem), point_mass(payload, (0.0, 0.0, ARM)))
+
+    def _gram(self, base: Array, effects: Sequence[Array], whitening: Whitening) -> Array:
+        joined = np.concatenate([base, *effects], axis=2)
+        white = [whitening.apply(np.ascontiguousarray(joined[:, j]), j) for j in range(joined.shape[1])]
+        P = whitening.precision
+        gram = np.zeros((joined.shape[2],) * 2)
+        for j, first in enumerate(white):
+            gram += P[j, j] * (first.T @ first)
+            for k in range(j):
+                if P[j, k]:
+                    part = P[j, k] * (first.T @ white[k])
+                    gram += part + part.T
+        return gram
+
+    def _left(self, gram: Array, true: int, rival: int) -> float:
+        theta = self.causes[true].coefficients
+        return max(float(theta @ self.remainder(gram, true, rival) @ theta), 0.0)
+
+    def remainder(self, gram: Array, true: int, rival: int | None) -> Array:
+        """What base model and rival, or the base model alone, leave of the true cause's columns (k, k)."""
+        b = len(self.columns)
+        edges = b + np.concatenate([[0], np.cumsum(self.sizes)])
+        own = np.arange(edges[true], edges[true + 1])
+        beside = np.arange(b)
+        if rival is not None:
+            beside = np.concatenate([beside, np.arange(edges[rival], edges[rival + 1])])
+        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        unit = gram / scale[:, None] / scale
+        values, vectors = np.linalg.eigh(unit[np.ix_(beside, beside)])
+        kept = values > 1e-9 * values[-1]
+        cross = unit[np.ix_(own, beside)] @ vectors[:, kept] / np.sqrt(values[kept])
+        left: Array = (unit[np.ix_(own, own)] - cross @ cross.T) * np.outer(scale[own], scale[own])
+        return left
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Stages that only pauses part."""
+
+    motion: Motion
+    starts: tuple[int, ...]
+    payload: float
+    gravity: Array | None
+
+
+def _joined(stages: Sequence[Stage]) -> list[_Part]:
+    """Joins stages of one payload and base pose: heat passes from one to the next."""
+    parts: list[tuple[list[Motion], float, Array | None]] = []
+    for stage in stages:
+        same = parts and parts[-1][1] == stage.payload and parts[-1][2] is stage.gravity
+        if not same:
+            parts.append(([stage.motion], stage.payload, stage.gravity))
+            continue
+        before = parts[-1][0][-1]
+        m = stage.motion
+        parts[-1][0].append(Motion(m.t + float(before.t[-1]) + stage.pause, m.q, m.dq, m.ddq))
+    result = []
+    for motions, carried, gravity in parts:
+        starts = tuple(int(s) for s in np.cumsum([0, *(len(m) for m in motions[:-1])]))
+        result.append(_Part(Motion.concatenate(motions), starts, carried, gravity))
+    return result
