@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from estimation.clocks import clocked
 from estimation.diagnosis.baseline import Baseline, base_parameters, build_baseline, inertia_of
 from estimation.diagnosis.carried import lightened
+from estimation.diagnosis.composed import composed
 from estimation.diagnosis.diagnosis import Diagnosis
 from estimation.diagnosis.excess import residual_shares
 from estimation.diagnosis.hopeless_logs import hopeless_logs
@@ -268,7 +269,9 @@ def _searched(
     entries = measure(problem, hypotheses, _teller(bar, share, 0.2))
     give_back()
     advance = _noter(bar, share + 0.25)
-    return Search(problem, entries, select(problem, entries, false_alarm=false_alarm, rng=rng, advance=advance))
+    selection = select(problem, entries, false_alarm=false_alarm, rng=rng, advance=advance)
+    members = [found.member for found in selection.found]
+    return Search(composed(problem, members, hypotheses), entries, selection)
 
 
 def _teller(bar: Progress, start: float, share: float) -> Callable[[float], None]:

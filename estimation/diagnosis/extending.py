@@ -149,7 +149,7 @@ def _slope(problem: Problem, member: Member, k: int, step: float) -> Array:
     """How the member's torque changes by one standard error of a shape parameter (N, n, 1)."""
     value = member.shape[k]
     h = step if np.isfinite(step) else 0.3 * abs(value)
-    low, high = member.hypothesis.effect.bounds(problem.situation, member.hypothesis.joint)[k]
+    low, high = member.hypothesis.effect.bounds(problem.sees(member.hypothesis.effect), member.hypothesis.joint)[k]
     up, down = min(value + h, high), max(value - h, low)
     if up <= down:
         return np.zeros((len(problem.recording), problem.n, 1))

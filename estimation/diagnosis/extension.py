@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -122,11 +122,16 @@ def find_effect(name: str) -> Effect:
 
 
 def extension_torque(extensions: Sequence[Extension], state: Situation) -> Array:
-    """Evaluates the extensions of a model in what its base model says of a motion (N, n) [N m or N]."""
+    """Evaluates the extensions of a model in what its base model says of a motion (N, n) [N m or N].
+
+    What acts on all of the torque comes after the others.
+    """
     total = np.zeros_like(state.q)
     for extension in extensions:
-        total += extension.torque(state)
-    return total
+        if not extension.source.last:
+            total += extension.torque(state)
+    whole = replace(state, beyond=total)
+    return total + sum((e.torque(whole) for e in extensions if e.source.last), start=np.zeros_like(total))
 
 
 def _described(effect: Effect, robot: Robot, joint: int | None) -> list[tuple[str, str]]:

@@ -74,6 +74,7 @@ class Problem:
         remainder: torque less base model (N0, n) [N m or N], at the recording's own rows.
         pull: what holds base parameters that the data leave open, in units of rows over the noise's scale.
         upper: the frequencies above the bands; None where nothing is asked of them.
+        whole: what effects depend on that act on all of the torque, as far as that is known; None where none is seen.
     """
 
     recording: Recording
@@ -88,6 +89,11 @@ class Problem:
     remainder: Array
     pull: Pull
     upper: Upper | None = None
+    whole: Situation | None = None
+
+    def sees(self, effect: Effect) -> Situation:
+        """Gives what an effect depends on."""
+        return self.whole if effect.last and self.whole is not None else self.situation
 
     @property
     def n(self) -> int:
@@ -106,7 +112,7 @@ class Problem:
 
     def columns_of(self, hypothesis: Hypothesis, shape: tuple[float, ...]) -> tuple[tuple[int, ...], tuple[Array, ...]]:
         """Evaluates a hypothesis: the joints it acts on, and its columns (N, k) on each."""
-        return hypothesis.columns(self.situation, shape)
+        return hypothesis.columns(self.sees(hypothesis.effect), shape)
 
     def measured(self, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Group:
         """Evaluates a hypothesis at a shape and measures it."""

@@ -111,7 +111,7 @@ def refine(
     1973), so that the search has as many dimensions as the effect has shape parameters. Shapes that machines are built
     with are then tried, without a parameter to pay for.
     """
-    situation = problem.situation
+    situation = problem.sees(hypothesis.effect)
     bounds = hypothesis.effect.bounds(situation, hypothesis.joint)
     scales = [shape.scale for shape in hypothesis.effect.shapes]
     free = [k for k, (low, high) in enumerate(bounds) if high > low]
@@ -128,6 +128,8 @@ def refine(
             best[:] = [member]
         return worth
 
+    # What is known now may have been free where the search comes from.
+    start = tuple(min(max(value, low), high) for value, (low, high) in zip(start, bounds, strict=True))
     evaluate(start)
     if free and effort:
         at = list(start)

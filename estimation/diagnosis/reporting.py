@@ -173,7 +173,7 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
         )
     told_of = {finding.joint for finding in findings if finding.effect == CLIPPING.name}
     for j in sorted({*range(1, recording.n + 1)} - told_of):
-        if CLIPPING.chance(told.problem.situation, j, recording.tau) < CERTAIN:
+        if CLIPPING.chance(told.problem.sees(CLIPPING), j, recording.tau) < CERTAIN:
             notes.append(_AT_LIMIT.format(j, float(np.abs(recording.tau[:, j - 1]).max())))
     strange = _strange(told.problem, before)
     notes += strange.values()

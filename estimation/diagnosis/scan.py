@@ -123,7 +123,7 @@ def measure(
 
 
 def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
-    situation = problem.situation
+    situation = problem.sees(hypothesis.effect)
     shapes = hypothesis.effect.grid(situation, hypothesis.joint)
     tries = len(shapes)
     if tries > LONG:

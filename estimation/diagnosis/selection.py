@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
+from estimation.diagnosis.composed import composed
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.quiet_logs import profile_gain
 from estimation.diagnosis.refinement import Member, refine
-from estimation.diagnosis.scan import Entry, Outcome, Scan, scan
+from estimation.diagnosis.scan import Entry, Outcome, Scan, measure, scan
 from estimation.diagnosis.scoring import Accepted, accept, score
 from robots.common.parallel import available_cores
 
@@ -76,7 +77,7 @@ def select(
     One that the others make unnecessary once they are refined beside it is not tried again, and no set of effects is
     built on twice: the search would go round in a circle.
     """
-    members, p_values = _seen(problem, entries, false_alarm, rng)
+    members, p_values = _seen(problem, entries, false_alarm, rng, ())
     seen = {member.hypothesis for member in members}
     spurned: set[Hypothesis] = set()
     visited = [seen]
@@ -100,6 +101,10 @@ def select(
             break
         members.append(best[0])
         p_values.append(chance[best[0].hypothesis])
+        # What is known of the torque now may come near what the log shows.
+        more, sure = _seen(problem, entries, false_alarm, rng, members)
+        seen |= {member.hypothesis for member in more}
+        members, p_values = [*members, *more], [*p_values, *sure]
         if len(members) > 1:
             members, p_values = _polished(problem, entries, members, p_values, seen, rng)
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
@@ -125,25 +130,29 @@ def select(
 
 
 def _seen(
-    problem: Problem, entries: Sequence[Entry], false_alarm: float, rng: np.random.Generator
+    problem: Problem, entries: Sequence[Entry], false_alarm: float, rng: np.random.Generator, members: Sequence[Member]
 ) -> tuple[list[Member], list[float]]:
-    """Refines what the torque as logged shows by itself, beside each other, with the chance of it where it is not.
+    """Refines what the torque as logged shows by itself, beside members and each other, with the chance of it.
 
     That is not a question of what it explains: a torque cut off at a few peaks explains little.
     """
-    members: list[Member] = []
+    found: list[Member] = []
     p_values: list[float] = []
-    for entry in entries:
-        hypothesis = entry.hypothesis
-        chance = hypothesis.effect.chance(problem.situation, hypothesis.joint, problem.recording.tau) * len(entries)
+    taken = {member.hypothesis for member in members}
+    now = composed(problem, members, [entry.hypothesis for entry in entries])
+    for hypothesis in (entry.hypothesis for entry in entries if entry.hypothesis not in taken):
+        state = now.sees(hypothesis.effect)
+        chance = hypothesis.effect.chance(state, hypothesis.joint, problem.recording.tau) * len(entries)
         if chance < SURE * false_alarm:
-            beside = accept(problem, tuple(member.group for member in members))
-            (outcome,) = scan(problem, [entry], beside, rng, nulls=False).outcomes
-            member = refine(problem, hypothesis, outcome.shape, beside) if outcome.degrees else None
-            if member is not None and member.gain > 0:
-                members.append(member)
-                p_values.append(chance)
-    return members, p_values
+            beside = accept(problem, tuple(member.group for member in (*members, *found)))
+            for outcome in scan(now, measure(now, [hypothesis]), beside, rng, nulls=False).outcomes:
+                member = refine(now, hypothesis, outcome.shape, beside) if outcome.degrees else None
+                if member is not None and member.gain > 0:
+                    # Once more, beside all of the torque as it is when that is known to be so.
+                    known = composed(problem, (*members, *found, member), [hypothesis])
+                    found.append(refine(known, hypothesis, member.shape, beside))
+                    p_values.append(chance)
+    return found, p_values
 
 
 def contenders(problem: Problem, result: Scan, members: Sequence[Member] = ()) -> list[Outcome]:
@@ -240,7 +249,8 @@ def _polished(
         for i in range(len(members)):
             others = [m for k, m in enumerate(members) if k != i]
             beside = accept(problem, tuple(m.group for m in others))
-            own = refine(problem, members[i].hypothesis, members[i].shape, beside)
+            now = composed(problem, members, [members[i].hypothesis])
+            own = refine(now, members[i].hypothesis, members[i].shape, beside)
             if own.hypothesis in seen:
                 members[i] = own
                 continue

@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.carried import unloaded
+from estimation.diagnosis.composed import fit, known_beside, known_without
 from estimation.diagnosis.extending import dense
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member, refine
-from estimation.diagnosis.regularisation import held
 from estimation.diagnosis.scoring import accept
 
 Array = NDArray[np.float64]
 
-# Rounds in which rows that an effect makes useless and the base model beside them are found in turn.
-ROUNDS = 3
+# Rows in which more than this share of the most is cut off are useless as measurements.
+CUT = 0.01
 # The noise is another where its logarithm changes by more than this.
 CALMER = 0.03
 # So is the base model's torque beside the effects where it is different by more than this share.
@@ -52,17 +52,15 @@ def settle(problem: Problem, members: Sequence[Member]) -> Settled:
     """Fits base model and effects together.
 
     Torque that was cut off draws the base model towards what is left of it, and how much was cut is then told by that.
-    So the base model is fitted without such rows first, and the cut once more beside it.
+    So the base model is fitted without such rows first, then to the torque as it is cut; and the cut beside it.
     """
-    cut = {k for k, member in enumerate(members) if _useless(problem, member) is not None}
+    useless = [_useless(problem, member) for member in members]
+    cut = [k for k, flags in enumerate(useless) if flags is not None]
     if cut:
-        whole = [member for k, member in enumerate(members) if k not in cut]
-        for _ in range(ROUNDS):
-            useless = [_useless(problem, members[k]) for k in cut]
-            values, _ = _fit(problem, whole, ~np.logical_or.reduce([flags for flags in useless if flags is not None]))
-            problem = _with_values(problem, values)
+        flags = np.logical_or.reduce([flags for flags in useless if flags is not None])
+        problem = known_beside(known_without(problem, members, flags), members)
         members = [_again(problem, members, k) if k in cut else member for k, member in enumerate(members)]
-    values, full = _fit(problem, members, np.ones_like(problem.recording.unsure))
+    values, full = fit(problem, members)
     known = len(problem.pull.target)
     return Settled(
         residual=problem.recording.tau - full @ values,
@@ -90,7 +88,7 @@ def moved(problem: Problem, values: Array, members: Sequence[Member]) -> bool:
     torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
     if np.max(np.sqrt(np.mean(change**2, axis=0)) / np.maximum(torque, 1e-12)) > MOVED:
         return True
-    now = _with_values(problem, values)
+    now = replace(problem, situation=problem.baseline.situation(problem.recording, values[: base.size]))
     for member in members:
         before, after = (dense(p, member.hypothesis, member.shape) @ member.coefficients for p in (problem, now))
         if np.sum((after - before) ** 2) > OTHER**2 * np.sum(before**2):
@@ -98,29 +96,14 @@ def moved(problem: Problem, values: Array, members: Sequence[Member]) -> bool:
     return False
 
 
-def _fit(problem: Problem, members: Sequence[Member], counted: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Fits base model, nuisance and members to the rows (N, n) that count: all values, and their columns."""
-    baseline, recording = problem.baseline, problem.recording
-    blocks = [dense(problem, member.hypothesis, member.shape) for member in members]
-    full = np.concatenate([baseline.regressor, baseline.nuisance, *blocks], axis=2)
-    weights = counted & ~recording.unsure
-    scaled = weights / problem.whitening.scales(len(recording))
-    flat = (full * scaled[:, :, None]).reshape(-1, full.shape[2])
-    return held(flat.T @ flat, flat.T @ (recording.tau * scaled).reshape(-1), problem.pull), full
-
-
 def _useless(problem: Problem, member: Member) -> NDArray[np.bool_] | None:
     """Rows (N, n) that an effect makes useless as measurements, by the log and by its torque; None if it makes none."""
     hypothesis = member.hypothesis
     flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
-    return None if flags is None else flags | dense(problem, hypothesis, member.shape).any(axis=2)
-
-
-def _with_values(problem: Problem, values: Array) -> Problem:
-    """The problem, its effects evaluated at other base parameters."""
-    return replace(
-        problem, situation=problem.baseline.situation(problem.recording, values[: problem.baseline.base.size])
-    )
+    if flags is None:
+        return None
+    lost = np.abs(dense(problem, hypothesis, member.shape)).max(axis=2)
+    return np.asarray(flags | (lost > CUT * lost.max()))
 
 
 def _again(problem: Problem, members: Sequence[Member], k: int) -> Member:

@@ -34,7 +34,7 @@ def shape_errors(problem: Problem, member: Member, others: Accepted) -> list[flo
 
     One whose bounds are equal is known.
     """
-    situation = problem.situation
+    situation = problem.sees(member.hypothesis.effect)
     bounds = member.hypothesis.effect.bounds(situation, member.hypothesis.joint)
     steps = []
     for k, (value, (low, high), shape) in enumerate(
@@ -123,7 +123,7 @@ def _along_ridge(problem: Problem, member: Member, k: int, others: Accepted, ste
     way counts.
     """
     shapes = member.hypothesis.effect.shapes
-    bounds = member.hypothesis.effect.bounds(problem.situation, member.hypothesis.joint)
+    bounds = member.hypothesis.effect.bounds(problem.sees(member.hypothesis.effect), member.hypothesis.joint)
     other, value = 1 - k, member.shape[k]
     best: list[float] = []
 

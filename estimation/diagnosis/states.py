@@ -18,6 +18,7 @@ from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.smoothed_motion import smoothed
 from estimation.preparation import Prepared, prepare
 from robots.common.errors import InputError
+from robots.common.stretches import spans
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -31,6 +32,8 @@ ORDER = 8  # of the low-pass before thinning
 # lost, and no more than a share of the log.
 LOST, MOST_LOST = 4.0, 0.02
 SHORTEST = 5.0  # [s] of log below which nothing can be told
+# Torque within this share of its largest is at it, three samples in a row.
+FLAT = 1e-6
 # A mean over repetitions is taken where it knows frequencies higher by this factor than a single pass.
 SHARPER = 1.2
 # At the ends of a log, rows in which all joints are slower than this share are left out, up to so long [s].
@@ -182,8 +185,21 @@ def _torque(log: Prepared, step: float) -> _Interpolation:
         even = t[0] + period * np.arange(int((t[-1] - t[0]) / period + 1e-6) + 1)
         tau = np.column_stack([np.interp(even, t, column) for column in tau.T])
         sections = butter(ORDER, 0.8 * period / step, output="sos")
-        t, tau = even, sosfiltfilt(sections, tau, axis=0)
+        t, tau = even, _under_its_top(tau, sosfiltfilt(sections, tau, axis=0))
     return _Interpolation(t, tau)
+
+
+def _under_its_top(tau: Array, passed: Array) -> Array:
+    """Keeps the flat tops of torque (N, n) that a filter has passed: a drive at its limit gives no more than that."""
+    result = passed.copy()
+    for own, column in zip(result.T, tau.T, strict=True):
+        most = float(np.abs(column).max(initial=0.0))
+        flat = [slice(a, b) for a, b in spans(np.abs(column) >= (1.0 - FLAT) * most) if b - a >= 3]
+        if flat:
+            np.clip(own, -most, most, out=own)
+        for rows in flat:
+            own[rows] = column[rows]
+    return result
 
 
 class _Interpolation:

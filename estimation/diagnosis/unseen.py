@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.carried import lightened, regressor_on, situation_on, unloaded
+from estimation.diagnosis.carried import lightened, regressor_on
+from estimation.diagnosis.composed import columns_on
 from estimation.diagnosis.extending import dense
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.gain import PARTS, Unseen, cross_validated, models, on_held_out
@@ -83,9 +84,10 @@ def measure_unseen(
     rng = np.random.default_rng(seed)
     pull = pull_on(problem, members)
     if held_out:
-        unseen, now, whole, first, columns = _on_logs(robot, problem, members, effects, held_out, pull)
+        unseen, states, whole, first, columns = _on_logs(robot, problem, members, effects, held_out, pull)
     else:
-        unseen, now = _left_out(problem, effects, pull), problem.situation
+        unseen = _left_out(problem, effects, pull)
+        states = [problem.sees(member.hypothesis.effect) for member in members]
         whole, first, columns = problem.recording, 0, list(effects)
     there = slice(first, None)
     torque = np.zeros_like(whole.tau[there])
@@ -97,7 +99,10 @@ def measure_unseen(
         rises=tuple(_rise(unseen, i, member) for i, member in enumerate(members)),
         worse=tuple(unseen.surely_worse(i + 1) for i in range(len(members))),
         kept=tuple(unseen.kept(i + 1, _joints(member)) for i, member in enumerate(members)),
-        coordinates=tuple(m.hypothesis.effect.coordinate(now, m.hypothesis.joint, m.shape)[1][there] for m in members),
+        coordinates=tuple(
+            m.hypothesis.effect.coordinate(state, m.hypothesis.joint, m.shape)[1][there]
+            for m, state in zip(members, states, strict=True)
+        ),
         whole=whole,
         first=first,
         effects=effects,
@@ -240,24 +245,18 @@ def _on_logs(
     effects: Sequence[Array],
     held_out: Sequence[Log],
     pull: Pull,
-) -> tuple[Unseen, Situation, Recording, int, list[Array]]:
+) -> tuple[Unseen, list[Situation], Recording, int, list[Array]]:
     recording = problem.recording
     other = lightened(robot, record(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN))
     other = other.trusting(recording.trusted)
     # One clock: where the unseen logs come later, the heat of the ones before is still there.
     later = bool(other.t[0] > recording.t[-1])
     whole = following(recording, other) if later else other
-    now = situation_on(whole, problem.situation.model, unloaded(problem))
     first = len(recording) if later else 0
-    columns = []
-    for member in members:
-        X = np.zeros((len(whole), robot.n, len(member.coefficients)))
-        joints, parts = member.hypothesis.columns(now, member.shape)
-        for j, part in zip(joints, parts, strict=True):
-            X[:, j] = part
-        columns.append(X[first:])
+    states, columns = columns_on(problem, whole, members)
+    columns = [X[first:] for X in columns]
     baseline = problem.baseline
     base = regressor_on(baseline.base, other)
     nuisance = np.zeros((len(other), robot.n, baseline.nuisance.shape[2]))
     unseen = on_held_out(problem, effects, other, np.concatenate([base, nuisance], axis=2), columns, pull)
-    return unseen, now, whole, first, columns
+    return unseen, states, whole, first, columns

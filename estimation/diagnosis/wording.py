@@ -64,7 +64,7 @@ def word_finding(
         ),
         sentence=sentence,
         visible=member.visible,
-        coordinate=hypothesis.effect.coordinate(problem.situation, joint, member.shape)[0],
+        coordinate=hypothesis.effect.coordinate(problem.sees(hypothesis.effect), joint, member.shape)[0],
         pattern=pattern,
     )
 

@@ -88,6 +88,7 @@ class Effect(ABC):
         kicks: whether it acts by changes of acceleration: they are largest, and least known, where a joint turns round.
         fast: whether its torque owes nothing to accelerations: it is looked for above the frequencies of those, too.
         blurs: whether it lets friction turn round later or over some time: how sharp its sign is shows beside it only.
+        last: whether it acts on all of the torque, that of other effects too (`Situation.beyond`).
         shapes: the parameters that the columns are not linear in.
         rivals: effects that resemble it, the closest first.
         experiments: kinds of experiment that separate it from them, the best first.
@@ -103,6 +104,7 @@ class Effect(ABC):
     kicks: ClassVar[bool] = False
     fast: ClassVar[bool] = False
     blurs: ClassVar[bool] = False
+    last: ClassVar[bool] = False
     shapes: ClassVar[tuple[Shape, ...]] = ()
     rivals: ClassVar[tuple[str, ...]] = ()
     experiments: ClassVar[tuple[str, ...]] = ()

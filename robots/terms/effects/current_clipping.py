@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from robots.common.stretches import spans
 from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
@@ -19,55 +20,55 @@ Array = NDArray[np.float64]
 class CurrentClipping(JointEffect):
     """tau = c (clip(tau, -L, L) - tau), c = 1 where all of the torque beyond L is lost.
 
-    The log is cut with its noise, which at the limit is then lost to one side: L comes out low by some share of it.
+    tau is all of the torque, that of other effects too. A drive cuts noise as well, which at the limit is then lost to
+    one side: where a log shows L by flat tops, the column is what is lost on average; elsewhere L comes out low.
 
     Flat tops in the log are also flagged by `gate`: such samples say that the torque was L or more, not how much.
     """
 
     name: ClassVar[str] = "current_clipping"
     title: ClassVar[str] = "torque cut off at the current limit"
+    last: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("level", "N m", 1e-3, 1e6, "log", inexact=0.01),)
     rivals: ClassVar[tuple[str, ...]] = ("torque_constant_saturation", "load_dependent_friction")
     experiments: ClassVar[tuple[str, ...]] = ("payload", "static_hold")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the share that is lost."""
-        return (Coefficient("share_lost", "1", 0.0, 2.0),)
+        return (Coefficient("share_lost", "1", 0.0, 1.0),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists levels that 1 to 40 % of the samples exceed; about the largest torque where that is a flat top."""
+        """Lists levels that 1 to 40 % of the samples exceed; the largest torque where that is a flat top."""
         assert joint is not None
-        if self._flat(situation, joint):
-            ((low, high),) = self.bounds(situation, joint)
-            return tuple((float(level),) for level in np.linspace(low, high, 9)[:-1])
-        size = np.abs(situation.torque[:, joint - 1])
+        if flat := self._flat(situation, joint):
+            return ((flat,),)
+        size = np.abs(situation.whole[:, joint - 1])
         levels = np.quantile(size, (0.6, 0.7, 0.8, 0.875, 0.925, 0.96, 0.98, 0.99))
         return tuple((float(level),) for level in np.unique(levels) if 1e-3 < level < size.max())
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the level below the largest torque, and near the largest of the log where that is a flat top."""
+        """Keeps the level below the largest torque, and at the largest of the log where that is a flat top."""
         assert joint is not None
-        top = float(np.abs(situation.torque[:, joint - 1]).max(initial=0.0))
+        top = float(np.abs(situation.whole[:, joint - 1]).max(initial=0.0))
         flat = self._flat(situation, joint)
-        return ((NEAR * min(flat, top), flat),) if flat else ((max(0.2 * top, 1e-3), max(top, 2e-3)),)
+        return ((flat, flat),) if flat else ((max(0.2 * top, 1e-3), max(top, 2e-3)),)
 
     def _flat(self, situation: Situation, joint: int) -> float:
-        """The largest torque of the log where that is a flat top, and a base model comes near it; else zero.
-
-        One that does not leaves the most of the torque to other effects: the log's limit is none of its own torque.
-        """
+        """The largest torque of the log where that is a flat top, and the known torque comes near it; else zero."""
         measured = situation.measured
-        if measured is None:
+        if measured is None or self.chance(situation, joint, measured) >= CERTAIN:
             return 0.0
-        level = float(np.abs(measured[:, joint - 1]).max())
-        chance = situation.cached(("flat top", joint), lambda: self.chance(situation, joint, measured))
-        near = float(np.abs(situation.torque[:, joint - 1]).max()) > NEAR * level
-        return level if near and chance < CERTAIN else 0.0
+        return float(np.abs(measured[:, joint - 1]).max())
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates what the cut takes away."""
-        torque = situation.torque[:, joint - 1]
-        return (np.clip(torque, -shape[0], shape[0]) - torque)[:, None]
+        """Evaluates what the cut takes away: where noise is cut as well, what it takes on average."""
+        torque, level = situation.whole[:, joint - 1], shape[0]
+        lost = np.clip(torque, -level, level) - torque
+        if self._flat(situation, joint):
+            assert situation.measured is not None
+            noise = _spread(situation.measured[:, joint - 1] - torque, np.abs(torque) < level)
+            lost += _above(-torque - level, noise) - _above(torque - level, noise)
+        return lost[:, None]
 
     def gate(self, situation: Situation, joint: Place, measured: Array) -> NDArray[np.bool_]:
         """Flags flat tops: three and more samples in a row at the largest torque of the log.
@@ -79,21 +80,17 @@ class CurrentClipping(JointEffect):
         size = np.abs(measured[:, joint - 1])
         for start, stop in _stretches(situation, size >= (1.0 - FLAT) * size.max(initial=0.0)):
             flagged[start:stop, joint - 1] = True
-        certain = flagged.sum() >= FLAT_SAMPLES or self.chance(situation, joint, measured) < CERTAIN
+        certain = flagged.sum() >= FLAT_SAMPLES or _accident(situation, joint, measured) < CERTAIN
         return flagged if certain and size.any() else np.zeros_like(flagged)
 
     def chance(self, situation: Situation, joint: Place, measured: Array) -> float:
-        """Gives the chance that the largest torque is logged in so many stretches of three samples and more.
+        """Gives the chance of the log's flat tops, if the known torque comes near them.
 
-        As often as other samples are in stretches of one torque: where it is told in coarse steps, that says nothing.
+        One that does not is not known as to its most: the log's limit is none of what is known.
         """
         assert joint is not None
-        torque = measured[:, joint - 1]
-        top = np.abs(torque) >= (1.0 - EQUAL) * np.abs(torque).max(initial=0.0)
-        alike = np.abs(np.diff(torque)) <= EQUAL * np.abs(torque).max(initial=0.0)
-        still = np.concatenate([[False], alike]) | np.concatenate([alike, [False]])
-        others = sum(stop - start for start, stop in _stretches(situation, still & ~top))
-        return float(((1.0 + others) / (1.0 + np.sum(~top))) ** len(_stretches(situation, still & top)))
+        most, known = (float(np.abs(x[:, joint - 1]).max(initial=0.0)) for x in (measured, situation.whole))
+        return _accident(situation, joint, measured) if known > NEAR * most else 1.0
 
     def describe(
         self,
@@ -108,9 +105,10 @@ class CurrentClipping(JointEffect):
         return f"The torque of joint {joint} is cut off at {shape[0]:.4g} {force}: the drive's current is at its limit."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the base model's torque."""
+        """Gives the torque that is cut."""
         assert joint is not None
-        return f"torque of joint {joint} by the base model [N m]", situation.torque[:, joint - 1]
+        name = "the base model" if situation.beyond is None else "the model without a limit"
+        return f"torque of joint {joint} by {name} [N m]", situation.whole[:, joint - 1]
 
 
 FLAT = 1e-4
@@ -121,10 +119,40 @@ EQUAL = 1e-6
 CERTAIN = 1e-6
 """Chance below which flat tops are no chance."""
 NEAR = 0.9
-"""Share of such a top down to which the level may come out."""
+"""Share of such a top down to which the known torque is near it."""
 
 
 def _stretches(situation: Situation, flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Lists the stretches [start, stop) of three and more flagged rows (N,), of one log each."""
     parts = ((run.start, spans(flags[run])) for run in situation.runs)
     return [(first + a, first + b) for first, part in parts for a, b in part if b - a >= 3]
+
+
+def _spread(values: Array, counted: NDArray[np.bool_]) -> float:
+    """Gives the standard deviation of noise, whatever else is among it."""
+    return 1.4826 * float(np.median(np.abs(values[counted]))) if counted.any() else 0.0
+
+
+def _above(excess: Array, noise: float) -> Array:
+    """Gives how much more normal noise of that deviation is cut on average than a torque alone, by its excess (N,)."""
+    if noise <= 0:
+        return np.zeros_like(excess)
+    z = -np.abs(excess) / noise
+    return np.asarray(noise * (np.exp(-0.5 * z**2) / np.sqrt(2 * np.pi) + z * ndtr(z)))
+
+
+def _accident(situation: Situation, joint: int, measured: Array) -> float:
+    """Gives the chance that the largest torque is logged in so many stretches of three samples and more.
+
+    As often as other samples are in stretches of one torque: where it is told in coarse steps, that says nothing.
+    """
+
+    def evaluate() -> float:
+        torque = measured[:, joint - 1]
+        top = np.abs(torque) >= (1.0 - EQUAL) * np.abs(torque).max(initial=0.0)
+        alike = np.abs(np.diff(torque)) <= EQUAL * np.abs(torque).max(initial=0.0)
+        still = np.concatenate([[False], alike]) | np.concatenate([alike, [False]])
+        others = sum(stop - start for start, stop in _stretches(situation, still & ~top))
+        return float(((1.0 + others) / (1.0 + np.sum(~top))) ** len(_stretches(situation, still & top)))
+
+    return situation.cached(("flat top", joint), evaluate) if measured is situation.measured else evaluate()

@@ -41,6 +41,7 @@ class Situation:
         parts: where logs carry different payloads, or the base stands otherwise than the robot's description says, the
             situations that this one joins; `parameters` are the first's, and each has a model of its own gravity.
         measured: torque as logged (N, n) [N m or N]; None where there is no log, and in models that are evaluated.
+        beyond: torque of other effects (N, n) [N m or N], for those that act on all of the torque; None for none.
     """
 
     model: TorqueModel
@@ -56,6 +57,7 @@ class Situation:
     velocity_scale: Array
     parts: tuple[Situation, ...] = ()
     measured: Array | None = None
+    beyond: Array | None = None
     _cache: dict[object, Any] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
@@ -76,6 +78,11 @@ class Situation:
         """The median sample period within the logs [s]; 0 for a single sample."""
         steps = np.concatenate([np.diff(self.t[run]) for run in self.runs])
         return float(np.median(steps)) if len(steps) else 0.0
+
+    @property
+    def whole(self) -> Array:
+        """All of the torque that is known (N, n) [N m or N]: the base model's, and that of other effects."""
+        return self.torque if self.beyond is None else self.torque + self.beyond
 
     @cached_property
     def gravity(self) -> Array:

@@ -129,7 +129,7 @@ def test_what_a_log_shows_by_itself_is_no_leftover() -> None:
     other = _member("stribeck", 1, ((flat - tau)[:, :1],))
 
     def beyond(candidate: Member, measured: np.ndarray) -> bool:
-        situation = SimpleNamespace(runs=(slice(0, ROWS),), robot=None)
+        situation = SimpleNamespace(runs=(slice(0, ROWS),), robot=None, measured=None)
         problem = SimpleNamespace(situation=situation, recording=SimpleNamespace(tau=measured), rows=ROWS)
         return _beyond(problem, replace(candidate, gain=200.0), [large])  # type: ignore[arg-type]
 
@@ -195,7 +195,8 @@ def test_a_search_starts_again_from_other_summits(far: bool, expected: float, mo
     class _Shape(tuple):  # type: ignore[type-arg]
         joints = group.joints
 
-    problem = SimpleNamespace(situation=SimpleNamespace(robot=None), rows=ROWS, measured=lambda _, shape: _Shape(shape))
+    situation = SimpleNamespace(robot=None)
+    problem = SimpleNamespace(sees=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
     effect = _Summits(far)
     member = refinement.refine(problem, Hypothesis(effect, 1), (0.08,), None)  # type: ignore[arg-type]
     assert member.shape[0] == pytest.approx(expected, rel=0.05)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -108,19 +109,26 @@ def test_a_few_flat_tops_are_no_chance_where_torque_is_told_finely(seen):
     between = (np.pi / 2 + 2 * np.pi * 12.5) / 8.0
     size = 6.0 * np.exp(-0.1 * (t - between) ** 2)
     torque[:, 1] = size * np.sin(8.0 * t) + 0.01 * np.random.default_rng(0).normal(size=len(t))
-    assert clipping.chance(now, 2, torque) > 1e-4
+
+    def chance(measured):
+        """Of torque that is known but for what is cut off."""
+        return clipping.chance(replace(now, beyond=torque - now.torque), 2, measured)
+
+    assert chance(torque) > 1e-4
     cut = np.minimum(torque, 0.99 * torque.max())
     cut[:, 1] *= np.where(cut[:, 1] < 0, 0.9, 1.0)
     top = cut == cut.max()
     assert 6 <= np.sum(top) < 30
-    assert clipping.chance(now, 2, cut) < 1e-6
+    assert chance(cut) < 1e-6
+    # A model that does not come near the tops does not know the torque that they cut.
+    assert clipping.chance(replace(now, beyond=0.5 * torque - now.torque), 2, cut) == 1.0
     flagged = clipping.gate(now, 2, cut)
     assert 6 <= flagged.sum() <= top.sum()
     assert top[flagged].all()
     coarse = np.round(torque / 0.2) * 0.2
-    assert clipping.chance(now, 2, coarse) > 1e-3
+    assert chance(coarse) > 1e-3
     assert not clipping.gate(now, 2, np.round(torque / 0.05) * 0.05).any()
-    assert clipping.chance(now, 2, np.zeros(torque.shape)) == 1.0
+    assert chance(np.zeros(torque.shape)) == 1.0
 
 
 @pytest.mark.parametrize(("delay", "sharp"), [(0.003, 0.2), (0.008, 2e-3), (0.0003, 2e-3), (-0.001, 2e-3)])

@@ -1,0 +1,137 @@
+"""What acts on all of the torque, such as a limit of current, in sight of base model and other effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.carried import situation_on, unloaded
+from estimation.diagnosis.extending import dense
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.recording import Recording
+from estimation.diagnosis.refinement import Member
+from estimation.diagnosis.regularisation import held
+from robots.terms.effects import Situation
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+ROUNDS = 4
+"""In which all of the torque is found by what is left of it."""
+STEP = 1e-3
+"""Change of the torque, as a share of its root mean square, by which it is told what passes."""
+
+
+def composed(problem: Problem, members: Sequence[Member], hypotheses: Sequence[Hypothesis]) -> Problem:
+    """Lets effects that act on all of the torque know what it is: base model and other members, fitted together.
+
+    Where no log shows by itself that samples are useless as measurements, the problem stays as it is: what is cut off
+    elsewhere is little of all.
+
+    Args:
+        problem: the data.
+        members: what is known to act.
+        hypotheses: of which some may act on all of the torque.
+    """
+    useless = np.zeros_like(problem.recording.unsure)
+    for hypothesis in hypotheses:
+        if hypothesis.effect.last:
+            flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
+            useless |= False if flags is None else flags
+    return known_beside(known_without(problem, members, useless), members) if useless.any() else problem
+
+
+def known_without(problem: Problem, members: Sequence[Member], useless: Flags) -> Problem:
+    """Tells all of the torque by the rows (N, n) that are of use, and members that do not act on all of it."""
+    before = [member for member in members if not member.hypothesis.effect.last]
+    known = _Fit(problem, before, ~useless)
+    return known.told(known.values(problem.recording.tau))
+
+
+def known_beside(problem: Problem, members: Sequence[Member]) -> Problem:
+    """Tells all of the torque by all rows, where what acts on it is among the members.
+
+    Without the useless rows alone, those that noise has kept from being so would make it too small. So the torque as it
+    is cut on average is fitted to all of them (Gauss and Newton): a row counts by what of its torque's changes passes.
+    """
+    last = [member for member in members if member.hypothesis.effect.last]
+    if not last or problem.whole is None:
+        return problem
+    before = [member for member in members if not member.hypothesis.effect.last]
+    known = _Fit(problem, before, np.ones_like(problem.recording.unsure))
+    step = STEP * np.sqrt(np.mean(problem.recording.tau**2, axis=0))
+    values = known.values(problem.recording.tau - _lost(problem, last))
+    for _ in range(ROUNDS):
+        problem = known.told(values)
+        lost, more, less = (_lost(_with_more(problem, by), last) for by in (0.0 * step, step, -step))
+        passes = np.clip(1.0 + (more - less) / (2.0 * step), 0.0, 1.0)
+        torque = known.full @ values
+        values = known.values(problem.recording.tau - torque - lost + passes * torque, passes)
+    return known.told(values)
+
+
+def _lost(problem: Problem, members: Sequence[Member]) -> Array:
+    return np.sum([dense(problem, member.hypothesis, member.shape).sum(axis=2) for member in members], axis=0)
+
+
+def _with_more(problem: Problem, torque: Array) -> Problem:
+    whole = problem.whole
+    assert whole is not None
+    return replace(problem, whole=replace(whole, beyond=torque + (whole.beyond if whole.beyond is not None else 0.0)))
+
+
+class _Fit:
+    """Base model, nuisance and members fitted together to the rows (N, n) that count."""
+
+    def __init__(self, problem: Problem, members: Sequence[Member], counted: Flags) -> None:
+        baseline, recording = problem.baseline, problem.recording
+        blocks = [dense(problem, member.hypothesis, member.shape) for member in members]
+        self.problem = problem
+        self.full = np.concatenate([baseline.regressor, baseline.nuisance, *blocks], axis=2)
+        self.weights = (counted & ~recording.unsure) / problem.whitening.scales(len(recording))
+
+    def values(self, tau: Array, passes: Array | float = 1.0) -> Array:
+        """Fits torque (N, n), of whose changes a share passes (N, n)."""
+        flat = (self.full * (self.weights * passes)[:, :, None]).reshape(-1, self.full.shape[2])
+        return held(flat.T @ flat, flat.T @ (tau * self.weights).reshape(-1), self.problem.pull)
+
+    def told(self, values: Array) -> Problem:
+        """The problem, all of the torque known by these values."""
+        problem, known = self.problem, len(self.problem.pull.target)
+        now = problem.baseline.situation(problem.recording, values[: problem.baseline.base.size])
+        beyond = self.full[:, :, known:] @ values[known:] if len(values) > known else None
+        return replace(problem, whole=replace(now, beyond=beyond))
+
+
+def fit(problem: Problem, members: Sequence[Member]) -> tuple[Array, Array]:
+    """Fits base model, nuisance and members together: all values, and their columns (N, n, b)."""
+    both = _Fit(problem, members, np.ones_like(problem.recording.unsure))
+    return both.values(problem.recording.tau), both.full
+
+
+def columns_on(
+    problem: Problem, recording: Recording, members: Sequence[Member]
+) -> tuple[list[Situation], list[Array]]:
+    """Evaluates what members depend on in another recording, and their columns (N, n, k) there."""
+    model = problem.situation.model
+    now = situation_on(recording, model, unloaded(problem))
+    states, columns = [now] * len(members), [_dense(now, member) for member in members]
+    if problem.whole is not None:
+        whole = situation_on(recording, model, unloaded(replace(problem, situation=problem.whole)))
+        parts = [X @ m.coefficients for X, m in zip(columns, members, strict=True) if not m.hypothesis.effect.last]
+        whole = replace(whole, beyond=np.sum(parts, axis=0) if parts else None)
+        for k, member in enumerate(members):
+            if member.hypothesis.effect.last:
+                states[k], columns[k] = whole, _dense(whole, member)
+    return states, columns
+
+
+def _dense(state: Situation, member: Member) -> Array:
+    X = np.zeros((*state.q.shape, len(member.coefficients)))
+    for j, part in zip(*member.hypothesis.columns(state, member.shape), strict=True):
+        X[:, j] = part
+    return X
