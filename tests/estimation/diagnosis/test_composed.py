@@ -60,7 +60,7 @@ def test_all_of_the_torque_is_known_beside_what_cuts_it_off(hidden: tuple[Proble
     # All of what is beyond the limit is lost, and the limit is that of the log.
     again = refine(sharp, CLIPPING, clipping.shape, accept(problem, (other.group,)))
     assert again.shape == (limit,)
-    assert again.coefficients[0] == pytest.approx(1.0, abs=0.02)
+    assert again.coefficients[0] == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_problem_whose_torque_nothing_cuts_off_stays_as_it_is(
