@@ -128,8 +128,9 @@ def refine(
             best[:] = [member]
         return worth
 
-    # What is known now may have been free where the search comes from.
-    start = tuple(min(max(value, low), high) for value, (low, high) in zip(start, bounds, strict=True))
+    if hypothesis.effect.last:
+        # What is known now may have been free where the search comes from.
+        start = tuple(min(max(value, low), high) for value, (low, high) in zip(start, bounds, strict=True))
     evaluate(start)
     if free and effort:
         at = list(start)
