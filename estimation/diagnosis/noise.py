@@ -12,6 +12,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from estimation.diagnosis.band import SHARE, find_bands, unbiased
 from estimation.diagnosis.gaps import find_gaps, free_columns, long_gap
+from estimation.diagnosis.lines import without_lines
 from estimation.diagnosis.own_functions import Beside
 from estimation.diagnosis.states import Recording
 from estimation.diagnosis.whitening import Whitening
@@ -90,12 +91,13 @@ def estimate_whitening(
     pieces = beside.left(pieces)
     tells = sum(map(len, pieces)) * step * FLAT >= FEWEST
     slowest, fastest = FLAT if tells else 0.0, INSIDE * cutoffs
-    noise = _colour(pieces, step, counts, parameters, slowest, fastest, beside)
+    period = next((cycle.period for cycle in recording.cycles if cycle is not None), None)
+    noise = _colour(pieces, step, counts, parameters, slowest, fastest, beside, period)
     levels = None
     if len(pieces) > 1:
         levels = _levels([noise.whitened(piece) for piece in pieces], step, slowest, fastest)
         pieces = [piece / level for piece, level in zip(pieces, levels, strict=True)]
-        noise = _colour(pieces, step, counts, parameters, slowest, fastest, beside)
+        noise = _colour(pieces, step, counts, parameters, slowest, fastest, beside, period)
     trimmed = max(len(a) for a in noise.coefficients)
     innovations = np.concatenate([noise.whitened(piece)[min(trimmed, len(piece) // 2) :] for piece in pieces])
     # White noise has as much power at each frequency: what effects add to the slow ones is left out, and above the band
@@ -103,8 +105,10 @@ def estimate_whitening(
     spectrum = np.fft.rfft(innovations, axis=0)
     f = np.fft.rfftfreq(len(innovations), step)
     inside = (f[:, None] >= slowest) & (f[:, None] < fastest)
+    power = without_lines(np.abs(spectrum) ** 2, f[1], period)
+    spectrum *= np.sqrt(power) / np.maximum(np.abs(spectrum), np.finfo(float).tiny)
     spectrum[~inside] = 0.0
-    power = np.abs(spectrum) ** 2 / beside.kept(len(innovations), counts)
+    power = np.where(inside, power / beside.kept(len(innovations), counts), 0.0)
     scale = np.maximum(np.sqrt(power.sum(axis=0) / np.maximum(inside.sum(axis=0), 1) / counts), 1e-12)
     white = _unit(spectrum, len(innovations))
     # Joints correlate in the frequencies that all of them know.
@@ -196,6 +200,7 @@ def _colour(
     slowest: float,
     fastest: Array,
     beside: Beside,
+    period: float | None,
 ) -> Noise:
     """Fits the noise by its spectrum within a window, and lets the model say what is outside.
 
@@ -211,12 +216,13 @@ def _colour(
         slowest: lowest frequency of the windows [Hz].
         fastest: highest of each joint's (n,) [Hz].
         beside: what was taken out of the pieces.
+        period: of the motion [s]; None where it does not repeat.
     """
     rows, joints = sum(map(len, pieces)), pieces[0].shape[1]
     highest = int(np.clip(round(MEMORY / step), LOWEST_ORDER, HIGHEST_ORDER))
     size = next_fast_len(max(map(len, pieces)) + highest + 1, real=True)
     power = sum(np.abs(np.fft.rfft(piece, size, axis=0)) ** 2 for piece in pieces) / counts
-    power = power / beside.kept(size, counts)
+    power = without_lines(power / beside.kept(size, counts), 1 / (size * step), period)
     power = power * rows * joints / max(rows * joints - parameters, 0.5 * rows * joints)
     covariances = np.empty((joints, highest + 1))
     for j in range(joints):
