@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from estimation.diagnosis.pulling import Pulling
 from estimation.diagnosis.resonance import resonance
 from estimation.diagnosis.swinging import Swinging
 from robots.robot import Robot
@@ -130,17 +131,18 @@ class Pattern(JointEffect):
         return f"The residual torque {where} {text}{turn}."
 
 
-def build_pattern(text: str) -> Pattern | Swinging | None:
+def build_pattern(text: str) -> Pattern | Swinging | Pulling | None:
     """Reads the name of a pattern; None for anything else."""
-    if text == Swinging.name:
-        return Swinging()
+    for whole in (Swinging, Pulling):
+        if text == whole.name:
+            return whole()
     parts = text.removeprefix(PREFIX).split(":")
     if not text.startswith(PREFIX) or len(parts) != 3 or parts[0] not in _FAMILIES or not parts[1].isdigit():
         return None
     return Pattern(parts[0], int(parts[1]), parts[2] == "odd")
 
 
-def all_patterns(robot: Robot) -> tuple[Pattern | Swinging, ...]:
+def all_patterns(robot: Robot) -> tuple[Pattern | Swinging | Pulling, ...]:
     """Lists the patterns to look for on every joint, and on the robot as a whole."""
     joints = range(1, robot.n + 1)
     own = [Pattern("speed"), Pattern("speed", odd=True), Pattern("load"), Pattern("load", odd=True)]
@@ -148,8 +150,10 @@ def all_patterns(robot: Robot) -> tuple[Pattern | Swinging, ...]:
     own += [Pattern("ringing"), Pattern("vibration"), Pattern("sway"), Pattern("turns")]
     each = [Pattern("angle", k, odd) for k in joints for odd in (False, True)]
     each += [Pattern("angles", k) for k in joints] if robot.n > 1 else []
-    each += [Pattern("motion", k) for k in joints] if robot.n > 1 else []
-    return (*own, *each, Swinging())
+    each += [Pattern("motion", k, odd) for k in joints for odd in (False, True)] if robot.n > 1 else []
+    each += [Pattern("drag", k) for k in joints]
+    each += [Pattern("posture", k) for k in joints] if robot.n > 1 else []
+    return (*own, *each, Swinging(), Pulling())
 
 
 def is_of_time(effect: object) -> bool:
@@ -181,6 +185,21 @@ def _motion(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> A
     v = s.dq[:, other - 1]
     own = s.dq[:, joint - 1]
     return np.column_stack([v, np.abs(v), v * np.abs(v), s.sign[:, other - 1], v * own])
+
+
+def _drag(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    return _products(s.q[:, joint - 1], s.dq[:, other - 1])
+
+
+def _posture(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    if other == joint:
+        return np.zeros((len(s), 8))
+    return _products(s.q[:, other - 1], s.dq[:, joint - 1])
+
+
+def _products(q: Array, v: Array) -> Array:
+    waves = [f(h * q) for h in (1, 2) for f in (np.cos, np.sin)]
+    return np.column_stack([wave * speed for wave in waves for speed in (v, v * v)])
 
 
 def _speed(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
@@ -237,7 +256,7 @@ def _vibration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -
         pull = np.ones((len(s), 1)) * [1.0, 0.0, 0.0]
     waves = (np.cos(phase), np.sin(phase))
     columns = [wave * pull[:, i % pull.shape[1]] for i in range(3) for wave in waves]
-    return np.column_stack(columns)
+    return np.column_stack([*columns, *waves])
 
 
 def _sway(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
@@ -256,6 +275,8 @@ _FAMILIES: dict[str, Callable[[Situation, int, int, tuple[float, ...]], Array]] 
     "angle": _angle,
     "angles": _angles,
     "motion": _motion,
+    "drag": _drag,
+    "posture": _posture,
     "speed": _speed,
     "load": _load,
     "acceleration": _acceleration,
@@ -270,13 +291,15 @@ _COUNTS = {
     "angle": 8,
     "angles": 16,
     "motion": 5,
+    "drag": 8,
+    "posture": 8,
     "speed": 6,
     "load": 5,
     "acceleration": 3,
     "memory": 4,
     "time": KNOTS,
     "ringing": 4,
-    "vibration": 6,
+    "vibration": 8,
     "sway": 2,
     "turns": 8,
 }
@@ -284,6 +307,8 @@ _WORDS = {
     "angle": "depends on the position of {who}",
     "angles": "depends on its own position and that of {who} together",
     "motion": "depends on the velocity of {who}",
+    "drag": "depends on its own position and the velocity of {who} together",
+    "posture": "depends on its own velocity and the position of {who} together",
     "speed": "depends on the speed of the joint",
     "load": "depends on the load of the joint",
     "acceleration": "depends on the acceleration of the joint, not in proportion",

@@ -123,13 +123,7 @@ def _tool(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.
 
 
 def _jacobian(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
-    rotation, origin = casadi.SX.eye(3), casadi.SX(3, 1)
-    poses = []
-    for i, joint in enumerate(chain.joints):
-        turn, offset = symbolic_placement(joint, q[i])
-        origin, rotation = origin + rotation @ offset, rotation @ turn
-        poses.append((joint.kind, rotation @ casadi.SX(cleaned(joint.axis)), origin))
-    flange = origin + rotation @ casadi.SX(chain.tip[:3, 3])
+    poses, flange = _forward(chain, q)
     columns = [
         casadi.vertcat(casadi.cross(axis, flange - at), axis)
         if kind == "revolute"
@@ -137,6 +131,21 @@ def _jacobian(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: cas
         for kind, axis, at in poses
     ]
     return casadi.horzcat(*columns)
+
+
+def _flange(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    return _forward(chain, q)[1]
+
+
+def _forward(chain: Chain, q: casadi.SX) -> tuple[list[tuple[str, casadi.SX, casadi.SX]], casadi.SX]:
+    """Gives each joint's kind, axis and origin, and the flange's place, in the base frame."""
+    rotation, origin = casadi.SX.eye(3), casadi.SX(3, 1)
+    poses: list[tuple[str, casadi.SX, casadi.SX]] = []
+    for i, joint in enumerate(chain.joints):
+        turn, offset = symbolic_placement(joint, q[i])
+        origin, rotation = origin + rotation @ offset, rotation @ turn
+        poses.append((joint.kind, rotation @ casadi.SX(cleaned(joint.axis)), origin))
+    return poses, origin + rotation @ casadi.SX(chain.tip[:3, 3])
 
 
 def moved_body(tip: Array) -> Array:
@@ -164,4 +173,5 @@ KINDS: dict[str, Callable[..., casadi.SX]] = {
     "gravity": _gravity,
     "tool": _tool,
     "jacobian": _jacobian,
+    "flange": _flange,
 }
