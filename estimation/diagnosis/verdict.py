@@ -14,8 +14,9 @@ from estimation.diagnosis.scan import Entry, scan
 from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.selection import Found, Selection
 
-# Named effects that explain less than this share of what stands out of the noise do not explain it.
-ENOUGH = 0.7
+# Named effects that explain less than this share of what stands out of the noise, or of what free functions do in their
+# place, do not explain it; nor do those that explain less than the second share of that, and fit worse (Schwarz).
+ENOUGH, NEARLY = 0.7, 0.9
 # Rivals within this of the best BIC stay possible.
 CLOSE = 10.0
 MOST_PATTERNS = 3
@@ -68,6 +69,9 @@ def judge(
     kept = selection.found
     if share < ENOUGH:
         kept = tuple(found for found in kept if found.member.hypothesis.joint is not None)
+    kept = tuple(found for found in kept if _holds_alone(problem, found, named, patterns, false_alarm, rng))
+    if not _holds_together(problem, named, patterns, false_alarm, rng):
+        kept = ()
     joints = {found.member.hypothesis.joint for found in kept} - {None}
     lost = {j for j in joints if not _holds(problem, j, named, patterns, left, false_alarm, rng)}
     # What acts on all joints at once goes before names of single joints that explain less than it does.
@@ -88,6 +92,9 @@ def judge(
         wide = any(member.hypothesis.joint is None for member in members)
         spread = [found for found in kept if wide or len(found.member.group.joints) > 1]
         borrowed = [f for f in spread if not _stays(problem, f, kept, patterns, false_alarm, rng)]
+        # So may one that acts on its own joint alone, if base parameters have taken another's torque for it.
+        single = [found for found in kept if found not in spread]
+        borrowed += [f for f in single if not _keep(problem, [f.member], [*_beside(kept, f), *members])]
         if not borrowed:
             return Judgement("unexplained", kept, tuple(members), tuple(p_values), float(share))
         weakest = min(borrowed, key=lambda found: found.member.gain)
@@ -118,9 +125,9 @@ def _holds(
         return False
     here = [entry for entry in patterns if entry.hypothesis.joint == joint]
     free, _ = _patterns(problem, here, others, false_alarm, rng)
-    if gain - degrees < ENOUGH * sum(map(_worth, free)):
+    if _beaten(problem, gain, degrees, free):
         return False
-    if len(own) > 1 and not _thriftier(problem, own, others, free):
+    if len(own) > 1 and not _thriftier(problem, own, others, free, LEAST):
         return False
     if any(member.hypothesis.effect.passing for member in own):
         # What comes and goes follows nearly any torque: functions of the motion that do so with less refute it.
@@ -137,6 +144,40 @@ def _holds(
     return _keep(problem, whole, [*single, *free]) or _thriftier(problem, [*own, *whole], single, free)
 
 
+def _holds_alone(
+    problem: Problem,
+    found: Found,
+    named: Sequence[Member],
+    patterns: Sequence[Entry],
+    false_alarm: float,
+    rng: np.random.Generator,
+) -> bool:
+    """Whether a name of the whole robot explains what free functions would in its place."""
+    own = found.member
+    if own.hypothesis.joint is not None:
+        return True
+    others = [member for member in named if member is not own]
+    free, _ = _patterns(problem, patterns, others, false_alarm, rng)
+    return not _beaten(problem, own.gain, own.degrees, free)
+
+
+def _holds_together(
+    problem: Problem, named: Sequence[Member], patterns: Sequence[Entry], false_alarm: float, rng: np.random.Generator
+) -> bool:
+    """Whether names fit better than one cause of all joints' torque that no name is for, all parameters counted."""
+    whole = [entry for entry in patterns if entry.hypothesis.joint is None]
+    free, _ = _patterns(problem, whole, [], false_alarm, rng)
+    return _thriftier(problem, named, [], free[:1])
+
+
+def _beaten(problem: Problem, gain: float, degrees: int, free: Sequence[Member]) -> bool:
+    """Whether free functions explain much more than names do, or clearly more for their number of parameters."""
+    price = float(np.log(problem.rows))
+    most = sum(map(_worth, free))
+    better = sum(member.gain - member.degrees * price for member in free) - (gain - degrees * price)
+    return gain - degrees < ENOUGH * most or (better > 0 and gain - degrees < NEARLY * most)
+
+
 def _stays(
     problem: Problem,
     found: Found,
@@ -146,9 +187,13 @@ def _stays(
     rng: np.random.Generator,
 ) -> bool:
     """Whether a name keeps its gain beside free functions that were chosen without it."""
-    others = [other.member for other in kept if other is not found]
+    others = _beside(kept, found)
     free, _ = _patterns(problem, patterns, others, false_alarm, rng, alone=True)
     return _keep(problem, [found.member], [*others, *free])
+
+
+def _beside(kept: Sequence[Found], found: Found) -> list[Member]:
+    return [other.member for other in kept if other is not found]
 
 
 def _keep(problem: Problem, names: Sequence[Member], beside: Sequence[Member]) -> bool:
@@ -157,13 +202,15 @@ def _keep(problem: Problem, names: Sequence[Member], beside: Sequence[Member]) -
     return all(score(problem, name.group, accepted).gain > STAYS * name.gain for name in names)
 
 
-def _thriftier(problem: Problem, names: Sequence[Member], others: Sequence[Member], free: Sequence[Member]) -> bool:
-    """Whether names fit better than free functions in their place, all parameters counted."""
+def _thriftier(
+    problem: Problem, names: Sequence[Member], others: Sequence[Member], free: Sequence[Member], margin: float = 0.0
+) -> bool:
+    """Whether names fit better than free functions in their place, by a margin (Schwarz), all parameters counted."""
     gain = accept(problem, tuple(m.group for m in (*others, *names))).gain
     gain -= accept(problem, tuple(m.group for m in others)).gain
     price = float(np.log(problem.rows))
     criterion = sum(member.gain - member.degrees * price for member in free)
-    return not free or gain - sum(member.degrees for member in names) * price > criterion
+    return not free or gain - sum(member.degrees for member in names) * price > criterion + margin
 
 
 def _worth(member: Member) -> float:

@@ -90,7 +90,8 @@ def test_a_drift_is_a_free_function_of_time(
     [
         ((0, 1), 2, 10.0, False),  # without it a free function on the other joint explains nearly all that it does
         ((0, 1), 2, 90.0, True),  # it explains something else
-        ((0,), 2, 10.0, True),  # it does nothing on the other joint
+        ((0,), 2, 10.0, False),  # it acts on its own joint alone, but base parameters had taken the other's for it
+        ((0,), 2, 90.0, True),  # it does nothing on the other joint
         ((0,), None, 10.0, False),  # something swings, and moves all joints
         ((0,), None, 90.0, True),
     ],
@@ -115,3 +116,45 @@ def test_a_formula_is_not_named_for_what_is_unexplained_on_joints_that_it_reache
     assert said.verdict == "unexplained"
     assert said.patterns == (free,)
     assert said.kept == ((found,) if kept else ())
+
+
+@pytest.mark.parametrize(
+    ("free", "degrees", "holds"),
+    [
+        (620.0, 6, False),  # a function of one joint's motion explains clearly more, and is worth its parameters
+        (620.0, 40, True),  # it explains that much with far more of them
+        (550.0, 6, True),  # it is better, but formulas are not exact: not by enough
+        (900.0, 90, False),  # whatever it costs, the name leaves a third of it
+    ],
+)
+def test_a_name_of_the_whole_robot_is_weighed_against_functions_of_a_joint(
+    free: float, degrees: int, holds: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A tilted base of a gain of 500 and two parameters, named for what happens on one joint."""
+    tilt = _member("base_tilt", None, 500.0, 2)
+    pattern = Hypothesis(Pattern("drag", 3), 1)
+    other = replace(_member("spring", 1, free, degrees), hypothesis=pattern)
+    monkeypatch.setattr(verdict, "_patterns", lambda *arguments, **kind: ([other], [1e-30]))
+    found = Found(tilt, 1e-9, ())
+    problem = SimpleNamespace(rows=ROWS)
+    held = verdict._holds_alone(problem, found, [tilt], [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
+    assert held is holds
+
+
+def test_several_names_on_one_joint_must_fit_better_than_one_free_function(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A spring and a presliding of 309 together are a cable that relaxes, if that explains as much by itself."""
+    pair = [_member("spring", 1, 200.0, 3), _member("presliding_hysteresis", 1, 109.0, 2)]
+    free = replace(_member("spring", 1, 299.0, 4), hypothesis=Hypothesis(Pattern("memory"), 1))
+    gains = {id(pair[0].group): 200.0, id(pair[1].group): 109.0, id(free.group): 299.0}
+    monkeypatch.setattr(
+        verdict, "accept", lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups))
+    )
+    problem = SimpleNamespace(rows=ROWS)
+
+    def held(functions: list[Member]) -> bool:
+        monkeypatch.setattr(verdict, "_patterns", lambda *arguments, **kind: (functions, []))
+        return verdict._holds(problem, 1, pair, [], [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
+
+    assert 309.0 - 5 * PRICE - (299.0 - 4 * PRICE) < verdict.LEAST
+    assert not held([free])
+    assert held([replace(free, gain=280.0)])
