@@ -130,15 +130,17 @@ def diagnose(
             data = [log for k, log in enumerate(data) if k not in hopeless]
             recording = lightened(robot, record(robot, data))
         search = _search(base, recording, effects, false_alarm, seed, bar)
-        bar.update(0.75, "what is left")
-        patterns = measure(search.problem, all_hypotheses(robot, list(all_patterns(robot))))
-        judgement = judge(search.problem, search.selection, patterns, false_alarm, np.random.default_rng(seed + 2))
-        bar.update(0.85, "limits of what the logs can show")
-        limits = find_limits(search.problem, search.entries, false_alarm=false_alarm)
+        problem, selection, entries = search.problem, search.selection, search.entries
+        bar.update(0.75, "limits of what the logs can show")
+        limits = find_limits(problem, entries, false_alarm=false_alarm)
+        # The columns of all hypotheses are most of what is kept: those of the patterns take their room.
+        del search, entries
+        give_back()
+        bar.update(0.83, "what is left")
+        patterns = measure(problem, all_hypotheses(robot, list(all_patterns(robot))))
+        judgement = judge(problem, selection, patterns, false_alarm, np.random.default_rng(seed + 2))
         bar.update(0.93, "gain on unseen data")
-        problem, selection = search.problem, search.selection
-        # The columns of all hypotheses are most of what is kept: the fits to come need room.
-        del search, patterns
+        del patterns
         give_back()
         told = Told(
             problem=problem,
