@@ -55,6 +55,11 @@ class Pattern(JointEffect):
         return self.sentence(None)
 
     @property
+    def fast(self) -> bool:  # type: ignore[override]
+        """Whether it is looked for above the bands too: what vibrates owes nothing to accelerations."""
+        return self.kind == "vibration"
+
+    @property
     def shapes(self) -> tuple[Shape, ...]:  # type: ignore[override]
         """A frequency or an order where the family has one."""
         if self.kind == "ringing":

@@ -14,6 +14,7 @@ from scipy.signal import firwin
 from estimation.diagnosis.band import TRANSITION, Band, low_pass
 from estimation.diagnosis.baseline import FAINT, Baseline
 from estimation.diagnosis.gaps import find_gaps, long_gap
+from estimation.diagnosis.lines import without_lines
 from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.whitening import Whitening
@@ -155,6 +156,7 @@ def _levelling(
         values = values[start : start + round(count * period * rate)]
         power = np.abs(np.fft.rfft(values)) ** 2 / max(np.count_nonzero(values), 1)
         f = np.fft.rfftfreq(len(values), 1 / rate)
+        power = without_lines(power[:, None], f[1], period if count > 1 else None)[:, 0]
         lines = np.arange(len(f)) % count == 0
         known += len(values)
         for part, (below, above) in enumerate(pairwise(edges)):

@@ -12,6 +12,7 @@ import pytest
 from estimation.diagnosis.band import TRANSITION
 from estimation.diagnosis.extending import fit_extended
 from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.patterns import Pattern
 from estimation.diagnosis.periods import Cycle
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import Recording, cut
@@ -154,3 +155,30 @@ def test_noise_is_levelled(clean: Recording, pose_arm: Callable[..., Problem], p
         # Each part has 60 frequencies or more.
         for low, high in pairwise(edges):
             assert power[(f >= low) & (f < high)].mean() == pytest.approx(1.0, abs=0.4)
+
+
+def test_a_vibration_above_the_band_is_told(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
+    """A steady torque between the two cut-offs shows beside accelerations that are not known there.
+
+    It is no part of the noise: its one line would be most of that.
+    """
+    size = 0.03
+    cutoffs = [pose_arm(recording, wider=WIDER).whitening.bands[0].cutoff]
+    cutoffs.append(pose_arm(recording, wider=WIDER).upper.whitening.bands[0].cutoff)  # type: ignore[union-attr]
+    frequency = float(np.mean(cutoffs)) * (1 - TRANSITION / 2)
+    wave = np.cos(2 * np.pi * frequency * (recording.t - recording.t[0]))
+    tau = recording.tau.copy()
+    tau[:, 0] += size * wave
+    vibration = Hypothesis(Pattern("vibration"), 1)
+    gains = []
+    for wider in (None, WIDER):
+        problem = pose_arm(replace(recording, tau=tau), wider=wider)
+        found = score(problem, problem.measured(vibration, (frequency,)), accept(problem, ()))
+        gains.append(found.gain)
+    energy = len(recording) * size**2 / 2 / NOISE**2
+    assert gains[0] < 20.0
+    # Rows at the ends and beside reversals do not count, and a quarter is lost to what looks like a burst.
+    assert 0.4 * energy < gains[1] < 1.2 * energy
+    coefficients = found.bounded(np.full(8, -np.inf), np.full(8, np.inf))[1]
+    told = problem.situation, 1, (frequency,)
+    assert np.corrcoef(Pattern("vibration").local(*told) @ coefficients, wave)[0, 1] > 0.9
