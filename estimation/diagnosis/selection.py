@@ -155,8 +155,14 @@ def _seen(
     return found, p_values
 
 
-def contenders(problem: Problem, result: Scan, members: Sequence[Member] = ()) -> list[Outcome]:
-    """Picks the hypotheses worth refining: near the best at the grid, each effect and joint once."""
+def contenders(
+    problem: Problem, result: Scan, members: Sequence[Member] = (), least: float = -np.inf
+) -> list[Outcome]:
+    """Picks the hypotheses worth refining: near the best at the grid, each effect and joint once.
+
+    What acts for a moment must also be able to come near the best there, or near a worth (Schwarz) that is known to be
+    reached: `least`.
+    """
     taken = {(m.hypothesis.name, m.hypothesis.joint) for m in members}
     able = [o for o in result.outcomes if o.degrees and (o.hypothesis.name, o.hypothesis.joint) not in taken]
     if not able:
@@ -166,7 +172,7 @@ def contenders(problem: Problem, result: Scan, members: Sequence[Member] = ()) -
         return float(times * outcome.gain - outcome.degrees * np.log(problem.rows))
 
     ranked = sorted(able, key=worth, reverse=True)
-    best, top = max(o.gain for o in able), worth(ranked[0])
+    best, top = max(o.gain for o in able), max(worth(ranked[0]), least)
     hopeless = {o.hypothesis for o in able if o.hypothesis.effect.passing and worth(o, TWICE) < top}
     return [o for o in ranked if o.gain >= NEAR * best and o.hypothesis not in hopeless][:CONTENDERS]
 
@@ -255,7 +261,8 @@ def _polished(
                 members[i] = own
                 continue
             result = scan(problem, entries, beside, rng, nulls=False)
-            rest = [o for o in contenders(problem, result, others) if o.hypothesis != own.hypothesis][:4]
+            near = contenders(problem, result, others, own.bic(problem.rows))
+            rest = [o for o in near if o.hypothesis != own.hypothesis][:4]
             best = max([own, *_best(problem, rest, beside)], key=lambda m: m.bic(problem.rows))
             changed |= best.hypothesis != members[i].hypothesis
             members[i] = best
@@ -278,12 +285,13 @@ def _found(
         others = [m for k, m in enumerate(members) if k != i]
         beside = accept(problem, tuple(m.group for m in others))
         result = scan(problem, entries, beside, rng, nulls=False)
-        rest = [o for o in contenders(problem, result, others) if o.hypothesis != member.hypothesis]
         lower, upper = member.hypothesis.coefficient_bounds(problem.situation.robot, member.shape)
         own = score(problem, member.group, beside)
         gain, coefficients = own.bounded(lower, upper)
         measured = replace(member, gain=gain, coefficients=coefficients, visible=own.visible)
         reference = measured.bic(problem.rows)
+        near = contenders(problem, result, others, reference)
+        rest = [o for o in near if o.hypothesis != member.hypothesis]
         able = [rival for rival in _best(problem, rest, beside) if rival.gain >= NEAR * gain]
         rivals = [(rival, reference - rival.bic(problem.rows)) for rival in able]
         found.append(Found(measured, p_values[i], tuple(rivals)))
