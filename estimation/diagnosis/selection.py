@@ -155,9 +155,7 @@ def _seen(
     return found, p_values
 
 
-def contenders(
-    problem: Problem, result: Scan, members: Sequence[Member] = (), least: float = -np.inf
-) -> list[Outcome]:
+def contenders(problem: Problem, result: Scan, members: Sequence[Member] = (), least: float = -np.inf) -> list[Outcome]:
     """Picks the hypotheses worth refining: near the best at the grid, each effect and joint once.
 
     What acts for a moment must also be able to come near the best there, or near a worth (Schwarz) that is known to be

@@ -15,7 +15,7 @@ from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.selection import Found, Selection
 
 # Named effects that explain less than this share of what stands out of the noise, or of what free functions do in their
-# place, do not explain it; nor do those that explain less than the second share of that, and fit worse (Schwarz).
+# place, do not explain it; nor do those that fit worse than one of those and explain less than the second share of it.
 ENOUGH, NEARLY = 0.7, 0.9
 # Rivals within this of the best BIC stay possible.
 CLOSE = 10.0
@@ -121,10 +121,10 @@ def _holds(
     gain -= accept(problem, tuple(m.group for m in others)).gain
     degrees = sum(member.degrees for member in own)
     rest = sum(_worth(member) for member in left if member.hypothesis.joint == joint)
-    if gain - degrees < ENOUGH * (gain - degrees + rest):
-        return False
     here = [entry for entry in patterns if entry.hypothesis.joint == joint]
     free, _ = _patterns(problem, here, others, false_alarm, rng)
+    if gain - degrees < ENOUGH * max(gain - degrees + rest, sum(map(_worth, free))):
+        return False
     if _beaten(problem, gain, degrees, free):
         return False
     if len(own) > 1 and not _thriftier(problem, own, others, free, LEAST):
@@ -171,11 +171,19 @@ def _holds_together(
 
 
 def _beaten(problem: Problem, gain: float, degrees: int, free: Sequence[Member]) -> bool:
-    """Whether free functions explain much more than names do, or clearly more for their number of parameters."""
-    price = float(np.log(problem.rows))
-    most = sum(map(_worth, free))
-    better = sum(member.gain - member.degrees * price for member in free) - (gain - degrees * price)
-    return gain - degrees < ENOUGH * most or (better > 0 and gain - degrees < NEARLY * most)
+    """Whether one free function explains much more than names do, or clearly more and fits better.
+
+    Several of them may be about other things besides, which the names do not claim.
+    """
+    if not free:
+        return False
+    most, own = _worth(free[0]), gain - degrees * float(np.log(problem.rows))
+    return gain - degrees < ENOUGH * most or (gain - degrees < NEARLY * most and own < _criterion(problem, free[:1]))
+
+
+def _criterion(problem: Problem, free: Sequence[Member]) -> float:
+    """What functions explain together, each beside those before, less what their parameters are worth (Schwarz)."""
+    return sum(member.gain - member.degrees * float(np.log(problem.rows)) for member in free)
 
 
 def _stays(
@@ -209,8 +217,7 @@ def _thriftier(
     gain = accept(problem, tuple(m.group for m in (*others, *names))).gain
     gain -= accept(problem, tuple(m.group for m in others)).gain
     price = float(np.log(problem.rows))
-    criterion = sum(member.gain - member.degrees * price for member in free)
-    return not free or gain - sum(member.degrees for member in names) * price > criterion + margin
+    return not free or gain - sum(member.degrees for member in names) * price > _criterion(problem, free) + margin
 
 
 def _worth(member: Member) -> float:
