@@ -11,15 +11,15 @@ Array = NDArray[np.float64]
 # Chance that noise of a smooth density has any line in a spectrum.
 CHANCE = 1e-3
 # Frequencies [Hz] beside a line that tell what the noise is there, and the fewest places that do.
-BESIDE, FEWEST = 1.0, 61
+BESIDE, FEWEST = 1.0, 41
 
 
 def without_lines(power: Array, width: float, period: float | None = None) -> Array:
     """Levels lines to the noise about them.
 
     The power of noise at one frequency is exponentially distributed about its density, and a median tells that whatever
-    stands out of it. What repeats with a motion has lines at all of its harmonics, and is told by the errors of a model
-    there: a line among those is one that stands out of the other harmonics.
+    stands out of it. What a model lacks has lines at the harmonics of a repeated motion: those stay as they are, and so
+    does all of a log that is too short to tell a line from a colour.
 
     Args:
         power: at each frequency, from none on (F, n).
@@ -29,21 +29,18 @@ def without_lines(power: Array, width: float, period: float | None = None) -> Ar
     Returns:
         The power (F, n), lines and what they spread to as the noise about them.
     """
-    places = np.arange(len(power))
-    waves = places * width * (period or 0.0)
-    repeats = np.abs(waves - np.round(waves)) <= 0.5 * width * (period or 0.0)
-    level, highest = np.array(power, dtype=float), np.full(len(power), np.inf)
-    for own in (places[repeats], places[~repeats]) if period else (places,):
-        if len(own) < FEWEST:
-            continue
-        reach = min(max(FEWEST, int(2 * BESIDE / width * len(own) / len(places))) | 1, len(own) // 2 * 2 - 1)
-        level[own] = median_filter(level[own], (reach, 1), mode="reflect") / np.log(2)
-        highest[own] = np.log(len(own) / CHANCE)
+    reach = int(2 * BESIDE / width) | 1
+    if not FEWEST <= reach < len(power):
+        return power
+    waves = np.arange(len(power)) * width * (period or 0.0)
+    between = np.abs(waves - np.round(waves)) > 0.5 * width * period if period else np.ones(len(power), dtype=bool)
+    level = median_filter(power, (reach, 1), mode="reflect") / np.log(2)
     result = np.array(power, dtype=float)
     for j in range(power.shape[1]):
-        for place in np.flatnonzero(power[:, j] > highest * level[:, j]):
+        lines = between & (power[:, j] > np.log(len(power) / CHANCE) * level[:, j])
+        for place in np.flatnonzero(lines):
             # Between two places of the spectrum a line falls off with the square of the distance to either side.
-            reach = int(0.5 * np.sqrt(power[place, j] / max(level[place, j], np.finfo(float).tiny)))
-            near = slice(max(place - reach, 0), place + reach + 1)
-            result[near, j] = level[near, j]
+            spread = int(0.5 * np.sqrt(power[place, j] / max(level[place, j], np.finfo(float).tiny)))
+            near = slice(max(place - spread, 0), place + spread + 1)
+            result[near, j] = np.where(between[near], level[near, j], result[near, j])
     return result

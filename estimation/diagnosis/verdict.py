@@ -93,8 +93,10 @@ def judge(
         spread = [found for found in kept if wide or len(found.member.group.joints) > 1]
         borrowed = [f for f in spread if not _stays(problem, f, kept, patterns, false_alarm, rng)]
         # So may one that acts on its own joint alone, if base parameters have taken another's torque for it.
-        single = [found for found in kept if found not in spread]
-        borrowed += [f for f in single if not _keep(problem, [f.member], [*_beside(kept, f), *members])]
+        for found in (found for found in kept if found not in spread):
+            elsewhere = [member for member in members if member.hypothesis.joint != found.member.hypothesis.joint]
+            if not _keep(problem, [found.member], [*_beside(kept, found), *elsewhere]):
+                borrowed.append(found)
         if not borrowed:
             return Judgement("unexplained", kept, tuple(members), tuple(p_values), float(share))
         weakest = min(borrowed, key=lambda found: found.member.gain)
