@@ -71,7 +71,11 @@ SINGLE = (
     Hide(seed=7060, effects=(transmission.Backlash,), size=0.015, kind="panda", joint=1, drives=False),
 )
 PAIRS = (Hide(seed=7011, effects=(friction.PositionDependent, surroundings.Payload), joint=1),)
-STRANGE = (Hide(seed=7021, effects=(strangers.CrossWave,), joint=2, size=0.05),)
+STRANGE = (
+    Hide(seed=7021, effects=(strangers.CrossWave,), joint=2, size=0.05),
+    Hide(seed=7071, effects=(strangers.Drag,), joint=1, size=0.03),
+    Hide(seed=7072, effects=(strangers.Hose,), size=0.03, kind="ur10"),
+)
 SWINGING = Hide(seed=7041, effects=(strangers.Slosh,), size=0.01, duration=60.0)
 MORE = (
     Hide(seed=7004, effects=(surroundings.Payload,), kind="heavy"),

@@ -13,7 +13,17 @@ from tests.truth.effects.friction import (
     Stribeck,
     Warming,
 )
-from tests.truth.effects.strangers import CrossWave, FloorVibration, Interpolation, Slosh, TiredCable
+from tests.truth.effects.strangers import (
+    BorrowedFriction,
+    CrossWave,
+    Drag,
+    DraggingBrake,
+    FloorVibration,
+    Hose,
+    Interpolation,
+    Slosh,
+    TiredCable,
+)
 from tests.truth.effects.surroundings import Contact, Payload, Tilt
 from tests.truth.effects.transmission import Backlash, Balancer, Cable, Elastic, Ripple, WristCoupling
 
@@ -41,5 +51,15 @@ KNOWN: tuple[type[Effect], ...] = (
     Tilt,
     Contact,
 )
-STRANGERS: tuple[type[Effect], ...] = (CrossWave, TiredCable, FloorVibration, Interpolation, Slosh)
+STRANGERS: tuple[type[Effect], ...] = (
+    CrossWave,
+    TiredCable,
+    FloorVibration,
+    Interpolation,
+    Slosh,
+    Hose,
+    Drag,
+    BorrowedFriction,
+    DraggingBrake,
+)
 __all__ = ["KNOWN", "STRANGERS", "Effect"]

@@ -145,6 +145,95 @@ class Slosh(Effect):
         return np.column_stack([np.interp(np.arange(len(force)), rows, column) for column in torque[rows].T])
 
 
+@dataclass(frozen=True, kw_only=True)
+class Hose(Effect):
+    """A dress pack of stiffness amount [N/m] from the ceiling to the flange, which pulls where it is taut."""
+
+    anchor: tuple[float, float, float] = (0.0, 0.0, 2.0)
+    slack: float = 0.5
+
+    name = "unexplained"
+    largest = 1e5
+
+    @classmethod
+    def joints(cls, machine: Machine) -> tuple[int | None, ...]:
+        return (None,)
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Hose:
+        middle = (machine.lower + machine.upper)[None] / 2
+        size = float(np.linalg.norm(_places(machine, middle, np.zeros(3))))
+        place = (rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3), rng.uniform(0.8, 1.6))
+        return cls(anchor=tuple(size * x for x in place), slack=size * rng.uniform(0.2, 0.5))
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        every = max(round(0.004 / ride.step), 1)
+        q = ride.link_q[::every]
+        reach = np.array(self.anchor) - _places(ride.machine, q, np.zeros(3))
+        length = np.linalg.norm(reach, axis=1, keepdims=True)
+        force = self.amount * np.maximum(length - self.slack, 0.0) * reach / np.maximum(length, 1e-9)
+        torque = point_force_torque(ride.machine.model, q, ride.machine.n, np.zeros(3), force)
+        places = np.arange(len(ride.t)) / every
+        return np.column_stack([np.interp(places, np.arange(len(q)), column) for column in torque.T])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drag(Effect):
+    """amount |v_k| v_k cos(q_j + phase) on joint j: what another joint stirs, felt by the pose."""
+
+    other: int = 1
+    phase: float = 0.0
+
+    name = "unexplained"
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Drag:
+        others = [k for k in range(1, machine.n + 1) if k != joint]
+        return cls(joint=joint, other=int(rng.choice(others)), phase=rng.uniform(0, 2 * np.pi))
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        v = ride.v[:, self.other - 1]
+        return self.on_joint(ride, self.amount * np.abs(v) * v * np.cos(ride.q[:, self.j] + self.phase))
+
+
+@dataclass(frozen=True, kw_only=True)
+class BorrowedFriction(Effect):
+    """Friction amount |v_k| / (|v_k| + v0) that another joint's speed puts on joint j, as of shared seals."""
+
+    other: int = 1
+
+    name = "unexplained"
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> BorrowedFriction:
+        others = [k for k in range(1, machine.n + 1) if k != joint]
+        return cls(joint=joint, other=int(rng.choice(others)))
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        k = self.other - 1
+        speed = np.abs(ride.v[:, k])
+        size = speed / (speed + 0.2 * ride.machine.speed[k])
+        return self.on_joint(ride, self.amount * size * ride.sign[:, self.j])
+
+
+@dataclass(frozen=True, kw_only=True)
+class DraggingBrake(Effect):
+    """A brake that drags by amount [N m] two fifths of the time."""
+
+    every: float = 15.0
+
+    name = "unexplained"
+    lasting = False
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> DraggingBrake:
+        return cls(joint=joint, every=span * rng.uniform(0.15, 0.5))
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        drags = np.mod(ride.t / self.every, 1.0) < 0.4
+        return self.on_joint(ride, self.amount * drags * ride.sign[:, self.j])
+
+
 def _places(machine: Machine, q: np.ndarray, point: np.ndarray) -> np.ndarray:
     data = machine.model.createData()
     places = np.empty((len(q), 3))
