@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 
 VARIANTS = 4
 """Motions that are tried of the best kind."""
-ENOUGH = 0.95
-"""Chance beyond which the least trouble decides."""
+ENOUGH = 0.99
+"""Chance beyond which the least trouble decides: causes are true to some per cent, and the chance knows noise alone."""
 TIMES, LONGEST = (2, 4, 8, 16), 300.0
 """How often motions are made where once does not do, and how long an experiment may last then [s], with pauses."""
 
