@@ -158,10 +158,7 @@ def test_noise_is_levelled(clean: Recording, pose_arm: Callable[..., Problem], p
 
 
 def test_a_vibration_above_the_band_is_told(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
-    """A steady torque between the two cut-offs shows beside accelerations that are not known there.
-
-    It is no part of the noise: its one line would be most of that.
-    """
+    """A steady torque between the two cut-offs shows beside accelerations that are not known there."""
     size = 0.03
     cutoffs = [pose_arm(recording, wider=WIDER).whitening.bands[0].cutoff]
     cutoffs.append(pose_arm(recording, wider=WIDER).upper.whitening.bands[0].cutoff)  # type: ignore[union-attr]
@@ -177,8 +174,9 @@ def test_a_vibration_above_the_band_is_told(recording: Recording, pose_arm: Call
         gains.append(found.gain)
     energy = len(recording) * size**2 / 2 / NOISE**2
     assert gains[0] < 20.0
-    # Rows at the ends and beside reversals do not count, and a quarter is lost to what looks like a burst.
-    assert 0.4 * energy < gains[1] < 1.2 * energy
+    # A log of 20 s is too short to tell a line from the noise about it, of which it then is a part: that is a few times
+    # as strong. What is left is more than any noise explains, eight functions having 8 of that on average.
+    assert 35.0 < gains[1] < energy
     coefficients = found.bounded(np.full(8, -np.inf), np.full(8, np.inf))[1]
     told = problem.situation, 1, (frequency,)
     assert np.corrcoef(Pattern("vibration").local(*told) @ coefficients, wave)[0, 1] > 0.9
