@@ -24,8 +24,7 @@ class CrossWave(Effect):
 
     @classmethod
     def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> CrossWave:
-        others = [k for k in range(1, machine.n + 1) if k != joint]
-        return cls(joint=joint, other=int(rng.choice(others)))
+        return cls(joint=joint, other=_another(machine, rng, joint))
 
     def torque(self, ride: Ride) -> np.ndarray:
         wave = np.cos(2 * ride.q[:, self.j]) * np.sin(1.5 * ride.q[:, self.other - 1])
@@ -188,8 +187,7 @@ class Drag(Effect):
 
     @classmethod
     def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Drag:
-        others = [k for k in range(1, machine.n + 1) if k != joint]
-        return cls(joint=joint, other=int(rng.choice(others)), phase=rng.uniform(0, 2 * np.pi))
+        return cls(joint=joint, other=_another(machine, rng, joint), phase=rng.uniform(0, 2 * np.pi))
 
     def torque(self, ride: Ride) -> np.ndarray:
         v = ride.v[:, self.other - 1]
@@ -206,8 +204,7 @@ class BorrowedFriction(Effect):
 
     @classmethod
     def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> BorrowedFriction:
-        others = [k for k in range(1, machine.n + 1) if k != joint]
-        return cls(joint=joint, other=int(rng.choice(others)))
+        return cls(joint=joint, other=_another(machine, rng, joint))
 
     def torque(self, ride: Ride) -> np.ndarray:
         k = self.other - 1
@@ -232,6 +229,11 @@ class DraggingBrake(Effect):
     def torque(self, ride: Ride) -> np.ndarray:
         drags = np.mod(ride.t / self.every, 1.0) < 0.4
         return self.on_joint(ride, self.amount * drags * ride.sign[:, self.j])
+
+
+def _another(machine: Machine, rng: np.random.Generator, joint: int | None) -> int:
+    """Draws another joint than one, from 1."""
+    return int(rng.choice([k for k in range(1, machine.n + 1) if k != joint]))
 
 
 def _places(machine: Machine, q: np.ndarray, point: np.ndarray) -> np.ndarray:
