@@ -254,14 +254,18 @@ def _polished(
             others = [m for k, m in enumerate(members) if k != i]
             beside = accept(problem, tuple(m.group for m in others))
             now = composed(problem, members, [members[i].hypothesis])
-            own = refine(now, members[i].hypothesis, members[i].shape, beside)
-            if own.hypothesis in seen:
-                members[i] = own
+            if members[i].hypothesis in seen:
+                members[i] = refine(now, members[i].hypothesis, members[i].shape, beside)
                 continue
             result = scan(problem, entries, beside, rng, nulls=False)
-            near = contenders(problem, result, others, own.bic(problem.rows))
-            rest = [o for o in near if o.hypothesis != own.hypothesis][:4]
-            best = max([own, *_best(problem, rest, beside)], key=lambda m: m.bic(problem.rows))
+            reached = _measured(problem, members[i], beside).bic(problem.rows)
+            near = contenders(problem, result, others, reached)
+            rest = [o for o in near if o.hypothesis != members[i].hypothesis][:4]
+            # All at once: the refinement of its own shape takes as long as those of its rivals.
+            with ThreadPoolExecutor(1) as apart:
+                own = apart.submit(refine, now, members[i].hypothesis, members[i].shape, beside)
+                rivals = _best(problem, rest, beside)
+            best = max([own.result(), *rivals], key=lambda m: m.bic(problem.rows))
             changed |= best.hypothesis != members[i].hypothesis
             members[i] = best
         if not changed:
@@ -283,14 +287,19 @@ def _found(
         others = [m for k, m in enumerate(members) if k != i]
         beside = accept(problem, tuple(m.group for m in others))
         result = scan(problem, entries, beside, rng, nulls=False)
-        lower, upper = member.hypothesis.coefficient_bounds(problem.situation.robot, member.shape)
-        own = score(problem, member.group, beside)
-        gain, coefficients = own.bounded(lower, upper)
-        measured = replace(member, gain=gain, coefficients=coefficients, visible=own.visible)
+        measured = _measured(problem, member, beside)
         reference = measured.bic(problem.rows)
         near = contenders(problem, result, others, reference)
         rest = [o for o in near if o.hypothesis != member.hypothesis]
-        able = [rival for rival in _best(problem, rest, beside) if rival.gain >= NEAR * gain]
+        able = [rival for rival in _best(problem, rest, beside) if rival.gain >= NEAR * measured.gain]
         rivals = [(rival, reference - rival.bic(problem.rows)) for rival in able]
         found.append(Found(measured, p_values[i], tuple(rivals)))
     return found
+
+
+def _measured(problem: Problem, member: Member, beside: Accepted) -> Member:
+    """Measures a member anew, at its shape, beside what is accepted."""
+    result = score(problem, member.group, beside)
+    bounds = member.hypothesis.coefficient_bounds(problem.situation.robot, member.shape)
+    gain, coefficients = result.bounded(*bounds)
+    return replace(member, gain=gain, coefficients=coefficients, visible=result.visible)
