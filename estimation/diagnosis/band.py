@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Literal, overload
 
 import numpy as np
 import scipy.fft
@@ -13,6 +14,7 @@ from scipy.signal import firwin, welch
 from estimation.diagnosis.states import Recording
 
 Array = NDArray[np.float64]
+Small = NDArray[np.float32]
 
 # The error of the acceleration may make this share of the torque noise's power; above, both are filtered away.
 SHARE = 0.2
@@ -44,34 +46,40 @@ class Band:
     stride: int
     cutoff: float
 
-    def passed(self, series: Array, after: Array | None = None) -> Array:
+    @overload
+    def passed(self, series: Array, after: Array | None = None, *, single: Literal[False] = False) -> Array: ...
+    @overload
+    def passed(self, series: Array, after: Array | None = None, *, single: Literal[True]) -> Small: ...
+    def passed(self, series: Array, after: Array | None = None, *, single: bool = False) -> Array | Small:
         """Filters and thins rows (N,) or (N, k) of one log; `after` (p,) filters what is left.
 
-        Columns that lie one after the other in memory (Fortran's order) are filtered several times as fast.
+        Columns that lie one after the other in memory (Fortran's order) are filtered several times as fast; with
+        `single` precision twice as fast again, their rounding then 1e-7 of the largest.
         """
+        kind: type = np.float32 if single else np.float64
         if not len(self.taps) and after is None:
-            return series[:: self.stride]
+            return series[:: self.stride].astype(kind, copy=False)
         rows = -(-len(series) // self.stride)
         columns = np.ascontiguousarray(series.T if series.ndim > 1 else series[None])
         # Two real columns are one complex one, the filters being real; as large as each other, so that the rounding of
         # neither shows in the other, and zeros stay zeros.
         sizes = np.maximum(columns.max(axis=1, initial=0.0), -columns.min(axis=1, initial=0.0))[:, None]
         units = 1.0 / np.where(sizes > 0, sizes, 1.0)
-        packed = np.zeros((-(-len(columns) // 2), len(series)), dtype=complex)
-        np.multiply(columns[::2], units[::2], out=packed.real)
-        np.multiply(columns[1::2], units[1::2], out=packed.imag[: len(columns) // 2])
+        packed = np.zeros((-(-len(columns) // 2), len(series)), dtype=np.complex64 if single else np.complex128)
+        np.multiply(columns[::2], units[::2], out=packed.real, casting="same_kind")
+        np.multiply(columns[1::2], units[1::2], out=packed.imag[: len(columns) // 2], casting="same_kind")
         size, response = _response(self, len(series), 0 if after is None else len(after))
         spectrum = scipy.fft.fft(packed, size, axis=1)
         if response is not None:
-            spectrum *= response
+            spectrum *= response.astype(spectrum.dtype, copy=False)
         # Thinned rows have the mean of the spectra that fall onto each other.
         folded = spectrum.reshape(len(packed), self.stride, -1).sum(axis=1) / self.stride
         if after is not None:
-            folded *= scipy.fft.fft(after, folded.shape[1])
+            folded *= scipy.fft.fft(after, folded.shape[1]).astype(folded.dtype, copy=False)
         thin = scipy.fft.ifft(folded, axis=1, overwrite_x=True)[:, :rows]
-        result = np.empty((len(columns), rows))
-        np.multiply(thin.real, sizes[::2], out=result[::2])
-        np.multiply(thin.imag[: len(columns) // 2], sizes[1::2], out=result[1::2])
+        result: Array | Small = np.empty((len(columns), rows), dtype=kind)
+        np.multiply(thin.real, sizes[::2], out=result[::2], casting="same_kind")
+        np.multiply(thin.imag[: len(columns) // 2], sizes[1::2], out=result[1::2], casting="same_kind")
         return result[0] if series.ndim == 1 else result.T
 
 

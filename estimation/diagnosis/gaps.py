@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from estimation.diagnosis.whitening import Whitening
 
 Array = NDArray[np.float64]
+Real = TypeVar("Real", np.float32, np.float64)
 
 # Functions of one gap that the band cannot tell apart count once.
 DISTINCT = 1e-4
@@ -52,12 +54,17 @@ class Gaps:
         result[rows] = (1 - w) * series[before] + w * series[after]
         return result
 
-    def freed(self, white: Array, joint: int) -> Array:
+    def freed(self, white: NDArray[Real], joint: int) -> NDArray[Real]:
         """Projects the short gaps' torques out of white columns of a joint."""
         if joint >= len(self.free) or not self.free[joint].shape[1]:
             return white
-        own = self.free[joint]
+        own = (self._single if white.dtype == np.float32 else self.free)[joint]
         return np.asarray(white - own @ (own.T @ white))
+
+    @cached_property
+    def _single(self) -> tuple[csc_matrix, ...]:
+        """The free columns in single precision."""
+        return tuple(own.astype(np.float32) for own in self.free)
 
     def resting(self, starts: tuple[int, ...], rows: int, stride: int, margin: int) -> NDArray[np.bool_]:
         """Marks the thinned rows (M, n) of long gaps and `margin` rows beside: what bridges them is not measured."""

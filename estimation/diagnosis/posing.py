@@ -73,7 +73,7 @@ def pose(
         baseline=baseline,
         whitening=whitening,
         situation=baseline.situation(recording, values),
-        mixed=np.ascontiguousarray(np.einsum("jk,nkb->jnb", root, Q, optimize=True)),
+        mixed=np.ascontiguousarray(np.einsum("jk,nkb->jnb", root, Q, optimize=True), dtype=np.float32),
         residual=tilted @ root.T,
         white=np.linalg.solve(root.T, tilted.T).T,
         energy=float(np.sum(tilted**2)),

@@ -81,7 +81,7 @@ class Problem:
     baseline: Baseline
     whitening: Whitening
     situation: Situation
-    mixed: Array
+    mixed: Small
     residual: Array
     white: Array
     energy: float
@@ -130,7 +130,7 @@ class Problem:
         self, joints: tuple[int, ...], columns: tuple[Array, ...], count: int, *, effect: Effect | None = None
     ) -> list[Group]:
         """Does what `group` does for several groups on the same joints at once: columns (N, count k), k of each."""
-        whole = [self.whitening.filtered(part, j) for j, part in zip(joints, columns, strict=True)]
+        whole = [self.whitening.filtered(part, j, single=True) for j, part in zip(joints, columns, strict=True)]
         white = [self.whitening.counted(part, j) for j, part in zip(joints, whole, strict=True)]
         total = white[0].shape[1]
         k = total // count
@@ -153,7 +153,7 @@ class Problem:
             apart = part.T.reshape(count, k, -1)
             gram += apart @ apart.transpose(0, 2, 1)
         high = [np.asfortranarray(part, dtype=np.float32) for part in above]
-        small = [np.asfortranarray(part, dtype=np.float32) for part in white]
+        small = [np.asfortranarray(part) for part in white]
         return [
             Group(
                 joints=joints,
@@ -167,7 +167,11 @@ class Problem:
             for i, own in enumerate(slice(i * k, (i + 1) * k) for i in range(count))
         ]
 
-    def _products(self, joints: tuple[int, ...], white: Sequence[Array], count: int) -> tuple[Array, Array, Array]:
+    @cached_property
+    def _residual(self) -> Small:
+        return np.asfortranarray(self.residual, dtype=np.float32)
+
+    def _products(self, joints: tuple[int, ...], white: Sequence[Small], count: int) -> tuple[Array, Array, Array]:
         """Products of white columns (N, count k) with base model (count k, b), residual, each other (count, k, k)."""
         total = white[0].shape[1]
         against, cross = np.zeros((total, self.mixed.shape[2])), np.zeros(total)
@@ -175,10 +179,10 @@ class Problem:
         split = [part.T.reshape(count, total // count, -1) for part in white]
         for a, j in enumerate(joints):
             against += white[a].T @ self.mixed[j]
-            cross += white[a].T @ self.residual[:, j]
-            gram += self.whitening.precision[j, j] * (split[a] @ split[a].transpose(0, 2, 1))
+            cross += white[a].T @ self._residual[:, j]
+            gram += self.whitening.precision[j, j] * (split[a] @ split[a].transpose(0, 2, 1)).astype(float)
             for b in range(a):
-                part = self.whitening.precision[j, joints[b]] * (split[a] @ split[b].transpose(0, 2, 1))
+                part = self.whitening.precision[j, joints[b]] * (split[a] @ split[b].transpose(0, 2, 1)).astype(float)
                 gram += part + part.transpose(0, 2, 1)
         return against, cross, gram
 
@@ -186,8 +190,8 @@ class Problem:
         """Makes two columns of a torque: what it is in some white rows (N,) of its joints' bands, and the rest."""
         torques = [part.astype(np.float64) @ coefficients for part in group.columns]
         white = [np.column_stack([np.where(rows, x, 0.0), np.where(rows, 0.0, x)]) for x in torques]
-        against, cross, (gram,) = self._products(group.joints, white, 1)
         small = tuple(np.asfortranarray(part, dtype=np.float32) for part in white)
+        against, cross, (gram,) = self._products(group.joints, small, 1)
         return Group(group.joints, small, against, gram - against @ against.T, np.diag(gram).copy(), cross)
 
     @cached_property
@@ -257,5 +261,5 @@ class Problem:
         return total
 
 
-def _squares(columns: Array) -> Array:
-    return np.asarray(np.einsum("ij,ij->j", columns, columns))
+def _squares(columns: Array | Small) -> Array:
+    return np.asarray(np.einsum("ij,ij->j", columns, columns, dtype=float))

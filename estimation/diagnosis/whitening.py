@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any, Literal, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from estimation.diagnosis.band import Band
 from estimation.diagnosis.gaps import Gaps
 
 Array = NDArray[np.float64]
+Small = NDArray[np.float32]
+Real = TypeVar("Real", np.float32, np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,25 +61,33 @@ class Whitening:
         """Whitens columns (N,) or (N, k) of one joint, counted from 0."""
         return self.counted(self.filtered(series, joint), joint)
 
-    def filtered(self, series: Array, joint: int) -> Array:
-        """Does what `apply` does, rows that do not count included."""
+    @overload
+    def filtered(self, series: Array, joint: int, *, single: Literal[False] = False) -> Array: ...
+    @overload
+    def filtered(self, series: Array, joint: int, *, single: Literal[True]) -> Small: ...
+    def filtered(self, series: Array, joint: int, *, single: bool = False) -> Array | Small:
+        """Does what `apply` does, rows that do not count included; in `single` precision twice as fast."""
         series = self.gaps.bridged(series, joint)
         taps = np.concatenate([[1.0], -self.coefficients[joint]]) / self.scale[joint]
-        parts = []
+        parts: list[Any] = []
         for run, (start, stop) in enumerate(pairwise((*self.starts, len(series)))):
-            white = self.bands[joint].passed(series[start:stop], taps / self.level(run, joint))
+            filters, piece = taps / self.level(run, joint), series[start:stop]
+            band = self.bands[joint]
+            white = band.passed(piece, filters, single=True) if single else band.passed(piece, filters)
             # Before the log there is nothing to predict from: its first rows would weigh as if they were shocks.
             lead = min(len(taps) - 1, len(white))
             white[:lead] *= np.linspace(0, 1, len(taps))[1 : lead + 1, *(None,) * (series.ndim - 1)]
             parts.append(white)
-        return np.concatenate(parts) if len(parts) > 1 else parts[0]
+        whole: Array | Small = np.concatenate(parts) if len(parts) > 1 else parts[0]
+        return whole
 
-    def counted(self, white: Array, joint: int) -> Array:
+    def counted(self, white: NDArray[Real], joint: int) -> NDArray[Real]:
         """Leaves out of white columns what is in rows that do not count."""
         white = self.gaps.freed(white, joint)
         if self.weights is None:
             return white
-        return white * self.weights[:, joint, *(None,) * (white.ndim - 1)]
+        weights = self.weights[:, joint, *(None,) * (white.ndim - 1)]
+        return white * weights.astype(white.dtype, copy=False)
 
     def all(self, series: Array) -> Array:
         """Whitens (N, n) or (N, n, k)."""
