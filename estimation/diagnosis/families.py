@@ -1,0 +1,158 @@
+"""Families of free functions: what torque may depend on where no cause of the catalogue says how."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from estimation.diagnosis.resonance import resonance
+from robots.terms.effects import Situation
+
+Array = NDArray[np.float64]
+
+HARMONICS = (1, 2, 3, 4)
+MEMORIES = (0.1, 0.3, 1.0, 3.0)  # [s]
+KNOTS = 8
+
+
+@dataclass(frozen=True)
+class Family:
+    """Functions of one or two inputs.
+
+    Attributes:
+        columns: evaluates them (N, k), of what is seen, the joint (from 1), another one's number and the shape.
+        count: k.
+        words: what the residual torque does, with room for the other joint's name and the shape.
+    """
+
+    columns: Callable[[Situation, int, int, tuple[float, ...]], Array]
+    count: int
+    words: str
+
+
+def _angle(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    q = s.q[:, other - 1]
+    return np.column_stack([f(h * q) for h in HARMONICS for f in (np.cos, np.sin)])
+
+
+def _angles(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    if other == joint:
+        return np.zeros((len(s), 16))
+    a, b = s.q[:, joint - 1], s.q[:, other - 1]
+    first = [f(h * a) for h in (1, 2) for f in (np.cos, np.sin)]
+    second = [f(h * b) for h in (1, 2) for f in (np.cos, np.sin)]
+    return np.column_stack([x * y for x in first for y in second])
+
+
+def _motion(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    if other == joint:
+        return np.zeros((len(s), 5))
+    v = s.dq[:, other - 1]
+    own = s.dq[:, joint - 1]
+    return np.column_stack([v, np.abs(v), v * np.abs(v), s.sign[:, other - 1], v * own])
+
+
+def _drag(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    return _products(s.q[:, joint - 1], s.dq[:, other - 1])
+
+
+def _posture(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    if other == joint:
+        return np.zeros((len(s), 8))
+    return _products(s.q[:, other - 1], s.dq[:, joint - 1])
+
+
+def _products(q: Array, v: Array) -> Array:
+    waves = [f(h * q) for h in (1, 2) for f in (np.cos, np.sin)]
+    return np.column_stack([wave * speed for wave in waves for speed in (v, v * v)])
+
+
+def _speed(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    v = s.dq[:, joint - 1]
+    x = np.abs(v) / max(float(np.abs(v).max()), 1e-9)
+    centres = (0.0, 0.05, 0.15, 0.35, 0.65, 1.0)
+    widths = (0.03, 0.06, 0.1, 0.2, 0.25, 0.3)
+    return np.column_stack([np.exp(-0.5 * ((x - c) / w) ** 2) for c, w in zip(centres, widths, strict=True)])
+
+
+def _load(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    load = s.load[:, joint - 1]
+    x = load / max(float(np.abs(load).max()), 1e-9)
+    return np.column_stack([x, np.abs(x), x * np.abs(x), x**2, np.abs(x) ** 3])
+
+
+def _acceleration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    a = s.ddq[:, joint - 1]
+    x = a / max(float(np.abs(a).max()), 1e-9)
+    return np.column_stack([np.abs(x), x * np.abs(x), x**3])
+
+
+def _memory(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    columns = []
+    for memory in MEMORIES:
+        keep = float(np.exp(-s.period / memory))
+        column = np.zeros(len(s))
+        for run in s.runs:
+            column[run] = lfilter([1 - keep], [1.0, -keep], s.dq[run, joint - 1])
+        columns.append(column)
+    return np.column_stack(columns)
+
+
+def _time(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    x = (s.t - s.t[0]) / max(float(s.t[-1] - s.t[0]), 1e-9)
+    return np.column_stack([np.cos(np.pi * k * x) for k in range(1, KNOTS + 1)])
+
+
+def _ringing(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    sources = np.column_stack([s.rigid[:, joint - 1], s.ddq[:, joint - 1]])
+    for run in s.runs:
+        sources[run] -= sources[run].mean(axis=0)
+    place, rate = resonance(s, sources, shape[0])
+    return np.column_stack([place[:, 0], rate[:, 0], place[:, 1], rate[:, 1]])
+
+
+def _vibration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    phase = 2 * np.pi * shape[0] * (s.t - s.t[0])
+    pull = s.sensitivity("gravity")[:, joint - 1]
+    size = np.abs(pull).max(axis=0)
+    # An axis along gravity feels none of it, but for rounding.
+    pull = np.where(size > 1e-6 * max(float(size.max()), 1e-300), pull, 0.0)
+    if not float(size.max()) > 1e-9:
+        pull = np.ones((len(s), 1)) * [1.0, 0.0, 0.0]
+    waves = (np.cos(phase), np.sin(phase))
+    columns = [wave * pull[:, i % pull.shape[1]] for i in range(3) for wave in waves]
+    return np.column_stack([*columns, *waves])
+
+
+def _sway(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    phase = 2 * np.pi * shape[0] * (s.t - s.t[0])
+    return np.column_stack([np.cos(phase), np.sin(phase)])
+
+
+def _turns(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    q, v, a = (x[:, joint - 1] for x in (s.q, s.dq, s.ddq))
+    waves = (np.cos(shape[0] * q), np.sin(shape[0] * q))
+    # What an error of the position of so many waves does through stiffness, friction and inertia.
+    return np.column_stack([wave * factor for factor in (np.ones(len(s)), v, v**2, a) for wave in waves])
+
+
+FAMILIES: dict[str, Family] = {
+    "angle": Family(_angle, 8, "depends on the position of {who}"),
+    "angles": Family(_angles, 16, "depends on its own position and that of {who} together"),
+    "motion": Family(_motion, 5, "depends on the velocity of {who}"),
+    "drag": Family(_drag, 8, "depends on its own position and the velocity of {who} together"),
+    "posture": Family(_posture, 8, "depends on its own velocity and the position of {who} together"),
+    "speed": Family(_speed, 6, "depends on the speed of the joint"),
+    "load": Family(_load, 5, "depends on the load of the joint"),
+    "acceleration": Family(_acceleration, 3, "depends on the acceleration of the joint, not in proportion"),
+    "memory": Family(_memory, 4, "remembers the velocity of the joint for a while"),
+    "time": Family(_time, KNOTS, "changes slowly with time"),
+    "ringing": Family(_ringing, 4, "rings at {point} Hz after the motion"),
+    "vibration": Family(_vibration, 8, "vibrates at {point} Hz whatever the motion"),
+    "sway": Family(_sway, 2, "swings to and fro at {point} Hz whatever the motion"),
+    "turns": Family(_turns, 8, "repeats {point} times a turn of the joint and grows with its speed"),
+}
