@@ -105,7 +105,9 @@ class Diagnosis:
                 f"    unseen error {100 * gain.nrmse_before:.2f} % -> {100 * gain.nrmse_after:.2f} % of the {of} "
                 f"(fall {100 * gain.ci95[0]:.2f} to {100 * gain.ci95[1]:.2f} %)"
             )
-            open_ = [_open(parameter) for parameter in finding.parameters if not parameter.determined]
+            # Coefficients of a free function mean nothing each.
+            named = finding.effect != "unexplained"
+            open_ = [_open(parameter) for parameter in finding.parameters if named and not parameter.determined]
             if open_:
                 lines.append(f"    not well determined by these logs: {', '.join(open_)}")
             close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]

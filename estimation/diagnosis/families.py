@@ -85,6 +85,12 @@ def _load(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Arr
     return np.column_stack([x, np.abs(x), x * np.abs(x), x**2, np.abs(x) ** 3])
 
 
+def _torque(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    torque = s.torque[:, joint - 1]
+    x = torque / max(float(np.abs(torque).max()), 1e-9)
+    return np.column_stack([np.tanh(x / 0.05), np.tanh(x / 0.2), x * np.abs(x), x**3, np.abs(x), x**2])
+
+
 def _acceleration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     a = s.ddq[:, joint - 1]
     x = a / max(float(np.abs(a).max()), 1e-9)
@@ -148,6 +154,7 @@ FAMILIES: dict[str, Family] = {
     "posture": Family(_posture, 8, "depends on its own velocity and the position of {who} together"),
     "speed": Family(_speed, 6, "depends on the speed of the joint"),
     "load": Family(_load, 5, "depends on the load of the joint"),
+    "torque": Family(_torque, 6, "depends on the torque of the joint, not in proportion"),
     "acceleration": Family(_acceleration, 3, "depends on the acceleration of the joint, not in proportion"),
     "memory": Family(_memory, 4, "remembers the velocity of the joint for a while"),
     "time": Family(_time, KNOTS, "changes slowly with time"),

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.families import FAMILIES
+from estimation.diagnosis.leaning import Leaning
 from estimation.diagnosis.pulling import Pulling
 from estimation.diagnosis.swinging import Swinging
 from robots.robot import Robot
-from robots.terms.effects import Coefficient, JointEffect, Shape, Situation
+from robots.terms.effects import Coefficient, Effect, JointEffect, Shape, Situation
 
 Array = NDArray[np.float64]
 
@@ -19,10 +20,12 @@ PREFIX = "pattern:"
 # Frequencies of a ringing load and of a vibration [Hz].
 RINGING = tuple(float(f) for f in np.geomspace(0.5, 8.0, 13))
 TURNS = tuple(float(h) for h in (*range(5, 33), 40, 48, 64))
-SLOWEST = 0.6
+SLOWEST, RUBBING = 0.6, 2.0
 # Swings of a torque that goes to and fro by itself: fewer than so many in the data are a drift.
 SWINGS = 5.0
 SWAYING = ("vibration", "sway")
+# What acts on all joints at once.
+WHOLE: tuple[Effect, ...] = (Swinging(), Pulling(), Leaning())
 
 
 @dataclass(frozen=True)
@@ -76,13 +79,13 @@ class Pattern(JointEffect):
         duration = _duration(situation)
         bottom, top = SLOWEST, min(0.15 / max(situation.period, 1e-6), 30.0)
         if self.kind == "sway":
-            bottom, top = SWINGS / duration, SLOWEST
+            bottom, top = SWINGS / duration, self._fastest
         return tuple((float(f),) for f in np.arange(bottom, top, 0.5 / duration))
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
         """Keeps a vibration's frequency below what the samples resolve, and a swing's where it is one."""
         if self.kind == "sway":
-            return ((SWINGS / _duration(situation), 2 * SLOWEST),)
+            return ((SWINGS / _duration(situation), 2 * self._fastest),)
         if self.kind == "vibration":
             return ((0.5 * SLOWEST, min(0.2 / max(situation.period, 1e-6), 50.0)),)
         return super().bounds(situation, joint)
@@ -90,19 +93,25 @@ class Pattern(JointEffect):
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks the frequencies of a vibration by the residual's spectrum over that of its surroundings."""
+        """Ranks the frequencies of what goes to and fro by the residual's spectrum over that of its surroundings."""
         grid = self.grid(situation, joint)
         if self.kind not in SWAYING or len(grid) <= count:
             return grid
         assert joint is not None
         rows = len(situation)
-        series = residual[:, joint - 1] - residual[:, joint - 1].mean()
+        series = residual[:, joint - 1] * (situation.sign[:, joint - 1] if self.odd else 1.0)
+        series = series - series.mean()
         f = np.fft.rfftfreq(4 * rows, situation.period)
         power = np.abs(np.fft.rfft(series * np.hanning(rows), 4 * rows)) ** 2
         width = 401
         level = np.convolve(np.pad(power, width // 2, mode="reflect"), np.ones(width) / width, mode="valid")
         contrast = np.interp([point for (point,) in grid], f, power / np.maximum(level, 1e-300))
         return tuple(grid[i] for i in np.argsort(-contrast)[:count])
+
+    @property
+    def _fastest(self) -> float:
+        """Frequency up to which a torque sways [Hz]; a friction does by the turns of what rubs, as a belt's."""
+        return RUBBING if self.odd else SLOWEST
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the functions (N, k)."""
@@ -131,29 +140,29 @@ class Pattern(JointEffect):
         return f"The residual torque {where} {text}{turn}."
 
 
-def build_pattern(text: str) -> Pattern | Swinging | Pulling | None:
+def build_pattern(text: str) -> Effect | None:
     """Reads the name of a pattern; None for anything else."""
-    for whole in (Swinging, Pulling):
+    for whole in WHOLE:
         if text == whole.name:
-            return whole()
+            return whole
     parts = text.removeprefix(PREFIX).split(":")
     if not text.startswith(PREFIX) or len(parts) != 3 or parts[0] not in FAMILIES or not parts[1].isdigit():
         return None
     return Pattern(parts[0], int(parts[1]), parts[2] == "odd")
 
 
-def all_patterns(robot: Robot) -> tuple[Pattern | Swinging | Pulling, ...]:
+def all_patterns(robot: Robot) -> tuple[Effect, ...]:
     """Lists the patterns to look for on every joint, and on the robot as a whole."""
     joints = range(1, robot.n + 1)
     own = [Pattern("speed"), Pattern("speed", odd=True), Pattern("load"), Pattern("load", odd=True)]
-    own += [Pattern("acceleration"), Pattern("memory"), Pattern("time"), Pattern("time", odd=True)]
-    own += [Pattern("ringing"), Pattern("vibration"), Pattern("sway"), Pattern("turns")]
+    own += [Pattern("torque"), Pattern("acceleration"), Pattern("memory"), Pattern("time"), Pattern("time", odd=True)]
+    own += [Pattern("ringing"), Pattern("vibration"), Pattern("sway"), Pattern("sway", odd=True), Pattern("turns")]
     each = [Pattern("angle", k, odd) for k in joints for odd in (False, True)]
     each += [Pattern("angles", k) for k in joints] if robot.n > 1 else []
     each += [Pattern("motion", k, odd) for k in joints for odd in (False, True)] if robot.n > 1 else []
     each += [Pattern("drag", k) for k in joints]
     each += [Pattern("posture", k) for k in joints] if robot.n > 1 else []
-    return (*own, *each, Swinging(), Pulling())
+    return (*own, *each, *WHOLE)
 
 
 def is_of_time(effect: object) -> bool:

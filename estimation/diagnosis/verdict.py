@@ -66,7 +66,7 @@ def judge(
     left, p_values = _patterns(problem, patterns, named, false_alarm, rng, alone=True)
     explained, rest = selection.accepted.gain, sum(map(_worth, left))
     share = explained / (explained + rest) if explained + rest > 0 else 1.0
-    kept = selection.found
+    kept = tuple(found for found in selection.found if _believable(problem, found.member))
     if share < ENOUGH:
         kept = tuple(found for found in kept if found.member.hypothesis.joint is not None)
     kept = tuple(found for found in kept if _holds_alone(problem, found, named, patterns, false_alarm, rng))
@@ -105,6 +105,12 @@ def judge(
         members, p_values = _patterns(problem, patterns, beside, false_alarm, rng, alone=True)
     verdict = "none" if not kept else "ambiguous" if any(map(is_open, kept)) else "named"
     return Judgement(verdict, kept, (), (), float(share))
+
+
+def _believable(problem: Problem, member: Member) -> bool:
+    """Whether a machine may have what was fitted."""
+    place, robot = member.hypothesis, problem.situation.robot
+    return place.effect.believable(robot, place.joint, member.coefficients)
 
 
 def _holds(

@@ -22,7 +22,7 @@ from robots.signals import Log
 from tests.diagnosis_blind.judging import Truth, complaints
 from tests.truth.cases import Case, draw_case, write_log
 from tests.truth.description import write_description
-from tests.truth.effects import actuator, friction, strangers, surroundings, transmission
+from tests.truth.effects import actuator, friction, strangers, surroundings, transmission, whole_strangers
 from tests.truth.effects.base import Effect
 
 
@@ -74,9 +74,11 @@ PAIRS = (Hide(seed=7011, effects=(friction.PositionDependent, surroundings.Paylo
 STRANGE = (
     Hide(seed=7021, effects=(strangers.CrossWave,), joint=2, size=0.05),
     Hide(seed=7071, effects=(strangers.Drag,), joint=1, size=0.03),
-    Hide(seed=7072, effects=(strangers.Hose,), size=0.03, kind="ur10"),
+    Hide(seed=7072, effects=(whole_strangers.Hose,), size=0.03, kind="ur10"),
+    Hide(seed=7073, effects=(whole_strangers.LeaningBase,), size=0.02, kind="ur10"),
+    Hide(seed=7074, effects=(strangers.DeadZone,), joint=2, size=0.02),
 )
-SWINGING = Hide(seed=7041, effects=(strangers.Slosh,), size=0.01, duration=60.0)
+SWINGING = Hide(seed=7041, effects=(whole_strangers.Slosh,), size=0.01, duration=60.0)
 MORE = (
     Hide(seed=7004, effects=(surroundings.Payload,), kind="heavy"),
     Hide(seed=7033, kind="ur10"),

@@ -117,6 +117,15 @@ class Effect(ABC):
         """Gives the range of each coefficient at some shape values: as described, where shapes do not narrow it."""
         return tuple((coefficient.lower, coefficient.upper) for coefficient in self.parameters(robot, joint))
 
+    def believable(self, robot: Robot, joint: Place, coefficients: Array) -> bool:
+        """Whether a machine may have these values: one that is stopped by its largest size wants to be more still."""
+        limits = [(c.lower, c.upper) for c in self.parameters(robot, joint)]
+        return not any(
+            limit and np.isclose(value, limit, rtol=1e-6)
+            for value, pair in zip(coefficients, limits, strict=True)
+            for limit in pair
+        )
+
     @abstractmethod
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque per unit of each coefficient.

@@ -36,7 +36,7 @@ class BaseTilt(Effect):
         tilts = Coefficient("tilt_1", "rad", -0.5, 0.5), Coefficient("tilt_2", "rad", -0.5, 0.5)
         unit = force_unit(robot, 0)
         own = Coefficient("moment_cosine", unit), Coefficient("moment_sine", unit)
-        return (*tilts, *own) if _upright(robot) else tilts
+        return (*tilts, *own) if upright(robot) else tilts
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Leaves the moments of an upright axis to `likely`."""
@@ -47,7 +47,7 @@ class BaseTilt(Effect):
     ) -> tuple[tuple[float | None, ...], ...]:
         """Gives the moments of an upright first axis, none and free; a log from another base has shown them."""
         level = np.asarray(situation.robot.chain.gravity, dtype=float)
-        alike = _upright(situation.robot) and bool(np.all(situation.gravity == level))
+        alike = upright(situation.robot) and bool(np.all(situation.gravity == level))
         return ((0.0,), (1.0,)) if alike else ((0.0,),)
 
     def joints(self, robot: Robot) -> tuple[Place, ...]:
@@ -56,14 +56,14 @@ class BaseTilt(Effect):
 
     def leaves(self, robot: Robot, joint: int) -> float:
         """Gives half of it for an upright first axis: where its own moments are too small to be told, they show."""
-        return 0.5 if joint == 0 and _upright(robot) else super().leaves(robot, joint)
+        return 0.5 if joint == 0 and upright(robot) else super().leaves(robot, joint)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per angle, and of the first joint per N m of its own moments."""
         axes = level_axes(np.asarray(situation.robot.chain.gravity, dtype=float))
         turned = np.cross(situation.gravity[:, None], axes)  # (N, 2, 3)
         tilted = situation.sensitivity("gravity") @ turned.transpose(0, 2, 1)
-        if not _upright(situation.robot):
+        if not upright(situation.robot):
             return tilted
         own = np.zeros_like(tilted)
         if shape and shape[0]:
@@ -84,8 +84,8 @@ class BaseTilt(Effect):
         return f"The base is tilted by {angle:.3g} deg: gravity does not pull where the description says."
 
 
-def _upright(robot: Robot) -> bool:
-    """Whether the first joint turns about gravity."""
+def upright(robot: Robot) -> bool:
+    """Whether the first joint turns about gravity: moments of its link are then not shown by a level robot."""
     first, down = robot.chain.joints[0], np.asarray(robot.chain.gravity, dtype=float)
     along = float(abs(first.rotation @ first.axis @ down)) > 0.99 * float(np.linalg.norm(down))
     return first.kind == "revolute" and along

@@ -37,6 +37,10 @@ class CurrentClipping(JointEffect):
         """Describes the share that is lost."""
         return (Coefficient("share_lost", "1", 0.0, 1.0),)
 
+    def believable(self, robot: Robot, joint: Place, coefficients: Array) -> bool:
+        """Gives true: a torque that is cut off is all lost."""
+        return True
+
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists levels that 1 to 40 % of the samples exceed; the largest torque where that is a flat top."""
         assert joint is not None

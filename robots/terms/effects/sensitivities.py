@@ -148,6 +148,16 @@ def _forward(chain: Chain, q: casadi.SX) -> tuple[list[tuple[str, casadi.SX, cas
     return poses, origin + rotation @ casadi.SX(chain.tip[:3, 3])
 
 
+def _moment(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    # The potential energy of gravity g is -g' S: it is linear in g, and the torque of g is its gradient.
+    rotation, origin, total = casadi.SX.eye(3), casadi.SX(3, 1), casadi.SX(3, 1)
+    for i, joint in enumerate(chain.joints):
+        turn, offset = symbolic_placement(joint, q[i])
+        origin, rotation = origin + rotation @ offset, rotation @ turn
+        total = total + pi[10 * i] * origin + rotation @ pi[10 * i + 1 : 10 * i + 4]
+    return total
+
+
 def moved_body(tip: Array) -> Array:
     """Builds the (10, 10) map of inertial parameters in the flange frame to those in the last link's frame."""
     columns = []
@@ -174,4 +184,5 @@ KINDS: dict[str, Callable[..., casadi.SX]] = {
     "tool": _tool,
     "jacobian": _jacobian,
     "flange": _flange,
+    "moment": _moment,
 }

@@ -142,7 +142,8 @@ class Situation:
             kind: ``position`` d rigid/dq (N, n, n), ``velocity`` d rigid/d(dq) (N, n, n), ``inertia`` (N, n, n) without
                 rotors, ``gravity`` d rigid/d(gravity in the base frame) (N, n, 3), ``tool`` torque per inertial
                 parameter of a body on the flange, in its frame (N, n, 10), ``jacobian`` of the flange in the base
-                frame, linear then angular (N, 6, n).
+                frame, linear then angular (N, 6, n), ``flange`` its place there (N, 3, 1), ``moment`` the first moment
+                of the links' masses there [kg m] (N, 3, 1).
         """
         from robots.terms.effects.sensitivities import evaluate
 

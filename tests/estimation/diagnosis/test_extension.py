@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.extension import Extension, find_effect, read_extension
+from estimation.diagnosis.leaning import Leaning
 from estimation.diagnosis.patterns import all_patterns, build_pattern
 from estimation.diagnosis.pulling import Pulling
 from estimation.diagnosis.swinging import Swinging
@@ -27,7 +28,7 @@ def state(arm: Robot) -> Situation:
 
 def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(arm: Robot, state: Situation) -> None:
     """A pattern in a model file is the pattern that was found; all its values are finite."""
-    *own, swinging, pulling = all_patterns(arm)
+    *own, swinging, pulling, leaning = all_patterns(arm)
     for pattern in own:
         assert build_pattern(pattern.name) == pattern
         for shape in pattern.grid(state, 1)[:2]:
@@ -45,10 +46,11 @@ def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(
         # The flange is on the elbow's axis: it moves, but no force on it turns the elbow.
         assert X[:, 0].any(axis=0).all()
         assert not X[:, 1].any()
-    assert type(build_pattern(pulling.name)) is type(pulling) is Pulling
-    assert pulling.joints(arm) == (None,)
-    assert pulling.columns(state, None).shape == (300, 2, len(pulling.parameters(arm, None)))
-    for whole in (swinging, pulling):
+    for effect, kind in ((pulling, Pulling), (leaning, Leaning)):
+        assert type(build_pattern(effect.name)) is type(effect) is kind
+        assert effect.joints(arm) == (None,)
+        assert effect.columns(state, None).shape == (300, 2, len(effect.parameters(arm, None)))
+    for whole in (swinging, pulling, leaning):
         text = whole.describe(None, np.zeros(12), whole.grid(state, None)[0])
         assert text.startswith("The residual torque of all joints")
 

@@ -14,6 +14,7 @@ from estimation.diagnosis.patterns import Pattern
 from estimation.diagnosis.problem import Group
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found
+from robots.robot import Robot
 from robots.terms.effects import EFFECTS
 
 ROWS = 5000
@@ -110,6 +111,7 @@ def test_a_formula_is_not_named_for_what_is_unexplained_on_joints_that_it_reache
     monkeypatch.setattr(verdict, "score", lambda problem, group, beside: SimpleNamespace(gain=left))
     monkeypatch.setattr(verdict, "_patterns", lambda *arguments, **kind: ([free], [1e-30]))
     monkeypatch.setattr(verdict, "_holds", lambda *arguments: True)
+    monkeypatch.setattr(verdict, "_believable", lambda *arguments: True)
     found = Found(offset, 1e-9, ())
     selection = SimpleNamespace(found=(found,), accepted=SimpleNamespace(gain=100.0))
     said = verdict.judge(SimpleNamespace(rows=ROWS), selection, [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
@@ -158,3 +160,17 @@ def test_several_names_on_one_joint_must_fit_better_than_one_free_function(monke
     assert 309.0 - 5 * PRICE - (299.0 - 4 * PRICE) < verdict.LEAST
     assert not held([free])
     assert held([replace(free, gain=280.0)])
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "believed"),
+    [("encoder_offset", 0.5, False), ("encoder_offset", -0.02, True), ("current_clipping", 1.0, True)],
+)
+def test_a_value_at_the_edge_of_what_machines_have_is_no_name(
+    name: str, value: float, believed: bool, arm: Robot
+) -> None:
+    """An encoder half a radian off wants to be more than that; all of a torque may be cut off; a play may be none."""
+    problem = SimpleNamespace(situation=SimpleNamespace(robot=arm))
+    member = replace(_member(name, 1, 300.0, 1), coefficients=np.array([value]))
+    assert verdict._believable(problem, member) is believed  # type: ignore[arg-type]
+    assert EFFECTS["backlash"].believable(arm, 1, np.zeros(1))

@@ -14,18 +14,18 @@ from tests.truth.effects.friction import (
     Warming,
 )
 from tests.truth.effects.strangers import (
+    BeltFriction,
     BorrowedFriction,
     CrossWave,
+    DeadZone,
     Drag,
     DraggingBrake,
-    FloorVibration,
-    Hose,
     Interpolation,
-    Slosh,
     TiredCable,
 )
 from tests.truth.effects.surroundings import Contact, Payload, Tilt
 from tests.truth.effects.transmission import Backlash, Balancer, Cable, Elastic, Ripple, WristCoupling
+from tests.truth.effects.whole_strangers import FloorVibration, Hose, LeaningBase, Slosh
 
 KNOWN: tuple[type[Effect], ...] = (
     Stribeck,
@@ -61,5 +61,8 @@ STRANGERS: tuple[type[Effect], ...] = (
     Drag,
     BorrowedFriction,
     DraggingBrake,
+    BeltFriction,
+    LeaningBase,
+    DeadZone,
 )
 __all__ = ["KNOWN", "STRANGERS", "Effect"]

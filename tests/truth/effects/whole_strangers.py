@@ -1,0 +1,158 @@
+"""Effects on all joints at once that no catalogue has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from scipy.signal import lfilter
+
+from tests.truth.dynamics import point_force_torque, rigid_torque, with_gravity
+from tests.truth.effects.base import Effect, log_uniform
+from tests.truth.machines import Machine
+from tests.truth.ride import Ride
+
+
+@dataclass(frozen=True, kw_only=True)
+class FloorVibration(Effect):
+    """A floor that shakes along a line: amount [m/s2] at a steady frequency."""
+
+    frequency: float = 6.0
+    direction: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    phase: float = 0.0
+
+    name = "unexplained"
+    largest = 20.0
+
+    @classmethod
+    def joints(cls, machine: Machine) -> tuple[int | None, ...]:
+        return (None,)
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> FloorVibration:
+        direction = rng.normal(size=3)
+        return cls(
+            frequency=rng.uniform(2.0, 9.0),
+            direction=tuple((direction / np.linalg.norm(direction)).tolist()),
+            phase=rng.uniform(0, 2 * np.pi),
+        )
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        field = with_gravity(ride.machine.model, -np.array(self.direction))
+        still = np.zeros_like(ride.q)
+        shake = np.cos(2 * np.pi * self.frequency * ride.t + self.phase)
+        return self.amount * shake[:, None] * rigid_torque(field, ride.link_q, still, still)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slosh(Effect):
+    """Liquid in a tank at the flange: a mass amount [kg] on weak springs, driven by the flange's acceleration."""
+
+    frequency: float = 1.5
+    damping: float = 0.05
+
+    name = "unexplained"
+    largest = 100.0
+
+    @classmethod
+    def joints(cls, machine: Machine) -> tuple[int | None, ...]:
+        return (None,)
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Slosh:
+        return cls(frequency=rng.uniform(0.8, 2.5), damping=log_uniform(rng, 0.02, 0.1))
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        machine, point = ride.machine, np.array([0.0, 0.0, 0.1])
+        every = max(round(0.004 / ride.step), 1)
+        place = _places(machine, ride.link_q, point)
+        w, force = 2 * np.pi * self.frequency, np.zeros((len(ride.t), 3))
+        h = ride.step
+        # x'' + 2 d w x' + w^2 x = -p'' in the horizontal plane, by the bilinear rule; the tank feels w^2 x + 2 d w x'.
+        k = 2 / h
+        den = np.array(
+            [k**2 + 2 * self.damping * w * k + w**2, 2 * w**2 - 2 * k**2, k**2 - 2 * self.damping * w * k + w**2]
+        )
+        num = np.array([2 * self.damping * w * k + w**2, 2 * w**2, w**2 - 2 * self.damping * w * k])
+        for run in ride.runs:
+            speed = np.gradient(place[run], h, axis=0)
+            pull = np.gradient(speed, h, axis=0)
+            force[run, :2] = lfilter(num, den, -pull[:, :2], axis=0)
+        force[np.arange(len(force)) % every > 0] = 0.0
+        torque = point_force_torque(machine.model, ride.link_q, machine.n, point, self.amount * force)
+        rows = np.arange(0, len(force), every)
+        return np.column_stack([np.interp(np.arange(len(force)), rows, column) for column in torque[rows].T])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hose(Effect):
+    """A dress pack of stiffness amount [N/m] from the ceiling to the flange, which pulls where it is taut."""
+
+    anchor: tuple[float, float, float] = (0.0, 0.0, 2.0)
+    slack: float = 0.5
+
+    name = "unexplained"
+    largest = 1e5
+
+    @classmethod
+    def joints(cls, machine: Machine) -> tuple[int | None, ...]:
+        return (None,)
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Hose:
+        middle = (machine.lower + machine.upper)[None] / 2
+        size = float(np.linalg.norm(_places(machine, middle, np.zeros(3))))
+        place = (rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3), rng.uniform(0.8, 1.6))
+        return cls(anchor=tuple(size * x for x in place), slack=size * rng.uniform(0.2, 0.5))
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        every = max(round(0.004 / ride.step), 1)
+        q = ride.link_q[::every]
+        reach = np.array(self.anchor) - _places(ride.machine, q, np.zeros(3))
+        length = np.linalg.norm(reach, axis=1, keepdims=True)
+        force = self.amount * np.maximum(length - self.slack, 0.0) * reach / np.maximum(length, 1e-9)
+        torque = point_force_torque(ride.machine.model, q, ride.machine.n, np.zeros(3), force)
+        places = np.arange(len(ride.t)) / every
+        return np.column_stack([np.interp(places, np.arange(len(q)), column) for column in torque.T])
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeaningBase(Effect):
+    """A base on soft bolts that turns about its x and y axes under the robot's weight: amount [rad/(N m)]."""
+
+    ratio: float = 1.0
+
+    name = "unexplained"
+    largest = 1e-2
+
+    @classmethod
+    def joints(cls, machine: Machine) -> tuple[int | None, ...]:
+        return (None,)
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> LeaningBase:
+        return cls(ratio=rng.uniform(0.5, 2.0))
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        every = max(round(0.004 / ride.step), 1)
+        q, model = ride.link_q[::every], ride.machine.model
+        data, weight = model.createData(), np.empty((len(q), 3))
+        for k in range(len(q)):
+            weight[k] = data.mass[0] * pin.centerOfMass(model, data, q[k])
+        weight = np.cross(weight, model.gravity.linear)
+        still, torque = np.zeros_like(q), np.zeros_like(q)
+        for axis, softness in enumerate((self.amount, self.amount * self.ratio)):
+            turned = with_gravity(model, np.cross(model.gravity.linear, np.eye(3)[axis]))
+            torque += softness * weight[:, axis, None] * rigid_torque(turned, q, still, still)
+        places = np.arange(len(ride.t)) / every
+        return np.column_stack([np.interp(places, np.arange(len(q)), column) for column in torque.T])
+
+
+def _places(machine: Machine, q: np.ndarray, point: np.ndarray) -> np.ndarray:
+    data = machine.model.createData()
+    places = np.empty((len(q), 3))
+    for k in range(len(q)):
+        pin.forwardKinematics(machine.model, data, q[k])
+        places[k] = data.oMi[machine.n].act(point)
+    return places
