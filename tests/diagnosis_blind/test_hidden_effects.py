@@ -161,7 +161,7 @@ def test_what_swings_at_the_flange_is_told_with_its_frequency() -> None:
     """Liquid in a tank is ``unexplained`` on the whole robot, told by its frequency, and mends unseen data."""
     truth, said = examined(SWINGING)
     (hidden,) = truth.effects
-    assert isinstance(hidden, strangers.Slosh)
+    assert isinstance(hidden, whole_strangers.Slosh)
     assert said["verdict"] == "unexplained"
     (finding,) = said["findings"]
     assert (finding["effect"], finding["joint"]) == ("unexplained", None)
