@@ -22,6 +22,8 @@ from robots.common.parallel import available_cores
 CONTENDERS = 7
 # A hypothesis whose grid point explains less than this share of the best one's gain is no contender.
 NEAR = 0.3
+# A member whose gain is within this share of what it was when it won over its rivals wins over them still.
+SAME = 0.02
 # What acts for a moment is no contender where twice its gain at the grid is too little: its search takes the longest.
 TWICE = 2.0
 MOST = 4  # effects at once
@@ -81,6 +83,7 @@ def select(
     seen = {member.hypothesis for member in members}
     spurned: set[Hypothesis] = set()
     visited = [seen]
+    won: dict[Hypothesis, float] = {}
     first: Scan | None = None
     while True:
         accepted = accept(problem, tuple(member.group for member in members))
@@ -101,12 +104,13 @@ def select(
             break
         members.append(best[0])
         p_values.append(chance[best[0].hypothesis])
+        won[best[0].hypothesis] = best[0].gain
         # What is known of the torque now may come near what the log shows.
         more, sure = _seen(problem, entries, false_alarm, rng, members)
         seen |= {member.hypothesis for member in more}
         members, p_values = [*members, *more], [*p_values, *sure]
         if len(members) > 1:
-            members, p_values = _polished(problem, entries, members, p_values, seen, rng)
+            members, p_values = _polished(problem, entries, members, p_values, seen, won, rng)
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
         now = {member.hypothesis for member in members}
@@ -242,11 +246,13 @@ def _polished(
     members: list[Member],
     p_values: list[float],
     seen: Collection[Hypothesis],
+    won: dict[Hypothesis, float],
     rng: np.random.Generator,
 ) -> tuple[list[Member], list[float]]:
     """Refines each member beside the others, lets its rivals take its place, and drops what is no longer needed.
 
-    What was seen in the torque stays.
+    What was seen in the torque stays. Rivals of one that has `won` over them with the gain that it has still, whatever
+    is beside it now, are not tried again.
     """
     for _ in range(2):
         changed = False
@@ -254,12 +260,14 @@ def _polished(
             others = [m for k, m in enumerate(members) if k != i]
             beside = accept(problem, tuple(m.group for m in others))
             now = composed(problem, members, [members[i].hypothesis])
-            if members[i].hypothesis in seen:
+            reached = _measured(problem, members[i], beside)
+            before = won.get(members[i].hypothesis)
+            still = before is not None and abs(reached.gain - before) <= SAME * before
+            if still or members[i].hypothesis in seen:
                 members[i] = refine(now, members[i].hypothesis, members[i].shape, beside)
                 continue
             result = scan(problem, entries, beside, rng, nulls=False)
-            reached = _measured(problem, members[i], beside).bic(problem.rows)
-            near = contenders(problem, result, others, reached)
+            near = contenders(problem, result, others, reached.bic(problem.rows))
             rest = [o for o in near if o.hypothesis != members[i].hypothesis][:4]
             # All at once: the refinement of its own shape takes as long as those of its rivals.
             with ThreadPoolExecutor(1) as apart:
@@ -268,6 +276,7 @@ def _polished(
             best = max([own.result(), *rivals], key=lambda m: m.bic(problem.rows))
             changed |= best.hypothesis != members[i].hypothesis
             members[i] = best
+            won[best.hypothesis] = best.gain
         if not changed:
             break
     keep = [i for i, m in enumerate(members) if m.hypothesis in seen or m.worth(problem.rows) > LEAST]

@@ -47,7 +47,7 @@ def _searching(
     )
     for name in ("_worth_it", "_sure", "_beyond"):
         replace(name, lambda *args: True)
-    replace("_polished", lambda problem, entries, members, p_values, seen, rng: (polished(members), p_values))
+    replace("_polished", lambda problem, entries, members, p_values, seen, won, rng: (polished(members), p_values))
     replace("_found", lambda problem, entries, members, p_values, rng: [SimpleNamespace(member=m) for m in members])
     return scans
 
@@ -79,3 +79,46 @@ def test_two_that_drop_each_other_end_the_search(monkeypatch: pytest.MonkeyPatch
     scans = _searching(monkeypatch, lambda members: members[-1:], showing=(A, B))
     assert len(_selected()) == 1
     assert len(scans) <= 4
+
+
+@pytest.mark.parametrize(("gain", "tried"), [(99.0, False), (90.0, True), (110.0, True)])
+def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
+    gain: float, tried: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An effect that won with a gain of 100, and one beside it of its old gain, which is left in peace.
+
+    A rival, twice as good now, takes the place of the first where it is looked at.
+    """
+
+    def member(hypothesis: Hypothesis, gain: float) -> SimpleNamespace:
+        return SimpleNamespace(
+            hypothesis=hypothesis, group=hypothesis, shape=(), gain=gain, bic=lambda rows: gain, worth=lambda rows: gain
+        )
+
+    looked: list[int] = []
+    gains = {A: gain, B: 100.0, C: 2 * gain}
+
+    def scan(problem, entries, accepted, rng, *, nulls):
+        looked.append(1)
+        return SimpleNamespace(outcomes=[])
+
+    monkeypatch.setattr(selection, "accept", lambda problem, groups: groups)
+    monkeypatch.setattr(selection, "composed", lambda problem, members, hypotheses: problem)
+    monkeypatch.setattr(selection, "refine", lambda problem, h, shape, beside: member(h, gains[h]))
+    monkeypatch.setattr(selection, "_measured", lambda problem, m, beside: member(m.hypothesis, gains[m.hypothesis]))
+    monkeypatch.setattr(selection, "scan", scan)
+    monkeypatch.setattr(selection, "contenders", lambda *args: [SimpleNamespace(hypothesis=C)])
+    monkeypatch.setattr(selection, "_best", lambda problem, rest, beside: [member(C, gains[C])] if rest else [])
+    won = {A: 100.0, B: 100.0}
+    members, _ = selection._polished(
+        SimpleNamespace(rows=1000),  # type: ignore[arg-type]
+        [],
+        [member(A, 100.0), member(B, 100.0)],  # type: ignore[list-item]
+        [0.0, 0.0],
+        set(),
+        won,
+        np.random.default_rng(0),
+    )
+    assert len(looked) == int(tried)
+    assert [m.hypothesis for m in members] == [C if tried else A, B]
+    assert won.get(C, 0.0) == (2 * gain if tried else 0.0)
