@@ -22,6 +22,7 @@ CLOSE = 0.02
 AGREED = 0.1
 ROUNDS = 5
 TOO_FAINT = 1.4
+AWAY = 0.25
 EVERY = 2
 BESIDE = 5
 
@@ -188,6 +189,8 @@ def draw_case(
             size=size,
             records=tuple(play(machine, references, effects, noise, np.random.default_rng([seed, 1]))),
         )
+        if any(_runs_away(machine, record) for record in case.records):
+            raise Hidden("the loop runs away from its reference")
         # A closed loop moves more sharply than its reference, which some effects show more in.
         shares = case.visible()
         if any(share <= 0 for share in shares):
@@ -202,6 +205,12 @@ def draw_case(
     if max(ratios) > TOO_FAINT:
         raise Hidden(f"{effects[int(np.argmax(ratios))].name} shows {size / max(ratios):.2g} at most")
     return case
+
+
+def _runs_away(machine: Machine, record: Record) -> bool:
+    """Whether a joint is farther from its range than `AWAY` of it: no robot would, and no size is what was asked for."""
+    reach = AWAY * (machine.upper - machine.lower)
+    return bool(np.any((record.q < machine.lower - reach) | (record.q > machine.upper + reach)))
 
 
 def write_log(record: Record, path: Path) -> None:
