@@ -208,7 +208,7 @@ def draw_case(
 
 
 def _runs_away(machine: Machine, record: Record) -> bool:
-    """Whether a joint is farther from its range than `AWAY` of it: no robot would, and no size is what was asked for."""
+    """Whether a joint is farther from its range than `AWAY` of it: nothing has the size then that was asked for."""
     reach = AWAY * (machine.upper - machine.lower)
     return bool(np.any((record.q < machine.lower - reach) | (record.q > machine.upper + reach)))
 
