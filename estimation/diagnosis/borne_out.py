@@ -28,6 +28,7 @@ class BorneOut:
         seen: what the members bring on unseen data.
         spoiling: free functions that err on unseen data, with p-value and gain.
         notes: what was left out, in words.
+        refuted: whether unseen data speak against a name that stood out clearly: then it is no cause, but there is one.
     """
 
     founds: tuple[Found, ...]
@@ -36,6 +37,7 @@ class BorneOut:
     seen: Measured
     spoiling: tuple[tuple[Member, float, Gain], ...]
     notes: tuple[str, ...]
+    refuted: bool
 
 
 def bear_out(
@@ -43,6 +45,7 @@ def bear_out(
     measure: Callable[[Sequence[Member]], Measured],
     beyond: Callable[[Effect], bool],
     forms: Callable[[Sequence[Member], int], Sequence[Member]],
+    faint: Callable[[Member], bool] = lambda member: False,
 ) -> BorneOut:
     """Leaves out what makes unseen errors larger, one after the other, the surest first.
 
@@ -54,13 +57,21 @@ def bear_out(
         measure: measures members on unseen data.
         beyond: tells of which effects those data can say nothing.
         forms: lists other forms of one of some members, the likeliest first.
+        faint: tells which names hardly stand out of the noise: unseen data that do not speak for one are the odds
+            against it.
     """
     founds = list(judgement.kept)
     members = [*(found.member for found in founds), *judgement.patterns]
     p_values = [*(found.p_value for found in founds), *judgement.p_values]
     spoiling: list[tuple[Member, float, Gain]] = []
     notes: list[str] = []
+    refuted = False
     seen = measure(members)
+    while idle := [i for i in range(len(founds)) if _idle(seen, i, members[i], beyond, faint)]:
+        notes.append(_FAINT.format(members[idle[0]].hypothesis.label))
+        for items in (founds, members, p_values):
+            items.pop(idle[0])
+        seen = measure(members)
     while harmful := [i for i, member in enumerate(members) if _harms(seen, i, member, beyond)]:
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         label = members[worst].hypothesis.label
@@ -77,12 +88,14 @@ def bear_out(
             for items in (founds, members, p_values):
                 items.pop(worst)
             notes.append(_DROPPED.format(label))
+            refuted = True
         seen = measure(members)
     joints = sorted({member.hypothesis.joint or 0 for member, _, _ in spoiling})
     notes += [_SPOILING.format(f"joint {joint}" if joint else "the robot as a whole") for joint in joints]
-    return BorneOut(tuple(founds), tuple(members), tuple(p_values), seen, tuple(spoiling), tuple(notes))
+    return BorneOut(tuple(founds), tuple(members), tuple(p_values), seen, tuple(spoiling), tuple(notes), refuted)
 
 
+_FAINT = "A fit of {} hardly stood out of the noise, and unseen data do not speak for it: left out."
 _DROPPED = "A fit of {} stood out of the noise, but does not help on unseen data: left out."
 _REPLACED = "A fit of {} stood out of the noise, but does not help on unseen data; {}, which fits about as well, does."
 _SPOILING = (
@@ -117,6 +130,18 @@ def _instead(
             rest = tuple((other, more - worse) for other, more in close[k + 1 :])
             return Found(rival, found.p_value, rest), seen
     return harmless[0] if harmless else None
+
+
+def _idle(
+    seen: Measured,
+    i: int,
+    member: Member,
+    beyond: Callable[[Effect], bool],
+    faint: Callable[[Member], bool],
+) -> bool:
+    """Whether a name that hardly stands out brings nothing on unseen data that it should be seen in."""
+    gain = seen.gains[i]
+    return faint(member) and not beyond(member.hypothesis.effect) and gain.nrmse_after >= gain.nrmse_before
 
 
 def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bool]) -> bool:

@@ -21,7 +21,7 @@ from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import cut
-from estimation.diagnosis.selection import Found, Selection
+from estimation.diagnosis.selection import LEAST, Found, Selection
 from estimation.diagnosis.unseen import Measured, measure_unseen, simulate_unseen
 from estimation.diagnosis.verdict import CLOSE, Judgement, is_open
 from estimation.diagnosis.windup import EFFECT as ELASTICITY
@@ -67,12 +67,14 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         lambda members: measure_unseen(robot, problem, members, told.held_out, told.seed + 3),
         partial(_is_beyond, told),
         partial(alike_forms, problem),
+        lambda member: member.worth(problem.rows) <= LEAST,
     )
     members, founds, seen, spoiling = held.members, held.founds, held.seen, held.spoiling
     verdict = judgement.verdict
     if held.notes and len(members) == len(founds) and not spoiling:
-        # Something did stand out of the noise, if no name holds.
-        verdict = "unexplained" if not members else "ambiguous" if any(map(is_open, founds)) else "named"
+        # Something did stand out of the noise clearly, if a name that did does not hold.
+        verdict = "ambiguous" if any(map(is_open, founds)) else "named"
+        verdict = verdict if members else "unexplained" if held.refuted else "none"
     fitted = fit_extended(problem, members, _provenance(told))
     findings = tuple(
         word_finding(

@@ -52,7 +52,9 @@ class Bench:
         lost = {m.hypothesis.joint - 1 for m, s in zip(members, shown, strict=True) if m.hypothesis.joint and s.astray}
         return SimpleNamespace(
             unseen=SimpleNamespace(astray=lambda joint: joint in lost),
-            gains=tuple(Gain(nrmse_before=0.03, nrmse_after=0.03, ci95=(s.low, s.high)) for s in shown),
+            gains=tuple(
+                Gain(nrmse_before=0.03, nrmse_after=0.03 - (s.low + s.high) / 2, ci95=(s.low, s.high)) for s in shown
+            ),
             rises=tuple(s.rise for s in shown),
             worse=tuple(s.high < 0 for s in shown),
             kept=tuple(s.kept for s in shown),
@@ -93,13 +95,20 @@ def _borne(
     p_values: Sequence[float] = (),
     held_out: bool = True,
     forms: Sequence[Member] = (),
+    faint: Sequence[Member] = (),
 ) -> BorneOut:
     judgement = Judgement("named", founds, tuple(free), tuple(p_values), 1.0)
 
     def beyond(effect: Effect) -> bool:
         return held_out and effect.passing
 
-    return bear_out(judgement, bench, beyond, lambda members, i: forms if members[i] is SPRING else ())  # type: ignore[arg-type]
+    return bear_out(
+        judgement,
+        bench,  # type: ignore[arg-type]
+        beyond,
+        lambda members, i: forms if members[i] is SPRING else (),
+        lambda member: member in faint,
+    )
 
 
 @pytest.mark.parametrize(("rise", "stays"), [(HARM - 0.03, True), (HARM + 0.01, False)])
@@ -255,3 +264,16 @@ def test_a_passing_effect_is_not_judged_on_other_logs() -> None:
     # For the same reason other logs cannot make it take another's place.
     bench = _bench(stribeck=HARMS, external_contact=HARMS)
     assert _borne(bench, Found(STRIBECK, 1e-9, ((PUSH, 1.0),))).members == ()
+
+
+@pytest.mark.parametrize(("shown", "stays"), [(HELPS, True), (IDLE, True), (HARMS, False)])
+def test_a_faint_name_needs_unseen_data_that_speak_for_it(shown: Shown, stays: bool) -> None:
+    """What hardly stood out is noise unless its gain is positive, sure or not; what clearly did is refuted surely."""
+    slightly = Shown(-0.003, 0.002, 1.001)
+    for said, faint, kept in ((shown, False, stays), (slightly, False, True), (slightly, True, False)):
+        result = _borne(_bench(spring=said), Found(SPRING, 1e-3, ()), faint=[SPRING] if faint else [])
+        assert (result.members == (SPRING,)) is kept
+        assert result.refuted is (not kept and not faint)
+        assert bool(result.notes) is (not kept)
+    # A push is over when the unseen log begins.
+    assert _borne(_bench(external_contact=slightly), Found(PUSH, 1e-3, ()), faint=[PUSH]).members == (PUSH,)
