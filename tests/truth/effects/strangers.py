@@ -147,13 +147,15 @@ class BeltFriction(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class DeadZone(Effect):
-    """A torque signal that shows nothing up to amount [N m], and that much too little beyond."""
+    """A torque signal that shows nothing up to the share amount of its first log's largest, and so much too little."""
 
     name = "unexplained"
+    largest = 0.5
 
     def signal(self, ride: Ride, torque: np.ndarray) -> np.ndarray:
         own = torque[:, self.j]
-        return torque + self.on_joint(ride, -np.clip(own, -self.amount, self.amount))
+        zone = self.amount * np.abs(own[ride.runs[0]]).max()
+        return torque + self.on_joint(ride, -np.clip(own, -zone, zone))
 
 
 def _another(machine: Machine, rng: np.random.Generator, joint: int | None) -> int:
