@@ -27,11 +27,16 @@ class Family:
         columns: evaluates them (N, k), of what is seen, the joint (from 1), another one's number and the shape.
         count: k.
         words: what the residual torque does, with room for the other joint's name and the shape.
+        of: the joint's input (N,) that the shape's value is the largest size of, in the logs that it was found in: the
+            functions are the same ones in any other log.
+        unit: of that.
     """
 
     columns: Callable[[Situation, int, int, tuple[float, ...]], Array]
     count: int
     words: str
+    of: Callable[[Situation, int], Array] | None = None
+    unit: str = ""
 
 
 def _angle(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
@@ -71,29 +76,41 @@ def _products(q: Array, v: Array) -> Array:
     return np.column_stack([wave * speed for wave in waves for speed in (v, v * v)])
 
 
+def _speed_of(s: Situation, joint: int) -> Array:
+    return np.asarray(np.abs(s.dq[:, joint - 1]))
+
+
+def _load_of(s: Situation, joint: int) -> Array:
+    return np.asarray(s.load[:, joint - 1])
+
+
+def _torque_of(s: Situation, joint: int) -> Array:
+    return np.asarray(s.torque[:, joint - 1])
+
+
+def _acceleration_of(s: Situation, joint: int) -> Array:
+    return np.asarray(s.ddq[:, joint - 1])
+
+
 def _speed(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
-    v = s.dq[:, joint - 1]
-    x = np.abs(v) / max(float(np.abs(v).max()), 1e-9)
+    x = _speed_of(s, joint) / shape[0]
     centres = (0.0, 0.05, 0.15, 0.35, 0.65, 1.0)
     widths = (0.03, 0.06, 0.1, 0.2, 0.25, 0.3)
     return np.column_stack([np.exp(-0.5 * ((x - c) / w) ** 2) for c, w in zip(centres, widths, strict=True)])
 
 
 def _load(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
-    load = s.load[:, joint - 1]
-    x = load / max(float(np.abs(load).max()), 1e-9)
+    x = _load_of(s, joint) / shape[0]
     return np.column_stack([x, np.abs(x), x * np.abs(x), x**2, np.abs(x) ** 3])
 
 
 def _torque(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
-    torque = s.torque[:, joint - 1]
-    x = torque / max(float(np.abs(torque).max()), 1e-9)
+    x = _torque_of(s, joint) / shape[0]
     return np.column_stack([np.tanh(x / 0.05), np.tanh(x / 0.2), x * np.abs(x), x**3, np.abs(x), x**2])
 
 
 def _acceleration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
-    a = s.ddq[:, joint - 1]
-    x = a / max(float(np.abs(a).max()), 1e-9)
+    x = _acceleration_of(s, joint) / shape[0]
     return np.column_stack([np.abs(x), x * np.abs(x), x**3])
 
 
@@ -152,10 +169,16 @@ FAMILIES: dict[str, Family] = {
     "motion": Family(_motion, 5, "depends on the velocity of {who}"),
     "drag": Family(_drag, 8, "depends on its own position and the velocity of {who} together"),
     "posture": Family(_posture, 8, "depends on its own velocity and the position of {who} together"),
-    "speed": Family(_speed, 6, "depends on the speed of the joint"),
-    "load": Family(_load, 5, "depends on the load of the joint"),
-    "torque": Family(_torque, 6, "depends on the torque of the joint, not in proportion"),
-    "acceleration": Family(_acceleration, 3, "depends on the acceleration of the joint, not in proportion"),
+    "speed": Family(_speed, 6, "depends on the speed of the joint", _speed_of, "rad/s or m/s"),
+    "load": Family(_load, 5, "depends on the load of the joint", _load_of, "N m or N"),
+    "torque": Family(_torque, 6, "depends on the torque of the joint, not in proportion", _torque_of, "N m or N"),
+    "acceleration": Family(
+        _acceleration,
+        3,
+        "depends on the acceleration of the joint, not in proportion",
+        _acceleration_of,
+        "rad/s2 or m/s2",
+    ),
     "memory": Family(_memory, 4, "remembers the velocity of the joint for a while"),
     "time": Family(_time, KNOTS, "changes slowly with time"),
     "ringing": Family(_ringing, 4, "rings at {point} Hz after the motion"),

@@ -59,21 +59,29 @@ class Pattern(JointEffect):
 
     @property
     def shapes(self) -> tuple[Shape, ...]:  # type: ignore[override]
-        """A frequency or an order where the family has one."""
+        """A frequency or an order where the family has one, or what its input is measured by."""
         if self.kind == "ringing":
             return (Shape("frequency", "Hz", 0.3, 12.0, "log", RINGING),)
         if self.kind in SWAYING:
             return (Shape("frequency", "Hz", 1e-3 if self.kind == "sway" else 0.3, 50.0, "linear"),)
         if self.kind == "turns":
             return (Shape("order", "periods per turn", 4.0, 80.0, "linear", TURNS),)
-        return ()
+        family = FAMILIES[self.kind]
+        return (Shape("largest", family.unit, 0.0, np.inf),) if family.of else ()
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the coefficients: numbers of functions, without a physical meaning each."""
         return tuple(Coefficient(f"function_{i + 1}", "") for i in range(FAMILIES[self.kind].count))
 
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
-        """Lists the frequencies of what goes to and fro half a resolution apart; else the family's own points."""
+        """Lists the frequencies of what goes to and fro half a resolution apart; else the family's own points.
+
+        An input is measured by its largest size here.
+        """
+        of = FAMILIES[self.kind].of
+        if of:
+            assert joint is not None
+            return ((max(float(np.abs(of(situation, joint)).max(initial=0.0)), 1e-9),),)
         if self.kind not in SWAYING:
             return super().grid(situation, joint)
         duration = _duration(situation)
@@ -83,7 +91,10 @@ class Pattern(JointEffect):
         return tuple((float(f),) for f in np.arange(bottom, top, 0.5 / duration))
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
-        """Keeps a vibration's frequency below what the samples resolve, and a swing's where it is one."""
+        """Keeps a vibration below what the samples resolve, a swing where it is one, and what measures an input."""
+        if FAMILIES[self.kind].of:
+            ((largest,),) = self.grid(situation, joint)
+            return ((largest, largest),)
         if self.kind == "sway":
             return ((SWINGS / _duration(situation), 2 * self._fastest),)
         if self.kind == "vibration":

@@ -122,3 +122,22 @@ def test_a_damaged_extension_is_refused(arm: Robot) -> None:
         read_extension(shorter, arm)
     with pytest.raises(InputError, match="another version"):
         read_extension({**shorter, "parameters": [{"name": "compliance"}, {"name": "dynamic_stiffness"}]}, arm)
+
+
+@pytest.mark.parametrize("kind", ["speed", "load", "torque", "acceleration"])
+def test_a_function_of_an_input_is_the_same_in_a_log_in_which_that_is_smaller(
+    arm: Robot, state: Situation, kind: str
+) -> None:
+    """What was found in a whole motion says of its calmest part what it said there."""
+    pattern = build_pattern(f"pattern:{kind}:0:even")
+    assert pattern is not None
+    (shape,) = pattern.grid(state, 1)
+    assert pattern.bounds(state, 1) == ((shape[0], shape[0]),)
+    coefficients = np.arange(1.0, len(pattern.parameters(arm, 1)) + 1)
+    found = Extension(
+        effect=pattern.name, joint=1, shape=shape, coefficients=coefficients, covariance=np.eye(len(coefficients) + 1)
+    )
+    rows = slice(100, 110)
+    part = situation(state.model, state.parameters, state.t[rows], state.q[rows], state.dq[rows], state.ddq[rows])
+    assert pattern.grid(part, 1)[0][0] < shape[0]
+    assert found.torque(part) == pytest.approx(found.torque(state)[rows], abs=1e-12)
