@@ -23,6 +23,8 @@ from estimation.pulls import Pull
 Array = NDArray[np.float64]
 
 FAINT = 1e-7
+# A column smaller than this is none: one over its square is no number.
+NOTHING = 1e-100
 # A coefficient of which more than this lies in directions that the data do not determine is not determined.
 LOST = 0.01
 
@@ -163,7 +165,7 @@ def _covariance(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
     With it come the coefficients (p,) that the data leave open: their errors there are those of a norm, not of data.
     """
     norms = np.linalg.norm(matrix, axis=0)
-    norms[norms == 0] = 1.0
+    norms[norms < NOTHING] = 1.0
     values, vectors = np.linalg.eigh((matrix.T @ matrix) / norms[:, None] / norms)
     kept = values > FAINT**1.5 * values[-1]
     inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T

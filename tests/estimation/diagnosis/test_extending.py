@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.diagnosis.extending import dense, fit_extended
+from estimation.diagnosis.extending import _covariance, dense, fit_extended
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import Recording
@@ -84,3 +84,12 @@ def test_no_log_knows_a_delay_better_than_its_formula(
     by_noise = np.sqrt(member.scatter / member.group.gram[0, 0])
     assert by_noise < 0.04 * delay
     assert (0.05 * value) ** 2 + (0.5 * by_noise) ** 2 < error**2 < (0.05 * value) ** 2 + (2 * by_noise) ** 2
+
+
+def test_a_column_that_is_hardly_one_is_left_open() -> None:
+    """Two columns as if alone, and a third of 1e-170 that the data say nothing of, without an overflow."""
+    matrix = np.random.default_rng(0).normal(size=(50, 3)) * [1.0, 1.0, 1e-170]
+    covariance, lost = _covariance(matrix)
+    assert covariance[:2, :2] == pytest.approx(np.linalg.inv(matrix[:, :2].T @ matrix[:, :2]))
+    assert np.isfinite(covariance).all()
+    assert lost.tolist() == [False, False, True]
