@@ -66,8 +66,8 @@ class Band:
         sizes = np.maximum(columns.max(axis=1, initial=0.0), -columns.min(axis=1, initial=0.0))[:, None]
         units = 1.0 / np.where(sizes > 0, sizes, 1.0)
         packed = np.zeros((-(-len(columns) // 2), len(series)), dtype=np.complex64 if single else np.complex128)
-        np.multiply(columns[::2], units[::2], out=packed.real, casting="same_kind")
-        np.multiply(columns[1::2], units[1::2], out=packed.imag[: len(columns) // 2], casting="same_kind")
+        np.multiply(columns[::2], units[::2], out=packed.real)
+        np.multiply(columns[1::2], units[1::2], out=packed.imag[: len(columns) // 2])
         size, response = _response(self, len(series), 0 if after is None else len(after))
         spectrum = scipy.fft.fft(packed, size, axis=1)
         if response is not None:
@@ -78,8 +78,8 @@ class Band:
             folded *= scipy.fft.fft(after, folded.shape[1]).astype(folded.dtype, copy=False)
         thin = scipy.fft.ifft(folded, axis=1, overwrite_x=True)[:, :rows]
         result: Array | Small = np.empty((len(columns), rows), dtype=kind)
-        np.multiply(thin.real, sizes[::2], out=result[::2], casting="same_kind")
-        np.multiply(thin.imag[: len(columns) // 2], sizes[1::2], out=result[1::2], casting="same_kind")
+        np.multiply(thin.real, sizes[::2], out=result[::2])
+        np.multiply(thin.imag[: len(columns) // 2], sizes[1::2], out=result[1::2])
         return result[0] if series.ndim == 1 else result.T
 
 

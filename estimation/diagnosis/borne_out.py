@@ -45,7 +45,7 @@ def bear_out(
     measure: Callable[[Sequence[Member]], Measured],
     beyond: Callable[[Effect], bool],
     forms: Callable[[Sequence[Member], int], Sequence[Member]],
-    faint: Callable[[Member], bool] = lambda member: False,
+    faint: Callable[[Member], bool],
 ) -> BorneOut:
     """Leaves out what makes unseen errors larger, one after the other, the surest first.
 

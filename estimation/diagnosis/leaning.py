@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from robots.robot import Robot
 from robots.terms.effects import Coefficient, Effect, Situation
-from robots.terms.effects.base_tilt import level_axes, upright
+from robots.terms.effects.base_tilt import level_axes, tilted_torque, upright
 
 Array = NDArray[np.float64]
 
@@ -40,8 +40,6 @@ class Leaning(Effect):
         """Evaluates the torque of all joints per compliance and per angle (N, n, 5), or (N, n, 3)."""
         robot, gravity = situation.robot, situation.gravity
         axes = level_axes(np.asarray(robot.chain.gravity, dtype=float))
-        turned = np.cross(gravity[:, None], axes)  # (N, 2, 3)
-        tilted = situation.sensitivity("gravity") @ turned.transpose(0, 2, 1)  # (N, n, 2)
         moment = np.cross(situation.sensitivity("moment").reshape(len(situation), 3), gravity) @ axes.T  # (N, 2)
         none = np.zeros(len(situation))
         leans = [(moment[:, 0], none), (none, moment[:, 1]), (moment[:, 1], moment[:, 0])]
@@ -53,7 +51,7 @@ class Leaning(Effect):
                     np.sin(situation.q[:, 0]), across[:, k]
                 )
                 leans.append((angles[:, 0], angles[:, 1]))
-        return np.asarray(tilted @ np.stack([np.column_stack(lean) for lean in leans], axis=2))
+        return np.asarray(tilted_torque(situation) @ np.stack([np.column_stack(lean) for lean in leans], axis=2))
 
     def describe(
         self,

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal, TypeVar, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.band import Band
-from estimation.diagnosis.gaps import Gaps
+from estimation.diagnosis.gaps import Gaps, Real
 
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
-Real = TypeVar("Real", np.float32, np.float64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,9 +60,7 @@ class BaseTilt(Effect):
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per angle, and of the first joint per N m of its own moments."""
-        axes = level_axes(np.asarray(situation.robot.chain.gravity, dtype=float))
-        turned = np.cross(situation.gravity[:, None], axes)  # (N, 2, 3)
-        tilted = situation.sensitivity("gravity") @ turned.transpose(0, 2, 1)
+        tilted = tilted_torque(situation)
         if not upright(situation.robot):
             return tilted
         own = np.zeros_like(tilted)
@@ -89,6 +87,13 @@ def upright(robot: Robot) -> bool:
     first, down = robot.chain.joints[0], np.asarray(robot.chain.gravity, dtype=float)
     along = float(abs(first.rotation @ first.axis @ down)) > 0.99 * float(np.linalg.norm(down))
     return first.kind == "revolute" and along
+
+
+def tilted_torque(situation: Situation) -> Array:
+    """Evaluates the torque of all joints per angle of the base about each of its level axes (N, n, 2)."""
+    axes = level_axes(np.asarray(situation.robot.chain.gravity, dtype=float))
+    turned = np.cross(situation.gravity[:, None], axes)  # (N, 2, 3)
+    return np.asarray(situation.sensitivity("gravity") @ turned.transpose(0, 2, 1))
 
 
 def level_axes(gravity: Array) -> Array:

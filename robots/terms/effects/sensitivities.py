@@ -137,23 +137,32 @@ def _flange(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casad
     return _forward(chain, q)[1]
 
 
-def _forward(chain: Chain, q: casadi.SX) -> tuple[list[tuple[str, casadi.SX, casadi.SX]], casadi.SX]:
-    """Gives each joint's kind, axis and origin, and the flange's place, in the base frame."""
+def _frames(chain: Chain, q: casadi.SX) -> list[tuple[casadi.SX, casadi.SX]]:
+    """Gives each link's rotation and origin in the base frame."""
     rotation, origin = casadi.SX.eye(3), casadi.SX(3, 1)
-    poses: list[tuple[str, casadi.SX, casadi.SX]] = []
+    frames = []
     for i, joint in enumerate(chain.joints):
         turn, offset = symbolic_placement(joint, q[i])
         origin, rotation = origin + rotation @ offset, rotation @ turn
-        poses.append((joint.kind, rotation @ casadi.SX(cleaned(joint.axis)), origin))
+        frames.append((rotation, origin))
+    return frames
+
+
+def _forward(chain: Chain, q: casadi.SX) -> tuple[list[tuple[str, casadi.SX, casadi.SX]], casadi.SX]:
+    """Gives each joint's kind, axis and origin, and the flange's place, in the base frame."""
+    frames = _frames(chain, q)
+    poses: list[tuple[str, casadi.SX, casadi.SX]] = [
+        (joint.kind, rotation @ casadi.SX(cleaned(joint.axis)), origin)
+        for joint, (rotation, origin) in zip(chain.joints, frames, strict=True)
+    ]
+    rotation, origin = frames[-1]
     return poses, origin + rotation @ casadi.SX(chain.tip[:3, 3])
 
 
 def _moment(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
     # The potential energy of gravity g is -g' S: it is linear in g, and the torque of g is its gradient.
-    rotation, origin, total = casadi.SX.eye(3), casadi.SX(3, 1), casadi.SX(3, 1)
-    for i, joint in enumerate(chain.joints):
-        turn, offset = symbolic_placement(joint, q[i])
-        origin, rotation = origin + rotation @ offset, rotation @ turn
+    total = casadi.SX(3, 1)
+    for i, (rotation, origin) in enumerate(_frames(chain, q)):
         total = total + pi[10 * i] * origin + rotation @ pi[10 * i + 1 : 10 * i + 4]
     return total
 

@@ -65,7 +65,7 @@ class Slosh(Effect):
 
     def torque(self, ride: Ride) -> np.ndarray:
         machine, point = ride.machine, np.array([0.0, 0.0, 0.1])
-        every = max(round(0.004 / ride.step), 1)
+        every = _thinning(ride)
         place = _places(machine, ride.link_q, point)
         w, force = 2 * np.pi * self.frequency, np.zeros((len(ride.t), 3))
         h = ride.step
@@ -107,14 +107,13 @@ class Hose(Effect):
         return cls(anchor=tuple(size * x for x in place), slack=size * rng.uniform(0.2, 0.5))
 
     def torque(self, ride: Ride) -> np.ndarray:
-        every = max(round(0.004 / ride.step), 1)
+        every = _thinning(ride)
         q = ride.link_q[::every]
         reach = np.array(self.anchor) - _places(ride.machine, q, np.zeros(3))
         length = np.linalg.norm(reach, axis=1, keepdims=True)
         force = self.amount * np.maximum(length - self.slack, 0.0) * reach / np.maximum(length, 1e-9)
         torque = point_force_torque(ride.machine.model, q, ride.machine.n, np.zeros(3), force)
-        places = np.arange(len(ride.t)) / every
-        return np.column_stack([np.interp(places, np.arange(len(q)), column) for column in torque.T])
+        return _between(ride, torque, every)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,7 +134,7 @@ class LeaningBase(Effect):
         return cls(ratio=rng.uniform(0.5, 2.0))
 
     def torque(self, ride: Ride) -> np.ndarray:
-        every = max(round(0.004 / ride.step), 1)
+        every = _thinning(ride)
         q, model = ride.link_q[::every], ride.machine.model
         data, weight = model.createData(), np.empty((len(q), 3))
         for k in range(len(q)):
@@ -145,8 +144,7 @@ class LeaningBase(Effect):
         for axis, softness in enumerate((self.amount, self.amount * self.ratio)):
             turned = with_gravity(model, np.cross(model.gravity.linear, np.eye(3)[axis]))
             torque += softness * weight[:, axis, None] * rigid_torque(turned, q, still, still)
-        places = np.arange(len(ride.t)) / every
-        return np.column_stack([np.interp(places, np.arange(len(q)), column) for column in torque.T])
+        return _between(ride, torque, every)
 
 
 def _places(machine: Machine, q: np.ndarray, point: np.ndarray) -> np.ndarray:
@@ -156,3 +154,14 @@ def _places(machine: Machine, q: np.ndarray, point: np.ndarray) -> np.ndarray:
         pin.forwardKinematics(machine.model, data, q[k])
         places[k] = data.oMi[machine.n].act(point)
     return places
+
+
+def _thinning(ride: Ride) -> int:
+    """Rows of a ride that become one, of 4 ms: what changes with the pose is slow."""
+    return max(round(0.004 / ride.step), 1)
+
+
+def _between(ride: Ride, thinned: np.ndarray, every: int) -> np.ndarray:
+    """Interpolates the values (N', n) of every so many rows."""
+    places = np.arange(len(ride.t)) / every
+    return np.column_stack([np.interp(places, np.arange(len(thinned)), column) for column in thinned.T])
