@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
-from scipy.sparse import csc_matrix
 
+from estimation.diagnosis.free_torque import FreeTorque, Real, span_of
 from robots.common.stretches import spans
 
 if TYPE_CHECKING:
     from estimation.diagnosis.whitening import Whitening
 
 Array = NDArray[np.float64]
-Real = TypeVar("Real", np.float32, np.float64)
 
-# Functions of one gap that the band cannot tell apart count once.
-DISTINCT = 1e-4
 # A joint that has not moved on for so long [s] is at rest.
 LONG_GAP = 0.3
 
@@ -38,11 +34,11 @@ class Gaps:
 
     Attributes:
         bridges: per joint the rows, those before and after that count, and the weight of the latter.
-        free: per joint orthonormal white columns (N, f) of the short gaps.
+        free: per joint white columns of the short gaps, to be projected out.
     """
 
     bridges: tuple[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], Array], ...]
-    free: tuple[csc_matrix, ...]
+    free: tuple[FreeTorque, ...]
 
     def bridged(self, series: Array, joint: int) -> Array:
         """Replaces the rows of gaps in columns (N,) or (N, k) of a joint, counted from 0."""
@@ -56,15 +52,7 @@ class Gaps:
 
     def freed(self, white: NDArray[Real], joint: int) -> NDArray[Real]:
         """Projects the short gaps' torques out of white columns of a joint."""
-        if joint >= len(self.free) or not self.free[joint].shape[1]:
-            return white
-        own = (self._single if white.dtype == np.float32 else self.free)[joint]
-        return np.asarray(white - own @ (own.T @ white))
-
-    @cached_property
-    def _single(self) -> tuple[csc_matrix, ...]:
-        """The free columns in single precision."""
-        return tuple(own.astype(np.float32) for own in self.free)
+        return self.free[joint].projected_out(white) if joint < len(self.free) else white
 
     def resting(self, starts: tuple[int, ...], rows: int, stride: int, margin: int) -> NDArray[np.bool_]:
         """Marks the thinned rows (M, n) of long gaps and `margin` rows beside: what bridges them is not measured."""
@@ -111,11 +99,10 @@ def long_gap(step: float) -> int:
 
 def free_columns(
     unsure: NDArray[np.bool_], longest: int, whitening: Whitening, widths: Sequence[float]
-) -> tuple[csc_matrix, ...]:
+) -> tuple[FreeTorque, ...]:
     """Builds the white columns of the short gaps: polynomials over each, one for every `widths[j]` rows and one more.
 
-    Each is whitened where it is not zero only, so that a long log costs no more a gap than a short one; they are made
-    orthonormal gap by gap where gaps do not touch each other's rows.
+    Each is whitened where it is not zero only, so that a long log costs no more a gap than a short one.
     """
     result = []
     for j, (column, width) in enumerate(zip(unsure.T, widths, strict=True)):
@@ -131,7 +118,7 @@ def free_columns(
                     row, white = _white_gap(whitening, j, start, shapes, run_stop - run_start)
                     pieces.append((first_row + row, white / whitening.level(run, j)))
             first_row += -(-(run_stop - run_start) // whitening.stride)
-        result.append(_sparse([_orthonormal_block(block) for block in _touching(pieces)], first_row))
+        result.append(span_of(pieces, first_row))
     return tuple(result)
 
 
@@ -149,46 +136,6 @@ def _white_gap(whitening: Whitening, joint: int, start: int, shapes: Array, rows
     lead = max(0, min(len(taps) - 1 - first, len(white)))
     white[:lead] *= np.linspace(0, 1, len(taps))[1 + first : 1 + first + lead, None]
     return first, white
-
-
-def _touching(pieces: Sequence[tuple[int, Array]]) -> Iterator[list[tuple[int, Array]]]:
-    """Groups pieces (first row, values), in the order of their first rows, that share rows."""
-    block: list[tuple[int, Array]] = []
-    end = 0
-    for row, values in pieces:
-        if block and row >= end:
-            yield block
-            block = []
-        block.append((row, values))
-        end = max(end, row + len(values))
-    if block:
-        yield block
-
-
-def _orthonormal_block(pieces: Sequence[tuple[int, Array]]) -> tuple[int, Array]:
-    """Makes the columns of pieces that share rows orthonormal: first row, and values."""
-    first = min(row for row, _ in pieces)
-    rows = max(row + len(values) for row, values in pieces) - first
-    block = np.zeros((rows, sum(values.shape[1] for _, values in pieces)))
-    at = 0
-    for row, values in pieces:
-        block[row - first : row - first + len(values), at : at + values.shape[1]] = values
-        at += values.shape[1]
-    norms = np.linalg.norm(block, axis=0)
-    block /= np.where(norms > 0, norms, 1.0)
-    values, vectors = np.linalg.eigh(block.T @ block)
-    kept = values > DISTINCT * values[-1]
-    return first, block @ (vectors[:, kept] / np.sqrt(values[kept]))
-
-
-def _sparse(blocks: Sequence[tuple[int, Array]], rows: int) -> csc_matrix:
-    """Puts blocks (first row, values) side by side."""
-    if not blocks:
-        return csc_matrix((rows, 0))
-    data = np.concatenate([values.T.ravel() for _, values in blocks])
-    indices = np.concatenate([np.tile(np.arange(row, row + len(values)), values.shape[1]) for row, values in blocks])
-    lengths = np.concatenate([np.full(values.shape[1], len(values)) for _, values in blocks])
-    return csc_matrix((data, indices, np.concatenate([[0], np.cumsum(lengths)])), shape=(rows, len(lengths)))
 
 
 def _short(start: int, stop: int, longest: int, beside: int, rows: int) -> list[tuple[int, int]]:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.band import Band
-from estimation.diagnosis.gaps import Gaps, Real
+from estimation.diagnosis.free_torque import Real
+from estimation.diagnosis.gaps import Gaps
 
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
