@@ -118,7 +118,7 @@ def find_bands(
     return tuple(low_pass(float(cutoff), rate, stride) for cutoff in cutoffs)
 
 
-def unbiased(recording: Recording, inertia: Array, residual: Array) -> Array:
+def unbiased(recording: Recording, inertia: Array, residual: Array, moving: Array | float = 1.0) -> Array:
     """Finds up to which frequencies (n,) [Hz] the errors of accelerations bias no model by what shows.
 
     An error of energy E in a column that has the energy G with it, both over the noise's, takes the share E / G off its
@@ -128,6 +128,7 @@ def unbiased(recording: Recording, inertia: Array, residual: Array) -> Array:
         recording: the data.
         inertia: torque on each joint per acceleration of each (n, n) [kg m2].
         residual: torque less model (N, n) [N m or N].
+        moving: share of the rows (n,) in which each joint moves: the others count for nothing.
     """
     lengths = [run.stop - run.start for run in recording.runs]
     window = min(max(lengths), round(WINDOW / recording.step))
@@ -141,9 +142,9 @@ def unbiased(recording: Recording, inertia: Array, residual: Array) -> Array:
         return spectra[0][0], np.average([power for _, power in spectra], axis=0, weights=weights)
 
     f, noise = density(residual)
-    energies = 2 * recording.duration * f[1] / np.maximum(noise, QUIETEST)
+    energies = 2 * recording.duration * f[1] * moving / np.maximum(noise, QUIETEST)
     column = np.cumsum(density(recording.ddq @ inertia.T)[1] * energies, axis=0)
-    error = np.cumsum((2 * np.pi * f[:, None]) ** 4 * (inertia**2 @ recording.floor) * energies, axis=0)
+    error = np.cumsum((2 * np.pi * f[:, None]) ** 4 * (moving * (inertia**2 @ recording.floor)) * energies, axis=0)
     shown = np.minimum(error / np.maximum(column, QUIETEST), 1.0) ** 2 * (column - error) > BIAS
     return np.where(shown.any(axis=0), f[np.argmax(shown, axis=0)], np.inf)
 

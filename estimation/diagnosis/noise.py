@@ -41,6 +41,8 @@ LOWEST_ORDER = 4
 HUBER = 3.5
 # But not where rows stick out for so long [s] together and no reversal is nearer than this [s].
 TOGETHER, KICKED = 0.05, 0.15
+# The noise's fast changes are taken from known rows where a joint has so many.
+FEWEST_ROWS = 100
 # Bridges of so many rows are short in any case; where fewer than this share of the rows remain, all bridges stay.
 SHORT, ENOUGH = 8, 0.3
 # What is not known of kicks drowns in the noise below this share of it: at each reversal it is different.
@@ -75,8 +77,10 @@ def estimate_whitening(
     gaps = find_gaps(recording.unsure, recording.starts)
     bridged = np.column_stack([gaps.bridged(column, j) for j, column in enumerate(residual.T)])
     pieces = [bridged[run] for run in recording.runs]
-    highest = unbiased(recording, inertia, bridged) if share == SHARE else np.inf
-    bands = find_bands(recording, inertia, _density(pieces, recording.step), share, highest)
+    moving = np.array([1.0 - len(rows) / len(residual) for rows, *_ in rests.bridges])
+    highest = unbiased(recording, inertia, bridged, moving) if share == SHARE else np.inf
+    known = [~recording.unsure[run] for run in recording.runs]
+    bands = find_bands(recording, inertia, _density(pieces, recording.step, known), share, highest)
     pieces = [
         np.column_stack([band.passed(column) for band, column in zip(bands, piece.T, strict=True)]) for piece in pieces
     ]
@@ -95,7 +99,8 @@ def estimate_whitening(
     noise = _colour(pieces, step, counts, parameters, slowest, fastest, beside, period)
     levels = None
     if len(pieces) > 1:
-        levels = _levels([noise.whitened(piece) for piece in pieces], step, slowest, fastest)
+        counted = [rows.sum(axis=0) for rows in beside.measured]
+        levels = _levels([noise.whitened(piece) for piece in pieces], counted, step, slowest, fastest)
         pieces = [piece / level for piece, level in zip(pieces, levels, strict=True)]
         noise = _colour(pieces, step, counts, parameters, slowest, fastest, beside, period)
     trimmed = max(len(a) for a in noise.coefficients)
@@ -167,17 +172,20 @@ def _pushed(outside: NDArray[np.bool_], recording: Recording, stride: int, cutof
     return outside & crowded & (np.concatenate(near) == 0)
 
 
-def _levels(white: Sequence[Array], step: float, slowest: float, fastest: Array) -> Array:
+def _levels(
+    white: Sequence[Array], counts: Sequence[NDArray[np.intp]], step: float, slowest: float, fastest: Array
+) -> Array:
     """Gives the noise of each log over that of all (logs, n), from whitened residuals (N, n) of each.
 
-    By the faster half of what is known: a torque that acts in one log only is slow. A log of few frequencies is taken
-    to be as noisy as the others.
+    By the faster half of what is known: a torque that acts in one log only is slow. A log of few frequencies, or of few
+    rows that count (n,), is taken to be as noisy as the others.
     """
     powers, numbers = np.empty((2, len(white), len(fastest)))
-    for i, rows in enumerate(white):
+    for i, (rows, counted) in enumerate(zip(white, counts, strict=True)):
         f = np.fft.rfftfreq(len(rows), step)[:, None]
         inside = (f >= np.maximum(slowest, fastest / 2)) & (f < fastest)
-        numbers[i] = inside.sum(axis=0)
+        # What is bridged has no noise, and as many frequencies less.
+        numbers[i] = inside.sum(axis=0) * counted / len(rows)
         powers[i] = (np.abs(np.fft.rfft(rows, axis=0)) ** 2 * inside).sum(axis=0) / len(rows)
     mean = np.maximum(powers.sum(axis=0) / np.maximum(numbers.sum(axis=0), 1), 1e-300)
     ratio = np.maximum(powers / np.maximum(numbers, 1) / mean, QUIETEST**2)
@@ -265,9 +273,13 @@ def quiet_joints(recording: Recording, residual: Array, inertia: Array) -> NDArr
     return np.asarray(np.diag(inertia) * recording.jolts < DROWNED * noise)
 
 
-def _density(pieces: Sequence[Array], step: float) -> Array:
-    """Power density of the noise (n,) in the upper half of the band, from its fast changes."""
+def _density(pieces: Sequence[Array], step: float, known: Sequence[NDArray[np.bool_]] | None = None) -> Array:
+    """Power density of the noise (n,) in the upper half of the band, from its fast changes in rows that are `known`."""
     # A second difference passes white noise of variance s^2 as 6 s^2 and slow noise not at all; the median square
     # stands above the rare kicks at reversals.
     squares = np.concatenate([np.diff(piece, 2, axis=0) ** 2 for piece in pieces])
-    return np.asarray(np.median(squares, axis=0) / 0.455 / 6 * 2 * step)
+    if known is not None:
+        # A bridge is a straight line, without noise: most rows of a joint that stands for most of the time.
+        inner = np.concatenate([rows[:-2] & rows[1:-1] & rows[2:] for rows in known])
+        squares[~inner & (inner.sum(axis=0) >= FEWEST_ROWS)] = np.nan
+    return np.asarray(np.nanmedian(squares, axis=0) / 0.455 / 6 * 2 * step)

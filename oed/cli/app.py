@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from oed.cli.campaign import campaign
+from oed.cli.command import Command
 from oed.cli.design import design
 from oed.cli.diagnose import diagnose
 from oed.cli.export import export
@@ -26,7 +27,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 for command in (design, pareto, retime, export, campaign, simulate, identify, thermal, diagnose, predict):
-    app.command()(command)
+    app.command(cls=Command)(command)
 
 
 def _show_version(wanted: bool) -> None:

@@ -90,3 +90,18 @@ def test_logs_of_any_length_count(counted: tuple[Recording, np.ndarray, np.ndarr
     assert unbiased(pieces, np.eye(1), noise) == pytest.approx(whole, rel=0.05)
     few = cut(recording, slice(0, 10))
     assert unbiased(few, np.eye(1), noise[:10]) == np.inf
+
+
+def test_rows_at_rest_are_told_apart(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
+    """A joint that stands for as long again is known as far as it was: to two steps of the frequencies."""
+    recording, _, noise = counted
+    still = np.zeros((ROWS, 1))
+    longer = replace(
+        recording,
+        **{name: np.concatenate([getattr(recording, name), still]) for name in ("q", "dq", "ddq", "tau")},
+        t=recording.t[0] + STEP * np.arange(2 * ROWS),
+        unsure=np.concatenate([recording.unsure, still == 0.0]),
+    )
+    whole = unbiased(recording, np.eye(1), noise)
+    rested = unbiased(longer, np.eye(1), np.concatenate([noise, still]), np.array([0.5]))
+    assert rested == pytest.approx(whole, abs=0.3)

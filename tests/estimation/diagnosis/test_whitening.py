@@ -229,3 +229,29 @@ def test_kicks_drown_where_their_torque_is_below_the_noise() -> None:
     # 10 000 samples tell the noise to 1 %.
     assert quiet_joints(recording, residual + slow, np.diag([20.0, 2.0])).tolist() == [True, False]
     assert quiet_joints(recording, 2.0 * residual + slow, np.diag([20.0, 2.0])).tolist() == [True, True]
+
+
+@pytest.mark.parametrize("seen", [0, 5])
+def test_a_log_in_which_a_joint_stands_takes_nothing_from_the_others(seen: int) -> None:
+    """A motion of one joint after one of two: what is known of the other's noise stays, however long it stands.
+
+    Not more than a few rows of it are seen to move, by an encoder that flickers: they tell no level. Standard errors of
+    the powers are 5 %.
+    """
+    noise = _noise(30_000)
+    unsure = np.zeros((30_000, 2), dtype=bool)
+    unsure[8_000:, 0] = True
+    unsure[9_000 : 9_000 + 900 * seen : 900, 0] = False
+    residual = noise.copy()
+    residual[8_000:, 0] = 20.0  # a brake holds it
+    recording = replace(_recording(30_000, unsure=unsure), starts=(0, 8_000), cycles=(None, None), names=("a", "b"))
+    both = estimate_whitening(recording, residual, 0, np.eye(2))
+    alone = estimate_whitening(_recording(8_000), noise[:8_000], 0, np.eye(2))
+    assert [band.cutoff for band in both.bands] == pytest.approx([band.cutoff for band in alone.bands], rel=0.05)
+    assert both.levels is not None
+    assert both.levels == pytest.approx(1.0, abs=0.1)
+    rows = slice(50, 8_000 // both.stride - 50)
+    assert _level(both, residual, rows) == pytest.approx([1.0, 1.0], abs=0.2)
+    assert both.weights is not None
+    assert not both.weights[8_000 // both.stride + 1 :, 0].any()
+    assert both.weights[8_000 // both.stride + 1 :, 1].any()
