@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import permutations
 from typing import Protocol
 
 import numpy as np
@@ -80,13 +81,18 @@ class Grams:
 
     def chance_of(self, new: Array) -> float:
         """Does what `chance` does, by the Gram matrix of the experiment."""
+        return float(self.chances_of(new).min())
+
+    def chances_of(self, new: Array) -> Array:
+        """Gives the chance that each cause (row), were it true, would be told from each rival (column); one of itself.
+
+        By the Gram matrix of the experiment.
+        """
         total = self.old + new
-        return min(
-            chance_to_resolve(self._left(total, true, rival))
-            for true in range(len(self.causes))
-            for rival in range(len(self.causes))
-            if true != rival
-        )
+        result = np.ones((len(self.causes),) * 2)
+        for true, rival in permutations(range(len(self.causes)), 2):
+            result[true, rival] = chance_to_resolve(self._left(total, true, rival))
+        return result
 
     def of(self, stages: Sequence[Stage], begin: float = 0.0) -> Array:
         """Evaluates an experiment that begins at a time [s] of the logs' clock: the Gram matrix of all columns."""

@@ -25,6 +25,10 @@ VARIANTS = 4
 """Motions that are tried of the best kind."""
 ENOUGH = 0.99
 """Chance beyond which the least trouble decides: causes are true to some per cent, and the chance knows noise alone."""
+TIE = 0.01
+"""Weight of the mean chance over all pairs of causes beside the least one."""
+HOPELESS = 0.2
+"""Chance below which two causes are said to stay alike."""
 TIMES, LONGEST = (2, 4, 8, 16), 300.0
 """How often motions are made where once does not do, and how long an experiment may last then [s], with pauses."""
 
@@ -85,13 +89,28 @@ class NextExperiment:
 
 @dataclass(frozen=True, eq=False)
 class _Choice:
-    """A kind of experiment with its motions made so often, and what that tells (b + k, b + k)."""
+    """A kind of experiment, its motions made so often; what that tells (b + k, b + k), and of which cause (K, K)."""
 
     kind: str
     stages: tuple[Stage, ...]
     gram: Array
-    chance: float
+    chances: Array
     times: int = 1
+
+    @property
+    def chance(self) -> float:
+        """That it leaves one cause, whichever it is."""
+        return float(self.chances.min())
+
+    @property
+    def rank(self) -> tuple[float, int]:
+        """The least first: of those that are sure enough the least trouble, else the surest.
+
+        Where two causes stay alike whatever is done, the one that tells the others apart.
+        """
+        if self.chance >= ENOUGH:
+            return -ENOUGH, self.times
+        return -self.chance - TIE * float(self.chances.mean()), self.times
 
     @property
     def duration(self) -> float:
@@ -125,21 +144,22 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
     choices = [_made(grams, room, index, kind) for kind in MAKERS]
     if max(choice.chance for choice in choices) < ENOUGH:
         choices = [_longer(grams, choice) for choice in choices]
-    # Of those that are sure enough the first is the least trouble; else the surest.
-    ranking = sorted(choices, key=lambda choice: (-min(choice.chance, ENOUGH), choice.times))
+    ranking = sorted(choices, key=lambda choice: choice.rank)
     best = ranking[0]
     for variant in range(1, VARIANTS if best.kind in VARIED and best.chance < ENOUGH else 1):
         other = _times(grams, _made(grams, room, index, best.kind, variant), best.times)
-        best = max(best, other, key=lambda choice: choice.chance)
+        best = min(best, other, key=lambda choice: choice.rank)
     stages = repeated(best.stages, best.times)
     # What builds up or comes at a moment does not tell twice as much in twice the time.
     chance = best.chance if best.times == 1 else grams.chance(stages)
     names = [c.hypothesis.label.replace("_", " ") for c in possible]
     often = f" ({best.times} times over)" if best.times > 1 else ""
-    why = (
-        f"{', '.join(names[:-1])} and {names[-1]} explain the logs about equally well; {EXPERIMENTS[best.kind]}{often} "
-        f"would tell them apart with a chance of {100 * chance:.0f} %"
-    )
+    why = f"{_and(names)} explain the logs about equally well; {EXPERIMENTS[best.kind]}{often} would tell "
+    if len(possible) > 2 and chance < HOPELESS:
+        alike = np.unravel_index(int(np.argmin(best.chances)), best.chances.shape)
+        why += f"most of them apart, but hardly {_and([names[k] for k in sorted(alike)])}: no experiment tried does"
+    else:
+        why += f"them apart with a chance of {100 * chance:.0f} %"
     return NextExperiment(
         kind=best.kind,
         joint=joint,
@@ -151,6 +171,10 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
     )
 
 
+def _and(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]}"
+
+
 def repeated(stages: Sequence[Stage], times: int) -> tuple[Stage, ...]:
     """Makes each stage so often, one after the other; what is changed before it, such as a payload, is changed once."""
     again = [replace(stage, pause=Stage.pause) for stage in stages]
@@ -160,11 +184,11 @@ def repeated(stages: Sequence[Stage], times: int) -> tuple[Stage, ...]:
 def _made(grams: Grams, room: Room, joint: int, kind: str, variant: int = 0) -> _Choice:
     stages = MAKERS[kind](room, joint, variant)
     gram = grams.later(stages)
-    return _Choice(kind, stages, gram, grams.chance_of(gram))
+    return _Choice(kind, stages, gram, grams.chances_of(gram))
 
 
 def _times(grams: Grams, choice: _Choice, times: int) -> _Choice:
-    return replace(choice, times=times, chance=grams.chance_of(times * choice.gram))
+    return replace(choice, times=times, chances=grams.chances_of(times * choice.gram))
 
 
 def _longer(grams: Grams, choice: _Choice) -> _Choice:

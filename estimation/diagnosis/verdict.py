@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,7 +66,7 @@ def judge(
     left, p_values = _patterns(problem, patterns, named, false_alarm, rng, alone=True)
     explained, rest = selection.accepted.gain, sum(map(_worth, left))
     share = explained / (explained + rest) if explained + rest > 0 else 1.0
-    kept = tuple(found for found in selection.found if _believable(problem, found.member))
+    kept = tuple(_possible(problem, found) for found in selection.found if _believable(problem, found.member))
     if share < ENOUGH:
         kept = tuple(found for found in kept if found.member.hypothesis.joint is not None)
     kept = tuple(found for found in kept if _holds_alone(problem, found, named, patterns, false_alarm, rng))
@@ -105,6 +105,11 @@ def judge(
         members, p_values = _patterns(problem, patterns, beside, false_alarm, rng, alone=True)
     verdict = "none" if not kept else "ambiguous" if any(map(is_open, kept)) else "named"
     return Judgement(verdict, kept, (), (), float(share))
+
+
+def _possible(problem: Problem, found: Found) -> Found:
+    """Leaves out rivals that no machine has."""
+    return replace(found, rivals=tuple(pair for pair in found.rivals if _believable(problem, pair[0])))
 
 
 def _believable(problem: Problem, member: Member) -> bool:

@@ -37,17 +37,21 @@ class CurrentClipping(JointEffect):
         """Describes the share that is lost."""
         return (Coefficient("share_lost", "1", 0.0, 1.0),)
 
+    def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
+        """Gives what a limit takes of the torque beyond its level: of less, another bends it."""
+        return ((LEAST, 1.0),)
+
     def believable(self, robot: Robot, joint: Place, coefficients: Array) -> bool:
-        """Gives true: a torque that is cut off is all lost."""
-        return True
+        """Gives true for all of the range: a torque that is cut off is all lost."""
+        return float(coefficients[0]) > LEAST
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists levels that 1 to 40 % of the samples exceed; the largest torque where that is a flat top."""
+        """Lists levels that .15 to 40 % of the samples exceed; the largest torque where that is a flat top."""
         assert joint is not None
         if flat := self._flat(situation, joint):
             return ((flat,),)
         size = np.abs(situation.whole[:, joint - 1])
-        levels = np.quantile(size, (0.6, 0.7, 0.8, 0.875, 0.925, 0.96, 0.98, 0.99))
+        levels = np.quantile(size, (0.6, 0.7, 0.8, 0.875, 0.925, 0.96, 0.98, 0.99, 0.996, 0.9985))
         return tuple((float(level),) for level in np.unique(levels) if 1e-3 < level < size.max())
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
@@ -115,6 +119,8 @@ class CurrentClipping(JointEffect):
         return f"torque of joint {joint} by {name} [N m]", situation.whole[:, joint - 1]
 
 
+LEAST = 0.5
+"""Share of the torque beyond its level that a limit takes, whatever errors its estimate has; in truth it is one."""
 FLAT = 1e-4
 """Relative difference from the largest torque up to which a sample is at it."""
 FLAT_SAMPLES = 30

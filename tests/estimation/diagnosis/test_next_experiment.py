@@ -140,6 +140,25 @@ def test_a_payload_is_mounted_once_however_often_the_motion_is_made(problem):
     assert repeated(stages, 1) == stages
 
 
+def test_where_two_causes_stay_alike_the_others_are_told_apart(problem):
+    """A torque constant twice: nothing tells it from itself, and of what remains the payload tells most and is named."""
+    error = _guess(problem, "torque_constant_error", 2, (), 0.01)
+    other = _guess(problem, "torque_constant_error", 3, (), 0.01)
+    plan = plan_next(problem, [error, other, error])
+    assert plan is not None
+    assert plan.resolves < 1e-6
+    assert "hardly torque constant error of joint 2 and torque constant error of joint 2" in plan.why
+    grams = Grams(problem, [error, other])
+    first, last = (
+        MAKERS[choice.kind](room_of(problem.situation.robot, problem.recording), 1, 0)
+        for choice in (plan.ranking[0], plan.ranking[-1])
+    )
+    assert grams.chance(repeated(first, plan.times)) > grams.chance(last)
+    pair = plan_next(problem, [error, error])
+    assert pair is not None
+    assert "with a chance of 0 %" in pair.why
+
+
 def test_one_cause_needs_no_experiment(problem):
     """With a single cause left there is nothing to tell apart."""
     assert plan_next(problem, [_guess(problem, "stribeck", 4, (0.05, 1.0), 0.02)]) is None
