@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -23,6 +24,7 @@ from robots.robot import Robot
 from robots.signals import Log
 
 Array = NDArray[np.float64]
+_Part = tuple[Array, Array, Array, Array, Array, Cycle | None, float, Directions, Array]
 
 # More rows than this only cost time: the logs are then thinned by a whole number, torque low-passed before.
 MOST_ROWS = 40_000
@@ -36,6 +38,8 @@ SHORTEST = 5.0  # [s] of log below which nothing can be told
 FLAT = 1e-6
 # A mean over repetitions is taken where it knows frequencies higher by this factor than a single pass.
 SHARPER = 1.2
+# A joint whose range in a log is below this share of its largest stands there.
+STANDS = 3e-4
 # At the ends of a log, rows in which all joints are slower than this share are left out, up to so long [s].
 SETTLED, ENDS = 0.15, 2.0
 
@@ -73,7 +77,7 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
     found = [[of.of_positions(x) for x in log.positions.q.T] for of, log in zip(spectra, prepared, strict=True)]
     highest = np.max([[spectrum.cutoff() for spectrum in own] for own in found], axis=0)
     cap = believable_cutoff(robot, prepared, highest)
-    parts = [_part(log, step, cap, of, own) for log, of, own in zip(prepared, spectra, found, strict=True)]
+    parts = _standing([_part(log, step, cap, of, own) for log, of, own in zip(prepared, spectra, found, strict=True)])
     lengths = [len(part[0]) for part in parts]
     total = sum(lengths) * step
     if total < shortest:
@@ -100,6 +104,28 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
     )
 
 
+def _standing(parts: Sequence[_Part]) -> list[_Part]:
+    """Takes joints that stand in a log, but for a tremble, for joints at rest: it says nothing of their motion.
+
+    What moves there is the error of the position loop, by some steps of the encoder, and friction holds against it. A
+    step has accelerations that the other joints would feel.
+    """
+    travel = np.array([np.ptp(part[1], axis=0) for part in parts])
+    result = []
+    for part, stands in zip(parts, travel < STANDS * travel.max(axis=0), strict=True):
+        t, q, dq, ddq, tau, cycle, cutoff, turns, floor = part
+        dq, ddq, floor = (np.where(stands, 0.0, values) for values in (dq, ddq, floor))
+        still = replace(
+            turns,
+            unsure=turns.unsure | stands,
+            clear=turns.clear & ~stands,
+            jolts=np.where(stands, 0.0, turns.jolts),
+            moments=np.where(stands, 0.0, turns.moments),
+        )
+        result.append((t, q, dq, ddq, tau, cycle, cutoff, still, floor))
+    return result
+
+
 def _payloads(prepared: Sequence[Prepared]) -> tuple[Array, ...]:
     if all(log.log.payload is None for log in prepared):
         return ()
@@ -118,9 +144,7 @@ def _step(prepared: Sequence[Prepared]) -> float:
     return slowest * stride
 
 
-def _part(
-    log: Prepared, step: float, cap: float, spectra: Spectra, found: Sequence[Spectrum]
-) -> tuple[Array, Array, Array, Array, Array, Cycle | None, float, Directions, Array]:
+def _part(log: Prepared, step: float, cap: float, spectra: Spectra, found: Sequence[Spectrum]) -> _Part:
     """One log: t, q, dq, ddq, tau on the working grid, its cycle there, the lowest cut-off, its directions, noise.
 
     Above `cap` [Hz], what the positions have is noise, whatever its power; `found` are the positions' own spectra.

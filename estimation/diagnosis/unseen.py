@@ -114,22 +114,27 @@ def measure_unseen(
 def _left_out(problem: Problem, effects: Sequence[Array], pull: Pull) -> Unseen:
     """Leaves out logs in turn; parts of logs where an effect lives in one log alone, which no other log could tell."""
     recording = problem.recording
-    if len(recording.runs) == 1 or not any(_in_one_log(recording, X) for X in effects):
+    why = _only_once(recording, effects)
+    if len(recording.runs) == 1 or not why:
         return cross_validated(problem, effects, pull)
     apart = replace(recording, starts=tuple(part.start for part in _parts(recording)))
     unseen = cross_validated(replace(problem, recording=apart), effects, pull)
-    return replace(unseen, how=_WITHIN.format(PARTS, len(recording.runs)))
+    return replace(unseen, how=_WITHIN.format(PARTS, len(recording.runs), why))
 
 
 _WITHIN = (
-    "each of {} stretches of each of {} logs, predicted from all other stretches: something that was found acts in one "
-    "log only, and no other log could tell it"
+    "each of {} stretches of each of {} logs, predicted from all other stretches: {}, and no other log could tell it"
 )
 
 
-def _in_one_log(recording: Recording, X: Array) -> bool:
-    energies = np.array([float(np.sum(X[run] ** 2)) for run in recording.runs])
-    return bool(energies.max() > ALONE * energies.sum())
+def _only_once(recording: Recording, effects: Sequence[Array]) -> str:
+    """Says what is told by one of several logs alone; nothing where all is told by others too."""
+    for X in effects:
+        energies = np.array([float(np.sum(X[run] ** 2)) for run in recording.runs])
+        if energies.max() > ALONE * energies.sum():
+            return "something that was found acts in one log only"
+    moves = np.array([~recording.unsure[run].all(axis=0) for run in recording.runs])
+    return "a joint moves in one log only" if (moves.sum(axis=0) == 1).any() else ""
 
 
 def _parts(recording: Recording) -> list[slice]:
@@ -157,7 +162,7 @@ def simulate_unseen(
     """
     whole, first = measured.whole, measured.first
     parts = [slice(max(run.start, first), run.stop) for run in whole.runs if run.stop > first]
-    if not held_out and (len(parts) == 1 or any(_in_one_log(whole, X) for X in measured.effects)):
+    if not held_out and (len(parts) == 1 or _only_once(whole, measured.effects)):
         parts = _parts(whole)
     strength = np.sum((measured.torque / problem.whitening.scale) ** 2, axis=1)
     part, rows = _strongest(parts, np.concatenate([np.zeros(first), strength]), round(STRETCH / whole.step))

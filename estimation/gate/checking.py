@@ -13,7 +13,7 @@ from estimation.gate.excerpts import Excerpt, cutoffs, excerpts_of, stretch, str
 from estimation.gate.excitation import HOPELESS, check_excitation
 from estimation.gate.finding import Finding
 from estimation.gate.jumps import check_jumps
-from estimation.gate.motion import check_motion
+from estimation.gate.motion import check_motion, standing
 from estimation.gate.orientations import check_orientations
 from estimation.gate.physics import joint_physics, mean_inertias
 from estimation.gate.quick_fit import Rows
@@ -80,6 +80,7 @@ def check_log(robot: Robot, log: Log) -> GateReport:
     findings: list[Finding] = [*too_short(log), *timing.findings, *check_repeats(log, columns)]
     findings += check_resolution(columns)
     found, spikes = check_spikes(columns)
+    breaks = np.array([first for first, _ in timing.parts[1:]], dtype=np.intp)
     findings += [
         *found,
         *notes_of_reader(log),
@@ -87,7 +88,7 @@ def check_log(robot: Robot, log: Log) -> GateReport:
         *constant_torques(columns),
         *same_columns(columns),
         *check_motion(robot, columns),
-        *check_jumps(log.t, columns, spikes, np.array([first for first, _ in timing.parts[1:]], dtype=np.intp)),
+        *check_jumps(log.t, columns, spikes, breaks, standing(robot, columns)),
     ]
     if len(spikes):
         log = pick_rows(log, np.delete(np.arange(len(log)), spikes))
@@ -116,8 +117,8 @@ def _physics(robot: Robot, log: Log, columns: Columns, timing: Timing) -> tuple[
     if len(log) < FEWEST or absurd:
         return dynamics, absurd
     torque, factor = _in_newton_metres(robot, log)
-    # A log in which nothing moves has nothing to fit.
-    spread = np.where(columns.varies & columns.travel.any(), columns.spread, 0.0) * factor
+    # A joint that stands has nothing to fit.
+    spread = np.where(columns.varies & ~standing(robot, columns), columns.spread, 0.0) * factor
     looked = _look(robot, log, torque, timing, spread)
     findings = _positions(robot, log, columns, torque, timing, spread, looked)
     if looked.excerpts:

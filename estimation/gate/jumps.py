@@ -36,7 +36,9 @@ def jump_rows(t: Array, q: Array) -> NDArray[np.intp]:
     return np.flatnonzero(large & (steps > LOCAL * around)) + 1
 
 
-def check_jumps(t: Array, columns: Columns, spikes: NDArray[np.intp], gaps: NDArray[np.intp]) -> list[Finding]:
+def check_jumps(
+    t: Array, columns: Columns, spikes: NDArray[np.intp], gaps: NDArray[np.intp], stands: NDArray[np.bool_]
+) -> list[Finding]:
     """Finds jumps of positions that are neither single rows nor beside a gap in time.
 
     Args:
@@ -44,11 +46,12 @@ def check_jumps(t: Array, columns: Columns, spikes: NDArray[np.intp], gaps: NDAr
         columns: of the log.
         spikes: rows that stick out, which are left out anyway.
         gaps: rows after a gap.
+        stands: joints (n,) that stand: they tremble by steps of the encoder, one sample each.
     """
     known = np.concatenate([spikes, spikes + 1, gaps])
     findings = []
     for joint, q in enumerate(columns.q):
-        rows = jump_rows(t, q) if columns.travel[joint] > 0 else np.empty(0, dtype=np.intp)
+        rows = jump_rows(t, q) if not stands[joint] else np.empty(0, dtype=np.intp)
         rows = rows[~np.isin(rows, known)]
         if not len(rows):
             continue

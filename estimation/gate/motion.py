@@ -1,8 +1,9 @@
-"""Joints that hardly move."""
+"""Joints that hardly move, or stand but for a tremble."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.gate.columns import Columns
 from estimation.gate.finding import Finding
@@ -10,6 +11,20 @@ from robots.robot import Robot
 
 # A joint hardly moves below this share of its range, or of a turn, ...
 HARDLY = 0.01
+# ... and stands below this one: what moves is the position loop's error, by some steps of the encoder, and friction may
+# have any value that holds the joint.
+STANDS = 3e-4
+
+
+def standing(robot: Robot, columns: Columns) -> NDArray[np.bool_]:
+    """Tells which joints (n,) stand: nothing of their own follows from such a motion, nor from their torque.
+
+    Args:
+        robot: with n joints.
+        columns: of the log.
+    """
+    stands: NDArray[np.bool_] = _shares(robot, columns) < STANDS
+    return stands
 
 
 def check_motion(robot: Robot, columns: Columns) -> list[Finding]:
@@ -19,11 +34,7 @@ def check_motion(robot: Robot, columns: Columns) -> list[Finding]:
         robot: with n joints.
         columns: of the log.
     """
-    travel = columns.travel
-    range_ = np.asarray(robot.limits.upper) - np.asarray(robot.limits.lower)
-    range_ = np.where(np.isfinite(range_), range_, 2 * np.pi)
-    range_ = np.minimum(range_, 2 * np.pi)
-    share = travel / np.maximum(range_, 1e-12)
+    travel, share = columns.travel, _shares(robot, columns)
     if not (travel > 0).any():
         return [
             Finding(
@@ -49,3 +60,10 @@ def check_motion(robot: Robot, columns: Columns) -> list[Finding]:
         )
         for joint in np.flatnonzero(share < HARDLY)
     ]
+
+
+def _shares(robot: Robot, columns: Columns) -> NDArray[np.float64]:
+    """Travel (n,) over the joints' ranges, or a turn."""
+    range_ = np.asarray(robot.limits.upper) - np.asarray(robot.limits.lower)
+    range_ = np.where(np.isfinite(range_), range_, 2 * np.pi)
+    return np.asarray(columns.travel / np.maximum(np.minimum(range_, 2 * np.pi), 1e-12))

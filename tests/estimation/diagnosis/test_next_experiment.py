@@ -141,7 +141,7 @@ def test_a_payload_is_mounted_once_however_often_the_motion_is_made(problem):
 
 
 def test_where_two_causes_stay_alike_the_others_are_told_apart(problem):
-    """A torque constant twice: nothing tells it from itself, and of what remains the payload tells most and is named."""
+    """A torque constant twice is never told from itself; what tells most of the rest comes first, and that is said."""
     error = _guess(problem, "torque_constant_error", 2, (), 0.01)
     other = _guess(problem, "torque_constant_error", 3, (), 0.01)
     plan = plan_next(problem, [error, other, error])

@@ -1,0 +1,77 @@
+"""Logs in which a joint stands, but for a tremble: they say nothing of it, and take nothing from the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis import diagnose
+from estimation.diagnosis.states import record
+from estimation.gate import check_log
+from robots.plants import simulate
+from robots.robot import Robot
+from robots.signals import Log, Motion
+
+COUNT = 2 * np.pi / 2**17
+
+
+@pytest.fixture(scope="module")
+def alone(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> Callable[..., Log]:
+    """A log of one joint's motion: the other trembles by a count, and friction holds it against any torque."""
+
+    def build(moving: int, later: float, step: float = 0.0) -> Log:
+        motion = fourier_motion(arm, 1)
+        still = np.array([1.0, 0.0]) if moving == 0 else np.array([0.0, 1.0])
+        motion = Motion(motion.t + later, *(getattr(motion, name) * still for name in ("q", "dq", "ddq")))
+        log = simulate(arm_plant(torque_noise=0.02), motion, seed=3 + moving)
+        q, tau = np.array(log.q), np.array(log.tau)
+        stuck, t = 1 - moving, np.asarray(log.t)
+        q[:, stuck] = COUNT * np.round(0.7 * np.sin(2 * np.pi * 0.37 * t) * np.sin(2 * np.pi * 0.05 * t))
+        tau[:, stuck] += 2.0 * np.sin(2 * np.pi * 0.11 * t) + 1.5
+        tau[:, moving] += step * np.sign(motion.dq[:, moving]) * (t > t[0] + 8.0)
+        return replace(log, q=q, tau=tau)
+
+    return build
+
+
+def test_a_joint_that_trembles_by_a_count_is_at_rest(arm: Robot, arm_log: Callable, alone: Callable[..., Log]) -> None:
+    """No row tells its direction, and its noise is that of the log in which it moves."""
+    both = arm_log(torque_noise=0.02)
+    first = record(arm, [both])
+    recording = record(arm, [both, alone(0, 100.0)])
+    second = recording.runs[1]
+    assert recording.unsure[second, 1].all()
+    assert recording.unsure[second, 0].mean() < 0.3
+    assert not recording.clear[second, 1].any()
+    assert recording.floor[1] == pytest.approx(first.floor[1])
+    assert recording.jolts[1] == pytest.approx(first.jolts[1])
+
+
+def test_the_gate_asks_nothing_of_a_joint_that_stands(arm: Robot, alone: Callable[..., Log]) -> None:
+    """It is told to stand hardly moving; its steps are no jumps, and its torque has neither sign nor size."""
+    report = check_log(arm, alone(0, 0.0))
+    own = {finding.name for finding in report.findings if finding.joint == 2}
+    assert own <= {"hardly_moves", "quantised_position"}
+    assert "hardly_moves" in own
+    assert not [finding for finding in report.findings if finding.severity == "refuse"]
+
+
+def test_single_joint_logs_beside_another_find_nothing_that_is_not_there(
+    arm: Robot, arm_log: Callable, alone: Callable[..., Log]
+) -> None:
+    """Torque that static friction takes is no effect, nor is it an unseen error (a false alarm: 1 in 100)."""
+    logs = [arm_log(torque_noise=0.02), alone(0, 100.0), alone(1, 200.0)]
+    found = diagnose(arm, logs)
+    assert found.verdict == "none"
+    assert np.max(found.baseline) < 0.05
+
+
+def test_what_one_joint_alone_shows_is_found(arm: Robot, alone: Callable[..., Log]) -> None:
+    """Logs of one joint each show that the first has more friction from a moment on; its own stretches measure that."""
+    found = diagnose(arm, [alone(0, 100.0, step=0.6), alone(1, 200.0)])
+    assert [(finding.effect, finding.joint) for finding in found.findings] == [("friction_step", 1)]
+    assert "a joint moves in one log only" in found.how_unseen or "acts in one log only" in found.how_unseen
+    assert found.extended[0] < 0.8 * found.baseline[0]
