@@ -13,6 +13,7 @@ from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Group, Problem
 from estimation.diagnosis.scoring import Accepted, score
+from estimation.diagnosis.speeds import scatter_over_speeds
 
 Array = NDArray[np.float64]
 
@@ -164,7 +165,12 @@ def refine(
     found = best[0]
     if hypothesis.effect.alike:
         return _agreed(problem, found, accepted)
-    return replace(found, scatter=_borne_out(problem, found, accepted)) if hypothesis.effect.kicks else found
+    if hypothesis.effect.kicks:
+        return replace(found, scatter=_borne_out(problem, found, accepted))
+    if hypothesis.effect.fast:
+        scatter = scatter_over_speeds(problem, found.group, found.coefficients, accepted)
+        return replace(found, scatter=scatter)
+    return found
 
 
 def _agreed(problem: Problem, member: Member, accepted: Accepted) -> Member:

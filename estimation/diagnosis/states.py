@@ -17,6 +17,7 @@ from estimation.diagnosis.periods import Cycle, find_cycle, project
 from estimation.diagnosis.position_spectra import Spectra, Spectrum
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.smoothed_motion import smoothed
+from estimation.gate.resolution import lattice_step
 from estimation.preparation import Prepared, prepare
 from robots.common.errors import InputError
 from robots.common.stretches import spans
@@ -98,6 +99,7 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
         clear=np.concatenate([part[7].clear for part in parts]),
         jolts=np.max([part[7].jolts for part in parts], axis=0),
         moments=np.max([part[7].moments for part in parts], axis=0),
+        counts=np.max([[lattice_step(x) for x in log.log.q.T] for log in prepared], axis=0),
         names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
         payloads=_payloads(prepared),
         fields=_fields(prepared),
