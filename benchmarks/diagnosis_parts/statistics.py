@@ -13,7 +13,6 @@ Row = dict[str, Any]
 LEVEL = 0.95
 # A gain smaller than this share of the error before is lost in the noise of the unseen log.
 LEAST_GAIN = 0.01
-ALIKE = 0.1
 CHANGE_TIME, NONLINEAR = 0.2, 0.2
 # Names of the truth's parameters, and those a diagnosis gives them.
 TIMES = {"change_time": ("change_time",), "start": ("start", "change_time")}
@@ -92,22 +91,19 @@ def within_limits(row: Row) -> bool:
 
 
 def gain_ratios(rows: Iterable[Row]) -> np.ndarray:
-    """Gain over the gain of the true effects' own model, where that is more than noise and the effect lasts.
+    """Gain over the gain of the true effects' own model, one at most, where that is more than noise and they last.
 
     The diagnosis' gain counts from its own base model, with the motion as measured; the true effects' from least
-    squares with the motion as it was, or from the diagnosis' base model where that is better. A base model that errs
-    by a tenth more than least squares, before and after, keeps its gain but must make none: one is the most then.
+    squares with the motion as it was, or from the diagnosis' base model where that is better.
     """
     ratios = []
     for row in rows:
         if not detected(row) or row.get("oracle_after") is None or not all(e["lasting"] for e in row["truth"]):
             continue
-        told, true = row["before"], row["oracle_before"]
-        start = told if told < (1 - ALIKE) * true else true
+        told, start = row["before"], min(row["before"], row["oracle_before"])
         possible = start - row["oracle_after"]
         if possible > LEAST_GAIN * start:
-            ratio = (told - row["after_extension"]) / possible
-            ratios.append(min(ratio, 1.0) if told > (1 + ALIKE) * true else ratio)
+            ratios.append(min((told - row["after_extension"]) / possible, 1.0))
     return np.array(ratios)
 
 

@@ -22,7 +22,7 @@ SHARE = 0.2
 # are taken for it. On its own the column of an inertia leaves no more of that than this, in units of a squared standard
 # deviation; beside the other columns of a base model it is some ten times as much.
 BIAS = 0.1
-# Spectra are taken over so long [s], of so many rows at least; a power density below this is none.
+# Spectra are taken over so long [s], of so many rows at least; a power density, or a column, below this is none.
 WINDOW, FEWEST, QUIETEST = 8.0, 16, 1e-100
 # Slowest low-pass [Hz], fastest as a share of the sampling rate: above, a sampled kick is no longer what it was.
 SLOWEST, FASTEST = 4.0, 0.2
@@ -64,7 +64,7 @@ class Band:
         # Two real columns are one complex one, the filters being real; as large as each other, so that the rounding of
         # neither shows in the other, and zeros stay zeros.
         sizes = np.maximum(columns.max(axis=1, initial=0.0), -columns.min(axis=1, initial=0.0))[:, None]
-        units = 1.0 / np.where(sizes > 0, sizes, 1.0)
+        units = 1.0 / np.where(sizes > QUIETEST, sizes, 1.0)
         packed = np.zeros((-(-len(columns) // 2), len(series)), dtype=np.complex64 if single else np.complex128)
         np.multiply(columns[::2], units[::2], out=packed.real)
         np.multiply(columns[1::2], units[1::2], out=packed.imag[: len(columns) // 2])

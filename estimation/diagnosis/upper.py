@@ -154,18 +154,19 @@ def _levelling(
         period, first, repeats = _lines(recording, run)
         start, count = -(-first // wide.stride), max(int(repeats + 1e-6), 1)
         values = values[start : start + round(count * period * rate)]
-        power = np.abs(np.fft.rfft(values)) ** 2 / max(np.count_nonzero(values), 1)
+        counted = np.count_nonzero(values)
+        power = np.abs(np.fft.rfft(values)) ** 2 / max(counted, 1)
         f = np.fft.rfftfreq(len(values), 1 / rate)
         power = without_lines(power[:, None], f[1], period if count > 1 else None)[:, 0]
         lines = np.arange(len(f)) % count == 0
-        known += len(values)
+        known += counted
         for part, (below, above) in enumerate(pairwise(edges)):
             inside = (f >= below) & (f < above)
             everywhere = float(power[inside].mean()) if inside.any() else 0.0
             at_lines = float(power[inside & lines].mean()) if (inside & lines).any() else everywhere
             # In whole repetitions, which the ends of a log may leave fewer of than there are.
             more = max(at_lines - everywhere, 0.0) * (repeats - 1.0) / (count - 1.0) if count > 1 else 0.0
-            density[part] += (everywhere + more) * len(values)
+            density[part] += (everywhere + more) * counted
     levels = np.sqrt(density / max(known, 1))
     taps = sum((band.taps / level for band, level in zip(between, levels, strict=True) if level > 0), np.zeros(length))
     return Band(taps, 1, float(high))

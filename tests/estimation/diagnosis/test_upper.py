@@ -15,7 +15,7 @@ from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.patterns import Pattern
 from estimation.diagnosis.periods import Cycle
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.recording import Recording, cut
+from estimation.diagnosis.recording import Recording, cut, following
 from estimation.diagnosis.refinement import refine
 from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.states import record
@@ -155,6 +155,35 @@ def test_noise_is_levelled(clean: Recording, pose_arm: Callable[..., Problem], p
         # Each part has 60 frequencies or more.
         for low, high in pairwise(edges):
             assert power[(f >= low) & (f < high)].mean() == pytest.approx(1.0, abs=0.4)
+
+
+def test_a_log_in_which_a_joint_stands_levels_no_noise(clean: Recording, pose_arm: Callable[..., Problem]) -> None:
+    """Twice as long a log of the other joint's motion after it: this one's noise above its band is of unit density.
+
+    The mean of some 500 frequencies has a standard error of 5 %.
+    """
+    rng = np.random.default_rng(6)
+    noisy = replace(clean, tau=clean.tau + NOISE * rng.standard_normal(clean.tau.shape))
+    whole = noisy
+    for k in (1, 2):
+        stands = replace(
+            clean,
+            t=clean.t + 100.0 * k,
+            dq=clean.dq * [0.0, 1.0],
+            ddq=clean.ddq * [0.0, 1.0],
+            tau=clean.tau + [3.0, 0.0] + NOISE * rng.standard_normal(clean.tau.shape),
+            unsure=clean.unsure | np.array([True, False]),
+        )
+        whole = following(whole, stands)
+    upper = pose_arm(whole, wider=WIDER).upper
+    assert upper is not None
+    above = upper.joints[0]
+    assert above is not None
+    power = np.abs(np.fft.rfft(above.residual)) ** 2 / np.count_nonzero(above.counts)
+    f = np.fft.rfftfreq(len(above.residual), clean.step * upper.whitening.stride)
+    cutoffs = [above.passing.cutoff / (1 - TRANSITION / 2), 15.0]
+    assert cutoffs[0] > 20.0
+    assert power[(f > cutoffs[1]) & (f < 0.8 * cutoffs[0])].mean() == pytest.approx(1.0, abs=0.4)
 
 
 def test_a_vibration_above_the_band_is_told(recording: Recording, pose_arm: Callable[..., Problem]) -> None:

@@ -139,6 +139,10 @@ def test_filtering_columns_together_is_filtering_each() -> None:
         assert result == pytest.approx(expected, abs=1e-12 * max(np.abs(column).max(), 1e-300))
         assert result == pytest.approx(band.passed(column, after), abs=1e-12 * np.abs(column).max())
     assert not together[:, 2].any()
+    # A number so small that one over it is none: the cube of a joint's position that stands at zero.
+    tiny = band.passed(np.stack([columns[:, 0], np.full(1000, 7e-314)], axis=1), single=True)
+    assert tiny[:, 0] == pytest.approx(band.passed(columns[:, 0]), abs=1e-5)
+    assert not tiny[:, 1].any()
 
 
 def test_rows_of_unknown_direction_do_not_count() -> None:
