@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from estimation.estimate import Estimate
 from estimation.moments import Moments
-from estimation.preparation import Prepared, Rows, prepare
+from estimation.preparation import Prepared, Rows, prepare_all
 from estimation.preprocessing import Harmonics
 from estimation.regression import JointRegressor, chunks, threaded
 from robots.base_parameters import find_base_parameters
@@ -137,7 +137,7 @@ def bootstrap(
     if base.independent != tuple(model.columns) or robot.n != model.robot.n:
         raise InputError("the estimate is of another robot", remedy="identify it again")
     usable = [part for log, gate in zip(data, gates, strict=True) for part in gate.usable(log)] if gates else data
-    prepared = [prepare(robot, log) for log in usable]
+    prepared = prepare_all(robot, usable)
     rows = [log.rows(choice.smoother) for log in prepared]
     if sum(len(part.motion) for part in rows) != len(estimate.t):
         raise InputError("other logs", allowed="those that the estimate was made of")

@@ -141,7 +141,10 @@ class Comparison:
         slow_rows = self.regressor(q, dq, ddq, part.gravity)
         missing, speeds = 1 - mask[slow].T, np.ascontiguousarray(signals[1].T)
         groups, ones = len(mask) // size, np.ones(size)
+        held = np.zeros(len(missing), dtype=bool) if part.held is None else part.held
         for joint, (sums, some, used) in enumerate(zip(all_sums, slow_rows, self.regressor.used, strict=True)):
+            if held[joint]:
+                continue
             wide = np.tanh(speeds[joint] / WIDER[:, None])
             count = len(used)
             rows = np.empty((groups, count + len(WIDER) + 1))
@@ -160,7 +163,7 @@ class Comparison:
                 side.cross[joint, block, chosen] = product[:-1, -1]
                 side.square[joint, block] = product[-1, -1]
         sides.fitted.count[:, block] = mask.sum(axis=0) / size
-        sides.judged.count[:, block] = len(mask) / size
+        sides.judged.count[~held, block] = len(mask) / size
 
     def _others(self, cutoff: float) -> list[Smoother]:
         """Smoothers of other kinds and about that cut-off."""
@@ -210,16 +213,23 @@ class Comparison:
         values = iter(self._without(blocks.fitted.columns(self._columns(trial.scales).tolist()), trial))
         rows = self._rows(smoother)
         errors = [np.abs(error) for part in rows for error in self._errors(part, trial.scales, values)]
-        levels = np.array([np.quantile(error, BAND, axis=0) for error in errors])
-        whole = np.quantile(np.concatenate(errors), BAND, axis=0)
+        # Of joints that stand in a block its errors are not known.
+        told = np.array([~np.isnan(error[0]) for error in errors])
+        levels = np.array([_quantile(error) for error in errors])
+        whole = _quantile(np.concatenate(errors))
         if len(errors) == 1:
             return whole, np.full(len(whole), np.nan)
-        shares = []
+        shares, count = np.zeros((2, len(whole)))
         for k, error in enumerate(errors):
-            others = np.concatenate(errors[:k] + errors[k + 1 :]) if len(errors) <= FEW else None
-            level = np.quantile(others, BAND, axis=0) if others is not None else np.delete(levels, k, 0).mean(axis=0)
-            shares.append((error <= level).mean(axis=0) * len(error))
-        return whole, np.asarray(np.sum(shares, axis=0) / sum(len(error) for error in errors))
+            if len(errors) <= FEW:
+                level = _quantile(np.concatenate(errors[:k] + errors[k + 1 :]))
+            else:
+                others = np.delete(told, k, 0)
+                known = np.where(others, np.delete(levels, k, 0), 0.0).sum(axis=0)
+                level = known / np.maximum(others.sum(axis=0), 1)
+            shares += np.where(told[k], (error <= level).sum(axis=0), 0.0)
+            count += told[k] * len(error)
+        return whole, np.where(count > 0, shares / np.maximum(count, 1), np.nan)
 
     def _errors(self, part: Rows, scales: Sequence[int], values: Iterator[Array]) -> Iterator[Array]:
         """Errors (N, n) of each block of a log by the next of the values."""
@@ -233,6 +243,8 @@ class Comparison:
                     sign = [i for i, k in enumerate(used) if self._is_sign(int(k), joint)]
                     Y[:, sign] = np.tanh(motion.dq[piece, joint, None] / VELOCITY_SCALES[scales[joint]])
                 error[:, joint] -= Y @ parameters[used]
+            if part.held is not None:
+                error[:, part.held] = np.nan
             yield error
 
     def _is_sign(self, column: int, joint: int) -> bool:
@@ -272,3 +284,11 @@ class Comparison:
         squares = np.array([total.gram[joint, i, i] / count[joint] for i, joint in enumerate(own)])
         level = friction_levels(self.base, np.sqrt(squares), self.fastest)
         return description_pull(self.base, np.sqrt(total.square / count), level)
+
+
+def _quantile(errors: Array) -> Array:
+    """The `BAND` of each joint's errors (N, n) that are known; NaN where none is."""
+    if not np.isnan(errors).any():
+        return np.asarray(np.quantile(errors, BAND, axis=0))
+    known = (column[~np.isnan(column)] for column in errors.T)
+    return np.array([np.quantile(column, BAND) if len(column) else np.nan for column in known])

@@ -16,7 +16,7 @@ from estimation.fitting import Fit, fit
 from estimation.gate import GateReport, check_log
 from estimation.known_setup import gravities_of, require_plain
 from estimation.model import Model
-from estimation.preparation import Prepared, prepare
+from estimation.preparation import Prepared, prepare_all
 from estimation.preprocessing import Harmonics
 from estimation.provenance import describe_logs
 from estimation.uncertainty import fast_noise, period_noise
@@ -101,7 +101,7 @@ def identify(
         gates.append(check_log(robot, log))
         gates[-1].raise_if_refused()
     usable = [part for log, gate in zip(data, gates, strict=True) for part in gate.usable(log)] if gates else data
-    prepared = [prepare(robot, log) for log in usable]
+    prepared = prepare_all(robot, usable)
     sharp = default_model(robot, friction=friction, velocity_scale=VELOCITY_SCALES[0], rotor=rotor, offset=offset)
     base = find_base_parameters(sharp, gravities=gravities_of(data))
     bar.update(1.0, "choosing smoothing and regularisation")

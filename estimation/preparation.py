@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 SLOW = 0.008
 # A joint with less RMS speed than this [rad/s or m/s] stands: what is left is rounding, not to be taken for motion.
 STANDING = 1e-9
+# One whose range in a log is below this share of its range in another stands there, but for a tremble by some steps of
+# its encoder.
+TREMBLE = 3e-4
 # A longer log is smoothed piece by piece, so that its intermediate signals never stand in memory together. Pieces
 # overlap by so many periods of the cut-off: the filter has forgotten their ends by then, to a part in 10^7.
 PIECE = 200_000
@@ -38,12 +41,14 @@ class Rows:
         tau: measured torque (N, n), as it was logged, less that of a known payload.
         mask: (N, n), zero where a row of a joint does not count.
         gravity: (3,) in the base frame [m/s2]; None as the robot's description says.
+        held: joints (n,) that stand here and move in another log: no prediction is judged by them; None for none.
     """
 
     motion: Motion
     tau: Array
     mask: Array
     gravity: Array | None = None
+    held: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)
@@ -55,12 +60,16 @@ class Prepared:
         tau: joint torque (N, n) [N m or N].
         positions: on the grid.
         load: the log's known payload; None without.
+        still: joints (n,) that stand here, but for a tremble, and move in another log; None for none.
+        held: those of them whose rows do not count, for friction holds them with any torque; None for none.
     """
 
     log: Log
     tau: Array
     positions: Resampled
     load: Load | None = None
+    still: NDArray[np.bool_] | None = None
+    held: NDArray[np.bool_] | None = None
 
     @cached_property
     def period(self) -> float | None:
@@ -116,7 +125,7 @@ class Prepared:
     def cut(self, part: slice) -> Prepared:
         """Takes some rows."""
         positions = resample(self.log.t[part], self.log.q[part])
-        return Prepared(_window(self.log, part), self.tau[part], positions, self.load)
+        return Prepared(_window(self.log, part), self.tau[part], positions, self.load, self.still, self.held)
 
     def stretches(self, count: int, rows: int) -> Iterator[Prepared]:
         """Gives `count` evenly spread stretches of so many rows each, or the log where that is all of it."""
@@ -139,7 +148,9 @@ class Prepared:
         """
         total = sum(len(motion) for motion, _ in parts)
         speed = np.sqrt(sum(np.einsum("tj,tj->j", motion.dq, motion.dq) for motion, _ in parts) / total)
-        moves = speed >= STANDING
+        none = np.zeros(len(speed), dtype=bool)
+        still, held = (none if joints is None else joints for joints in (self.still, self.held))
+        moves = (speed >= STANDING) & ~still
         rows = []
         for motion, tau in parts:
             if not moves.all():
@@ -147,7 +158,7 @@ class Prepared:
             fast = np.abs(motion.dq) >= SLOW * speed
             if self.load is not None:
                 tau = tau - self.load.torque(motion)
-            rows.append(Rows(motion, tau, (fast | ~moves).astype(float), self.log.gravity))
+            rows.append(Rows(motion, tau, ((fast | ~moves) & ~held).astype(float), self.log.gravity, self.held))
         return rows
 
 
@@ -166,6 +177,32 @@ def prepare(robot: Robot, log: Log) -> Prepared:
         raise InputError(
             error.problem, file=file, joint=error.joint, allowed=error.allowed, remedy=error.remedy
         ) from error
+
+
+def prepare_all(robot: Robot, logs: Sequence[Log]) -> list[Prepared]:
+    """Prepares logs as `prepare` does one, and tells which joints stand in one while they move in another.
+
+    The rows of those do not count where some log moves all joints. Without, they are all that tells how joints feel
+    each other's accelerations, friction or not.
+    """
+    prepared = [prepare(robot, log) for log in logs]
+    still = held_joints([log.positions.q for log in prepared])
+    whole = not still.any(axis=1).all()
+    return [
+        replace(log, still=own, held=own if whole else None) if own.any() else log
+        for log, own in zip(prepared, still, strict=True)
+    ]
+
+
+def held_joints(positions: Sequence[Array]) -> NDArray[np.bool_]:
+    """Tells which joints stand in each of several logs, but for a tremble, while they move in another (logs, n).
+
+    Args:
+        positions: of each log (N, n).
+    """
+    travel = np.array([np.ptp(q, axis=0) for q in positions])
+    held: NDArray[np.bool_] = travel < TREMBLE * travel.max(axis=0)
+    return held
 
 
 def rows_of(logs: Sequence[Prepared], by: float | Smoother, *, ends: bool = False) -> list[Rows]:

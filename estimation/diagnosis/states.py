@@ -18,7 +18,7 @@ from estimation.diagnosis.position_spectra import Spectra, Spectrum
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.smoothed_motion import smoothed
 from estimation.gate.resolution import lattice_step
-from estimation.preparation import Prepared, prepare
+from estimation.preparation import Prepared, held_joints, prepare
 from robots.common.errors import InputError
 from robots.common.stretches import spans
 from robots.robot import Robot
@@ -39,8 +39,6 @@ SHORTEST = 5.0  # [s] of log below which nothing can be told
 FLAT = 1e-6
 # A mean over repetitions is taken where it knows frequencies higher by this factor than a single pass.
 SHARPER = 1.2
-# A joint whose range in a log is below this share of its largest stands there.
-STANDS = 3e-4
 # At the ends of a log, rows in which all joints are slower than this share are left out, up to so long [s].
 SETTLED, ENDS = 0.15, 2.0
 
@@ -112,9 +110,8 @@ def _standing(parts: Sequence[_Part]) -> list[_Part]:
     What moves there is the error of the position loop, by some steps of the encoder, and friction holds against it. A
     step has accelerations that the other joints would feel.
     """
-    travel = np.array([np.ptp(part[1], axis=0) for part in parts])
     result = []
-    for part, stands in zip(parts, travel < STANDS * travel.max(axis=0), strict=True):
+    for part, stands in zip(parts, held_joints([part[1] for part in parts]), strict=True):
         t, q, dq, ddq, tau, cycle, cutoff, turns, floor = part
         dq, ddq, floor = (np.where(stands, 0.0, values) for values in (dq, ddq, floor))
         still = replace(

@@ -154,7 +154,7 @@ def _levelling(
         period, first, repeats = _lines(recording, run)
         start, count = -(-first // wide.stride), max(int(repeats + 1e-6), 1)
         values = values[start : start + round(count * period * rate)]
-        counted = np.count_nonzero(values)
+        counted = int(np.count_nonzero(values))
         power = np.abs(np.fft.rfft(values)) ** 2 / max(counted, 1)
         f = np.fft.rfftfreq(len(values), 1 / rate)
         power = without_lines(power[:, None], f[1], period if count > 1 else None)[:, 0]
