@@ -147,13 +147,15 @@ def _idle(
 def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bool]) -> bool:
     """Whether unseen errors are surely larger with a member, or larger by so much that it is no gain to have it.
 
-    A cause that acts at all times must also leave on stretches left out some of what it does where it was fitted, and
-    of a joint whose base model the logs do not tell nothing can be named.
+    A cause that acts at all times must also leave on stretches left out some of what it does where it was fitted: of
+    the error or, where a base model that other stretches hardly tell hides that, of what unseen rows say beside it. Of
+    a joint whose base model the logs do not tell nothing can be named.
     """
     effect, joint = member.hypothesis.effect, member.hypothesis.joint
     if beyond(effect):
         return False
-    if effect.depends_on == "state" and seen.kept[i] < LEFT:
+    told = seen.speaks[i] >= LEFT and seen.gains[i].ci95[0] > 0
+    if effect.depends_on == "state" and seen.kept[i] < LEFT and not told:
         return True
     if joint is not None and seen.unseen.astray(joint - 1):
         return True

@@ -47,6 +47,7 @@ class Measured:
         rises: by what factor each member changes the error of all joints that it acts on.
         worse: whether unseen rows speak against each member.
         kept: share of what each member does to the error of the fit that is left there.
+        speaks: share of each member's gain by which unseen rows speak for it (`Unseen.growth`).
         coordinates: on which each member shows there (M,).
         whole: the unseen data, after the logs of the fit where heat may last from them.
         first: row of `whole` at which the unseen data begin.
@@ -60,6 +61,7 @@ class Measured:
     rises: tuple[float, ...]
     worse: tuple[bool, ...]
     kept: tuple[float, ...]
+    speaks: tuple[float, ...]
     coordinates: tuple[Array, ...]
     whole: Recording
     first: int
@@ -99,6 +101,7 @@ def measure_unseen(
         rises=tuple(_rise(unseen, i, member) for i, member in enumerate(members)),
         worse=tuple(unseen.surely_worse(i + 1) for i in range(len(members))),
         kept=tuple(unseen.kept(i + 1, _joints(member)) for i, member in enumerate(members)),
+        speaks=tuple(unseen.growth[i + 1] / max(member.gain, 1e-300) for i, member in enumerate(members)),
         coordinates=tuple(
             m.hypothesis.effect.coordinate(state, m.hypothesis.joint, m.shape)[1][there]
             for m, state in zip(members, states, strict=True)

@@ -22,12 +22,13 @@ from robots.terms.effects.base import Effect
 
 @dataclass(frozen=True)
 class Shown:
-    """What unseen data say of a member: the interval of its gain, its rise, its share kept, its joint astray."""
+    """What unseen data say of a member: its gain's interval, its rise, shares kept and spoken for, its joint astray."""
 
     low: float = 0.001
     high: float = 0.003
     rise: float = 0.95
     kept: float = 1.0
+    speaks: float = 0.0
     astray: bool = False
 
 
@@ -58,6 +59,7 @@ class Bench:
             rises=tuple(s.rise for s in shown),
             worse=tuple(s.high < 0 for s in shown),
             kept=tuple(s.kept for s in shown),
+            speaks=tuple(s.speaks for s in shown),
         )
 
 
@@ -176,6 +178,9 @@ def test_a_name_that_surely_harms_is_left_out_with_a_note() -> None:
         (Shown(-0.002, 0.001, HARM - 0.01), True),
         (Shown(kept=LEFT - 0.01), False),  # it fits the rows that it was fitted to, and few others
         (Shown(kept=LEFT + 0.01), True),
+        (Shown(kept=LEFT - 0.1, speaks=LEFT + 0.01), True),  # what the base model errs by hides what rows say
+        (Shown(kept=LEFT - 0.1, speaks=LEFT - 0.01), False),
+        (Shown(-0.001, 0.003, kept=LEFT - 0.1, speaks=LEFT + 0.01), False),
         (Shown(astray=True), False),  # a joint whose base model the logs do not tell
     ],
 )
