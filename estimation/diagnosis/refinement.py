@@ -13,7 +13,6 @@ from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Group, Problem
 from estimation.diagnosis.scoring import Accepted, score
-from estimation.diagnosis.speeds import scatter_over_speeds
 
 Array = NDArray[np.float64]
 
@@ -165,12 +164,7 @@ def refine(
     found = best[0]
     if hypothesis.effect.alike:
         return _agreed(problem, found, accepted)
-    if hypothesis.effect.kicks:
-        return replace(found, scatter=_borne_out(problem, found, accepted))
-    if hypothesis.effect.fast:
-        scatter = scatter_over_speeds(problem, found.group, found.coefficients, accepted)
-        return replace(found, scatter=scatter)
-    return found
+    return replace(found, scatter=_borne_out(problem, found, accepted)) if hypothesis.effect.kicks else found
 
 
 def _agreed(problem: Problem, member: Member, accepted: Accepted) -> Member:
