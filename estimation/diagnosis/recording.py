@@ -15,8 +15,6 @@ from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
 
-CRUISE = 0.4
-"""Time [s] over which a line of an encoder's steps stays where it is if the joint is at most one off by then."""
 BESIDE = 0.05
 """Time [s] about a row of unknown direction in which accelerations are not known to all of their kicks."""
 
@@ -44,7 +42,6 @@ class Recording:
         payloads: per log a known body at the flange (10,), in its frame; empty where no log has one.
         fields: per log gravity (3,) in the base frame [m/s2], None as the robot is described; empty where all are so.
         trusted: joints (n,) whose clear rows count, and are `unsure` no more; None before that is known.
-        counts: each joint's encoder step (n,) [rad or m], zero where positions have none; None for no steps.
     """
 
     t: Array
@@ -65,7 +62,6 @@ class Recording:
     payloads: tuple[Array, ...] = ()
     fields: tuple[Array | None, ...] = ()
     trusted: NDArray[np.bool_] | None = None
-    counts: Array | None = None
 
     def __len__(self) -> int:
         return len(self.t)
@@ -111,25 +107,6 @@ class Recording:
                     turns[run][rows] = True
         away = self.away(turns)[:, 0]
         return np.concatenate([away[run][::stride] for run in self.runs])
-
-    def cruising(self, joint: int) -> NDArray[np.bool_]:
-        """Marks rows (N,) in which a joint, from 0, moves at constant speed, to one encoder step over `CRUISE` [s].
-
-        There the steps' errors are no noise: they fold down to lines that stay where they are.
-        """
-        step = 0.0 if self.counts is None else float(self.counts[joint])
-        result = np.zeros(len(self), dtype=bool)
-        lag = round(CRUISE / self.step)
-        for run in self.runs:
-            q = self.q[run, joint]
-            if step <= 0.0 or len(q) <= 2 * lag:
-                continue
-            steady = np.zeros(len(q), dtype=bool)
-            steady[lag:-lag] = np.abs(q[2 * lag :] - 2 * q[lag:-lag] + q[: -2 * lag]) <= step
-            for start, stop in spans(steady):
-                if stop - start > lag // 4:  # longer than an acceleration takes that changes its sign
-                    result[run][start - lag : stop + lag] = True
-        return result
 
     def away(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Marks rows of each log farther than `BESIDE` from marked ones, both (N, k)."""

@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from estimation.diagnosis.believable import believable_cutoff
+from estimation.diagnosis.cruising import cruised
 from estimation.diagnosis.directions import ALIKE, Directions, directions
 from estimation.diagnosis.periods import Cycle, find_cycle, project
 from estimation.diagnosis.position_spectra import Spectra, Spectrum
@@ -97,7 +98,6 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
         clear=np.concatenate([part[7].clear for part in parts]),
         jolts=np.max([part[7].jolts for part in parts], axis=0),
         moments=np.max([part[7].moments for part in parts], axis=0),
-        counts=np.max([[lattice_step(x) for x in log.log.q.T] for log in prepared], axis=0),
         names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
         payloads=_payloads(prepared),
         fields=_fields(prepared),
@@ -186,6 +186,8 @@ def _part(log: Prepared, step: float, cap: float, spectra: Spectra, found: Seque
     ends = [spectrum.at(float(cutoff)) for cutoff, spectrum in zip(cutoffs, found, strict=True)]
     beside = log.log.t[np.clip(np.searchsorted(log.log.t, t), 1, len(log.log.t) - 1) + np.array([[-1], [0]])]
     sampled = abs(step - period) < 1e-9 and bool(np.abs(beside - t).min(axis=0).max() < ALIKE * period)
+    steps = np.array([lattice_step(x) for x in log.log.q.T])
+    states[1:] = cruised(states[0], states[1], states[2], steps, step)
     turns = directions(states[1], states[2], cutoffs, floor, np.maximum(ends, floor), step, sampled)
     turns = turns.spread(_between(log.log.t, t, period))
     cut = slice(None) if moved is not None else _moving(states[1], step)

@@ -208,15 +208,13 @@ def _passed(wide: Whitening, series: Array, joint: int, passing: Band) -> Array:
 def _counts(wide: Whitening, recording: Recording, joint: int, edge: int) -> Array:
     """Weights of a joint's white rows (N',).
 
-    None beside rows in which its direction is not known, or its encoder's steps make lines, nor in the `edge` rows at
-    the ends of a log, where the filter sees the torque begin and end. They come after the filters: before, they would
-    turn slow torque into fast.
+    None beside rows in which its direction is not known, nor in the `edge` rows at the ends of a log, where the filter
+    sees the torque begin and end. They come after the filters: before, they would turn slow torque into fast.
     """
     reach = int(np.ceil(0.5 / wide.bands[joint].cutoff / recording.step))
     parts = []
-    known = ~(recording.unsure[:, joint] | recording.cruising(joint))
     for run in recording.runs:
-        part = ~maximum_filter1d(~known[run], 2 * reach + 1)[:: wide.stride]
+        part = ~maximum_filter1d(recording.unsure[run, joint], 2 * reach + 1)[:: wide.stride]
         part[:edge] = False
         part[max(len(part) - edge, 0) :] = False
         parts.append(part)

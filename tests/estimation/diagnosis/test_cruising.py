@@ -1,50 +1,50 @@
-"""Where an encoder's steps make lines, at constant speed, nothing fast is looked for."""
+"""At constant speed an encoder's steps are no motion, and elsewhere nothing is changed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.recording import CRUISE, Recording
-from estimation.diagnosis.states import record
-from estimation.diagnosis.upper import WIDER
-from robots.robot import Robot
-from robots.signals import Log
+from estimation.diagnosis.cruising import CRUISE, cruised
+
+STEP, COUNT = 0.004, 5e-5
 
 
-@pytest.fixture(scope="module")
-def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
-    """A log of the arm without effects."""
-    return replace(record(arm, [arm_log(torque_noise=0.02)]), floor=np.full(2, 1e-11), cycles=(None,))
+def _differentiated(q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    dq = np.gradient(q, STEP, axis=0)
+    return dq, np.gradient(dq, STEP, axis=0)
 
 
-def test_constant_speed_is_told_by_the_encoder(recording: Recording) -> None:
-    """A ramp cruises but where it begins, over two seconds; a slow sine does not, nor does anything without steps."""
-    t, count = recording.t - recording.t[0], 5e-5
-    ramp = np.where(t < 2.0, 0.025 * t**2, 0.1 * (t - 1.0))
-    turning = replace(recording, q=np.column_stack([ramp, np.sin(0.6 * t)]), counts=np.full(2, count))
-    cruises = turning.cruising(0)
-    assert cruises[t > 2.05].all()
-    assert not cruises[t < 2.0 - CRUISE].any()
-    assert turning.cruising(1).mean() < 0.05
-    assert not replace(turning, counts=np.zeros(2)).cruising(0).any()
-    assert not replace(turning, counts=None).cruising(0).any()
+def test_lines_of_steps_are_taken_out_of_a_ramp() -> None:
+    """A start over two seconds, then 0.1037 rad/s: accelerations of counted positions are a thousandth of what they were."""
+    t = STEP * np.arange(5000)
+    true = 0.1037 * np.where(t < 2.0, 0.25 * t**2, t - 1.0)
+    q = (COUNT * np.round(true / COUNT))[:, None]
+    dq, ddq = _differentiated(q)
+    v, a = cruised(q, dq, ddq, np.array([COUNT]), STEP)
+    ramp = (t > 2.1 + CRUISE) & (t < t[-1] - 1.1 * CRUISE)
+    assert np.abs(v[ramp] - 0.1037).max() < 2 * COUNT / CRUISE
+    assert np.abs(a[ramp]).max() <= 1.5 * COUNT / CRUISE**2 < 1e-3 * np.abs(ddq[ramp]).max()
+    start = t < 2.0 - CRUISE
+    np.testing.assert_array_equal(a[start], ddq[start])
+    np.testing.assert_array_equal(v[start], dq[start])
 
 
-def test_above_the_bands_rows_at_constant_speed_do_not_count(
-    recording: Recording, pose_arm: Callable[..., Problem]
-) -> None:
-    """An encoder so coarse that a third of the motion is at constant speed by it: those rows weigh nothing."""
-    coarse = replace(recording, counts=np.full(2, 0.1))
-    upper = pose_arm(coarse, wider=WIDER).upper
-    assert upper is not None
-    above = upper.joints[1]
-    assert above is not None
-    cruises = coarse.cruising(1)[:: upper.whitening.stride]
-    assert 0.05 < cruises.mean() < 0.95
-    assert not above.counts[cruises].any()
-    assert above.counts[~cruises].any()
+def test_motion_that_bends_is_left_alone() -> None:
+    """A slow sine, whose acceleration passes through zero, keeps its derivatives; so does what has no steps."""
+    t = STEP * np.arange(5000)
+    q = np.column_stack([np.sin(0.6 * t), 0.1 * t])
+    dq, ddq = _differentiated(q)
+    v, a = cruised(q, dq, ddq, np.array([COUNT, 0.0]), STEP)
+    np.testing.assert_array_equal(v, dq)
+    np.testing.assert_array_equal(a, ddq)
+
+
+@pytest.mark.parametrize("rows", [10, 200])
+def test_short_logs_are_left_alone(rows: int) -> None:
+    """Two times the lag and less have no line to be on."""
+    q = 0.1 * STEP * np.arange(rows)[:, None]
+    dq, ddq = _differentiated(q)
+    for got, given in zip(cruised(q, dq, ddq, np.array([COUNT]), STEP), (dq, ddq), strict=True):
+        np.testing.assert_array_equal(got, given)
