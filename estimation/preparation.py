@@ -194,14 +194,15 @@ def prepare_all(robot: Robot, logs: Sequence[Log]) -> list[Prepared]:
     ]
 
 
-def held_joints(positions: Sequence[Array]) -> NDArray[np.bool_]:
+def held_joints(positions: Sequence[Array], travel: Array | float = 0.0) -> NDArray[np.bool_]:
     """Tells which joints stand in each of several logs, but for a tremble, while they move in another (logs, n).
 
     Args:
         positions: of each log (N, n).
+        travel: their ranges (n,) in logs besides.
     """
-    travel = np.array([np.ptp(q, axis=0) for q in positions])
-    held: NDArray[np.bool_] = travel < TREMBLE * travel.max(axis=0)
+    ranges = np.array([np.ptp(q, axis=0) for q in positions])
+    held: NDArray[np.bool_] = ranges < TREMBLE * np.maximum(ranges.max(axis=0), travel)
     return held
 
 

@@ -44,7 +44,14 @@ SHARPER = 1.2
 SETTLED, ENDS = 0.15, 2.0
 
 
-def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shortest: float = SHORTEST) -> Recording:
+def record(
+    robot: Robot,
+    logs: Sequence[Log],
+    *,
+    step: float | None = None,
+    shortest: float = SHORTEST,
+    travel: Array | float = 0.0,
+) -> Recording:
     """Reads logs into noise-free motion on a common grid.
 
     Positions of a repeated motion are projected on its harmonics. Others are low-passed, joint by joint, where their
@@ -56,6 +63,7 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
         logs: of t, q and tau or current.
         step: sample period to take [s]; by default that of the slowest log, longer where there are too many rows.
         shortest: least time of all logs together [s].
+        travel: the joints' ranges (n,) in logs besides, by which those are known that stand in all of these.
 
     Raises:
         InputError: logs of another robot, without torque, or too short.
@@ -77,7 +85,8 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
     found = [[of.of_positions(x) for x in log.positions.q.T] for of, log in zip(spectra, prepared, strict=True)]
     highest = np.max([[spectrum.cutoff() for spectrum in own] for own in found], axis=0)
     cap = believable_cutoff(robot, prepared, highest)
-    parts = _standing([_part(log, step, cap, of, own) for log, of, own in zip(prepared, spectra, found, strict=True)])
+    parts = [_part(log, step, cap, of, own) for log, of, own in zip(prepared, spectra, found, strict=True)]
+    parts = _standing(parts, held_joints([part[1] for part in parts], travel))
     lengths = [len(part[0]) for part in parts]
     total = sum(lengths) * step
     if total < shortest:
@@ -104,14 +113,14 @@ def record(robot: Robot, logs: Sequence[Log], *, step: float | None = None, shor
     )
 
 
-def _standing(parts: Sequence[_Part]) -> list[_Part]:
-    """Takes joints that stand in a log, but for a tremble, for joints at rest: it says nothing of their motion.
+def _standing(parts: Sequence[_Part], held: NDArray[np.bool_]) -> list[_Part]:
+    """Takes joints that stand in a log (logs, n), but for a tremble, for joints at rest: it says nothing of them.
 
     What moves there is the error of the position loop, by some steps of the encoder, and friction holds against it. A
     step has accelerations that the other joints would feel.
     """
     result = []
-    for part, stands in zip(parts, held_joints([part[1] for part in parts]), strict=True):
+    for part, stands in zip(parts, held, strict=True):
         t, q, dq, ddq, tau, cycle, cutoff, turns, floor = part
         dq, ddq, floor = (np.where(stands, 0.0, values) for values in (dq, ddq, floor))
         still = replace(

@@ -255,7 +255,8 @@ def _on_logs(
     pull: Pull,
 ) -> tuple[Unseen, list[Situation], Recording, int, list[Array]]:
     recording = problem.recording
-    other = lightened(robot, record(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN))
+    travel = np.max([np.ptp(recording.q[run], axis=0) for run in recording.runs], axis=0)
+    other = lightened(robot, record(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN, travel=travel))
     other = other.trusting(recording.trusted)
     # One clock: where the unseen logs come later, the heat of the ones before is still there.
     later = bool(other.t[0] > recording.t[-1])

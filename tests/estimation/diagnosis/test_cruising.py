@@ -17,7 +17,7 @@ def _differentiated(q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArra
 
 
 def test_lines_of_steps_are_taken_out_of_a_ramp() -> None:
-    """A start over two seconds, then 0.1037 rad/s: accelerations of counted positions are a thousandth of what they were."""
+    """A start over two seconds, then 0.1037 rad/s: accelerations of counted positions fall to a thousandth."""
     t = STEP * np.arange(5000)
     true = 0.1037 * np.where(t < 2.0, 0.25 * t**2, t - 1.0)
     q = (COUNT * np.round(true / COUNT))[:, None]

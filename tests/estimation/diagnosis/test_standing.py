@@ -50,6 +50,15 @@ def test_a_joint_that_trembles_by_a_count_is_at_rest(arm: Robot, arm_log: Callab
     assert recording.jolts[1] == pytest.approx(first.jolts[1])
 
 
+def test_an_unseen_log_of_one_joint_is_judged_by_that(arm: Robot, arm_log: Callable, alone: Callable[..., Log]) -> None:
+    """Torque that friction holds is no error of the model there; the joint that moves errs by noise."""
+    found = diagnose(arm, arm_log(torque_noise=0.02), held_out=alone(0, 100.0), candidates=("stribeck",))
+    recording = record(arm, [alone(0, 100.0)], travel=np.array([1.0, 1.0]))
+    assert recording.unsure[:, 1].all()
+    assert found.baseline[0] < 0.05
+    assert found.baseline[1] == 0.0
+
+
 def test_the_gate_asks_nothing_of_a_joint_that_stands(arm: Robot, alone: Callable[..., Log]) -> None:
     """It is told to stand hardly moving; its steps are no jumps, and its torque has neither sign nor size."""
     report = check_log(arm, alone(0, 0.0))
