@@ -99,7 +99,7 @@ def estimate_whitening(
     noise = _colour(pieces, step, counts, parameters, slowest, fastest, beside, period)
     levels = None
     if len(pieces) > 1:
-        counted = [rows.sum(axis=0) for rows in beside.measured]
+        counted = [rows.sum(axis=0) for rows in np.split(~resting, np.cumsum([len(piece) for piece in pieces])[:-1])]
         levels = _levels([noise.whitened(piece) for piece in pieces], counted, step, slowest, fastest)
         pieces = [piece / level for piece, level in zip(pieces, levels, strict=True)]
         noise = _colour(pieces, step, counts, parameters, slowest, fastest, beside, period)
@@ -178,13 +178,13 @@ def _levels(
     """Gives the noise of each log over that of all (logs, n), from whitened residuals (N, n) of each.
 
     By the faster half of what is known: a torque that acts in one log only is slow. A log of few frequencies, or of few
-    rows that count (n,), is taken to be as noisy as the others.
+    rows in which a joint moves (n,), is taken to be as noisy as the others.
     """
     powers, numbers = np.empty((2, len(white), len(fastest)))
     for i, (rows, counted) in enumerate(zip(white, counts, strict=True)):
         f = np.fft.rfftfreq(len(rows), step)[:, None]
         inside = (f >= np.maximum(slowest, fastest / 2)) & (f < fastest)
-        # What is bridged has no noise, and as many frequencies less.
+        # A joint at rest has no noise, and as many frequencies less.
         numbers[i] = inside.sum(axis=0) * counted / len(rows)
         powers[i] = (np.abs(np.fft.rfft(rows, axis=0)) ** 2 * inside).sum(axis=0) / len(rows)
     mean = np.maximum(powers.sum(axis=0) / np.maximum(numbers.sum(axis=0), 1), 1e-300)

@@ -109,7 +109,8 @@ def judge(
 
 def _possible(problem: Problem, found: Found) -> Found:
     """Leaves out rivals that no machine has."""
-    return replace(found, rivals=tuple(pair for pair in found.rivals if _believable(problem, pair[0])))
+    rivals = tuple(pair for pair in found.rivals if _believable(problem, pair[0]))
+    return found if len(rivals) == len(found.rivals) else replace(found, rivals=rivals)
 
 
 def _believable(problem: Problem, member: Member) -> bool:

@@ -104,7 +104,7 @@ def test_above_the_bands_play_counts_in_calm_rows(problem: Problem) -> None:
     outside = calm[~upper.calm]
     # What is left there is the base model's share, which is orthogonal to what it was taken from.
     np.testing.assert_allclose(own.base.T @ calm, 0.0, atol=1e-9 * np.linalg.norm(whole))
-    assert np.linalg.norm(outside) < 0.3 * np.linalg.norm(whole[~upper.calm])
+    assert np.linalg.norm(outside) < 0.4 * np.linalg.norm(whole[~upper.calm])
 
 
 def test_an_extension_is_fitted_in_the_rows_it_was_found_in(problem: Problem) -> None:
