@@ -17,6 +17,7 @@ from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scan import Entry, Outcome, Scan, measure, scan
 from estimation.diagnosis.scoring import Accepted, accept, score
 from robots.common.parallel import available_cores
+from robots.terms.effects import Effect
 
 # Hypotheses refined at each step, the best by their point on the grid.
 CONTENDERS = 7
@@ -173,10 +174,21 @@ def contenders(problem: Problem, result: Scan, members: Sequence[Member] = (), l
     def worth(outcome: Outcome, times: float = 1.0) -> float:
         return float(times * outcome.gain - outcome.degrees * np.log(problem.rows))
 
+    def reached(outcome: Outcome, times: float = 1.0) -> float:
+        """What it is worth with its shape parameters paid for, as when it is refined."""
+        effect, joint = outcome.hypothesis.effect, outcome.hypothesis.joint
+        free = sum(high > low for low, high in effect.bounds(problem.sees(effect), joint))
+        rows = problem.rows * len(effect.acts_on(problem.situation.robot, joint))
+        return float(times * outcome.gain - (outcome.degrees + free) * np.log(rows))
+
     ranked = sorted(able, key=worth, reverse=True)
-    best, top = max(o.gain for o in able), max(worth(ranked[0]), least)
-    hopeless = {o.hypothesis for o in able if o.hypothesis.effect.passing and worth(o, TWICE) < top}
+    best, top = max(o.gain for o in able), max(*map(reached, ranked[:CONTENDERS]), least)
+    hopeless = {o.hypothesis for o in able if _of_a_moment(o.hypothesis.effect) and reached(o, TWICE) < top}
     return [o for o in ranked if o.gain >= NEAR * best and o.hypothesis not in hopeless][:CONTENDERS]
+
+
+def _of_a_moment(effect: Effect) -> bool:
+    return effect.passing or any(shape.moment for shape in effect.shapes)
 
 
 def _best(problem: Problem, outcomes: Sequence[Outcome], accepted: Accepted) -> list[Member]:

@@ -100,22 +100,27 @@ def test_what_errors_of_the_motion_may_make_of_a_gain_says_nothing_of_its_being_
 
 
 def test_a_contact_that_cannot_win_is_not_searched() -> None:
-    """Twice its gain at the grid is less than the best's worth: it is left out; what lasts is searched all the same."""
+    """Twice its gain at the grid, all its parameters paid for, is less than the best's worth: it is left out.
+
+    What lasts is searched all the same.
+    """
 
     def outcome(name: str, joint: int | None, gain: float, degrees: int) -> Outcome:
         return Outcome(Hypothesis(EFFECTS[name], joint), (), gain, 1.0, gain / 2, degrees)
 
-    problem = SimpleNamespace(rows=ROWS)
-    best = outcome("spring", 1, 400.0, 3)
-    weak, strong = outcome("external_contact", None, 180.0, 6), outcome("external_contact", None, 250.0, 6)
-    lasting = outcome("backlash", 1, 180.0, 1)
+    situation = SimpleNamespace(t=np.array([0.0, 60.0]), robot=SimpleNamespace(n=2))
+    problem = SimpleNamespace(rows=ROWS, situation=situation, sees=lambda effect: situation)
+    best = outcome("asymmetric_friction", 1, 400.0, 3)
+    # Of 6 coefficients; the moment, the duration and the hardness of a push are fitted too.
+    weak, strong = (outcome("external_contact", None, gain, 6) for gain in (215.0, 250.0))
+    lasting = outcome("stribeck", 1, 180.0, 1)
 
     def chosen(*outcomes: Outcome) -> set[str]:
         scanned = SimpleNamespace(outcomes=outcomes)
         return {o.hypothesis.name for o in contenders(problem, scanned)}  # type: ignore[arg-type]
 
-    assert chosen(best, weak, lasting) == {"spring", "backlash"}
-    assert chosen(best, strong, lasting) == {"spring", "external_contact", "backlash"}
+    assert chosen(best, weak, lasting) == {"asymmetric_friction", "stribeck"}
+    assert chosen(best, strong, lasting) == {"asymmetric_friction", "external_contact", "stribeck"}
     assert chosen(weak) == {"external_contact"}
 
 
