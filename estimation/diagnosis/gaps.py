@@ -50,6 +50,15 @@ class Gaps:
         result[rows] = (1 - w) * series[before] + w * series[after]
         return result
 
+    def gathered(self, slope: Array, joint: int) -> Array:
+        """Hands on to the rows beside a joint's gaps what (N,) has to do with the bridge: the adjoint of `bridged`."""
+        rows, before, after, weight = self.bridges[joint]
+        result = slope.copy()
+        result[rows] = 0.0
+        np.add.at(result, before, (1 - weight) * slope[rows])
+        np.add.at(result, after, weight * slope[rows])
+        return result
+
     def freed(self, white: NDArray[Real], joint: int) -> NDArray[Real]:
         """Projects the short gaps' torques out of white columns of a joint."""
         return self.free[joint].projected_out(white) if joint < len(self.free) else white

@@ -110,6 +110,24 @@ class Problem:
         """Number of white rows N."""
         return len(self.residual)
 
+    @cached_property
+    def slope(self) -> Array:
+        """What torque in each of the recording's rows (N0, n) explains, per unit: half the slope of <r, r>.
+
+        The sum of its products with an effect's torque is that effect's product with the residual, as far as the base
+        model has no part in it; zero where a joint rests.
+        """
+        rows = len(self.recording)
+        return np.column_stack([self.whitening.adjoint(self.residual[:, j], j, rows) for j in range(self.n)])
+
+    @cached_property
+    def steep(self) -> Array:
+        """The slope (N0, n) for what is `fast`: with the frequencies above the bands."""
+        if self.upper is None:
+            return self.slope
+        rows = len(self.recording)
+        return self.slope + np.column_stack([self.upper.slope(j, rows) for j in range(self.n)])
+
     def columns_of(self, hypothesis: Hypothesis, shape: tuple[float, ...]) -> tuple[tuple[int, ...], tuple[Array, ...]]:
         """Evaluates a hypothesis: the joints it acts on, and its columns (N, k) on each."""
         return hypothesis.columns(self.sees(hypothesis.effect), shape)

@@ -83,6 +83,15 @@ class Upper:
         above = self.joints[joint]
         return np.zeros(columns.shape[1]) if above is None else np.asarray(columns.T @ above.residual)
 
+    def slope(self, joint: int, rows: int) -> Array:
+        """Gives what torque in each of a joint's rows (N,) has to do with the residual above its band."""
+        above = self.joints[joint]
+        if above is None:
+            return np.zeros(rows)
+        runs = _runs(above.counts * above.residual, self.whitening.starts, rows, self.whitening.stride)
+        # Without delay, what is above is let through alike from either side.
+        return self.whitening.unfiltered(np.concatenate([above.passing.passed(run) for run in runs]), joint, rows)
+
     def regression(self, columns: Array, *, calm: NDArray[np.bool_]) -> tuple[Array, Array]:
         """Gives the rows (R, k) of columns (N, n, k) above the bands of joints that they act on, and torque (R,).
 

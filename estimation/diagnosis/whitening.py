@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal, overload
 
@@ -88,6 +88,28 @@ class Whitening:
             return white
         weights = self.weights[:, joint, *(None,) * (white.ndim - 1)]
         return white * weights.astype(white.dtype, copy=False)
+
+    def adjoint(self, white: Array, joint: int, rows: int) -> Array:
+        """Gives what each of a joint's rows (N,) has to do with white ones (M,): <apply(x), white> = <x, adjoint>.
+
+        But for x in the first rows of a log.
+        """
+        if self.weights is not None:
+            white = white * self.weights[:, joint]
+        return self.unfiltered(self.gaps.freed(white, joint), joint, rows)
+
+    def unfiltered(self, white: Array, joint: int, rows: int) -> Array:
+        """The same of `filtered`."""
+        taps = np.concatenate([[1.0], -self.coefficients[joint]]) / self.scale[joint]
+        band, parts, first = self.bands[joint], [], 0
+        for run, (start, stop) in enumerate(pairwise((*self.starts, rows))):
+            count = -(-(stop - start) // band.stride)
+            thinned = np.zeros(stop - start)
+            # The low-pass is its own adjoint, for it has no delay.
+            thinned[:: band.stride] = np.convolve(white[first : first + count], taps[::-1])[len(taps) - 1 :]
+            parts.append(replace(band, stride=1).passed(thinned) / self.level(run, joint))
+            first += count
+        return self.gaps.gathered(np.concatenate(parts), joint)
 
     def all(self, series: Array) -> Array:
         """Whitens (N, n) or (N, n, k)."""

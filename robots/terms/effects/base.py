@@ -213,6 +213,9 @@ class Effect(ABC):
     ) -> tuple[tuple[float, ...], ...]:
         """Lists the points of `grid` that are worth scanning on a residual (N, n), the best first.
 
+        It is weighed by what noise makes of it, so that its products with an effect's torque are what that explains per
+        unit [1/(N m) or 1/N]; zero where a joint rests.
+
         All of them, unless the effect knows a fast way to rank them. The ranking is a search: a false-alarm control
         must repeat it on every null log.
         """

@@ -68,17 +68,21 @@ class ExternalContact(Effect):
     def propose(
         self, situation: Situation, joint: Place, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks all times at once, by the residual's energy that a constant explains in each window."""
+        """Ranks all times at once, by the residual's sum in each window over what it is in most of that length."""
         grid = self.grid(situation, joint)
         if len(grid) <= count:
             return grid
-        level = np.sqrt(np.mean(residual**2, axis=0))
-        scaled = residual * np.divide(1.0, level, out=np.zeros_like(level), where=level > 0)
-        sums = np.concatenate([np.zeros((1, scaled.shape[1])), np.cumsum(scaled, axis=0)])
+        sums = np.concatenate([np.zeros((1, residual.shape[1])), np.cumsum(residual, axis=0)])
         starts, durations, _ = np.array(grid).T
         first = np.searchsorted(situation.t, starts + 0.1 * durations)
         last = np.searchsorted(situation.t, starts + 0.9 * durations)
-        scores = ((sums[last] - sums[first]) ** 2).sum(axis=1) / np.maximum(last - first, 1)
+        energies = (sums[last] - sums[first]) ** 2
+        for duration in np.unique(durations):
+            # What slow noise makes of long windows, and fast noise of short ones: the median of a chi-square.
+            own = energies[durations == duration]
+            usual = np.nanmedian(np.where(own > 0, own, np.nan), axis=0) / 0.455
+            energies[durations == duration] = np.divide(own, usual, out=np.zeros_like(own), where=usual > 0)
+        scores = energies.sum(axis=1)
         return tuple(grid[i] for i in np.argsort(-scores)[:count])
 
     def describe(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import casadi
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from robots.terms.base import force_unit
 from robots.terms.effects.base import Coefficient, Place, Shape, Situation
@@ -22,8 +23,10 @@ SAMPLES_PER_PERIOD = 2.5
 """A ripple that passes in fewer samples is not resolved."""
 WAVES = 2.0
 """Waves over the joint's range below which a ripple looks like gravity or a spring."""
-LARGEST = 400
-"""Orders on the grid at most: a longer list costs more in false alarms than its orders are likely."""
+LARGEST = 1600
+"""Orders on the grid at most: more than a joint tells over a turn and a half."""
+ABOUT = 201
+"""Points of the spectrum, four a resolution, that tell how much is usual about an order."""
 
 
 class TorqueRipple(StaticJointEffect):
@@ -112,13 +115,13 @@ class TorqueRipple(StaticJointEffect):
     def propose(
         self, situation: Situation, joint: Place, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks all orders at once, by the residual's spectrum over the angle."""
+        """Ranks all orders at once, by the residual's spectrum over the angle over that of their surroundings."""
         assert joint is not None
         grid = self.grid(situation, joint)
         if len(grid) <= count:
             return grid
         orders = np.array([order for order, _ in grid])
-        power = angle_spectrum(situation.q[:, joint - 1], residual[:, joint - 1], orders)
+        power = angle_spectrum(situation.q[:, joint - 1], residual[:, joint - 1], orders, level=True)
         return tuple(grid[i] for i in np.argsort(-power)[:count])
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
@@ -147,13 +150,14 @@ class TorqueRipple(StaticJointEffect):
         return f"position of joint {joint} within 1/{shape[0]:.4g} turn [rad]", situation.q[:, joint - 1] % period
 
 
-def angle_spectrum(q: Array, values: Array, orders: Array) -> Array:
+def angle_spectrum(q: Array, values: Array, orders: Array, *, level: bool = False) -> Array:
     """Gives |sum(values exp(-i h q))|^2 for each order h (K,), by binning the angle and one Fourier transform.
 
     Args:
         q: positions (N,) [rad].
         values: (N,).
         orders: (K,).
+        level: whether over the median of the orders about each.
     """
     reach = float(np.ptp(q)) or 1.0
     # Eight bins a period of the highest order keep its power to 5 %; the length sets the transform's resolution.
@@ -161,4 +165,6 @@ def angle_spectrum(q: Array, values: Array, orders: Array) -> Array:
     sums = np.bincount(np.minimum(((q - q.min()) / reach * bins).astype(int), bins - 1), weights=values, minlength=bins)
     spectrum = np.abs(np.fft.rfft(sums, 4 * bins)) ** 2
     frequencies = 2 * np.pi * np.arange(len(spectrum)) / (4 * reach)
+    if level:
+        spectrum /= np.maximum(median_filter(spectrum, ABOUT, mode="nearest"), 1e-300)
     return np.interp(orders, frequencies, spectrum)

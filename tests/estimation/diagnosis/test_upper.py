@@ -76,6 +76,23 @@ def test_a_ripple_tells_its_energy_over_the_noise(recording: Recording, pose_arm
     assert abs(size - SIZE) < 4 * error  # fails wrongly once in 16,000
 
 
+@pytest.mark.parametrize("name", ["torque_ripple", "asymmetric_friction"])
+def test_the_slope_has_the_products_of_an_effect_with_the_residual(
+    recording: Recording, pose_arm: Callable[..., Problem], name: str
+) -> None:
+    """In the bands, and above them of what is fast: what moments and orders are ranked by is what they explain."""
+    problem = pose_arm(_rippled(recording), wider=WIDER)
+    hypothesis, shape = (RIPPLE, SHAPE) if name == "torque_ripple" else (Hypothesis(EFFECTS[name], 1), ())
+    slope = problem.steep if hypothesis.effect.fast else problem.slope
+    joints, columns = problem.columns_of(hypothesis, shape)
+    products = np.sum([part.T @ slope[:, j] for j, part in zip(joints, columns, strict=True)], axis=0)
+    group = problem.measured(hypothesis, shape)
+    # The first rows of a log are filtered another way.
+    np.testing.assert_allclose(products, group.cross, atol=0.05 * np.sqrt(np.diag(group.gram)).max())
+    if hypothesis is RIPPLE:
+        assert abs(group.cross[0]) > 4 * np.sqrt(group.gram[0, 0])
+
+
 def test_only_fast_effects_are_measured_there(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """An effect by acceleration has no rows above the band; what is slow has next to nothing of its energy there."""
     problem = pose_arm(recording, wider=WIDER)

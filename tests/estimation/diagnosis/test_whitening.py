@@ -158,6 +158,31 @@ def test_rows_of_unknown_direction_do_not_count() -> None:
     assert np.linalg.norm(whitening.apply(kick, 1)) == pytest.approx(np.linalg.norm(plain.apply(kick, 1)))
 
 
+def test_the_adjoint_has_the_products_of_the_filter() -> None:
+    """What torque in some rows has to do with white rows is the product of the filtered torque with them.
+
+    Beside rests and reversals, in logs of two levels of noise, thinned.
+    """
+    rng = np.random.default_rng(3)
+    rows = 6_000
+    unsure = np.zeros((rows, 2), dtype=bool)
+    unsure[1_000:1_400] = unsure[2_500:2_504] = True
+    recording = replace(_recording(rows, unsure=unsure), starts=(0, 3_001), cycles=(None, None), names=("a", "b"))
+    noise = _noise(rows) * np.repeat([1.0, 0.3], [3_001, rows - 3_001])[:, None]
+    whitening = estimate_whitening(recording, noise, 0, 0.2 * np.eye(2))
+    whitening = replace(whitening, bands=tuple(replace(band, stride=2) for band in whitening.bands))
+    whitening = replace(whitening, weights=None, gaps=replace(whitening.gaps, free=()))
+    for joint in range(2):
+        white = rng.standard_normal(len(whitening.apply(noise[:, joint], joint)))
+        slope = whitening.adjoint(white, joint, rows)
+        assert not slope[1_010:1_390].any()
+        for first in (300, 2_480, 3_300, 5_960):
+            torque = np.zeros(rows)
+            torque[first : first + 30] = rng.standard_normal(30)
+            product = whitening.apply(torque, joint) @ white
+            assert torque @ slope == pytest.approx(product, abs=1e-9 * np.linalg.norm(slope)), first
+
+
 def test_where_in_a_gap_friction_turns_round_does_not_matter() -> None:
     """Signs that change within rows of unknown direction, one here, one there, are one and the same when white."""
     unsure = np.zeros((10_000, 2), dtype=bool)

@@ -35,6 +35,21 @@ def test_an_unknown_order_is_found(seen, order):
     assert min(abs(point[0] - order) for point in found[:3]) <= np.pi / np.ptp(q)
 
 
+def test_what_else_varies_over_the_angle_hides_no_order(seen):
+    """Noise of slow waves a hundred times as strong as that of quick ones does not pass for a ripple, nor do rests."""
+    now = seen(2, seed=2)
+    joint = 1 + int(np.argmax(np.ptp(now.q, axis=0)))
+    q = now.q[:, joint - 1]
+    rng = np.random.default_rng(2)
+    residual = rng.normal(size=now.q.shape)
+    for order in np.arange(3.0, 12.0, 0.25):
+        residual[:, joint - 1] += np.cos(order * q + rng.uniform(0, 2 * np.pi))
+    residual[:, joint - 1] += np.cos(60.0 * q + 0.7)
+    residual[now.t > 0.7 * now.t[-1]] = 0.0
+    found = RIPPLE.propose(now, joint, residual, 6)
+    assert min(abs(point[0] - 60.0) for point in found) <= np.pi / np.ptp(q)
+
+
 def test_fewer_than_two_waves_are_no_ripple(seen):
     """What does not repeat over the joint's range may be any smooth function: no such order is tried."""
     now = seen(2, seed=2)
