@@ -100,11 +100,17 @@ def test_above_the_bands_play_counts_in_calm_rows(problem: Problem) -> None:
     whole, calm = upper.columns(series, 1), upper.columns(series, 1, calm=True)
     own = upper.joints[1]
     assert own is not None
-    assert not upper.calm.all()
-    outside = calm[~upper.calm]
-    # What is left there is the base model's share, which is orthogonal to what it was taken from.
     np.testing.assert_allclose(own.base.T @ calm, 0.0, atol=1e-9 * np.linalg.norm(whole))
-    assert np.linalg.norm(outside) < 0.4 * np.linalg.norm(whole[~upper.calm])
+    assert not upper.calm.all()
+
+    def left(columns: np.ndarray) -> float:
+        """What columns have outside calm rows that no combination of the base model's has there."""
+        there, base = columns[~upper.calm], own.base[~upper.calm]
+        return float(np.linalg.norm(there - base @ np.linalg.lstsq(base, there)[0]) / np.linalg.norm(there))
+
+    # The base model's share, which is orthogonal to what it was taken from, is all that is there.
+    assert left(calm) < 1e-9
+    assert left(whole) > 0.1
 
 
 def test_an_extension_is_fitted_in_the_rows_it_was_found_in(problem: Problem) -> None:
