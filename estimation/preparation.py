@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 SLOW = 0.008
 # A joint with less RMS speed than this [rad/s or m/s] stands: what is left is rounding, not to be taken for motion.
 STANDING = 1e-9
-# One whose range in a log is below this share of its range in another stands there, but for a tremble by some steps of
+# One whose range in a log is below this share of its range elsewhere stands there, but for a tremble by some steps of
 # its encoder.
 TREMBLE = 3e-4
 # A longer log is smoothed piece by piece, so that its intermediate signals never stand in memory together. Pieces
@@ -186,7 +186,7 @@ def prepare_all(robot: Robot, logs: Sequence[Log]) -> list[Prepared]:
     each other's accelerations, friction or not.
     """
     prepared = [prepare(robot, log) for log in logs]
-    still = held_joints([log.positions.q for log in prepared])
+    still = still_joints([log.positions.q for log in prepared])
     whole = not still.any(axis=1).all()
     return [
         replace(log, still=own, held=own if whole else None) if own.any() else log
@@ -194,7 +194,7 @@ def prepare_all(robot: Robot, logs: Sequence[Log]) -> list[Prepared]:
     ]
 
 
-def held_joints(positions: Sequence[Array], travel: Array | float = 0.0) -> NDArray[np.bool_]:
+def still_joints(positions: Sequence[Array], travel: Array | float = 0.0) -> NDArray[np.bool_]:
     """Tells which joints stand in each of several logs, but for a tremble, while they move in another (logs, n).
 
     Args:
@@ -202,8 +202,8 @@ def held_joints(positions: Sequence[Array], travel: Array | float = 0.0) -> NDAr
         travel: their ranges (n,) in logs besides.
     """
     ranges = np.array([np.ptp(q, axis=0) for q in positions])
-    held: NDArray[np.bool_] = ranges < TREMBLE * np.maximum(ranges.max(axis=0), travel)
-    return held
+    still: NDArray[np.bool_] = ranges < TREMBLE * np.maximum(ranges.max(axis=0), travel)
+    return still
 
 
 def rows_of(logs: Sequence[Prepared], by: float | Smoother, *, ends: bool = False) -> list[Rows]:

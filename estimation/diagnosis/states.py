@@ -19,7 +19,7 @@ from estimation.diagnosis.position_spectra import Spectra, Spectrum
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.smoothed_motion import smoothed
 from estimation.gate.resolution import lattice_step
-from estimation.preparation import Prepared, held_joints, prepare
+from estimation.preparation import Prepared, prepare, still_joints
 from robots.common.errors import InputError
 from robots.common.stretches import spans
 from robots.robot import Robot
@@ -86,7 +86,7 @@ def record(
     highest = np.max([[spectrum.cutoff() for spectrum in own] for own in found], axis=0)
     cap = believable_cutoff(robot, prepared, highest)
     parts = [_part(log, step, cap, of, own) for log, of, own in zip(prepared, spectra, found, strict=True)]
-    parts = _standing(parts, held_joints([part[1] for part in parts], travel))
+    parts = _standing(parts, still_joints([part[1] for part in parts], travel))
     lengths = [len(part[0]) for part in parts]
     total = sum(lengths) * step
     if total < shortest:

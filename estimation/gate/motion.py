@@ -7,13 +7,12 @@ from numpy.typing import NDArray
 
 from estimation.gate.columns import Columns
 from estimation.gate.finding import Finding
+from estimation.preparation import TREMBLE
 from robots.robot import Robot
 
-# A joint hardly moves below this share of its range, or of a turn, ...
+# A joint hardly moves below this share of its range, or of a turn. It stands where it trembles: what moves then is the
+# position loop's error, by some steps of the encoder, and friction may have any value that holds the joint.
 HARDLY = 0.01
-# ... and stands below this one: what moves is the position loop's error, by some steps of the encoder, and friction may
-# have any value that holds the joint.
-STANDS = 3e-4
 
 
 def standing(robot: Robot, columns: Columns) -> NDArray[np.bool_]:
@@ -23,7 +22,7 @@ def standing(robot: Robot, columns: Columns) -> NDArray[np.bool_]:
         robot: with n joints.
         columns: of the log.
     """
-    stands: NDArray[np.bool_] = _shares(robot, columns) < STANDS
+    stands: NDArray[np.bool_] = _shares(robot, columns) < TREMBLE
     return stands
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimation import identify, predict
-from estimation.preparation import held_joints, prepare_all
+from estimation.preparation import prepare_all, still_joints
 from robots.plants import simulate
 from robots.robot import Robot
 from robots.signals import Log, Motion
@@ -46,9 +46,9 @@ def _errors(arm: Robot, logs: list[Log], arm_plant: Callable, fourier_motion: Ca
 def test_joints_that_stand_are_told_by_their_range(arm_log: Callable[..., Log], alone: Callable[[int], Log]) -> None:
     """Below 3e-4 of that in another log; a joint that stands in all of them is not told from one that moves."""
     logs = [arm_log(), alone(0), alone(1)]
-    np.testing.assert_array_equal(held_joints([log.q for log in logs]), [[0, 0], [0, 1], [1, 0]])
-    assert not held_joints([logs[1].q]).any()
-    assert not held_joints([np.zeros((9, 2)), np.zeros((5, 2))]).any()
+    np.testing.assert_array_equal(still_joints([log.q for log in logs]), [[0, 0], [0, 1], [1, 0]])
+    assert not still_joints([logs[1].q]).any()
+    assert not still_joints([np.zeros((9, 2)), np.zeros((5, 2))]).any()
 
 
 def test_their_rows_do_not_count_beside_a_log_of_all_joints(
