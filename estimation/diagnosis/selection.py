@@ -10,6 +10,7 @@ import numpy as np
 
 from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
 from estimation.diagnosis.composed import composed
+from estimation.diagnosis.contenders import NEAR, contenders
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.quiet_logs import profile_gain
@@ -17,16 +18,9 @@ from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scan import Entry, Outcome, Scan, measure, scan
 from estimation.diagnosis.scoring import Accepted, accept, score
 from robots.common.parallel import available_cores
-from robots.terms.effects import Effect
 
-# Hypotheses refined at each step, the best by their point on the grid.
-CONTENDERS = 7
-# A hypothesis whose grid point explains less than this share of the best one's gain is no contender.
-NEAR = 0.3
 # A member whose gain is within this share of what it was when it won over its rivals wins over them still.
 SAME = 0.02
-# What acts for a moment is no contender where twice its gain at the grid is too little: its search takes the longest.
-TWICE = 2.0
 MOST = 4  # effects at once
 # What is reported must be worth its parameters by so much (Schwarz): strong evidence, beside a small p-value.
 LEAST = 10.0
@@ -120,7 +114,7 @@ def select(
         elif now in visited:
             break
         visited.append(now)
-    found = _found(problem, entries, members, p_values, rng)
+    found = _found(problem, entries, members, p_values, seen, rng)
     others, alone = members[1:], SURE * false_alarm if len(members) == 1 else 0.0
     kept = [
         f
@@ -158,37 +152,6 @@ def _seen(
                     found.append(refine(known, hypothesis, member.shape, beside))
                     p_values.append(chance)
     return found, p_values
-
-
-def contenders(problem: Problem, result: Scan, members: Sequence[Member] = (), least: float = -np.inf) -> list[Outcome]:
-    """Picks the hypotheses worth refining: near the best at the grid, each effect and joint once.
-
-    What acts for a moment must also be able to come near the best there, or near a worth (Schwarz) that is known to be
-    reached: `least`.
-    """
-    taken = {(m.hypothesis.name, m.hypothesis.joint) for m in members}
-    able = [o for o in result.outcomes if o.degrees and (o.hypothesis.name, o.hypothesis.joint) not in taken]
-    if not able:
-        return []
-
-    def worth(outcome: Outcome, times: float = 1.0) -> float:
-        return float(times * outcome.gain - outcome.degrees * np.log(problem.rows))
-
-    def reached(outcome: Outcome, times: float = 1.0) -> float:
-        """What it is worth with its shape parameters paid for, as when it is refined."""
-        effect, joint = outcome.hypothesis.effect, outcome.hypothesis.joint
-        free = sum(high > low for low, high in effect.bounds(problem.sees(effect), joint))
-        rows = problem.rows * len(effect.acts_on(problem.situation.robot, joint))
-        return float(times * outcome.gain - (outcome.degrees + free) * np.log(rows))
-
-    ranked = sorted(able, key=worth, reverse=True)
-    best, top = max(o.gain for o in able), max(*map(reached, ranked[:CONTENDERS]), least)
-    hopeless = {o.hypothesis for o in able if _of_a_moment(o.hypothesis.effect) and reached(o, TWICE) < top}
-    return [o for o in ranked if o.gain >= NEAR * best and o.hypothesis not in hopeless][:CONTENDERS]
-
-
-def _of_a_moment(effect: Effect) -> bool:
-    return effect.passing or any(shape.moment for shape in effect.shapes)
 
 
 def _best(problem: Problem, outcomes: Sequence[Outcome], accepted: Accepted) -> list[Member]:
@@ -300,18 +263,24 @@ def _found(
     entries: Sequence[Entry],
     members: Sequence[Member],
     p_values: Sequence[float],
+    seen: Collection[Hypothesis],
     rng: np.random.Generator,
 ) -> list[Found]:
-    """Measures each member beside the others, and its rivals in its place."""
+    """Measures each member beside the others, and its rivals in its place.
+
+    What was seen in the torque as logged has none, whatever else explains as little of it.
+    """
     found = []
     for i, member in enumerate(members):
         others = [m for k, m in enumerate(members) if k != i]
         beside = accept(problem, tuple(m.group for m in others))
-        result = scan(problem, entries, beside, rng, nulls=False)
         measured = _measured(problem, member, beside)
         reference = measured.bic(problem.rows)
-        near = contenders(problem, result, others, reference)
-        rest = [o for o in near if o.hypothesis != member.hypothesis]
+        rest: list[Outcome] = []
+        if member.hypothesis not in seen:
+            result = scan(problem, entries, beside, rng, nulls=False)
+            near = contenders(problem, result, others, reference)
+            rest = [o for o in near if o.hypothesis != member.hypothesis]
         able = [rival for rival in _best(problem, rest, beside) if rival.gain >= NEAR * measured.gain]
         rivals = [(rival, reference - rival.bic(problem.rows)) for rival in able]
         found.append(Found(measured, p_values[i], tuple(rivals)))

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis import refinement, selection
+from estimation.diagnosis.contenders import contenders
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Group
 from estimation.diagnosis.refinement import RARE, Member
 from estimation.diagnosis.scan import Outcome
-from estimation.diagnosis.selection import _beyond, _worth_it, contenders
+from estimation.diagnosis.selection import _beyond, _worth_it
 from robots.terms.effects import EFFECTS, Shape
 from robots.terms.effects.stribeck import Stribeck
 
