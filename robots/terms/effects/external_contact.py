@@ -80,7 +80,7 @@ class ExternalContact(Effect):
         for duration in np.unique(durations):
             # What slow noise makes of long windows, and fast noise of short ones: the median of a chi-square.
             own = energies[durations == duration]
-            usual = np.nanmedian(np.where(own > 0, own, np.nan), axis=0) / 0.455
+            usual = np.array([np.median(some) / 0.455 if len(some := of[of > 0]) else 0.0 for of in own.T])
             energies[durations == duration] = np.divide(own, usual, out=np.zeros_like(own), where=usual > 0)
         scores = energies.sum(axis=1)
         return tuple(grid[i] for i in np.argsort(-scores)[:count])
