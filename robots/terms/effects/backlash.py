@@ -36,6 +36,9 @@ FARTHEST = 0.1
 LEAST, MOST = 1 / 8, 8.0
 """Shares of the gap that the time of its crossing tells: the time, whose cube that is, is true to a factor of two."""
 
+SMALLEST = 5e-7
+"""Half a play below which there is none [rad or m]: at a radius of a tenth of a metre, what teeth are rough by."""
+
 
 class Backlash(Effect):
     """The link lags its encoder by (b / 2) side: the side changes from where the load changes sign, over a time T.
@@ -69,6 +72,10 @@ class Backlash(Effect):
         """Ties the play that the torque's size tells to the gap that the crossings' time tells."""
         ((lower, upper),) = super().ranges(robot, joint, shape)
         return ((max(lower, LEAST * shape[0] / 2), min(upper, MOST * shape[0] / 2)),)
+
+    def believable(self, robot: Robot, joint: Place, coefficients: Array) -> bool:
+        """Gives false for less than teeth have: it is what another effect's formula leaves."""
+        return float(coefficients[0]) >= SMALLEST and super().believable(robot, joint, coefficients)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists gaps that take 6 to 50 ms, at loads near zero; none for a load that hardly ever changes sign."""

@@ -173,4 +173,5 @@ def test_a_value_at_the_edge_of_what_machines_have_is_no_name(
     problem = SimpleNamespace(situation=SimpleNamespace(robot=arm))
     member = replace(_member(name, 1, 300.0, 1), coefficients=np.array([value]))
     assert verdict._believable(problem, member) is believed  # type: ignore[arg-type]
-    assert EFFECTS["backlash"].believable(arm, 1, np.zeros(1))
+    assert EFFECTS["backlash"].believable(arm, 1, np.full(1, 1e-6))
+    assert not EFFECTS["backlash"].believable(arm, 1, np.full(1, 1e-7))
