@@ -56,4 +56,6 @@ def all_hypotheses(robot: Robot, effects: Sequence[Effect]) -> tuple[Hypothesis,
 
 
 def _finite(X: Array) -> Array:
-    return np.where(np.isfinite(X), X, 0.0)
+    with np.errstate(all="ignore"):
+        finite = np.isfinite(X.sum())  # one pass where all are, as nearly always
+    return X if finite else np.where(np.isfinite(X), X, 0.0)

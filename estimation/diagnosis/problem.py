@@ -148,8 +148,7 @@ class Problem:
         self, joints: tuple[int, ...], columns: tuple[Array, ...], count: int, *, effect: Effect | None = None
     ) -> list[Group]:
         """Does what `group` does for several groups on the same joints at once: columns (N, count k), k of each."""
-        whole = [self.whitening.filtered(part, j, single=True) for j, part in zip(joints, columns, strict=True)]
-        white = [self.whitening.counted(part, j) for j, part in zip(joints, whole, strict=True)]
+        whole, white = zip(*(self._whitened(part, j) for j, part in zip(joints, columns, strict=True)), strict=True)
         total = white[0].shape[1]
         k = total // count
         P = self.whitening.precision
@@ -184,6 +183,18 @@ class Problem:
             )
             for i, own in enumerate(slice(i * k, (i + 1) * k) for i in range(count))
         ]
+
+    def _whitened(self, columns: Array, joint: int) -> tuple[Small, Small]:
+        """Whitens columns (N, k) of a joint: with the rows that do not count, and without."""
+        acting = np.asarray(columns.any(axis=0))
+        if acting.all():
+            whole = self.whitening.filtered(columns, joint, single=True)
+            return whole, self.whitening.counted(whole, joint)
+        # A push has a column for each joint, zero on all others.
+        whole, white = (np.zeros((self.rows, len(acting)), np.float32, order="F") for _ in range(2))
+        if acting.any():
+            whole[:, acting], white[:, acting] = self._whitened(columns[:, acting], joint)
+        return whole, white
 
     @cached_property
     def _residual(self) -> Small:
