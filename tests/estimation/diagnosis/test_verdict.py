@@ -169,7 +169,7 @@ def test_several_names_on_one_joint_must_fit_better_than_one_free_function(monke
 def test_a_value_at_the_edge_of_what_machines_have_is_no_name(
     name: str, value: float, believed: bool, arm: Robot
 ) -> None:
-    """An encoder half a radian off wants to be more than that; all of a torque may be cut off; a play may be none."""
+    """An encoder half a radian off wants to be more than that; all of a torque may be cut off; teeth have some play."""
     problem = SimpleNamespace(situation=SimpleNamespace(robot=arm))
     member = replace(_member(name, 1, 300.0, 1), coefficients=np.array([value]))
     assert verdict._believable(problem, member) is believed  # type: ignore[arg-type]
