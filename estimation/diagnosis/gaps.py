@@ -137,7 +137,7 @@ def _white_gap(whitening: Whitening, joint: int, start: int, shapes: Array, rows
     """Whitens functions of a gap (m, k) that begins at a row of a log: the first white row, and the white rows."""
     band = whitening.bands[joint]
     half, stride = len(band.taps) // 2, band.stride
-    taps = np.concatenate([[1.0], -whitening.coefficients[joint]]) / whitening.scale[joint]
+    taps = whitening.taps(joint)
     low = max(0, start - half - stride) // stride * stride
     high = min(rows, start + len(shapes) + half + (len(taps) + 1) * stride)
     segment = np.zeros((high - low, shapes.shape[1]))

@@ -52,6 +52,10 @@ class Whitening:
         """The noise of a log, in units of `scale`."""
         return 1.0 if self.levels is None else float(self.levels[run, joint])
 
+    def taps(self, joint: int) -> Array:
+        """Gives a joint's filter (p_j + 1,), for the noise of a log of level one."""
+        return np.concatenate([[1.0], -self.coefficients[joint]]) / self.scale[joint]
+
     def scales(self, rows: int) -> Array:
         """Gives the standard deviation of the innovations of each of a recording's rows (N, n) [N m or N]."""
         levels = np.ones((len(self.starts), len(self.scale))) if self.levels is None else self.levels
@@ -68,7 +72,7 @@ class Whitening:
     def filtered(self, series: Array, joint: int, *, single: bool = False) -> Array | Small:
         """Does what `apply` does, rows that do not count included; in `single` precision twice as fast."""
         series = self.gaps.bridged(series, joint)
-        taps = np.concatenate([[1.0], -self.coefficients[joint]]) / self.scale[joint]
+        taps = self.taps(joint)
         parts: list[Any] = []
         for run, (start, stop) in enumerate(pairwise((*self.starts, len(series)))):
             filters, piece = taps / self.level(run, joint), series[start:stop]
@@ -100,7 +104,7 @@ class Whitening:
 
     def unfiltered(self, white: Array, joint: int, rows: int) -> Array:
         """The same of `filtered`."""
-        taps = np.concatenate([[1.0], -self.coefficients[joint]]) / self.scale[joint]
+        taps = self.taps(joint)
         band, parts, first = self.bands[joint], [], 0
         for run, (start, stop) in enumerate(pairwise((*self.starts, rows))):
             count = -(-(stop - start) // band.stride)
