@@ -22,9 +22,8 @@ from estimation.diagnosis.mended import mended
 from estimation.diagnosis.noise import estimate_whitening, quiet_joints
 from estimation.diagnosis.own_functions import own_functions
 from estimation.diagnosis.patterns import all_patterns
-from estimation.diagnosis.posing import fit_values, pose
+from estimation.diagnosis.posing import fit_values, informed_pull, pose
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.regularisation import pull_of
 from estimation.diagnosis.reporting import Told, assemble
 from estimation.diagnosis.scan import Entry, measure
 from estimation.diagnosis.selection import Selection, select
@@ -44,6 +43,8 @@ from robots.terms.effects import EFFECTS, Effect
 Array = NDArray[np.float64]
 
 DRAWS = 200
+# The base model alone is fitted again while what is left of a joint's torque falls below this share of what it was.
+ROUNDS, SETTLED = 4, 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,10 +255,23 @@ def _relied_on(base: BaseParameters, recording: Recording) -> Recording:
 
 
 def _plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Settled]:
-    """Fits the base model alone."""
+    """Fits the base model alone.
+
+    Rows count by what the fit before leaves of them: against noise as large as the torque, a description that lacks a
+    rotor or a tool would hold the fit, and what it then leaves pass for noise.
+    """
     baseline, tau = build_baseline(base, recording), recording.tau
-    values = fit_values(baseline, tau.std(axis=0) + 1e-12, recording.unsure, tau, pull_of(baseline, recording))
-    return baseline, Settled(tau - baseline.regressor @ values, values)
+    scale = tau.std(axis=0) + 1e-12
+    counts = ~recording.unsure
+    for _ in range(ROUNDS):
+        pull = informed_pull(baseline, recording, scale, tau)
+        values = fit_values(baseline, scale, recording.unsure, tau, pull)
+        left = tau - baseline.regressor @ values
+        noise = np.sqrt((left**2 * counts).sum(axis=0) / np.maximum(counts.sum(axis=0), 1)) + 1e-12
+        before, scale = scale, np.minimum(noise, scale)
+        if (scale > SETTLED * before).all():
+            break
+    return baseline, Settled(left, values)
 
 
 def _searched(

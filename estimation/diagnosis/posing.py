@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.baseline import FAINT, Baseline
 from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.regularisation import held, pull_of
+from estimation.diagnosis.regularisation import held, loosened, pull_of, row_weight
 from estimation.diagnosis.states import Recording
 from estimation.diagnosis.upper import Upper
 from estimation.diagnosis.whitening import Whitening
@@ -37,7 +37,7 @@ def pose(
         draws: noise drawn for the null; 0 for none.
         rng: draws it.
         extra: torque (N, n) of effects that are known already, taken off before the base model's situation is computed.
-        pull: what holds base parameters that the data leave open; by default `pull_of`.
+        pull: what holds base parameters that the data leave open; by default `informed_pull`.
         upper: the frequencies above the bands.
     """
     n = recording.n
@@ -63,11 +63,14 @@ def pose(
         if draws:
             projected += (Q[:, k].astype(np.float32).T @ part).astype(float)
         pressed[k] = sum(P[j, k] * noise[:, j] for j in range(n) if P[j, k])
-    pull = pull or pull_of(baseline, recording, whitening)
-    values = fit_values(baseline, whitening.scales(len(recording)), recording.unsure, recording.tau, pull)
+    scales = whitening.scales(len(recording))
+    if pull is None:
+        known = recording.tau if extra is None else recording.tau - extra
+        pull = informed_pull(baseline, recording, scales, known, whitening)
+    values = fit_values(baseline, scales, recording.unsure, recording.tau, pull)
     remainder = recording.tau - baseline.regressor @ values
     if extra is not None:
-        values = fit_values(baseline, whitening.scales(len(recording)), recording.unsure, recording.tau - extra, pull)
+        values = fit_values(baseline, scales, recording.unsure, recording.tau - extra, pull)
     return Problem(
         recording=recording,
         baseline=baseline,
@@ -89,8 +92,25 @@ def fit_values(baseline: Baseline, scale: Array, unsure: NDArray[np.bool_], tau:
 
     Directions that the log does not determine go where the pull has them.
     """
-    weights = 1.0 / scale
-    counts = weights * ~unsure
-    Y = np.concatenate([baseline.regressor, baseline.nuisance], axis=2) * counts[:, :, None]
-    flat = Y.reshape(-1, Y.shape[2])
-    return held(flat.T @ flat, flat.T @ (tau * counts).reshape(-1), pull)[: baseline.base.size]
+    gram, cross = _moments(baseline, scale, unsure, tau)
+    return held(gram, cross, pull)[: baseline.base.size]
+
+
+def informed_pull(
+    baseline: Baseline, recording: Recording, scale: Array, tau: Array, whitening: Whitening | None = None
+) -> Pull:
+    """Pulls base parameters (`pull_of`) where torque (N, n), weighed by the noise's scale, does not contradict it."""
+    pull = pull_of(baseline, recording, whitening)
+    gram, cross = _moments(baseline, scale, recording.unsure, tau)
+    return loosened(pull, gram, cross, 1.0 if whitening is None else row_weight(whitening))
+
+
+def _moments(baseline: Baseline, scale: Array, unsure: NDArray[np.bool_], tau: Array) -> tuple[Array, Array]:
+    counts = ~unsure / scale
+    size = baseline.regressor.shape[2] + baseline.nuisance.shape[2]
+    gram, cross = np.zeros((size, size)), np.zeros(size)
+    for j in range(tau.shape[1]):
+        own = np.concatenate([baseline.regressor[:, j], baseline.nuisance[:, j]], axis=1) * counts[:, j, None]
+        gram += own.T @ own
+        cross += own.T @ (tau[:, j] * counts[:, j])
+    return gram, cross

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from estimation.diagnosis.baseline import Baseline
 from estimation.diagnosis.states import Recording
@@ -14,6 +15,8 @@ Array = NDArray[np.float64]
 
 # Speed that a joint exceeds in a thousandth of the time only.
 FASTEST = 0.999
+# Standard deviations of a description that it may be wrong by before it is let go, and steps in which it is.
+WELL_OFF, LETTING_GO = 2.0, 20
 # Directions below this share of the largest are not determined.
 FAINT = 1e-12
 
@@ -57,6 +60,32 @@ def pull_of(baseline: Baseline, recording: Recording, whitening: Whitening | Non
     # A sign may be less sharp by so much; without a bound, rows that hardly show it would say anything.
     precision[range(b, b + m), range(b, b + m)] = 1.0 / (OWN * torque[:m]) ** 2
     return Pull(strength * precision, np.concatenate([pull.target, np.zeros(m)]))
+
+
+def loosened(pull: Pull, gram: Array, cross: Array, strength: float = 1.0) -> Pull:
+    """Lets go of a description where data contradict it: what a file lacks, a rotor or a tool, is not off by its size.
+
+    Parameters scatter about the description with heavy tails, independently along the directions in which data and
+    description are both diagonal. Where these say z > 2 standard deviations of the description, the pull there counts
+    (z / 2)^2 times less, z found by iteration (Huber's weights squared); what the data leave open stays held.
+
+    Args:
+        pull: on base parameters and nuisance (p,), with its strength.
+        gram: of the data, in the same units (p, p).
+        cross: of the data (p,).
+        strength: by which the pull's precision is more than that of what could be wrong.
+    """
+    root = np.linalg.cholesky(pull.precision / strength)
+    inverse = solve_triangular(root, np.eye(len(root)), lower=True)
+    told, ways = np.linalg.eigh(inverse @ gram @ inverse.T)
+    told = np.maximum(told, 0.0)
+    aim = ways.T @ inverse @ (cross - gram @ pull.target)
+    weights = np.ones(len(told))
+    for _ in range(LETTING_GO):
+        off = aim / (told + strength * weights)
+        weights = 1.0 / np.maximum(1.0, (off / WELL_OFF) ** 2)
+    turned = root @ ways
+    return Pull(strength * (turned * weights) @ turned.T, pull.target)
 
 
 def row_weight(whitening: Whitening) -> float:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimation import diagnose
 from estimation.diagnosis.baseline import base_parameters, build_baseline
 from estimation.diagnosis.posing import fit_values
 from estimation.diagnosis.regularisation import held, pull_of
@@ -50,3 +51,16 @@ def test_a_standing_joint_does_not_make_another_motion_absurd(arm: Robot, arm_lo
     error = other.tau - baseline.base.torque(other.q, other.dq, other.ddq, values)
     # Wrong by its own size is what the pull allows: three times for friction, which holds where joints are fast.
     assert np.all(np.sqrt((error**2).mean(axis=0)) < 4 * np.sqrt((other.tau**2).mean(axis=0)))
+
+
+def test_what_a_description_lacks_is_not_taken_for_noise(arm: Robot, arm_log: Callable[..., Log]) -> None:
+    """Links fifty times as heavy as described, as under rotors that no file tells of: what is left is the noise.
+
+    Against noise as large as the torque the description would hold the fit. What it leaves would be slow, noise so slow
+    would make rows tell little, and the description hold it all the more.
+    """
+    light = replace(arm, inertia=arm.inertia / 50.0)
+    log, other = arm_log(torque_noise=0.02), arm_log(motion_seed=3, torque_noise=0.02)
+    result = diagnose(light, log, held_out=other)
+    noise = 0.02 * np.sqrt(np.mean(log.tau**2, axis=0) / np.mean(other.tau**2, axis=0))
+    assert np.all(result.baseline < 1.3 * noise)
