@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.families import FAMILIES
 from estimation.diagnosis.leaning import Leaning
 from estimation.diagnosis.pulling import Pulling
+from estimation.diagnosis.spotting import Spot
 from estimation.diagnosis.swinging import Swinging
 from robots.robot import Robot
 from robots.terms.effects import Coefficient, Effect, JointEffect, Shape, Situation
@@ -26,6 +27,7 @@ SWINGS = 5.0
 SWAYING = ("vibration", "sway")
 # What acts on all joints at once.
 WHOLE: tuple[Effect, ...] = (Swinging(), Pulling(), Leaning())
+SPOTS = (Spot(), Spot(odd=True))
 
 
 @dataclass(frozen=True)
@@ -153,9 +155,9 @@ class Pattern(JointEffect):
 
 def build_pattern(text: str) -> Effect | None:
     """Reads the name of a pattern; None for anything else."""
-    for whole in WHOLE:
-        if text == whole.name:
-            return whole
+    for known in (*SPOTS, *WHOLE):
+        if text == known.name:
+            return known
     parts = text.removeprefix(PREFIX).split(":")
     if not text.startswith(PREFIX) or len(parts) != 3 or parts[0] not in FAMILIES or not parts[1].isdigit():
         return None
@@ -173,7 +175,7 @@ def all_patterns(robot: Robot) -> tuple[Effect, ...]:
     each += [Pattern("motion", k, odd) for k in joints for odd in (False, True)] if robot.n > 1 else []
     each += [Pattern("drag", k) for k in joints]
     each += [Pattern("posture", k) for k in joints] if robot.n > 1 else []
-    return (*own, *each, *WHOLE)
+    return (*own, *SPOTS, *each, *WHOLE)
 
 
 def is_of_time(effect: object) -> bool:

@@ -27,9 +27,19 @@ def _rub(motion: Motion, size: float) -> np.ndarray:
     return size * np.sin(2 * np.pi * 1.13 * np.asarray(motion.t)) * np.sign(np.asarray(motion.dq)[:, 1])
 
 
+def _catch(motion: Motion, size: float) -> np.ndarray:
+    return size * np.exp(-0.5 * ((np.asarray(motion.q)[:, 1] - 0.2) / 0.05) ** 2)
+
+
+def _grind(motion: Motion, size: float) -> np.ndarray:
+    return _catch(motion, size) * np.sign(np.asarray(motion.dq)[:, 1])
+
+
 @pytest.mark.parametrize(
     ("stranger", "share", "pattern"),
     [
+        (_catch, 0.2, "pattern:spot:0:even"),
+        (_grind, 0.2, "pattern:spot:0:odd"),
         (_swing, 0.1, "pattern:sway:0:even"),
         (_rub, 0.1, "pattern:sway:0:odd"),
         (_bend, 0.2, "pattern:acceleration:0:even"),
@@ -43,7 +53,10 @@ def test_a_stranger_is_told_by_what_it_depends_on(
     arm_plant: Callable,
     fourier_motion: Callable,
 ) -> None:
-    """A torque that swings by itself is no drift, and one that grows with the cube of the acceleration no spring."""
+    """A torque that swings by itself is no drift, one that grows with the cube of the acceleration no spring.
+
+    A tooth that catches is neither a spring nor a ripple, nor both.
+    """
     motion = fourier_motion(arm, duration=30.0)
     log = simulate(arm_plant(torque_noise=0.02), motion, seed=0)
     assert log.tau is not None
@@ -52,6 +65,11 @@ def test_a_stranger_is_told_by_what_it_depends_on(
     result = diagnose(arm, replace(log, tau=tau))
     assert result.verdict == "unexplained"
     assert (result.findings[0].joint, result.findings[0].pattern) == (2, pattern)
+    if "spot" in pattern:
+        values = {parameter.name: parameter.value for parameter in result.findings[0].parameters}
+        assert values["centre"] == pytest.approx(0.2, abs=0.02)
+        assert values["width"] == pytest.approx(0.05, rel=0.3)
+        assert values["peak"] == pytest.approx(size, rel=0.3)
     if "sway" in pattern:
         values = {parameter.name: parameter.value for parameter in result.findings[0].parameters}
         assert values["frequency"] == pytest.approx(1.13 if "odd" in pattern else 0.27, abs=0.01)
