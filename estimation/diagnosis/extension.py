@@ -137,7 +137,7 @@ def extension_torque(extensions: Sequence[Extension], state: Situation) -> Array
 def _described(effect: Effect, robot: Robot, joint: int | None) -> list[tuple[str, str]]:
     """Lists names and units: the linear parameters, then the shape."""
     linear = [(c.name, c.unit) for c in effect.parameters(robot, joint)]
-    return linear + [(s.name, s.unit) for s in effect.shapes]
+    return linear + [(s.name, s.unit_at(robot, joint)) for s in effect.shapes]
 
 
 def _finite(value: float) -> float | None:

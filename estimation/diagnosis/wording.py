@@ -87,7 +87,7 @@ def _parameters(
             Parameter(
                 name=own.name,
                 value=float(value),
-                unit=own.unit,
+                unit=own.unit_at(robot, extension.joint) if isinstance(own, Shape) else own.unit,
                 standard_error=float(error) if np.isfinite(error) else float("nan"),
                 ci95=(float(interval[0]), float(interval[1])) if np.isfinite(error) else (-np.inf, np.inf),
                 determined=bool(sure) and not (isinstance(own, Shape) and _roughly(own, value, interval)),

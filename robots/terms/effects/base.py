@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.terms.base import length_unit
 from robots.terms.effects.situation import Situation
 
 if TYPE_CHECKING:
@@ -22,6 +23,17 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Place = int | None
 """Where an effect acts: a joint, counted from 1, or None for the whole robot."""
+
+
+STRAIGHT = {
+    "rad": "m",
+    "rad/s": "m/s",
+    "N m": "N",
+    "N m/rad": "N/m",
+    "kg m2": "kg",
+    "periods per turn": "rad/m",
+}
+"""Units of shape parameters on a linear axis."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +65,11 @@ class Shape:
     def moment(self) -> bool:
         """Whether it is a moment of the logs' clock."""
         return self.unit == "s" and self.lower == -np.inf
+
+    def unit_at(self, robot: Robot, joint: Place) -> str:
+        """Gives its unit where the effect acts: that of a linear axis' positions and forces on one."""
+        straight = joint is not None and length_unit(robot, joint - 1) == "m"
+        return STRAIGHT.get(self.unit, self.unit) if straight else self.unit
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.base import force_unit
+from robots.terms.base import force_unit, length_unit
 from robots.terms.effects.base import Coefficient, Place, Shape, Situation
 from robots.terms.effects.static import Instant, StaticJointEffect
 
@@ -17,14 +17,19 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+HIGHEST = {"rad": 12.0, "m": 1000.0}
+"""Highest order per turn, and wave number of a linear axis [rad/m]: what is quicker is a ripple."""
+OVER = (1.5, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0)
+"""Phases [rad] that a scan's friction goes through over the range of a linear axis."""
+
 
 class PositionDependentFriction(StaticJointEffect):
-    """tau = sign(dq) (a cos(h q) + b sin(h q)), h periods per turn."""
+    """tau = sign(dq) (a cos(h q) + b sin(h q)), h periods per turn; of a linear axis h is a wave number [rad/m]."""
 
     name: ClassVar[str] = "position_dependent_friction"
     title: ClassVar[str] = "friction that depends on the position"
     shapes: ClassVar[tuple[Shape, ...]] = (
-        Shape("order", "periods per turn", 0.5, 12.0, "linear", (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)),
+        Shape("order", "periods per turn", 0.5, HIGHEST["m"], "linear", (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)),
     )
     rivals: ClassVar[tuple[str, ...]] = ("load_dependent_friction", "torque_ripple", "presliding_hysteresis")
     experiments: ClassVar[tuple[str, ...]] = ("sweep", "payload")
@@ -36,10 +41,17 @@ class PositionDependentFriction(StaticJointEffect):
         return Coefficient("cosine", force), Coefficient("sine", force)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists the orders of which the joint travels at least a sixth of a period."""
+        """Lists the orders of which the joint travels at least a sixth of a period; of a linear axis, waves over it."""
         assert joint is not None
         reach = float(np.ptp(situation.q[:, joint - 1]))
+        if length_unit(situation.robot, joint - 1) == "m":
+            return tuple((phase / reach,) for phase in OVER if phase <= reach * HIGHEST["m"]) if reach else ()
         return tuple((order,) for order in self.shapes[0].grid if order * reach > 1.0)
+
+    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
+        """Keeps the order below what would be a ripple's."""
+        assert joint is not None
+        return ((self.shapes[0].lower, HIGHEST[length_unit(situation.robot, joint - 1)]),)
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
@@ -47,6 +59,8 @@ class PositionDependentFriction(StaticJointEffect):
         """Gives the nearest whole order, where the joint's range does not tell it from the one found."""
         assert joint is not None
         order = max(float(round(shape[0])), 1.0)
+        if length_unit(situation.robot, joint - 1) == "m":
+            return ()
         reach = float(np.ptp(situation.q[:, joint - 1]))
         return ((order,),) if abs(order - shape[0]) * reach <= np.pi else ()
 
@@ -65,8 +79,9 @@ class PositionDependentFriction(StaticJointEffect):
     ) -> str:
         """Says what the values mean."""
         size, peak = np.hypot(*coefficients), np.arctan2(coefficients[1], coefficients[0]) / shape[0]
+        often = f"{shape[0]:.3g} times a turn" if length == "rad" else f"every {2000 * np.pi / shape[0]:.4g} mm"
         return (
-            f"The friction of joint {joint} varies by {size:.3g} {force} up and down, {shape[0]:.3g} times a turn, and "
+            f"The friction of joint {joint} varies by {size:.3g} {force} up and down, {often}, and "
             f"is highest at {peak:.3g} {length}."
         )
 

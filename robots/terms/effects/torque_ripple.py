@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from robots.terms.base import force_unit
+from robots.terms.base import force_unit, length_unit
 from robots.terms.effects.base import Coefficient, Place, Shape, Situation
 from robots.terms.effects.states import torque_reference
 from robots.terms.effects.static import Instant, StaticJointEffect
@@ -23,6 +23,8 @@ SAMPLES_PER_PERIOD = 2.5
 """A ripple that passes in fewer samples is not resolved."""
 WAVES = 2.0
 """Waves over the joint's range below which a ripple looks like gravity or a spring."""
+HIGHEST = {"rad": 1000.0, "m": 10_000.0}
+"""Highest order per turn, and wave number of a linear axis [rad/m]: four waves a turn of a screw with 3 mm of lead."""
 LARGEST = 1600
 """Orders on the grid at most: more than a joint tells over a turn and a half."""
 ABOUT = 201
@@ -31,6 +33,8 @@ ABOUT = 201
 
 class TorqueRipple(StaticJointEffect):
     """tau = (a + c l) cos(h p) + (b + d l) sin(h p), h periods per turn: a wave generator's, the teeth's, the poles'.
+
+    Of a linear axis h is a wave number [rad/m]: a ball screw's, a rack's teeth's, the poles' of its motor.
 
     l is the load, as a share of the joint's torque limit (of 100 N m where it has none): teeth mesh harder under it.
     p = q - dq T is the position a moment T before: a ripple of 50 Hz and more turns with what delays the torque's log.
@@ -42,7 +46,7 @@ class TorqueRipple(StaticJointEffect):
     name: ClassVar[str] = "torque_ripple"
     title: ClassVar[str] = "torque ripple per turn of gear or motor"
     shapes: ClassVar[tuple[Shape, ...]] = (
-        Shape("order", "periods per turn", 2.5, 1000.0, "linear"),
+        Shape("order", "periods per turn", 2.5, HIGHEST["m"], "linear"),
         Shape("late", "s", -0.01, 0.01, "linear", (0.0,), default=0.0),
     )
     rivals: ClassVar[tuple[str, ...]] = ("position_dependent_friction", "spring", "encoder_eccentricity")
@@ -86,7 +90,8 @@ class TorqueRipple(StaticJointEffect):
     def _lowest(self, situation: Situation, joint: int) -> float:
         """Gives the least order: fewer waves over the joint's range are no ripple but any smooth function."""
         reach = float(np.ptp(situation.q[:, joint - 1]))
-        return float(np.clip(2 * np.pi * WAVES / max(reach, 1e-9), self.shapes[0].lower, 0.5 * self.shapes[0].upper))
+        fewest = 2 * np.pi * WAVES / max(reach, 1e-9)
+        return float(np.clip(fewest, self.shapes[0].lower, 0.5 * _highest(situation, joint)))
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
@@ -110,7 +115,7 @@ class TorqueRipple(StaticJointEffect):
             return 0.0, 0.0
         slow = float(np.quantile(moving, 0.1))
         top = 2 * np.pi / (SAMPLES_PER_PERIOD * situation.period * slow)
-        return np.pi / reach, float(min(top, self.shapes[0].upper))
+        return np.pi / reach, float(min(top, _highest(situation, joint)))
 
     def propose(
         self, situation: Situation, joint: Place, residual: Array, count: int = 8
@@ -141,13 +146,18 @@ class TorqueRipple(StaticJointEffect):
     ) -> str:
         """Says what the values mean."""
         size = np.hypot(coefficients[0], coefficients[1])
-        return f"The torque of joint {joint} ripples by {size:.3g} {force} up and down, {shape[0]:.4g} times a turn."
+        often = f"{shape[0]:.4g} times a turn" if length == "rad" else f"every {2000 * np.pi / shape[0]:.4g} mm"
+        return f"The torque of joint {joint} ripples by {size:.3g} {force} up and down, {often}."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the angle within the ripple's period."""
         assert joint is not None
         period = 2 * np.pi / shape[0]
         return f"position of joint {joint} within 1/{shape[0]:.4g} turn [rad]", situation.q[:, joint - 1] % period
+
+
+def _highest(situation: Situation, joint: int) -> float:
+    return HIGHEST[length_unit(situation.robot, joint - 1)]
 
 
 def angle_spectrum(q: Array, values: Array, orders: Array, *, level: bool = False) -> Array:
