@@ -13,6 +13,7 @@ from tests.truth.machines import Machine
 from tests.truth.ride import Ride
 
 TRANSIT_LIMITS = (0.006, 0.05)
+LOADED = 0.1  # share of a joint's torque RMS below which its load is none
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +36,9 @@ class Ripple(Effect):
     def torque(self, ride: Ride) -> np.ndarray:
         angle = self.order * self.gear * ride.q[:, self.j] + self.phase
         load = ride.rigid[:, self.j]
-        share = load / np.sqrt((load**2).mean())
+        # Of a joint that carries next to nothing, teeth mesh no harder for what rounding makes of its load.
+        whole = np.sqrt((ride.base_torque()[:, self.j] ** 2).mean())
+        share = load / max(np.sqrt((load**2).mean()), LOADED * whole)
         wave = np.cos(angle) * (1 - self.loaded + self.loaded * share)
         return self.on_joint(ride, self.amount * wave)
 
