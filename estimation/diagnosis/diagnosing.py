@@ -45,6 +45,8 @@ Array = NDArray[np.float64]
 DRAWS = 200
 # The base model alone is fitted again while what is left of a joint's torque falls below this share of what it was.
 ROUNDS, SETTLED = 4, 0.9
+# Noise is no smaller than this share of the torque there.
+QUIETEST = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,17 +260,17 @@ def _plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Settle
     """Fits the base model alone.
 
     Rows count by what the fit before leaves of them: against noise as large as the torque, a description that lacks a
-    rotor or a tool would hold the fit, and what it then leaves pass for noise.
+    rotor or a tool would hold the fit, and what it then leaves pass for noise. But what is left is not all noise, and
+    joints that the base model describes well must not bend what it says of the others.
     """
     baseline, tau = build_baseline(base, recording), recording.tau
-    scale = tau.std(axis=0) + 1e-12
-    counts = ~recording.unsure
+    counts, size = ~recording.unsure, tau.std(axis=0) + 1e-12
+    scale = size
     for _ in range(ROUNDS):
-        pull = informed_pull(baseline, recording, scale, tau)
-        values = fit_values(baseline, scale, recording.unsure, tau, pull)
+        values = fit_values(baseline, scale, recording.unsure, tau, informed_pull(baseline, recording, scale, tau))
         left = tau - baseline.regressor @ values
-        noise = np.sqrt((left**2 * counts).sum(axis=0) / np.maximum(counts.sum(axis=0), 1)) + 1e-12
-        before, scale = scale, np.minimum(noise, scale)
+        noise = np.sqrt((left**2 * counts).sum(axis=0) / np.maximum(counts.sum(axis=0), 1))
+        before, scale = scale, np.clip(noise, QUIETEST * size, scale)
         if (scale > SETTLED * before).all():
             break
     return baseline, Settled(left, values)

@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 HIDDEN = "the base model absorbs it: no size shows in this motion"
 UNSURE = "nearly all of it is at rest or beside reversals, where friction may have either sign: no size shows"
 FEW = "of {} kinds of it that were tried only {} show, from {:.2g} % of the torque on"
+RESTING = 0.02
+"""Share of a log from which it is said that nothing is seen in rests."""
+RESTS = "{:.0f} % of the log the arm stands, where its torque is that of a friction nobody knows: nothing is seen there"
 SHAPES = 3
 """Shapes of an effect that its limit is the median of."""
 RIVAL_SHAPES = 4
@@ -42,7 +45,7 @@ class Limit:
         attributable: smallest that is also told from every rival; infinite where none is.
         toughest: the rival that is hardest to tell from it; None without.
         visible: share of its energy that the base model does not absorb.
-        note: why no size shows, or empty.
+        note: why no size shows, or what stays open; or empty.
     """
 
     effect: str
@@ -166,7 +169,13 @@ def _toughest(
 
 
 def _note(problem: Problem, hypothesis: Hypothesis) -> str:
-    """Says what a log that is shorter than an effect's slowest time constant leaves open."""
+    """Says what a log leaves open that is shorter than an effect's slowest time constant, or in which the arm rests.
+
+    What acts for a moment may do so in a rest.
+    """
+    resting = float(np.mean(problem.recording.unsure.all(axis=1)))
+    if hypothesis.effect.passing and resting > RESTING:
+        return RESTS.format(100 * resting)
     duration = float(problem.recording.t[-1] - problem.recording.t[0])
     slow = [shape for shape in hypothesis.effect.shapes if shape.name == "time_constant" and shape.upper > duration]
     if not slow:

@@ -66,7 +66,7 @@ def pose(
     scales = whitening.scales(len(recording))
     if pull is None:
         known = recording.tau if extra is None else recording.tau - extra
-        pull = informed_pull(baseline, recording, scales, known, whitening)
+        pull = informed_pull(baseline, recording, scales, known, row_weight(whitening))
     values = fit_values(baseline, scales, recording.unsure, recording.tau, pull)
     remainder = recording.tau - baseline.regressor @ values
     if extra is not None:
@@ -96,13 +96,11 @@ def fit_values(baseline: Baseline, scale: Array, unsure: NDArray[np.bool_], tau:
     return held(gram, cross, pull)[: baseline.base.size]
 
 
-def informed_pull(
-    baseline: Baseline, recording: Recording, scale: Array, tau: Array, whitening: Whitening | None = None
-) -> Pull:
+def informed_pull(baseline: Baseline, recording: Recording, scale: Array, tau: Array, strength: float = 1.0) -> Pull:
     """Pulls base parameters (`pull_of`) where torque (N, n), weighed by the noise's scale, does not contradict it."""
-    pull = pull_of(baseline, recording, whitening)
+    pull = pull_of(baseline, recording, strength)
     gram, cross = _moments(baseline, scale, recording.unsure, tau)
-    return loosened(pull, gram, cross, 1.0 if whitening is None else row_weight(whitening))
+    return loosened(pull, gram, cross, strength)
 
 
 def _moments(baseline: Baseline, scale: Array, unsure: NDArray[np.bool_], tau: Array) -> tuple[Array, Array]:

@@ -21,7 +21,7 @@ WELL_OFF, LETTING_GO = 2.0, 20
 FAINT = 1e-12
 
 
-def pull_of(baseline: Baseline, recording: Recording, whitening: Whitening | None = None) -> Pull:
+def pull_of(baseline: Baseline, recording: Recording, strength: float = 1.0) -> Pull:
     """Pulls base parameters as `identify` does, as strongly as the noise makes right.
 
     Parameters scatter about the robot's description by their own size (`description_pull`). Against rows that count by
@@ -34,10 +34,10 @@ def pull_of(baseline: Baseline, recording: Recording, whitening: Whitening | Non
     Args:
         baseline: the base model on the data.
         recording: the data.
-        whitening: knows the colour; without, noise counts as white.
+        strength: rows of the noise that tell as much of a slow torque as one of white noise (`row_weight`).
 
     Returns:
-        Of base parameters and the baseline's nuisance (b + m), in units of rows over the scale of `whitening`.
+        Of base parameters and the baseline's nuisance (b + m), in units of rows over the noise's scale.
     """
     counts = ~recording.unsure
     number = np.maximum(counts.sum(axis=0), 1)
@@ -53,7 +53,6 @@ def pull_of(baseline: Baseline, recording: Recording, whitening: Whitening | Non
         levels[own, np.arange(len(own))] = raised
         share = (levels / torque[:, None]).max(axis=0) / OWN
         pull = Pull(np.diag(np.maximum(share, SILENT) ** 2), np.zeros(len(own)))
-    strength = 1.0 if whitening is None else row_weight(whitening)
     b, m = len(pull.target), baseline.nuisance.shape[2]
     precision = np.zeros((b + m, b + m))
     precision[:b, :b] = pull.precision

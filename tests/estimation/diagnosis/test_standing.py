@@ -84,3 +84,18 @@ def test_what_one_joint_alone_shows_is_found(arm: Robot, alone: Callable[..., Lo
     assert [(finding.effect, finding.joint) for finding in found.findings] == [("friction_step", 1)]
     assert "a joint moves in one log only" in found.how_unseen or "acts in one log only" in found.how_unseen
     assert found.extended[0] < 0.8 * found.baseline[0]
+
+
+def test_limits_say_that_a_push_in_a_rest_is_not_seen(arm: Robot, arm_log: Callable) -> None:
+    """Of what passes, and only where the arm stands for more than a moment."""
+    log = arm_log(torque_noise=0.02)
+    halves = np.linspace(0.0, len(log.t) - 1.0, len(log.t))
+    # Three seconds of rest in the middle, at the place where the motion is.
+    at = np.clip(np.where(halves < len(log.t) / 2, halves, np.maximum(halves - 750, len(log.t) / 2)), 0, None).astype(
+        int
+    )
+    stopped = replace(log, q=log.q[at], tau=log.tau[at], dq=None, ddq=None)
+    for logs, rests in ((log, False), (stopped, True)):
+        limits = diagnose(arm, logs, candidates=("external_contact", "stribeck"), check=False).limits
+        told = {limit.effect for limit in limits if "stands" in limit.note}
+        assert told == ({"external_contact"} if rests else set())

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from robots.geometry.chain import Chain
 from robots.terms.effects import EFFECTS, situation
 from robots.terms.effects.torque_ripple import angle_spectrum
 
@@ -103,3 +104,39 @@ def test_a_late_ripple_is_the_one_before(seen):
     turned = order * np.abs(now.ddq[:, joint - 1]).max() * late**2 / 2
     assert np.abs(change - wanted).max() < 1.1 * turned
     assert np.abs(RIPPLE.columns(now, joint, (order, 0.0))[:, joint - 1, :2] - wanted).max() > 5 * turned
+
+
+def test_a_ripple_of_a_linear_axis_is_one_of_its_length(seen, random_robot):
+    """A screw's wave of 3 mm over a tenth of a metre is proposed, told in mm and N, its order in rad/m."""
+    robot = random_robot(2, 3)
+    joints = tuple(
+        replace(joint, kind="prismatic" if k == 1 else "revolute") for k, joint in enumerate(robot.chain.joints)
+    )
+    now = seen(3, robot=replace(robot, chain=Chain(joints)))
+    q = now.q[:, 1]
+    now = replace(now, q=now.q * 0.1 / np.ptp(q), dq=now.dq * 0.1 / np.ptp(q))
+    order = 2 * np.pi / 0.003
+    residual = np.random.default_rng(1).normal(size=now.q.shape)
+    residual[:, 1] += np.cos(order * now.q[:, 1] + 0.7)
+    found = RIPPLE.propose(now, 2, residual, 8)
+    assert min(abs(point[0] - order) for point in found[:3]) <= np.pi / 0.1
+    assert "every 3 mm" in RIPPLE.describe(2, np.ones(4), (order, 0.0), force="N", length="m")
+    assert [shape.unit_at(now.robot, 2) for shape in RIPPLE.shapes] == ["rad/m", "s"]
+    assert [shape.unit_at(now.robot, 1) for shape in RIPPLE.shapes] == ["periods per turn", "s"]
+
+
+def test_friction_by_the_position_of_a_linear_axis_goes_by_waves_over_its_range(seen, random_robot):
+    """No order per turn would show over a tenth of a metre; one wave and three over it are near the scan's points."""
+    robot = random_robot(2, 3)
+    joints = tuple(
+        replace(joint, kind="prismatic" if k == 1 else "revolute") for k, joint in enumerate(robot.chain.joints)
+    )
+    now = seen(3, robot=replace(robot, chain=Chain(joints)))
+    now = replace(now, q=now.q * 0.1 / np.ptp(now.q[:, 1]))
+    effect = EFFECTS["position_dependent_friction"]
+    orders = np.array([order for (order,) in effect.grid(now, 2)])
+    ((low, high),) = effect.bounds(now, 2)
+    assert np.all((orders > low) & (orders < high))
+    for waves in (1.0, 3.0):
+        assert np.min(np.abs(orders - 2 * np.pi * waves / 0.1)) * 0.1 < 1.5
+    assert "every 50 mm" in effect.describe(2, np.ones(2), (2 * np.pi / 0.05,), force="N", length="m")
