@@ -22,8 +22,9 @@ from estimation.diagnosis.mended import mended
 from estimation.diagnosis.noise import estimate_whitening, quiet_joints
 from estimation.diagnosis.own_functions import own_functions
 from estimation.diagnosis.patterns import all_patterns
-from estimation.diagnosis.posing import fit_values, informed_pull, pose
+from estimation.diagnosis.posing import moments, pose
 from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.regularisation import held, loosened, pull_of
 from estimation.diagnosis.reporting import Told, assemble
 from estimation.diagnosis.scan import Entry, measure
 from estimation.diagnosis.selection import Selection, select
@@ -265,9 +266,11 @@ def _plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Settle
     """
     baseline, tau = build_baseline(base, recording), recording.tau
     counts, size = ~recording.unsure, tau.std(axis=0) + 1e-12
+    pull, (grams, crosses) = pull_of(baseline, recording), moments(baseline, counts.astype(float), tau)
     scale = size
     for _ in range(ROUNDS):
-        values = fit_values(baseline, scale, recording.unsure, tau, informed_pull(baseline, recording, scale, tau))
+        gram, cross = np.tensordot(scale**-2.0, grams, 1), scale**-2.0 @ crosses
+        values = held(gram, cross, loosened(pull, gram, cross))[: baseline.base.size]
         left = tau - baseline.regressor @ values
         noise = np.sqrt((left**2 * counts).sum(axis=0) / np.maximum(counts.sum(axis=0), 1))
         before, scale = scale, np.clip(noise, QUIETEST * size, scale)

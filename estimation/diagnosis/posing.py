@@ -37,7 +37,7 @@ def pose(
         draws: noise drawn for the null; 0 for none.
         rng: draws it.
         extra: torque (N, n) of effects that are known already, taken off before the base model's situation is computed.
-        pull: what holds base parameters that the data leave open; by default `informed_pull`.
+        pull: what holds base parameters that the data leave open; by default `pull_of`, loosened.
         upper: the frequencies above the bands.
     """
     n = recording.n
@@ -64,13 +64,15 @@ def pose(
             projected += (Q[:, k].astype(np.float32).T @ part).astype(float)
         pressed[k] = sum(P[j, k] * noise[:, j] for j in range(n) if P[j, k])
     scales = whitening.scales(len(recording))
+    own = recording.tau if extra is None else recording.tau - extra
+    gram, cross = moments(baseline, ~recording.unsure / scales, own)
     if pull is None:
-        known = recording.tau if extra is None else recording.tau - extra
-        pull = informed_pull(baseline, recording, scales, known, row_weight(whitening))
+        strength = row_weight(whitening)
+        pull = loosened(pull_of(baseline, recording, strength), gram.sum(axis=0), cross.sum(axis=0), strength)
     values = fit_values(baseline, scales, recording.unsure, recording.tau, pull)
     remainder = recording.tau - baseline.regressor @ values
     if extra is not None:
-        values = fit_values(baseline, scales, recording.unsure, recording.tau - extra, pull)
+        values = held(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
     return Problem(
         recording=recording,
         baseline=baseline,
@@ -92,23 +94,16 @@ def fit_values(baseline: Baseline, scale: Array, unsure: NDArray[np.bool_], tau:
 
     Directions that the log does not determine go where the pull has them.
     """
-    gram, cross = _moments(baseline, scale, unsure, tau)
-    return held(gram, cross, pull)[: baseline.base.size]
+    gram, cross = moments(baseline, ~unsure / scale, tau)
+    return held(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
 
 
-def informed_pull(baseline: Baseline, recording: Recording, scale: Array, tau: Array, strength: float = 1.0) -> Pull:
-    """Pulls base parameters (`pull_of`) where torque (N, n), weighed by the noise's scale, does not contradict it."""
-    pull = pull_of(baseline, recording, strength)
-    gram, cross = _moments(baseline, scale, recording.unsure, tau)
-    return loosened(pull, gram, cross, strength)
-
-
-def _moments(baseline: Baseline, scale: Array, unsure: NDArray[np.bool_], tau: Array) -> tuple[Array, Array]:
-    counts = ~unsure / scale
+def moments(baseline: Baseline, weights: Array, tau: Array) -> tuple[Array, Array]:
+    """Gives each joint's normal equations (n, p, p), (n, p) of base parameters and nuisance, rows weighed (N, n)."""
     size = baseline.regressor.shape[2] + baseline.nuisance.shape[2]
-    gram, cross = np.zeros((size, size)), np.zeros(size)
-    for j in range(tau.shape[1]):
-        own = np.concatenate([baseline.regressor[:, j], baseline.nuisance[:, j]], axis=1) * counts[:, j, None]
-        gram += own.T @ own
-        cross += own.T @ (tau[:, j] * counts[:, j])
+    gram, cross = np.zeros((tau.shape[1], size, size)), np.zeros((tau.shape[1], size))
+    for j, weight in enumerate(weights.T):
+        own = np.concatenate([baseline.regressor[:, j], baseline.nuisance[:, j]], axis=1) * weight[:, None]
+        gram[j] = own.T @ own
+        cross[j] = own.T @ (tau[:, j] * weight)
     return gram, cross
