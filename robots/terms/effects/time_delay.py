@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SMALL = 1e-5  # [s]
+SHORTEST = 1e-4
+"""Delay [s] below which there is none: how friction turns round within a sample is not known that well."""
 APART = 1.6
 # What motion has above the frequencies that are known of it is late, too: a delay is told short by some per cent.
 INEXACT = 0.05
@@ -47,6 +49,10 @@ class TimeDelay(Effect):
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
         """Keeps the delay near that of the reversals, of which the torque's own is a difference quotient."""
         return near(shape[0])
+
+    def believable(self, robot: Robot, joint: Place, coefficients: Array) -> bool:
+        """Gives false for less than a formula of friction that turns round can tell."""
+        return abs(float(coefficients[0])) >= SHORTEST and super().believable(robot, joint, coefficients)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the change of torque per delay."""

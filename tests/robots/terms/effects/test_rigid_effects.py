@@ -321,3 +321,11 @@ def test_a_gear_of_known_compliance_has_a_resonance(now, seen, twin):
         assert elastic.likely(now, joint, (1.0, 0.0), np.array([1 / wanted[2]])) == ((stiff, 0.0),)
         assert elastic.likely(now, joint, (1.0, 0.0), np.array([1e9]))[0] == (elastic.bounds(now, joint)[0][0], 0.0)
     assert elastic.likely(now, 1, (60.0, 0.0), np.zeros(1)) == ()
+
+
+@pytest.mark.parametrize(("name", "joint"), [("time_delay", None), ("current_lag", 1)])
+def test_a_delay_of_less_than_friction_tells_is_none(random_robot, name, joint):
+    """A fiftieth of a sample is how a sign is drawn between two rows; .5 ms is a delay, 50 ms no drive's."""
+    robot = random_robot(2, 3)
+    believed = [EFFECTS[name].believable(robot, joint, np.array([delay])) for delay in (8e-5, 5e-4, 0.05)]
+    assert believed == [False, True, False]
