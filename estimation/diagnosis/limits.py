@@ -173,9 +173,10 @@ def _note(problem: Problem, hypothesis: Hypothesis) -> str:
 
     What acts for a moment may do so in a rest.
     """
-    resting = float(np.mean(problem.recording.unsure.all(axis=1)))
-    if hypothesis.effect.passing and resting > RESTING:
-        return RESTS.format(100 * resting)
+    if hypothesis.effect.passing:
+        resting = float(np.mean(problem.recording.unsure.all(axis=1)))
+        if resting > RESTING:
+            return RESTS.format(100 * resting)
     duration = float(problem.recording.t[-1] - problem.recording.t[0])
     slow = [shape for shape in hypothesis.effect.shapes if shape.name == "time_constant" and shape.upper > duration]
     if not slow:

@@ -69,10 +69,9 @@ def pose(
     if pull is None:
         strength = row_weight(whitening)
         pull = loosened(pull_of(baseline, recording, strength), gram.sum(axis=0), cross.sum(axis=0), strength)
-    values = fit_values(baseline, scales, recording.unsure, recording.tau, pull)
-    remainder = recording.tau - baseline.regressor @ values
-    if extra is not None:
-        values = held(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
+    values = held(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
+    alone = values if extra is None else fit_values(baseline, scales, recording.unsure, recording.tau, pull)
+    remainder = recording.tau - baseline.regressor @ alone
     return Problem(
         recording=recording,
         baseline=baseline,

@@ -66,16 +66,12 @@ class Backlash(Effect):
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes half the play."""
         assert joint is not None
-        return (Coefficient("half_play", length_unit(robot, joint - 1), 0.0, 0.05),)
+        return (Coefficient("half_play", length_unit(robot, joint - 1), 0.0, 0.05, least=SMALLEST),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
         """Ties the play that the torque's size tells to the gap that the crossings' time tells."""
         ((lower, upper),) = super().ranges(robot, joint, shape)
         return ((max(lower, LEAST * shape[0] / 2), min(upper, MOST * shape[0] / 2)),)
-
-    def believable(self, robot: Robot, joint: Place, coefficients: Array) -> bool:
-        """Gives false for less than teeth have: it is what another effect's formula leaves."""
-        return float(coefficients[0]) >= SMALLEST and super().believable(robot, joint, coefficients)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists gaps that take 6 to 50 ms, at loads near zero; none for a load that hardly ever changes sign."""

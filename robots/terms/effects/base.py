@@ -82,6 +82,7 @@ class Coefficient:
         lower: the least value that is physically possible.
         upper: the largest.
         inexact: standard error that the formula itself has, beside that of the data, as a share of the value.
+        least: size below which it is none: what another effect's formula leaves, or its own cannot tell.
     """
 
     name: str
@@ -89,6 +90,7 @@ class Coefficient:
     lower: float = -np.inf
     upper: float = np.inf
     inexact: float = 0.0
+    least: float = 0.0
 
 
 class Effect(ABC):
@@ -135,8 +137,14 @@ class Effect(ABC):
         return tuple((coefficient.lower, coefficient.upper) for coefficient in self.parameters(robot, joint))
 
     def believable(self, robot: Robot, joint: Place, coefficients: Array) -> bool:
-        """Whether a machine may have these values: one that is stopped by its largest size wants to be more still."""
-        limits = [(c.lower, c.upper) for c in self.parameters(robot, joint)]
+        """Whether a machine may have these values.
+
+        One that is stopped by its largest size wants to be more still, and one below its least is none.
+        """
+        described = self.parameters(robot, joint)
+        limits = [(c.lower, c.upper) for c in described]
+        if any(abs(value) < c.least for value, c in zip(coefficients, described, strict=True)):
+            return False
         return not any(
             limit and np.isclose(value, limit, rtol=1e-6)
             for value, pair in zip(coefficients, limits, strict=True)

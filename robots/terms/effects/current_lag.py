@@ -30,16 +30,12 @@ class CurrentLag(JointEffect):
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the lag: a filter has no other sign, and more than 50 ms is no drive's."""
-        return (Coefficient("lag", "s", 0.0, 0.05, INEXACT),)
+        return (Coefficient("lag", "s", 0.0, 0.05, INEXACT, SHORTEST),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
         """Keeps the lag near that of the reversals, and positive."""
         ((low, high),) = near(shape[0])
         return ((max(low, 0.0), max(high, SMALL)),)
-
-    def believable(self, robot: Robot, joint: Place, coefficients: Array) -> bool:
-        """Gives false for less than a formula of friction that turns round can tell."""
-        return float(coefficients[0]) >= SHORTEST and super().believable(robot, joint, coefficients)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the change of the joint's torque per delay."""

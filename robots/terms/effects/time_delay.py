@@ -44,15 +44,11 @@ class TimeDelay(Effect):
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the delay; more than 50 ms is no sensor's."""
-        return (Coefficient("delay", "s", -0.05, 0.05, INEXACT),)
+        return (Coefficient("delay", "s", -0.05, 0.05, INEXACT, SHORTEST),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
         """Keeps the delay near that of the reversals, of which the torque's own is a difference quotient."""
         return near(shape[0])
-
-    def believable(self, robot: Robot, joint: Place, coefficients: Array) -> bool:
-        """Gives false for less than a formula of friction that turns round can tell."""
-        return abs(float(coefficients[0])) >= SHORTEST and super().believable(robot, joint, coefficients)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the change of torque per delay."""

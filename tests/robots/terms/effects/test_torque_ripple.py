@@ -106,14 +106,19 @@ def test_a_late_ripple_is_the_one_before(seen):
     assert np.abs(RIPPLE.columns(now, joint, (order, 0.0))[:, joint - 1, :2] - wanted).max() > 5 * turned
 
 
-def test_a_ripple_of_a_linear_axis_is_one_of_its_length(seen, random_robot):
-    """A screw's wave of 3 mm over a tenth of a metre is proposed, told in mm and N, its order in rad/m."""
+@pytest.fixture(scope="module")
+def sliding(seen, random_robot):
+    """A smooth motion of three joints, the second of which slides."""
     robot = random_robot(2, 3)
     joints = tuple(
         replace(joint, kind="prismatic" if k == 1 else "revolute") for k, joint in enumerate(robot.chain.joints)
     )
-    now = seen(3, robot=replace(robot, chain=Chain(joints)))
-    q = now.q[:, 1]
+    return seen(3, robot=replace(robot, chain=Chain(joints)))
+
+
+def test_a_ripple_of_a_linear_axis_is_one_of_its_length(sliding):
+    """A screw's wave of 3 mm over a tenth of a metre is proposed, told in mm and N, its order in rad/m."""
+    now, q = sliding, sliding.q[:, 1]
     now = replace(now, q=now.q * 0.1 / np.ptp(q), dq=now.dq * 0.1 / np.ptp(q))
     order = 2 * np.pi / 0.003
     residual = np.random.default_rng(1).normal(size=now.q.shape)
@@ -125,14 +130,9 @@ def test_a_ripple_of_a_linear_axis_is_one_of_its_length(seen, random_robot):
     assert [shape.unit_at(now.robot, 1) for shape in RIPPLE.shapes] == ["periods per turn", "s"]
 
 
-def test_friction_by_the_position_of_a_linear_axis_goes_by_waves_over_its_range(seen, random_robot):
+def test_friction_by_the_position_of_a_linear_axis_goes_by_waves_over_its_range(sliding):
     """No order per turn would show over a tenth of a metre; one wave and three over it are near the scan's points."""
-    robot = random_robot(2, 3)
-    joints = tuple(
-        replace(joint, kind="prismatic" if k == 1 else "revolute") for k, joint in enumerate(robot.chain.joints)
-    )
-    now = seen(3, robot=replace(robot, chain=Chain(joints)))
-    now = replace(now, q=now.q * 0.1 / np.ptp(now.q[:, 1]))
+    now = replace(sliding, q=sliding.q * 0.1 / np.ptp(sliding.q[:, 1]))
     effect = EFFECTS["position_dependent_friction"]
     orders = np.array([order for (order,) in effect.grid(now, 2)])
     ((low, high),) = effect.bounds(now, 2)
