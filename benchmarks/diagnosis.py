@@ -31,7 +31,7 @@ from benchmarks.diagnosis_parts.strata import STRATA, TUNING, Task, tasks  # noq
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--count", type=float, default=1.0, help="share of the full number of cases (1340)")
+    parser.add_argument("--count", type=float, default=1.0, help="share of the full number of cases (1540)")
     parser.add_argument("--strata", nargs="+", default=list(STRATA), choices=list(STRATA))
     parser.add_argument("--workers", type=int, default=1, help="processes")
     parser.add_argument("--cluster", help="address of a Dask scheduler, whose workers have this folder")

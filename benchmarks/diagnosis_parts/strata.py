@@ -19,7 +19,8 @@ class Stratum:
     """A kind of case: how many the full benchmark has, how many effects each hides, and their visible size.
 
     `moves`: point to point with pauses between, instead of motion throughout. `drives`: whether the robot's description
-    states gear ratios and rotor inertias, which a URDF cannot.
+    states gear ratios and rotor inertias, which a URDF cannot. `memory`: of the noise's coloured half, from one sample
+    to the next: up to .95 it is over in .1 s, with .995 it wanders for a second.
     """
 
     name: str
@@ -30,10 +31,12 @@ class Stratum:
     durations: tuple[float, ...] = (60.0,)
     moves: bool = False
     drives: bool = True
+    memory: tuple[float, float] = (0.7, 0.95)
 
 
 # Most as short as a log may be, some up to four minutes.
 LENGTHS = (60.0, 60.0, 120.0, 240.0)
+SLOW = (0.95, 0.995)
 
 STRATA: dict[str, Stratum] = {
     stratum.name: stratum
@@ -48,6 +51,8 @@ STRATA: dict[str, Stratum] = {
         Stratum("bare", 100, 1, 0.01, drives=False),
         # So short and so little that several causes are left more often: what the one experiment resolves.
         Stratum("brief", 100, 1, 0.005, durations=(15.0,)),
+        Stratum("slow_none", 100, 0, 0.0, memory=SLOW),
+        Stratum("slow", 100, 1, 0.01, memory=SLOW),
     )
 }
 
@@ -88,6 +93,7 @@ def draw(task: Task) -> Case | None:
     stratum = STRATA[task.stratum]
     stream = 1 + list(STRATA).index(task.stratum)
     options = {"size": stratum.size, "periodic": task.seed % 2 == 0, "stream": stream, "moves": stratum.moves}
+    options["noise_memory"] = stratum.memory
     # Robots take turns faster than lengths do: each has logs of every length.
     duration = stratum.durations[task.seed // (2 * len(KINDS)) % len(stratum.durations)]
     kinds = [KINDS[(task.seed // 2 + k) % len(KINDS)] for k in range(len(KINDS))]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.carried import regressor_on, situation_on
+from estimation.diagnosis.directions import SHARP, sharpest
 from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.states import Recording
 from robots.base_parameters import BaseParameters, find_base_parameters
@@ -18,8 +19,9 @@ from robots.terms.effects import Situation
 
 Array = NDArray[np.float64]
 
-# tanh(dq / v0) of the Coulomb friction: from sharp to the widest that is still a sign, a share of a fast joint's speed.
-SCALES = tuple(float(v0) for v0 in 0.0005 * 2.0 ** np.arange(0.0, 9.5, 0.5))
+# tanh(dq / v0) of the Coulomb friction: from a slow axis' sharpest to the widest that is still a sign, a share of a
+# fast joint's speed.
+SCALES = tuple(float(v0) for v0 in SHARP * 2.0 ** np.arange(-6.0, 9.5, 0.5))
 WIDEST, SHARE = 0.065, 0.05
 ROUNDS = 3
 # Directions of the column-scaled regressor below this share of the largest are not determined by the log.
@@ -115,6 +117,8 @@ class _Signs:
     def __init__(self, Y: Array, signs: list[int], base: BaseParameters, recording: Recording, weights: Array) -> None:
         self.recording, self.stride = recording, max(1, len(recording) // 20_000)
         self.joints = [base.columns[i].joint - 1 for i in signs]
+        # The sharpest for each of them.
+        self.first = [sum(v0 < 0.999 * sharpest(recording.dq[:, joint]) for v0 in SCALES) for joint in self.joints]
         rows = slice(None, None, self.stride)
         self.weights = np.broadcast_to(weights, recording.tau.shape)[rows]
         self.counts = ~recording.unsure[rows] * self.weights
@@ -135,14 +139,14 @@ class _Signs:
 
     def sharpness(self, widest: Array) -> tuple[float, ...]:
         """Picks all joints' scales (n,) together, up to the widest, one joint at a time with the others as they are."""
-        picked = [1] * len(self.joints)
+        picked = [k + 1 for k in self.first]
         for _ in range(ROUNDS):
             for a, joint in enumerate(self.joints):
                 gains = []
-                for k in range(sum(v0 <= widest[joint] for v0 in SCALES)):
+                for k in range(self.first[a], sum(v0 <= widest[joint] for v0 in SCALES)):
                     trial = [len(SCALES) * b + (k if b == a else picked[b]) for b in range(len(self.joints))]
                     gains.append(float(self.cross[trial] @ self._fitted(trial)))
-                picked[a] = int(np.argmax(gains))
+                picked[a] = self.first[a] + int(np.argmax(gains))
         scales = [SCALES[0]] * self.recording.n
         for a, joint in enumerate(self.joints):
             scales[joint] = SCALES[picked[a]]

@@ -14,7 +14,7 @@ from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.refinement import Member
-from estimation.diagnosis.regularisation import held
+from estimation.diagnosis.regularisation import free, held
 from robots.terms.effects import Situation
 
 Array = NDArray[np.float64]
@@ -96,8 +96,12 @@ class _Fit:
 
     def values(self, tau: Array, passes: Array | float = 1.0) -> Array:
         """Fits torque (N, n), of whose changes a share passes (N, n)."""
+        return held(*self.moments(tau, passes), self.problem.pull)
+
+    def moments(self, tau: Array, passes: Array | float = 1.0) -> tuple[Array, Array]:
+        """Gives the normal equations (b, b), (b,) of such a fit."""
         flat = (self.full * (self.weights * passes)[:, :, None]).reshape(-1, self.full.shape[2])
-        return held(flat.T @ flat, flat.T @ (tau * self.weights).reshape(-1), self.problem.pull)
+        return flat.T @ flat, flat.T @ (tau * self.weights).reshape(-1)
 
     def told(self, values: Array) -> Problem:
         """The problem, all of the torque known by these values."""
@@ -107,10 +111,15 @@ class _Fit:
         return replace(problem, whole=replace(now, beyond=beyond))
 
 
-def fit(problem: Problem, members: Sequence[Member]) -> tuple[Array, Array]:
-    """Fits base model, nuisance and members together: all values, and their columns (N, n, b)."""
-    both = _Fit(problem, members, np.ones_like(problem.recording.unsure))
-    return both.values(problem.recording.tau), both.full
+def fit(problem: Problem, members: Sequence[Member]) -> tuple[Array, Array, Array]:
+    """Fits base model, nuisance and members together.
+
+    Returns:
+        All values (b,); what a fit that nothing holds leaves (N, n); all columns (N, n, b).
+    """
+    both, tau = _Fit(problem, members, np.ones_like(problem.recording.unsure)), problem.recording.tau
+    gram, cross = both.moments(tau)
+    return held(gram, cross, problem.pull), tau - both.full @ free(gram, cross), both.full
 
 
 def columns_on(

@@ -24,7 +24,7 @@ from estimation.diagnosis.own_functions import own_functions
 from estimation.diagnosis.patterns import all_patterns
 from estimation.diagnosis.posing import moments, pose
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.regularisation import held, loosened, pull_of
+from estimation.diagnosis.regularisation import free, held, loosened, pull_of
 from estimation.diagnosis.reporting import Told, assemble
 from estimation.diagnosis.scan import Entry, measure
 from estimation.diagnosis.selection import Selection, select
@@ -276,7 +276,9 @@ def _plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Settle
         before, scale = scale, np.clip(noise, QUIETEST * size, scale)
         if (scale > SETTLED * before).all():
             break
-    return baseline, Settled(left, values)
+    # Effects are measured beside a base model that nothing holds: so is the noise.
+    columns = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
+    return baseline, Settled(tau - columns @ free(gram, cross), values)
 
 
 def _searched(

@@ -19,6 +19,9 @@ SURE = 4.0
 # A sign that is smooth over some velocity is wrong by 0.45 e / v at most, where the velocity v is wrong by e: whatever
 # its width, by less than what friction's share of noise hides from so many standard errors on.
 CLEAR = 12.0
+# A sign is tried as sharp as over this velocity [rad/s or m/s], a slow joint's over this share of its fastest. Rows
+# slower than so many times that count for nothing: friction that turns round at once has no value of the model's there.
+SHARP, SURELY = 0.0005, 3.0
 # Two clocks are one within this share of a sample period.
 ALIKE = 0.02
 # Of a jump J of acceleration, a velocity known up to a frequency f is wrong by this times J / (2 pi f).
@@ -111,13 +114,19 @@ def directions(
             usual = max(usual, KICK * largest / (2 * np.pi * cutoff) * (LOOP / cutoff) ** 2)
         jolts[j] = 2 * np.pi * max(cutoff, LOOP) * usual
         error = CLEAR * np.maximum(error, usual)
-        clear[:, j] = sampled & (error < change) & (np.abs(v) > np.maximum(error, ALIKE * change))
+        least = np.maximum(error, np.maximum(ALIKE * change, SURELY * sharpest(v)))
+        clear[:, j] = sampled & (error < change) & (np.abs(v) > least)
         if (turned & (error < change)).any():
             moments[j] = usual / float(np.quantile(np.abs(a[turned & (error < change)]), SLOWEST))
         for start, stop in spans(np.abs(v) < CREEP * speed):
             if (stop - start) * step > CREEPING:
                 unsure[start:stop, j], clear[start:stop, j] = True, False
     return Directions(unsure, unsure & clear, jolts, moments)
+
+
+def sharpest(dq: Array) -> float:
+    """Gives the velocity over which a joint's sign is tried at its sharpest, by its velocities (N,)."""
+    return SHARP * min(1.0, float(np.abs(dq).max(initial=0.0)))
 
 
 def _error(ddq: Array, cutoff: float, floor: float, largest: float, step: float) -> Array:

@@ -26,11 +26,12 @@ LOADING = 0.01
 WINSOR = 5.0
 # The flat part of the band, as a share of its cut-off.
 INSIDE = 0.75
-# Longest memory of the noise model [s]: with more, it would take slow effects for noise.
-MEMORY = 0.2
-# Noise of that memory is flat below this frequency [Hz]; what stands out there is an effect's, and not counted.
-FLAT = 1.0
-FEWEST = 4.0  # periods of that frequency without which nothing is said of it
+# Longest memory of the noise model [s], of so many rows a coefficient at least. All of it is used: an order that
+# predicts best misses much of what noise slower than a second has, and slow effects are measured against that.
+MEMORY, ROWS = 1.0, 100
+# Noise is flat below this frequency [Hz], the higher one where nothing is spared: what stands out there is an effect's,
+# and not counted. Of fewer periods than so many nothing is said.
+FLAT, SLOW, FEWEST = 0.15, 1.0, 4.0
 ROUNDS = 20
 # A log's own level counts against that of all logs as its frequencies do against so many.
 FEW = 20.0
@@ -93,8 +94,8 @@ def estimate_whitening(
     counts = np.maximum(measured.sum(axis=0), 1).astype(float)
     beside = Beside([gaps.bridged(X, j) for j, X in enumerate(spared)], bands, recording.runs, measured)
     pieces = beside.left(pieces)
-    tells = sum(map(len, pieces)) * step * FLAT >= FEWEST
-    slowest, fastest = FLAT if tells else 0.0, INSIDE * cutoffs
+    slowest, fastest = max(FLAT if len(spared) else SLOW, FEWEST / (sum(map(len, pieces)) * step)), INSIDE * cutoffs
+    slowest = slowest if slowest <= SLOW else 0.0
     period = next((cycle.period for cycle in recording.cycles if cycle is not None), None)
     noise = _colour(pieces, step, counts, parameters, slowest, fastest, beside, period)
     levels = None
@@ -227,15 +228,15 @@ def _colour(
         period: of the motion [s]; None where it does not repeat.
     """
     rows, joints = sum(map(len, pieces)), pieces[0].shape[1]
-    highest = int(np.clip(round(MEMORY / step), LOWEST_ORDER, HIGHEST_ORDER))
-    size = next_fast_len(max(map(len, pieces)) + highest + 1, real=True)
+    orders = np.clip(np.minimum(MEMORY / step, counts / ROWS), LOWEST_ORDER, HIGHEST_ORDER).astype(int)
+    size = next_fast_len(max(map(len, pieces)) + int(orders.max()) + 1, real=True)
     power = sum(np.abs(np.fft.rfft(piece, size, axis=0)) ** 2 for piece in pieces) / counts
     power = without_lines(power / beside.kept(size, counts), 1 / (size * step), period)
     power = power * rows * joints / max(rows * joints - parameters, 0.5 * rows * joints)
-    covariances = np.empty((joints, highest + 1))
-    for j in range(joints):
-        covariances[j] = _covariance(power[:, j], size, step, counts[j], (slowest, float(fastest[j])), highest)
-    return fit_noise(np.concatenate(pieces), counts, covariances)
+    covariances = [
+        _covariance(power[:, j], size, step, counts[j], (slowest, float(fastest[j])), orders[j]) for j in range(joints)
+    ]
+    return fit_noise(np.concatenate(pieces), counts, covariances, HIGHEST_ORDER)
 
 
 def _covariance(power: Array, size: int, step: float, count: float, window: tuple[float, float], highest: int) -> Array:
@@ -256,7 +257,7 @@ def _covariance(power: Array, size: int, step: float, count: float, window: tupl
         power[f >= window[1]] = power[places[-quarter:]].mean()
         lags = np.exp(-2j * np.pi * step * f[~known, None] * np.arange(1, highest + 1))
         for _ in range(ROUNDS):
-            a, variance = levinson(covariance(), count)
+            a, variance = levinson(covariance(), count, HIGHEST_ORDER)
             power[~known] = variance / np.abs(1.0 - lags[:, : len(a)] @ a) ** 2
     return covariance()
 

@@ -14,8 +14,8 @@ from estimation.diagnosis.recording import Recording
 
 Array = NDArray[np.float64]
 
-# Knots of the functions: of the position over its range, of the speed as shares of its largest.
-POSITIONS = 8
+# Knots of the functions: of the position over its range, of friction over time, of the speed as shares of its largest.
+POSITIONS, TIMES = 8, 5
 SPEEDS = (0.0, 0.03, 0.1, 0.3, 0.6, 1.0)
 # Of a shorter log [s] they would take most of the noise at the frequencies of the motion.
 SHORTEST = 20.0
@@ -66,7 +66,7 @@ class Beside:
 
 
 def own_functions(recording: Recording, baseline: Baseline, residual: Array) -> tuple[Array, ...]:
-    """Evaluates piecewise linear functions of position, speed and load, less what the base model makes of them.
+    """Evaluates functions of position, speed and load, and friction by time, less what the base model makes of them.
 
     Most effects of the catalogue are about such a function. What they leave in the residual is as fast as the motion
     is, and would pass for a colour of the noise, under which they hide.
@@ -112,6 +112,7 @@ def _functions(recording: Recording, sign: Array, torque: Array, joint: int) -> 
         _hats(q, np.linspace(q.min(), q.max(), POSITIONS)),
         sign[:, joint, None] * _hats(speed, np.array(SPEEDS) * speed.max()),
         np.column_stack([np.abs(load) * sign[:, joint], np.abs(load) * load, load**3]),
+        sign[:, joint, None] * _hats(recording.t, np.linspace(recording.t[0], recording.t[-1], TIMES)),
     ]
     return np.hstack(blocks)
 

@@ -105,6 +105,11 @@ def held(gram: Array, cross: Array, pull: Pull) -> Array:
     return np.asarray(root @ (root.T @ aim))
 
 
+def free(gram: Array, cross: Array) -> Array:
+    """Solves normal equations (p, p), (p,) with nothing held: of directions that are not determined, none."""
+    return held(gram, cross, Pull(np.zeros((0, 0)), np.zeros(0)))
+
+
 def explained(gram: Array, cross: Array, pull: Pull) -> float:
     """Squared torque that such a fit explains, less what the pull costs it."""
     told = _root(gram, pull).T @ _aim(cross, pull)

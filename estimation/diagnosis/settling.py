@@ -32,7 +32,7 @@ class Settled:
     """Base model and effects, fitted together.
 
     Attributes:
-        residual: what they leave (N, n) [N m or N].
+        residual: what they leave (N, n) [N m or N] where nothing holds the base model: what noise is measured on.
         values: base parameters (b,).
         extra: torque of the effects (N, n) [N m or N]; None without any.
         degrees: parameters of the effects.
@@ -60,10 +60,10 @@ def settle(problem: Problem, members: Sequence[Member]) -> Settled:
         flags = np.logical_or.reduce([flags for flags in useless if flags is not None])
         problem = known_beside(known_without(problem, members, flags), members)
         members = [_again(problem, members, k) if k in cut else member for k, member in enumerate(members)]
-    values, full = fit(problem, members)
+    values, left, full = fit(problem, members)
     known = len(problem.pull.target)
     return Settled(
-        residual=problem.recording.tau - full @ values,
+        residual=left,
         values=values[: problem.baseline.base.size],
         extra=full[:, :, known:] @ values[known:],
         degrees=sum(member.degrees for member in members),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,7 +50,7 @@ def autocovariance(series: Array, count: float, lags: int = HIGHEST_ORDER) -> Ar
     return np.fft.irfft(np.abs(spectrum) ** 2, length)[: lags + 1] / max(count, 1.0)
 
 
-def fit_noise(residual: Array, counts: Array, covariances: Array, times: int = 1) -> Noise:
+def fit_noise(residual: Array, counts: Array, covariances: Sequence[Array] | Array, times: int = 1) -> Noise:
     """Fits one process per joint.
 
     Akaike's criterion takes the order that predicts best, and there stops short: what higher orders would add to the
@@ -60,7 +61,7 @@ def fit_noise(residual: Array, counts: Array, covariances: Array, times: int = 1
     Args:
         residual: (N, n), zero where masked.
         counts: rows that are not masked (n,).
-        covariances: autocovariances (n, lags + 1) to fit, the residual's own or corrected ones.
+        covariances: autocovariances (lags + 1,) of each joint to fit, the residual's own or corrected ones.
         times: each order is so many times the one that Akaike's criterion takes, as far as there are lags.
 
     Returns:

@@ -123,6 +123,7 @@ def draw_case(
     duration: float = 60.0,
     unseen: float = 30.0,
     noise_level: float = 0.025,
+    noise_memory: tuple[float, float] = (0.7, 0.95),
     stream: int = 0,
     moves: bool = False,
 ) -> Case:
@@ -138,6 +139,7 @@ def draw_case(
         duration: length of the log [s].
         unseen: length of the log of another motion [s]; 0 for none.
         noise_level: torque noise, as a share of the torque's RMS.
+        noise_memory: range of the correlation of one sample of the noise's coloured half with the next.
         stream: another case of the same seed.
         moves: moves with pauses between instead of motion throughout.
 
@@ -177,7 +179,7 @@ def draw_case(
             if found is None:
                 raise Hidden(f"{choice.__name__} cannot reach {size}")
             effects.append(found)
-    noise = draw_noise(machine.n, machine.gear, rng, level=noise_level)
+    noise = draw_noise(machine.n, machine.gear, rng, level=noise_level, memory=noise_memory)
     for _ in range(ROUNDS):
         case = Case(
             seed=seed,

@@ -50,8 +50,15 @@ class Noise:
         return np.round(q / count) * count
 
 
-def draw_noise(n: int, gear: np.ndarray, rng: np.random.Generator, *, level: float = 0.025) -> Noise:
-    """Draws a noise: memory .7 to .95, t with 5 degrees of freedom in a fifth, correlation up to .3.
+def draw_noise(
+    n: int,
+    gear: np.ndarray,
+    rng: np.random.Generator,
+    *,
+    level: float = 0.025,
+    memory: tuple[float, float] = (0.7, 0.95),
+) -> Noise:
+    """Draws a noise: memory .7 to .95 or in another range, t with 5 degrees of freedom in a fifth, correlation up to .3.
 
     The encoder has 2^17 to 2^20 counts, per turn of the joint in half of all robots and of the motor in the others.
     """
@@ -60,7 +67,7 @@ def draw_noise(n: int, gear: np.ndarray, rng: np.random.Generator, *, level: flo
         counts = counts * gear
     return Noise(
         level=level,
-        memory=rng.uniform(0.7, 0.95, n),
+        memory=rng.uniform(*memory, n),
         tails=5.0 if rng.random() < 0.2 else None,
         common=float(rng.uniform(0.0, 0.3)),
         counts=counts,

@@ -9,6 +9,7 @@ import pytest
 
 from estimation.diagnosis.baseline import base_parameters, build_baseline, inertia_of
 from estimation.diagnosis.noise import estimate_whitening
+from estimation.diagnosis.own_functions import own_functions
 from estimation.diagnosis.posing import fit_values, pose
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import Recording
@@ -27,10 +28,11 @@ def pose_arm(arm: Robot) -> Callable[..., Problem]:
         values = fit_values(baseline, recording.tau.std(axis=0), recording.unsure, recording.tau, pull)
         residual = recording.tau - baseline.regressor @ values
         inertia = inertia_of(baseline, recording, values)
-        whitening = estimate_whitening(recording, residual, baseline.base.size, inertia)
+        spared = own_functions(recording, baseline, residual)
+        whitening = estimate_whitening(recording, residual, baseline.base.size, inertia, spared=spared)
         upper = None
         if wider is not None:
-            wide = estimate_whitening(recording, residual, baseline.base.size, inertia, wider)
+            wide = estimate_whitening(recording, residual, baseline.base.size, inertia, wider, spared)
             upper = pose_upper(recording, baseline, residual, residual, whitening.bands, wide)
         return pose(recording, baseline, whitening, draws=draws, rng=np.random.default_rng(0), upper=upper)
 

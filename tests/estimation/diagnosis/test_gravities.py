@@ -141,7 +141,7 @@ def test_a_tilt_that_was_not_told_is_not_taken_for_nothing(upright: Robot, build
     assert told.verdict == "none"
     untold = diagnose(upright, [logs[0], replace(logs[1], gravity=None)], candidates=SOME, friction=SIMPLE)
     assert np.all(np.array(told.baseline) < 0.05)
-    assert max(untold.baseline) > 0.5
+    assert max(untold.baseline) > 0.3
 
 
 def test_a_base_askew_on_its_mount_is_found_under_two_gravities(upright: Robot, build: Build) -> None:
