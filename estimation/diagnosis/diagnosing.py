@@ -218,7 +218,7 @@ def _search(
         whitening = estimate_whitening(recording, settled.residual, fitted, inertia, spared=spared)
         if search is not None:
             members = [found.member for found in search.selection.found]
-            if not (calmer(search.problem, whitening.scale) or moved(search.problem, settled.values, members)):
+            if not (calmer(search.problem, whitening) or moved(search.problem, settled.values, members)):
                 break
             # Its columns are most of what a diagnosis keeps in memory: they go before others come.
             search = None

@@ -92,8 +92,7 @@ def row_weight(whitening: Whitening) -> float:
 
     So many plain rows, weighed by the innovations' scale, tell as much of a slow torque as one that is white.
     """
-    gains = [1.0 / max(abs(1.0 - float(np.sum(a))), 0.01) for a in whitening.coefficients]
-    return whitening.stride * float(np.mean(np.square(gains)))
+    return whitening.stride * float(np.mean(np.square(whitening.at_rest / whitening.scale)))
 
 
 def held(gram: Array, cross: Array, pull: Pull) -> Array:

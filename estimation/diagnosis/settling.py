@@ -14,6 +14,7 @@ from estimation.diagnosis.extending import dense
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scoring import accept
+from estimation.diagnosis.whitening import Whitening
 
 Array = NDArray[np.float64]
 
@@ -21,6 +22,8 @@ Array = NDArray[np.float64]
 CUT = 0.01
 # The noise is another where its logarithm changes by more than this.
 CALMER = 0.03
+# So is that of its slowest part by this: an effect that was not known adds to that above all.
+SLOWLY = 0.1
 # So is the base model's torque beside the effects where it is different by more than this share.
 MOVED = 0.02
 # Or the torque of an effect by more than this.
@@ -70,9 +73,11 @@ def settle(problem: Problem, members: Sequence[Member]) -> Settled:
     )
 
 
-def calmer(problem: Problem, scale: Array) -> bool:
-    """Whether the noise without what was found is smaller than it was taken to be."""
-    return bool(np.max(np.log(problem.whitening.scale / scale)) > CALMER)
+def calmer(problem: Problem, whitening: Whitening) -> bool:
+    """Whether the noise without what was found is smaller than it was taken to be, or its slow part is."""
+    before = problem.whitening
+    slower = before.at_rest / whitening.at_rest
+    return bool(np.max(np.log(before.scale / whitening.scale)) > CALMER or np.max(np.log(slower)) > SLOWLY)
 
 
 def moved(problem: Problem, values: Array, members: Sequence[Member]) -> bool:

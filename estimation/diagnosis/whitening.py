@@ -16,6 +16,9 @@ from estimation.diagnosis.gaps import Gaps
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
+# A filter lets through this share of what is at rest at least: what it says of less is chance.
+LEAST_AT_REST = 0.01
+
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
@@ -55,6 +58,12 @@ class Whitening:
     def taps(self, joint: int) -> Array:
         """Gives a joint's filter (p_j + 1,), for the noise of a log of level one."""
         return np.concatenate([[1.0], -self.coefficients[joint]]) / self.scale[joint]
+
+    @property
+    def at_rest(self) -> Array:
+        """The noise's density at rest, as the standard deviation of white noise that has as much there (n,)."""
+        gains = [max(abs(1.0 - float(np.sum(a))), LEAST_AT_REST) for a in self.coefficients]
+        return self.scale / np.array(gains)
 
     def scales(self, rows: int) -> Array:
         """Gives the standard deviation of the innovations of each of a recording's rows (N, n) [N m or N]."""

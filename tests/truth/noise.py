@@ -58,7 +58,7 @@ def draw_noise(
     level: float = 0.025,
     memory: tuple[float, float] = (0.7, 0.95),
 ) -> Noise:
-    """Draws a noise: memory .7 to .95 or in another range, t with 5 degrees of freedom in a fifth, correlation up to .3.
+    """Draws a noise: memory in a range, t with 5 degrees of freedom in a fifth, correlation up to .3.
 
     The encoder has 2^17 to 2^20 counts, per turn of the joint in half of all robots and of the motor in the others.
     """

@@ -89,8 +89,8 @@ def _level(whitening: Whitening, residual: np.ndarray, rows: slice = slice(None)
 def test_a_slow_effect_is_not_taken_for_noise() -> None:
     """With effects four times as large as the noise, the noise model stays nearly what it is without.
 
-    The level is told by some 500 frequencies to a standard error of 4.5 %. One wave below those that count adds nothing,
-    one among them is a line, of which a little remains at rest.
+    The level is told by some 500 frequencies to a standard error of 4.5 %. One wave below those that count adds
+    nothing, one among them is a line, of which a little remains at rest.
     """
     noise = _noise(20_000)
     t = STEP * np.arange(20_000)[:, None]
