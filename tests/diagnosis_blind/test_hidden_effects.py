@@ -39,6 +39,7 @@ class Hide:
     ratio: float = 0.7  # of the true effect's gain
     duration: float = 40.0  # [s]
     drives: bool = True  # in the robot's description, which a URDF alone has not
+    memory: tuple[float, float] = (0.7, 0.95)  # of the noise, from a sample to the next
 
     @property
     def name(self) -> str:
@@ -56,10 +57,13 @@ class Hide:
             periodic=self.periodic,
             duration=self.duration,
             unseen=self.duration / 2 if self.effects else 0.0,
+            noise_memory=self.memory,
         )
 
 
-NOTHING = (Hide(seed=7031), Hide(seed=7032, periodic=False))
+# Noise that wanders for half a second to a second is noise, too.
+SLOW = (0.99, 0.995)
+NOTHING = (Hide(seed=7031), Hide(seed=7032, periodic=False), Hide(seed=7034, memory=SLOW, duration=60.0))
 SINGLE = (
     # Much of what Stribeck friction does is beside reversals, where a log does not tell the velocity well.
     Hide(seed=7001, effects=(friction.Stribeck,), joint=2, ratio=0.6),

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimation.diagnosis.baseline import base_parameters, build_baseline
+from estimation.diagnosis.diagnosing import diagnose
 from estimation.diagnosis.states import record
 from robots.plants import simulate
 from robots.robot import Robot
@@ -25,3 +27,19 @@ def test_a_sign_is_as_wide_as_the_friction_turns_round(
     chosen = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
     scales = chosen.situation(recording, np.zeros(chosen.base.size)).velocity_scale
     assert np.all(np.abs(np.log(scales / width)) < np.log(2.0))
+
+
+@pytest.mark.parametrize("share", [1.0, 0.03])
+def test_friction_that_turns_round_at_once_leaves_nothing(
+    arm: Robot, arm_plant: Callable, fourier_motion: Callable, share: float
+) -> None:
+    """A sign as a formula has it, of joints as fast as usual and of slow ones, is a sign of the base model.
+
+    Where it is not as sharp, what is left at each reversal looks like a delay.
+    """
+    motions = [fourier_motion(arm, k, duration=30.0) for k in range(2)]
+    slow = [replace(m, q=share * m.q, dq=share * m.dq, ddq=share * m.ddq) for m in motions]
+    log, other = (simulate(arm_plant(velocity_scale=1e-9, torque_noise=0.005), m, seed=k) for k, m in enumerate(slow))
+    result = diagnose(arm, log, held_out=other)
+    assert result.verdict == "none"
+    assert np.all(result.baseline < 0.006)

@@ -12,8 +12,9 @@ from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import refine
 from estimation.diagnosis.scoring import accept
-from estimation.diagnosis.settling import moved, settle
+from estimation.diagnosis.settling import calmer, moved, settle
 from estimation.diagnosis.states import record
+from estimation.diagnosis.whitening import Whitening
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import EFFECTS
@@ -70,3 +71,22 @@ def test_little_is_searched_anew_where_it_changes_what_was_found(
     assert not moved(problem, values, [])
     assert moved(problem, values, [member])
     assert not moved(problem, unloaded(problem)[list(problem.baseline.base.independent)], [member])
+
+
+def test_a_search_is_done_again_where_the_slow_part_of_the_noise_is_smaller(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
+) -> None:
+    """Noise that is as fast as before, of a fifth less power at rest, is calmer; a change of some per cent is none."""
+    problem = pose_arm(record(arm, [arm_log(torque_noise=0.05)]))
+    known = problem.whitening
+
+    def less(power: float) -> Whitening:
+        """The same noise but for what the first joint has at rest."""
+        first = known.coefficients[0]
+        gain = (1.0 - first.sum()) / np.sqrt(power)
+        return replace(known, coefficients=(first + (1.0 - first.sum() - gain) / len(first), *known.coefficients[1:]))
+
+    assert calmer(problem, less(0.75))
+    assert not calmer(problem, less(0.9))
+    assert not calmer(problem, less(1.3))
+    assert calmer(problem, replace(known, scale=0.9 * known.scale))

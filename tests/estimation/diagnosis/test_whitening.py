@@ -105,6 +105,25 @@ def test_a_slow_effect_is_not_taken_for_noise() -> None:
     assert at_rest[1] == pytest.approx(at_rest[0], rel=0.5)
 
 
+@pytest.mark.parametrize("memory", [0.98, 0.995])
+def test_noise_that_wanders_is_noise(memory: float) -> None:
+    """Half white noise and half correlated over .2 s or .8 s: what it has at rest is told, or more than that.
+
+    Forty coefficients of 10,000 rows tell it to a tenth (Berk 1974), but hardly where it bends at .2 Hz: a memory of
+    .3 s is short for that. The order that predicts best, above 1 Hz, has three quarters and a fifth of it.
+    """
+    rng = np.random.default_rng(1)
+    rows = 20_000
+    slow = lfilter([np.sqrt(1 - memory**2)], [1, -memory], rng.standard_normal((rows + 2000, 2)), axis=0)[2000:]
+    noise = (rng.standard_normal((rows, 2)) + slow) * [2.0, 0.5]
+    phase = 2 * np.pi * 0.3 * STEP * np.arange(rows)
+    wave = np.column_stack([np.sin(phase), np.cos(phase)])
+    found = estimate_whitening(_recording(rows), noise, 0, np.eye(2), spared=(wave, wave))
+    true = np.sqrt(1 + (1 + memory) / (1 - memory)) * np.array([2.0, 0.5])
+    share = found.at_rest * np.sqrt(found.stride) / true
+    assert np.all((share > 0.8) & (share < 2.2))
+
+
 def test_kicks_at_reversals_and_times_at_rest_do_not_change_the_level() -> None:
     """Rows of unknown direction, short or long, whatever is in them, leave the level of the noise as it is."""
     noise = _noise(20_000)
