@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.carried import situation_on, unloaded
 from estimation.diagnosis.extending import dense
 from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.own_functions import is_short
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.refinement import Member
@@ -115,11 +116,12 @@ def fit(problem: Problem, members: Sequence[Member]) -> tuple[Array, Array, Arra
     """Fits base model, nuisance and members together.
 
     Returns:
-        All values (b,); what a fit that nothing holds leaves (N, n); all columns (N, n, b).
+        All values (b,); what the fit leaves (N, n) on which noise is measured; all columns (N, n, b).
     """
     both, tau = _Fit(problem, members, np.ones_like(problem.recording.unsure)), problem.recording.tau
     gram, cross = both.moments(tau)
-    return held(gram, cross, problem.pull), tau - both.full @ free(gram, cross), both.full
+    values = held(gram, cross, problem.pull)
+    return values, tau - both.full @ (values if is_short(problem.recording) else free(gram, cross)), both.full
 
 
 def columns_on(

@@ -20,7 +20,7 @@ from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.limits import find_limits
 from estimation.diagnosis.mended import mended
 from estimation.diagnosis.noise import estimate_whitening, quiet_joints
-from estimation.diagnosis.own_functions import own_functions
+from estimation.diagnosis.own_functions import is_short, own_functions
 from estimation.diagnosis.patterns import all_patterns
 from estimation.diagnosis.posing import moments, pose
 from estimation.diagnosis.problem import Problem
@@ -276,9 +276,10 @@ def _plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Settle
         before, scale = scale, np.clip(noise, QUIETEST * size, scale)
         if (scale > SETTLED * before).all():
             break
-    # Effects are measured beside a base model that nothing holds: so is the noise.
-    columns = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
-    return baseline, Settled(tau - columns @ free(gram, cross), values)
+    if not is_short(recording):
+        # Effects are measured beside a base model that nothing holds: so is the noise.
+        left = tau - np.concatenate([baseline.regressor, baseline.nuisance], axis=2) @ free(gram, cross)
+    return baseline, Settled(left, values)
 
 
 def _searched(

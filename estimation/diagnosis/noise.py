@@ -27,8 +27,9 @@ WINSOR = 5.0
 # The flat part of the band, as a share of its cut-off.
 INSIDE = 0.75
 # Longest memory of the noise model [s], of so many rows a coefficient at least. All of it is used: an order that
-# predicts best misses much of what noise slower than a second has, and slow effects are measured against that.
-MEMORY, ROWS = 1.0, 100
+# predicts best misses much of what noise slower than a second has, and slow effects are measured against that. Where
+# nothing is spared, a short one of the order that predicts best: with more it would take slow effects for noise.
+MEMORY, ROWS, SHORT_MEMORY = 1.0, 100, 0.2
 # Noise is flat below this frequency [Hz], the higher one where nothing is spared: what stands out there is an effect's,
 # and not counted. Of fewer periods than so many nothing is said.
 FLAT, SLOW, FEWEST = 0.15, 1.0, 4.0
@@ -228,19 +229,27 @@ def _colour(
         period: of the motion [s]; None where it does not repeat.
     """
     rows, joints = sum(map(len, pieces)), pieces[0].shape[1]
-    orders = np.clip(np.minimum(MEMORY / step, counts / ROWS), LOWEST_ORDER, HIGHEST_ORDER).astype(int)
+    longest = np.minimum(MEMORY / step, counts / ROWS) if beside.spares else np.full(joints, round(SHORT_MEMORY / step))
+    orders = np.clip(longest, LOWEST_ORDER, HIGHEST_ORDER).astype(int)
+    times = HIGHEST_ORDER if beside.spares else 1
     size = next_fast_len(max(map(len, pieces)) + int(orders.max()) + 1, real=True)
     power = sum(np.abs(np.fft.rfft(piece, size, axis=0)) ** 2 for piece in pieces) / counts
     power = without_lines(power / beside.kept(size, counts), 1 / (size * step), period)
     power = power * rows * joints / max(rows * joints - parameters, 0.5 * rows * joints)
     covariances = [
-        _covariance(power[:, j], size, step, counts[j], (slowest, float(fastest[j])), orders[j]) for j in range(joints)
+        _covariance(power[:, j], size, step, counts[j], (slowest, float(fastest[j])), orders[j], times)
+        for j in range(joints)
     ]
-    return fit_noise(np.concatenate(pieces), counts, covariances, HIGHEST_ORDER)
+    return fit_noise(np.concatenate(pieces), counts, covariances, times)
 
 
-def _covariance(power: Array, size: int, step: float, count: float, window: tuple[float, float], highest: int) -> Array:
-    """Gives one joint's covariances (highest + 1,) from its power (F,), known in a window alone, of `size` rows."""
+def _covariance(
+    power: Array, size: int, step: float, count: float, window: tuple[float, float], highest: int, times: int
+) -> Array:
+    """Gives one joint's covariances (highest + 1,) from its power (F,), known in a window alone, of `size` rows.
+
+    What is outside is what a process of so many `times` the order that predicts best has there.
+    """
     f = np.fft.rfftfreq(size, step)
     power = power.copy()
 
@@ -257,7 +266,7 @@ def _covariance(power: Array, size: int, step: float, count: float, window: tupl
         power[f >= window[1]] = power[places[-quarter:]].mean()
         lags = np.exp(-2j * np.pi * step * f[~known, None] * np.arange(1, highest + 1))
         for _ in range(ROUNDS):
-            a, variance = levinson(covariance(), count, HIGHEST_ORDER)
+            a, variance = levinson(covariance(), count, times)
             power[~known] = variance / np.abs(1.0 - lags[:, : len(a)] @ a) ** 2
     return covariance()
 

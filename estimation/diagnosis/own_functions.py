@@ -46,6 +46,11 @@ class Beside:
             whole = np.concatenate([band.passed(np.asfortranarray(X[run])) for run in runs]) * measured[:, [j]]
             self.pieces.append(np.split(orthonormal(whole, FAINT), np.cumsum(lengths)[:-1]))
 
+    @property
+    def spares(self) -> bool:
+        """Whether anything is taken out."""
+        return bool(self.pieces)
+
     def left(self, pieces: list[Array]) -> list[Array]:
         """Projects the columns out of residuals (M, n) of each log; rows that do not count are zero."""
         result = [piece * rows for piece, rows in zip(pieces, self.measured, strict=True)]
@@ -65,6 +70,11 @@ class Beside:
         return result
 
 
+def is_short(recording: Recording) -> bool:
+    """Whether what is fitted freely to the logs would take most of their noise at the frequencies of the motion."""
+    return recording.duration < SHORTEST
+
+
 def own_functions(recording: Recording, baseline: Baseline, residual: Array) -> tuple[Array, ...]:
     """Evaluates functions of position, speed and load, and friction by time, less what the base model makes of them.
 
@@ -79,7 +89,7 @@ def own_functions(recording: Recording, baseline: Baseline, residual: Array) -> 
     Returns:
         For each joint, columns (N, k) on its rows; nothing of a log that is too short.
     """
-    if recording.duration < SHORTEST:
+    if is_short(recording):
         return ()
     known = ~recording.unsure
     weights = known / np.maximum(recording.tau.std(axis=0), 1e-12)

@@ -105,7 +105,7 @@ def held(gram: Array, cross: Array, pull: Pull) -> Array:
 
 
 def free(gram: Array, cross: Array) -> Array:
-    """Solves normal equations (p, p), (p,) with nothing held: of directions that are not determined, none."""
+    """Solves normal equations (p, p), (p,) that nothing holds."""
     return held(gram, cross, Pull(np.zeros((0, 0)), np.zeros(0)))
 
 

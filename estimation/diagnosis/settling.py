@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.carried import unloaded
 from estimation.diagnosis.composed import fit, known_beside, known_without
 from estimation.diagnosis.extending import dense
+from estimation.diagnosis.own_functions import is_short
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scoring import accept
@@ -74,10 +75,12 @@ def settle(problem: Problem, members: Sequence[Member]) -> Settled:
 
 
 def calmer(problem: Problem, whitening: Whitening) -> bool:
-    """Whether the noise without what was found is smaller than it was taken to be, or its slow part is."""
+    """Whether the noise without what was found is smaller than it was taken to be, or its slow part as far as known."""
     before = problem.whitening
-    slower = before.at_rest / whitening.at_rest
-    return bool(np.max(np.log(before.scale / whitening.scale)) > CALMER or np.max(np.log(slower)) > SLOWLY)
+    if np.max(np.log(before.scale / whitening.scale)) > CALMER:
+        return True
+    slower = np.log(before.at_rest / whitening.at_rest)
+    return bool(np.max(slower) > SLOWLY) and not is_short(problem.recording)
 
 
 def moved(problem: Problem, values: Array, members: Sequence[Member]) -> bool:

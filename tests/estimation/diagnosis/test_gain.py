@@ -113,7 +113,7 @@ def _other_motion(seed: int, effect: float, there: float) -> Unseen:
         recording=Rows(unsure=moving, tau=tau),
         baseline=SimpleNamespace(regressor=Y, nuisance=np.zeros((rows, 1, 0))),
         whitening=SimpleNamespace(
-            scales=lambda count: np.ones((count, 1)), scale=np.ones(1), coefficients=[np.zeros(1)], stride=1
+            scales=lambda count: np.ones((count, 1)), scale=np.ones(1), at_rest=np.ones(1), stride=1
         ),
     )
     other = Rows(unsure=moving, tau=unseen, t=t, step=0.01, runs=[slice(0, rows)])

@@ -15,8 +15,9 @@ from estimation.diagnosis.scoring import accept
 from estimation.diagnosis.settling import calmer, moved, settle
 from estimation.diagnosis.states import record
 from estimation.diagnosis.whitening import Whitening
+from robots.plants import simulate
 from robots.robot import Robot
-from robots.signals import Log
+from robots.signals import Log, Motion
 from robots.terms.effects import EFFECTS
 
 LOST = 0.25
@@ -74,10 +75,10 @@ def test_little_is_searched_anew_where_it_changes_what_was_found(
 
 
 def test_a_search_is_done_again_where_the_slow_part_of_the_noise_is_smaller(
-    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
+    arm: Robot, arm_plant: Callable, fourier_motion: Callable[..., Motion], pose_arm: Callable[..., Problem]
 ) -> None:
-    """Noise that is as fast as before, of a fifth less power at rest, is calmer; a change of some per cent is none."""
-    problem = pose_arm(record(arm, [arm_log(torque_noise=0.05)]))
+    """Noise that is as fast as before, of a quarter less power at rest, is calmer; a change of some per cent is none."""
+    problem = pose_arm(record(arm, [simulate(arm_plant(torque_noise=0.05), fourier_motion(arm, duration=30.0))]))
     known = problem.whitening
 
     def less(power: float) -> Whitening:
