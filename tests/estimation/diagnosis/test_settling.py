@@ -77,7 +77,7 @@ def test_little_is_searched_anew_where_it_changes_what_was_found(
 def test_a_search_is_done_again_where_the_slow_part_of_the_noise_is_smaller(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable[..., Motion], pose_arm: Callable[..., Problem]
 ) -> None:
-    """Noise that is as fast as before, of a quarter less power at rest, is calmer; a change of some per cent is none."""
+    """Noise as fast as before, of a quarter less power at rest, is calmer; a change of some per cent is none."""
     problem = pose_arm(record(arm, [simulate(arm_plant(torque_noise=0.05), fourier_motion(arm, duration=30.0))]))
     known = problem.whitening
 
