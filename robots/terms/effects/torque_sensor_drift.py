@@ -20,7 +20,8 @@ class TorqueSensorDrift(JointEffect):
     """tau = sum_k b_k clip((t' - t_0 - k d) / d, 0, 1): a zero that goes by b_k during the k-th stretch of length d.
 
     One stretch as long as the data is a straight line; more of them follow a zero that wanders. It stays where the data
-    end, t' = min(t, t_1): nobody knows where it goes from there.
+    end, t' = min(t, t_1): nobody knows where it goes from there. A stretch of which the data have less than half is
+    none: what little they show of it would say anything.
     """
 
     name: ClassVar[str] = "torque_sensor_drift"
@@ -53,9 +54,12 @@ class TorqueSensorDrift(JointEffect):
         return (origin, origin), (min(max(duration / STRETCHES, SHORTEST), duration), duration), (end, end)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates a ramp per stretch; those that begin after the data are zero."""
-        elapsed = (np.minimum(situation.t, shape[2]) - shape[0]) / shape[1]
-        return np.asarray(np.clip(elapsed[:, None] - np.arange(STRETCHES), 0.0, 1.0))
+        """Evaluates a ramp per stretch; those that begin after the data, or end far beyond them, are zero."""
+        origin, stretch, end = shape
+        elapsed = (np.minimum(situation.t, end) - origin) / stretch
+        begun = np.arange(STRETCHES)
+        shown = begun + SHOWN <= (end - origin) / stretch
+        return np.asarray(np.clip(elapsed[:, None] - begun, 0.0, 1.0) * shown)
 
     def describe(
         self,
@@ -73,5 +77,7 @@ class TorqueSensorDrift(JointEffect):
 
 STRETCHES = 16
 """Stretches of a zero that wanders."""
+SHOWN = 0.5
+"""Share of a stretch that the data have at least."""
 SHORTEST = 3.5
 """Least time of a stretch [s]: what changes faster goes with the motion, not with time."""

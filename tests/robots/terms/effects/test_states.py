@@ -197,6 +197,17 @@ def test_a_zero_that_wanders_is_followed(seen):
     np.testing.assert_allclose(ended @ steps, np.interp(now.t, [0, duration / 8], [0, 0.5]), atol=1e-9)
 
 
+@pytest.mark.parametrize(("share", "ramps"), [(0.4, 3), (0.6, 4)])
+def test_a_zero_that_wanders_stays_in_a_stretch_that_is_hardly_begun(seen, share, ramps):
+    """Three stretches and a bit: the bit is a ramp if the data have half of it; else they said anything of its height."""
+    now = seen()
+    duration = float(now.t[-1])
+    stretch = duration / (3 + share)
+    X = EFFECTS["torque_sensor_drift"].local(now, 1, (0.0, stretch, duration))
+    assert X.any(axis=0).sum() == ramps
+    np.testing.assert_allclose(X[:, :ramps], np.clip(now.t[:, None] / stretch - np.arange(ramps), 0.0, 1.0))
+
+
 def test_the_documentation_lists_every_effect():
     """The page of the diagnosis names each effect of the catalogue."""
     text = (Path(__file__).parents[4] / "docs" / "diagnosis.md").read_text()
