@@ -199,7 +199,7 @@ def test_a_zero_that_wanders_is_followed(seen):
 
 @pytest.mark.parametrize(("share", "ramps"), [(0.4, 3), (0.6, 4)])
 def test_a_zero_that_wanders_stays_in_a_stretch_that_is_hardly_begun(seen, share, ramps):
-    """Three stretches and a bit: the bit is a ramp if the data have half of it; else they said anything of its height."""
+    """Three stretches and a bit: the bit is a ramp if the data have half of it; else they said anything of its size."""
     now = seen()
     duration = float(now.t[-1])
     stretch = duration / (3 + share)
