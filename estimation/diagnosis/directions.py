@@ -109,9 +109,8 @@ def directions(
         change = np.abs(a) * step
         # A kick that does not stand out of the noise where it is looked for is still there; a joint at rest has none.
         usual = float(np.sqrt(np.average(error**2, weights=np.where(turned, change, 0.0) + 1e-300)))
-        if cutoff < LOOP:
-            # It may be as large as the noise hides where it has most power.
-            usual = max(usual, KICK * largest / (2 * np.pi * cutoff) * (LOOP / cutoff) ** 2)
+        # It may be as large as the noise hides where it has most power.
+        usual = max(usual, KICK * largest / (2 * np.pi * cutoff) * (LOOP / cutoff) ** 2)
         jolts[j] = 2 * np.pi * max(cutoff, LOOP) * usual
         error = CLEAR * np.maximum(error, usual)
         least = np.maximum(error, np.maximum(ALIKE * change, SURELY * sharpest(v)))
