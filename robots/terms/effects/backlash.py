@@ -140,16 +140,19 @@ class Backlash(Effect):
         load = load_beside(situation, joint, rotor) - at
         for run in situation.runs:
             t = situation.t[run]
-            side[run] = np.sign(load[run.start])
             inside = (times >= t[0]) & (times <= t[-1])
-            for start, way, duration in zip(times[inside], ways[inside], durations[inside], strict=True):
-                first, last = np.searchsorted(t, (start, start + duration))
-                s = (t[first:last] - start) / duration
-                during = slice(run.start + first, run.start + last)
-                side[during] += 2 * way * (10 * s**3 - 15 * s**4 + 6 * s**5)
-                rate[during] += 2 * way * (30 * s**2 - 60 * s**3 + 30 * s**4) / duration
-                curve[during] += 2 * way * (60 * s - 180 * s**2 + 120 * s**3) / duration**2
-                side[run.start + last : run.stop] += 2 * way
+            start, jump, duration = times[inside], 2 * ways[inside], durations[inside]
+            first, last = np.searchsorted(t, (start, start + duration))
+            # The rows of all crossings, one after the other; they may overlap.
+            count = last - first
+            of = np.repeat(np.arange(len(start)), count)
+            rows = np.arange(len(of)) + np.repeat(first - np.cumsum(count) + count, count)
+            s = (t[rows] - start[of]) / duration[of]
+            per, rises = jump[of] / duration[of], np.bincount(last, jump, len(t) + 1)[: len(t)]
+            curve[run] = np.bincount(rows, per / duration[of] * (60 * s - 180 * s**2 + 120 * s**3), len(t))
+            rate[run] = np.bincount(rows, per * (30 * s**2 - 60 * s**3 + 30 * s**4), len(t))
+            crossed = np.bincount(rows, jump[of] * (10 * s**3 - 15 * s**4 + 6 * s**5), len(t))
+            side[run] = np.sign(load[run.start]) + np.cumsum(rises) + crossed
         return windup(situation, joint, side, rate, curve, rotor)[:, :, None]
 
     def describe(
