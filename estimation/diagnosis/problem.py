@@ -219,9 +219,13 @@ class Problem:
         """Makes two columns of a torque: what it is in some white rows (N,) of its joints' bands, and the rest."""
         torques = [part.astype(np.float64) @ coefficients for part in group.columns]
         white = [np.column_stack([np.where(rows, x, 0.0), np.where(rows, 0.0, x)]) for x in torques]
+        return self.white_group(group.joints, white)
+
+    def white_group(self, joints: tuple[int, ...], white: Sequence[Array]) -> Group:
+        """Measures columns (N, k) of some joints that are white already."""
         small = tuple(np.asfortranarray(part, dtype=np.float32) for part in white)
-        against, cross, (gram,) = self._products(group.joints, small, 1)
-        return Group(group.joints, small, against, gram - against @ against.T, np.diag(gram).copy(), cross)
+        against, cross, (gram,) = self._products(joints, small, 1)
+        return Group(joints, small, against, gram - against @ against.T, np.diag(gram).copy(), cross)
 
     @cached_property
     def calm(self) -> NDArray[np.bool_]:

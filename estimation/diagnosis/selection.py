@@ -17,6 +17,7 @@ from estimation.diagnosis.quiet_logs import profile_gain
 from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scan import Entry, Outcome, Scan, measure, scan
 from estimation.diagnosis.scoring import Accepted, accept, score
+from estimation.diagnosis.shocks import beside_a_shock
 from robots.common.parallel import available_cores
 
 # A member whose gain is within this share of what it was when it won over its rivals wins over them still.
@@ -95,6 +96,7 @@ def select(
         able = [m for m in refined if chance[m.hypothesis] <= false_alarm and m.hypothesis not in spurned]
         alone = SURE * false_alarm if not members else 0.0
         best = [m for m in able if _worth_it(problem, m, members) or _sure(problem, m, chance[m.hypothesis], alone)]
+        best = [m for m in best if not m.hypothesis.effect.passing or _lasts(problem, m, accepted)]
         if not best or not _beyond(problem, best[0], members):
             break
         members.append(best[0])
@@ -171,6 +173,11 @@ def _worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) ->
 def _sure(problem: Problem, candidate: Member, p_value: float, chance: float) -> bool:
     """Whether an effect has a p-value below a chance, and is worth its parameters at all."""
     return p_value < chance and candidate.bic(problem.rows) - candidate.doubt > 0
+
+
+def _lasts(problem: Problem, candidate: Member, accepted: Accepted) -> bool:
+    """Whether what acts for a moment is more than one shock of the noise."""
+    return beside_a_shock(problem, candidate, accepted).worth(problem.rows) > LEAST
 
 
 def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
