@@ -128,9 +128,9 @@ def diagnose_case(case: Case, robot: Robot) -> tuple[Any, dict[str, Any]]:
         before, after = case.oracle_gain(counted)
         squares = [(log.tau**2 * counts).sum(axis=0) for log, counts in zip(unseen, counted, strict=True)]
         size = np.sum(squares, axis=0) / np.sum([counts.sum(axis=0) for counts in counted], axis=0)
-        row["oracle_before"], row["oracle_after"] = float((before / size).sum()), float((after / size).sum())
+        row["oracle_before"], row["oracle_after"] = (before / size).tolist(), (after / size).tolist()
         told = (np.square(said["baseline"]["nrmse"]), np.square(said["extended"]["nrmse"]))
-        row["before"], row["after_extension"] = float(told[0].sum()), float(told[1].sum())
+        row["before"], row["after_extension"] = told[0].tolist(), told[1].tolist()
     return diagnosis, row
 
 

@@ -93,24 +93,25 @@ def within_limits(row: Row) -> bool:
 def gain_ratios(rows: Iterable[Row]) -> np.ndarray:
     """Gain over the gain of the true effects' own model, one at most, where that is more than noise and they last.
 
-    The diagnosis' gain counts from its own base model, with the motion as measured; the true effects' from least
-    squares with the motion as it was, or from the diagnosis' base model where that is better.
+    Gains are of mean squared errors over mean squared torque, summed over the joints. The diagnosis' gain counts from
+    its own base model, with the motion as measured; the true effects' from least squares with the motion as it was, or
+    on a joint from the diagnosis' base model where that is better there.
     """
     ratios = []
     for row in rows:
         if not detected(row) or row.get("oracle_after") is None or not all(e["lasting"] for e in row["truth"]):
             continue
-        told, start = row["before"], min(row["before"], row["oracle_before"])
-        possible = start - row["oracle_after"]
-        if possible > LEAST_GAIN * start:
-            ratios.append(min((told - row["after_extension"]) / possible, 1.0))
+        told, start = np.array(row["before"]), np.minimum(row["before"], row["oracle_before"])
+        possible = float(np.maximum(start - row["oracle_after"], 0.0).sum())
+        if possible > LEAST_GAIN * float(start.sum()):
+            ratios.append(min(float((told - row["after_extension"]).sum()) / possible, 1.0))
     return np.array(ratios)
 
 
 def errors_left(rows: Iterable[Row]) -> np.ndarray:
     """Squared unseen error with what was found over that of least squares with the true effects' own torque."""
     able = (row for row in rows if detected(row) and row.get("oracle_after") is not None)
-    return np.array([row["after_extension"] / row["oracle_after"] for row in able])
+    return np.array([np.sum(row["after_extension"]) / np.sum(row["oracle_after"]) for row in able])
 
 
 def parameter_errors(rows: Iterable[Row], wanted: dict[str, tuple[str, ...]]) -> list[dict[str, Any]]:

@@ -78,6 +78,17 @@ def test_a_worse_base_model_keeps_its_gain_and_makes_none(before: float, after: 
     assert gain_ratios([seen]) == pytest.approx([ratio])
 
 
+def test_a_gain_is_held_to_what_is_possible_on_each_joint() -> None:
+    """A base model that is better on the effect's joint leaves less to gain there, whatever it is on the others."""
+    better = {"before": [4.2e-3, 3.5e-3], "after_extension": [3.3e-3, 3.5e-3]}
+    possible = {"oracle_before": [4.5e-3, 3.1e-3], "oracle_after": [3.2e-3, 3.1e-3]}
+    seen = row([("stribeck", 1)], [("stribeck", 1)], **better, **possible)
+    assert gain_ratios([seen]) == pytest.approx([0.9])
+    # What the base model alone does better on another joint is not to be gained, nor taken off.
+    other = possible | {"oracle_after": [3.2e-3, 3.6e-3]}
+    assert gain_ratios([row([("stribeck", 1)], [("stribeck", 1)], **better, **other)]) == pytest.approx([0.9])
+
+
 def test_what_is_below_the_stated_limit_is_no_miss_of_it() -> None:
     """An effect of 1 % is held to a limit that its report states for its own joint, where that is 1 % or less."""
 
