@@ -7,38 +7,27 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from estimation.diagnosis.band import SHARE, find_bands, unbiased
+from estimation.diagnosis.colour import PLAIN, SPARING, fit_process
 from estimation.diagnosis.gaps import find_gaps, free_columns, long_gap
 from estimation.diagnosis.lines import without_lines
 from estimation.diagnosis.own_functions import Beside
 from estimation.diagnosis.states import Recording
 from estimation.diagnosis.whitening import Whitening
-from estimation.uncertainty.autoregressive import HIGHEST_ORDER, Noise, fit_noise, levinson
 
 Array = NDArray[np.float64]
 
-# Share of the variance added to the diagonal: without it the whitening would amplify an empty band.
-LOADING = 0.01
 # Innovations beyond so many standard deviations count as this many: a level that tails of five degrees pass rarely.
 WINSOR = 5.0
 # The flat part of the band, as a share of its cut-off.
 INSIDE = 0.75
-# Longest memory of the noise model [s], of so many rows a coefficient at least. All of it is used: an order that
-# predicts best misses much of what noise slower than a second has, and slow effects are measured against that. Where
-# nothing is spared, a short one of the order that predicts best: with more it would take slow effects for noise.
-MEMORY, ROWS, SHORT_MEMORY = 1.0, 100, 0.2
-# Noise is flat below this frequency [Hz], the higher one where nothing is spared: what stands out there is an effect's,
-# and not counted. Of fewer periods than so many nothing is said.
-FLAT, SLOW, FEWEST = 0.15, 1.0, 4.0
-ROUNDS = 20
+# Nothing is said of fewer periods than so many.
+FEWEST = 4.0
 # A log's own level counts against that of all logs as its frequencies do against so many.
 FEW = 20.0
 QUIETEST = 1e-3
-# Of the noise's process: fewer coefficients would not tell a colour from white, however seldom rows are.
-LOWEST_ORDER = 4
 # White rows beyond so many standard deviations weigh as if they were there (Huber): kicks that no filter undoes.
 HUBER = 3.5
 # But not where rows stick out for so long [s] together and no reversal is nearer than this [s].
@@ -73,6 +62,7 @@ def estimate_whitening(
         share: of the torque noise, what those may make in the bands.
         spared: for each joint columns (N, k) on which no noise is measured.
     """
+    colour = SPARING if len(spared) else PLAIN
     longest = long_gap(recording.step)
     rests = find_gaps(recording.unsure, recording.starts, longest)
     # Where the direction of motion is not known the residual is no noise.
@@ -91,20 +81,20 @@ def estimate_whitening(
     cutoffs = np.array([band.cutoff for band in bands])
     widths = 1 / (2 * cutoffs * recording.step)
     resting = rests.resting(recording.starts, len(residual), stride, int(np.ceil(1.5 * widths.max())) + 2)
-    measured = _measured(recording, stride, widths, ~resting) if len(spared) else ~resting
+    measured = ~resting if colour.held else _measured(recording, stride, widths, ~resting)
     counts = np.maximum(measured.sum(axis=0), 1).astype(float)
     beside = Beside([gaps.bridged(X, j) for j, X in enumerate(spared)], bands, recording.runs, measured)
     pieces = beside.left(pieces)
-    slowest, fastest = max(FLAT if len(spared) else SLOW, FEWEST / (sum(map(len, pieces)) * step)), INSIDE * cutoffs
-    slowest = slowest if slowest <= SLOW else 0.0
+    slowest, fastest = max(colour.flat, FEWEST / (sum(map(len, pieces)) * step)), INSIDE * cutoffs
+    slowest = slowest if slowest <= PLAIN.flat else 0.0
     period = next((cycle.period for cycle in recording.cycles if cycle is not None), None)
-    noise = _colour(pieces, step, counts, parameters, slowest, fastest, beside, period)
+    noise = fit_process(pieces, step, counts, parameters, (slowest, fastest), beside, period, colour)
     levels = None
     if len(pieces) > 1:
         counted = [rows.sum(axis=0) for rows in np.split(~resting, np.cumsum([len(piece) for piece in pieces])[:-1])]
         levels = _levels([noise.whitened(piece) for piece in pieces], counted, step, slowest, fastest)
         pieces = [piece / level for piece, level in zip(pieces, levels, strict=True)]
-        noise = _colour(pieces, step, counts, parameters, slowest, fastest, beside, period)
+        noise = fit_process(pieces, step, counts, parameters, (slowest, fastest), beside, period, colour)
     trimmed = max(len(a) for a in noise.coefficients)
     innovations = np.concatenate([noise.whitened(piece)[min(trimmed, len(piece) // 2) :] for piece in pieces])
     # White noise has as much power at each frequency: what effects add to the slow ones is left out, and above the band
@@ -200,75 +190,6 @@ def _unit(spectrum: NDArray[np.complex128], rows: int) -> Array:
     white = np.clip(white / np.maximum(white.std(axis=0), 1e-12), -WINSOR, WINSOR)
     white -= white.mean(axis=0)
     return np.asarray(white / np.maximum(white.std(axis=0), 1e-12))
-
-
-def _colour(
-    pieces: Sequence[Array],
-    step: float,
-    counts: Array,
-    parameters: int,
-    slowest: float,
-    fastest: Array,
-    beside: Beside,
-    period: float | None,
-) -> Noise:
-    """Fits the noise by its spectrum within a window, and lets the model say what is outside.
-
-    What an effect leaves in the residual is slow, as motion is; taken for noise it would hide itself. Above the window
-    is the edge of the band. Outside, the spectrum is what the fitted process has there, again and again until it stays
-    (a Yule-Walker fit of data that are missing).
-
-    Args:
-        pieces: residual of each log (N, n), `step` [s] a row.
-        step: the sample period [s].
-        counts: rows of each joint that are no bridge over a time at rest (n,).
-        parameters: how many were fitted to the residual: they have taken some of the noise.
-        slowest: lowest frequency of the windows [Hz].
-        fastest: highest of each joint's (n,) [Hz].
-        beside: what was taken out of the pieces.
-        period: of the motion [s]; None where it does not repeat.
-    """
-    rows, joints = sum(map(len, pieces)), pieces[0].shape[1]
-    longest = np.minimum(MEMORY / step, counts / ROWS) if beside.spares else np.full(joints, round(SHORT_MEMORY / step))
-    orders = np.clip(longest, LOWEST_ORDER, HIGHEST_ORDER).astype(int)
-    times = HIGHEST_ORDER if beside.spares else 1
-    size = next_fast_len(max(map(len, pieces)) + int(orders.max()) + 1, real=True)
-    power = sum(np.abs(np.fft.rfft(piece, size, axis=0)) ** 2 for piece in pieces) / counts
-    power = without_lines(power / beside.kept(size, counts), 1 / (size * step), period)
-    power = power * rows * joints / max(rows * joints - parameters, 0.5 * rows * joints)
-    covariances = [
-        _covariance(power[:, j], size, step, counts[j], (slowest, float(fastest[j])), orders[j], times)
-        for j in range(joints)
-    ]
-    return fit_noise(np.concatenate(pieces), counts, covariances, times)
-
-
-def _covariance(
-    power: Array, size: int, step: float, count: float, window: tuple[float, float], highest: int, times: int
-) -> Array:
-    """Gives one joint's covariances (highest + 1,) from its power (F,), known in a window alone, of `size` rows.
-
-    What is outside is what a process of so many `times` the order that predicts best has there.
-    """
-    f = np.fft.rfftfreq(size, step)
-    power = power.copy()
-
-    def covariance() -> Array:
-        result = np.fft.irfft(power, size)[: highest + 1]
-        result[0] = max(result[0] * (1 + LOADING), np.finfo(float).tiny)
-        return np.asarray(result)
-
-    known = (f >= window[0]) & (f < window[1])
-    if known.any() and not known.all():
-        places = np.flatnonzero(known)
-        quarter = max(1, len(places) // 4)
-        power[f < window[0]] = power[places[:quarter]].mean()
-        power[f >= window[1]] = power[places[-quarter:]].mean()
-        lags = np.exp(-2j * np.pi * step * f[~known, None] * np.arange(1, highest + 1))
-        for _ in range(ROUNDS):
-            a, variance = levinson(covariance(), count, times)
-            power[~known] = variance / np.abs(1.0 - lags[:, : len(a)] @ a) ** 2
-    return covariance()
 
 
 def quiet_joints(recording: Recording, residual: Array, inertia: Array) -> NDArray[np.bool_]:

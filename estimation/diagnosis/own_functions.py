@@ -46,11 +46,6 @@ class Beside:
             whole = np.concatenate([band.passed(np.asfortranarray(X[run])) for run in runs]) * measured[:, [j]]
             self.pieces.append(np.split(orthonormal(whole, FAINT), np.cumsum(lengths)[:-1]))
 
-    @property
-    def spares(self) -> bool:
-        """Whether anything is taken out."""
-        return bool(self.pieces)
-
     def left(self, pieces: list[Array]) -> list[Array]:
         """Projects the columns out of residuals (M, n) of each log; rows that do not count are zero."""
         result = [piece * rows for piece, rows in zip(pieces, self.measured, strict=True)]
