@@ -34,8 +34,8 @@ class Spot(JointEffect):
     odd: bool = False
 
     shapes = (
-        Shape("centre", "rad or m", -np.inf, np.inf),
-        Shape("width", "rad or m", 0.0, np.inf, "log"),
+        Shape("centre", "rad", -np.inf, np.inf),
+        Shape("width", "rad", 0.0, np.inf, "log"),
     )
 
     @property
