@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import resource
 import tempfile
 import time
@@ -18,6 +19,7 @@ from benchmarks.diagnosis_parts.followups import follow
 from benchmarks.diagnosis_parts.strata import STRATA, Task, draw
 from robots import load_robot
 from robots.common.errors import AssumedValueWarning, OedError
+from robots.common.memory import give_back
 from robots.robot import Robot
 from robots.signals import Log
 from tests.truth.cases import Case
@@ -50,7 +52,12 @@ def run(task: Task) -> dict[str, Any]:
 
 
 def forget_peak() -> None:
-    """Lets the system count this process's largest memory from now on: the plant's own may be larger (Linux only)."""
+    """Lets the system count this process's largest memory from now on (Linux only).
+
+    The plant's own may be larger, and what a case before left is given back.
+    """
+    gc.collect()
+    give_back()
     with contextlib.suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
 
