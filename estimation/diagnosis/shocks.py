@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
+from scipy.signal import correlate
 
 from estimation.diagnosis.problem import Group, Problem
 from estimation.diagnosis.refinement import ACTS, Member
@@ -77,7 +78,7 @@ def _sizes(problem: Problem, left: Array, joints: tuple[int, ...], offset: float
     weights = problem.whitening.weights
     # As large as it was, not as it counts.
     whole = left if weights is None else left / np.maximum(weights, 1e-3)
-    columns = [np.convolve(whole[:, j], _bump(problem, j, offset)[::-1], mode="same") for j in joints]
+    columns = [correlate(whole[:, j], _bump(problem, j, offset), mode="same", method="direct") for j in joints]
     return np.abs(np.column_stack(columns))
 
 

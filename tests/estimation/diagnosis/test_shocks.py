@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from estimation import diagnose
+from estimation.diagnosis.band import low_pass
+from estimation.diagnosis.shocks import _bump, _sizes
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -39,3 +42,19 @@ def test_a_shock_is_no_push(
     log = replace(log, q=np.round(log.q / COARSE) * COARSE, tau=log.tau + noise + pushed)
     result = diagnose(arm, log, candidates=("external_contact", "stribeck"), friction="coulomb-viscous")
     assert [finding.effect for finding in result.findings] == found
+
+
+@pytest.mark.parametrize("rows", [25, 400])
+def test_a_shock_is_found_where_it_is_and_as_large_as_it_is(rows: int) -> None:
+    """Also in a log that is shorter than the band's filter; a row that counts for less is as large as it was."""
+    band, weights = low_pass(2.0, 10.0, 2), np.ones((rows, 1))
+    problem = SimpleNamespace(rows=rows, whitening=SimpleNamespace(bands=(band,), stride=2, weights=weights))
+    bump = _bump(problem, 0, 0.5)
+    whole, middle = np.zeros(rows + 2 * len(bump)), len(bump) + 11
+    whole[middle - len(bump) // 2 : middle + len(bump) // 2 + 1] = 7.0 * bump
+    left = whole[len(bump) : len(bump) + rows, None]
+    weights[11] = 0.5
+    sizes = _sizes(problem, left * weights, (0,), 0.5)
+    assert sizes.shape == (rows, 1)
+    assert np.argmax(sizes) == 11
+    assert sizes.max() == pytest.approx(7.0, rel=0.02)
