@@ -195,7 +195,8 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
                 f"value {parameter.value:.3g} s is one of many that fit."
             )
         if finding.gain.ci95[0] <= 0:
-            notes.append(f"The gain of {finding.effect} on unseen data is not sure: its interval begins below zero.")
+            where = f"{finding.effect} of joint {finding.joint}" if finding.joint else finding.effect
+            notes.append(f"The gain of {where} on unseen data is not sure: its interval begins below zero.")
     open_ = sorted({member.hypothesis.joint for member in told.judgement.patterns if member.hypothesis.joint})
     if open_:
         names = ", ".join(map(str, open_))
