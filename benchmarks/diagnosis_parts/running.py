@@ -24,6 +24,7 @@ from robots.robot import Robot
 from robots.signals import Log
 from tests.truth.cases import Case
 from tests.truth.description import write_description
+from tests.truth.oracle import ask_oracle
 from tests.truth.plant import Record
 
 
@@ -132,10 +133,11 @@ def diagnose_case(case: Case, robot: Robot) -> tuple[Any, dict[str, Any]]:
     if unseen and case.effects:
         # On the same rows: the diagnosis leaves out ends, where filters err, and rows whose direction it does not know.
         counted = [_counted(diagnosis.trace, log) for log in unseen]
-        before, after = case.oracle_gain(counted)
+        oracle = ask_oracle(case, counted)
         squares = [(log.tau**2 * counts).sum(axis=0) for log, counts in zip(unseen, counted, strict=True)]
         size = np.sum(squares, axis=0) / np.sum([counts.sum(axis=0) for counts in counted], axis=0)
-        row["oracle_before"], row["oracle_after"] = (before / size).tolist(), (after / size).tolist()
+        for name in ("before", "after", "as_measured"):
+            row[f"oracle_{name}"] = (getattr(oracle, name) / size).tolist()
         told = (np.square(said["baseline"]["nrmse"]), np.square(said["extended"]["nrmse"]))
         row["before"], row["after_extension"] = told[0].tolist(), told[1].tolist()
     return diagnosis, row

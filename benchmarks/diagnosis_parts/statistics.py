@@ -90,19 +90,24 @@ def within_limits(row: Row) -> bool:
     return any(size is not None and row["truth"][0]["visible"] >= size for size in stated)
 
 
-def gain_ratios(rows: Iterable[Row]) -> np.ndarray:
+def gain_ratios(rows: Iterable[Row], oracle: str = "oracle_after") -> np.ndarray:
     """Gain over the gain of the true effects' own model, one at most, where that is more than noise and they last.
 
     Gains are of mean squared errors over mean squared torque, summed over the joints. The diagnosis' gain counts from
     its own base model, with the motion as measured; the true effects' from least squares with the motion as it was, or
     on a joint from the diagnosis' base model where that is better there.
+
+    Args:
+        rows: of the benchmark.
+        oracle: ``oracle_after``, which knows the motion that the effects act by, or ``oracle_as_measured``, which has
+            their formulas and the positions that were logged.
     """
     ratios = []
     for row in rows:
-        if not detected(row) or row.get("oracle_after") is None or not all(e["lasting"] for e in row["truth"]):
+        if not detected(row) or row.get(oracle) is None or not all(e["lasting"] for e in row["truth"]):
             continue
         told, start = np.array(row["before"]), np.minimum(row["before"], row["oracle_before"])
-        possible = float(np.maximum(start - row["oracle_after"], 0.0).sum())
+        possible = float(np.maximum(start - row[oracle], 0.0).sum())
         if possible > LEAST_GAIN * float(start.sum()):
             ratios.append(min(float((told - row["after_extension"]).sum()) / possible, 1.0))
     return np.array(ratios)

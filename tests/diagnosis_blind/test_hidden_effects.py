@@ -24,6 +24,7 @@ from tests.truth.cases import Case, draw_case, write_log
 from tests.truth.description import write_description
 from tests.truth.effects import actuator, friction, strangers, surroundings, transmission, whole_strangers
 from tests.truth.effects.base import Effect
+from tests.truth.oracle import ask_oracle
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -115,8 +116,8 @@ def truth_of(case: Case) -> Truth:
     if not case.unseen or not all(effect.lasting for effect in case.effects):
         return Truth(effects=case.effects)
     size = np.mean(np.concatenate([record.tau for record in case.unseen]) ** 2, axis=0)
-    before, after = (float((errors / size).sum()) for errors in case.oracle_gain())
-    return Truth(effects=case.effects, before=before, after=after)
+    told = ask_oracle(case)
+    return Truth(effects=case.effects, before=float((told.before / size).sum()), after=float((told.after / size).sum()))
 
 
 @pytest.mark.parametrize("hide", SINGLE, ids=lambda hide: hide.name)

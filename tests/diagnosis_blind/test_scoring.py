@@ -78,6 +78,15 @@ def test_a_worse_base_model_keeps_its_gain_and_makes_none(before: float, after: 
     assert gain_ratios([seen]) == pytest.approx([ratio])
 
 
+def test_a_gain_is_held_to_formulas_and_logged_positions_too() -> None:
+    """What the logged positions do not tell is not to be gained by any model of the effect."""
+    seen = row([("backlash", 2)], [("backlash", 2)], **AFTER, before=4.5e-3, oracle_as_measured=[3.2e-3])
+    assert gain_ratios([seen]) == pytest.approx([1.3 / 1.5])
+    assert gain_ratios([seen], "oracle_as_measured") == pytest.approx([1.0])
+    assert "lowest tenth 0.87" in figures([seen])
+    assert "motion as logged, 1 cases" in figures([seen])
+
+
 def test_a_gain_is_held_to_what_is_possible_on_each_joint() -> None:
     """A base model that is better on the effect's joint leaves less to gain there, whatever it is on the others."""
     better = {"before": [4.2e-3, 3.5e-3], "after_extension": [3.3e-3, 3.5e-3]}

@@ -24,7 +24,7 @@ ROUNDS = 5
 TOO_FAINT = 1.4
 AWAY = 0.25
 EVERY = 2
-BESIDE = 5
+MOTION = ("q_true", "v_true", "a_true", "sign")
 
 
 class Hidden(Exception):
@@ -57,7 +57,7 @@ class Case:
     def visible(self) -> list[float]:
         """The share of its torque's RMS that each effect shows beyond the base model, in the logs as they became."""
         level = self.level()
-        stack = [np.concatenate([getattr(r, key)[::EVERY] for r in self.logs]) for key in _MOTION]
+        stack = [np.concatenate([getattr(r, key)[::EVERY] for r in self.logs]) for key in MOTION]
         projection = Projection(base_regressor(self.machine.known, *stack), level)
         parts = [np.concatenate([r.parts[k][::EVERY] for r in self.logs]) for k in range(len(self.effects))]
         return [float(projection.visible(part).max()) for part in parts]
@@ -65,51 +65,6 @@ class Case:
     def level(self) -> np.ndarray:
         """RMS of each joint's torque (n,) without noise."""
         return np.sqrt(np.concatenate([r.clean for r in self.logs]).__pow__(2).mean(axis=0))
-
-    def oracle_gain(self, counted: Sequence[np.ndarray] | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Mean squared errors (n,) on the unseen logs of the base model, and of it with the effects' own torques.
-
-        Both are least squares on the logs, with the motion as it was and each effect's own torque as one column.
-
-        Args:
-            counted: rows (N, n) of each unseen log that count; by default all but those beside a joint's reversal: from
-                a log nobody knows which sign its friction has there.
-        """
-        level = self.level()
-        chosen = counted or [_away_from_reversals(r.v_true) for r in self.unseen]
-        counts = np.concatenate([rows[::EVERY] for rows in chosen])
-        errors = []
-        for columns in (False, True):
-            Y, y, parts = self._stack(self.logs, columns)
-            if columns:
-                Y = np.concatenate([Y, parts], axis=2)
-            fit = Projection(Y, level).fit(y)
-            Y, y, parts = self._stack(self.unseen, columns)
-            if columns:
-                Y = np.concatenate([Y, parts], axis=2)
-            errors.append(((y - Y @ fit) ** 2 * counts).sum(axis=0) / counts.sum(axis=0))
-        return errors[0], errors[1]
-
-    def _stack(self, records: Sequence[Record], parts: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-        stack = [np.concatenate([getattr(r, key)[::EVERY] for r in records]) for key in _MOTION]
-        Y = base_regressor(self.machine.known, *stack)
-        y = np.concatenate([r.tau[::EVERY] for r in records])
-        if not parts:
-            return Y, y, None
-        own = [np.concatenate([r.parts[k][::EVERY] for r in records]) for k in range(len(self.effects))]
-        return Y, y, np.stack(own, axis=2)
-
-
-_MOTION = ("q_true", "v_true", "a_true", "sign")
-
-
-def _away_from_reversals(v: np.ndarray) -> np.ndarray:
-    """Marks rows (N, n) more than `BESIDE` samples from a change of direction."""
-    turned = np.zeros(v.shape, dtype=bool)
-    turned[1:] = np.sign(v[1:]) != np.sign(v[:-1])
-    counted = np.cumsum(np.vstack([np.zeros((1, v.shape[1])), turned]), axis=0)
-    rows = np.arange(len(v))
-    return counted[np.minimum(rows + BESIDE + 1, len(v))] == counted[np.maximum(rows - BESIDE, 0)]
 
 
 def draw_case(
