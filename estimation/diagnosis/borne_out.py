@@ -46,11 +46,12 @@ def bear_out(
     beyond: Callable[[Effect], bool],
     forms: Callable[[Sequence[Member], int], Sequence[Member]],
     faint: Callable[[Member], bool],
+    unnamed: Callable[[Member, Sequence[Member]], tuple[Member, float] | None],
 ) -> BorneOut:
     """Leaves out what makes unseen errors larger, one after the other, the surest first.
 
     However well it fits, it is no cause: a few rows at the end of a log. Where another form of it that fits about as
-    well is borne out, or a rival, that takes its place.
+    well is borne out, or a rival, that takes its place; else what it was for is told as unexplained.
 
     Args:
         judgement: what was found.
@@ -59,6 +60,7 @@ def bear_out(
         forms: lists other forms of one of some members, the likeliest first.
         faint: tells which names hardly stand out of the noise: unseen data that do not speak for one are the odds
             against it.
+        unnamed: finds a free function of what a name that is left out was for, beside other members; with its p-value.
     """
     founds = list(judgement.kept)
     members = [*(found.member for found in founds), *judgement.patterns]
@@ -85,10 +87,14 @@ def bear_out(
                 notes.append(_REPLACED.format(label, members[worst].hypothesis.label))
             continue
         else:
+            refused = members[worst]
             for items in (founds, members, p_values):
                 items.pop(worst)
             notes.append(_DROPPED.format(label))
             refuted = True
+            if (free := unnamed(refused, members)) is not None:
+                members.append(free[0])
+                p_values.append(free[1])
         seen = measure(members)
     joints = sorted({member.hypothesis.joint or 0 for member, _, _ in spoiling})
     notes += [_SPOILING.format(f"joint {joint}" if joint else "the robot as a whole") for joint in joints]

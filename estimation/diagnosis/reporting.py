@@ -17,13 +17,17 @@ from estimation.diagnosis.findings import Finding
 from estimation.diagnosis.forms import alike_forms
 from estimation.diagnosis.gain import Unseen
 from estimation.diagnosis.hidden_springs import hidden_springs
+from estimation.diagnosis.hypotheses import all_hypotheses
 from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
+from estimation.diagnosis.patterns import all_patterns
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import cut
+from estimation.diagnosis.refinement import Member
+from estimation.diagnosis.scan import measure
 from estimation.diagnosis.selection import LEAST, Found, Selection
 from estimation.diagnosis.unseen import Measured, measure_unseen, simulate_unseen
-from estimation.diagnosis.verdict import CLOSE, Judgement, is_open
+from estimation.diagnosis.verdict import CLOSE, Judgement, is_open, strongest_pattern
 from estimation.diagnosis.windup import EFFECT as ELASTICITY
 from estimation.diagnosis.windup import Windup, measure_windups
 from estimation.diagnosis.wording import word_finding
@@ -68,10 +72,13 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         partial(_is_beyond, told),
         partial(alike_forms, problem),
         lambda member: member.worth(problem.rows) <= LEAST,
+        partial(_unnamed, robot, told),
     )
     members, founds, seen, spoiling = held.members, held.founds, held.seen, held.spoiling
     verdict = judgement.verdict
-    if held.notes and len(members) == len(founds) and not spoiling:
+    if len(members) > len(founds) or spoiling:
+        verdict = "unexplained"
+    elif held.notes:
         # Something did stand out of the noise clearly, if a name that did does not hold.
         verdict = "ambiguous" if any(map(is_open, founds)) else "named"
         verdict = verdict if members else "unexplained" if held.refuted else "none"
@@ -131,6 +138,15 @@ def _is_beyond(told: Told, effect: Effect) -> bool:
     if not told.held_out:
         return False
     return effect.passing or (not told.dated and effect.depends_on == "time")
+
+
+def _unnamed(robot: Robot, told: Told, member: Member, beside: Sequence[Member]) -> tuple[Member, float] | None:
+    """Finds a free function on the joint of a name that unseen data refuted, or on all where it was the robot's."""
+    own = member.hypothesis.joint
+    wanted = [h for h in all_hypotheses(robot, list(all_patterns(robot))) if own is None or h.joint == own]
+    entries = measure(told.problem, wanted)
+    rng = np.random.default_rng(told.seed + 4)
+    return strongest_pattern(told.problem, entries, beside, told.false_alarm, rng)
 
 
 _LOST = "Simulated forward, the fitted robot ran away from the position loop: its fit suits no simulation."

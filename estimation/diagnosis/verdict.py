@@ -107,6 +107,18 @@ def judge(
     return Judgement(verdict, kept, (), (), float(share))
 
 
+def strongest_pattern(
+    problem: Problem,
+    patterns: Sequence[Entry],
+    named: Sequence[Member],
+    false_alarm: float,
+    rng: np.random.Generator,
+) -> tuple[Member, float] | None:
+    """Gives the free function that explains most beside names, and its p-value; None where noise explains as much."""
+    members, p_values = _patterns(problem, patterns, named, false_alarm, rng, alone=True)
+    return (members[0], p_values[0]) if members else None
+
+
 def _possible(problem: Problem, found: Found) -> Found:
     """Leaves out rivals that no machine has."""
     rivals = tuple(pair for pair in found.rivals if _believable(problem, pair[0]))

@@ -98,6 +98,7 @@ def _borne(
     held_out: bool = True,
     forms: Sequence[Member] = (),
     faint: Sequence[Member] = (),
+    unnamed: tuple[Member, float] | None = None,
 ) -> BorneOut:
     judgement = Judgement("named", founds, tuple(free), tuple(p_values), 1.0)
 
@@ -110,6 +111,7 @@ def _borne(
         beyond,
         lambda members, i: forms if members[i] is SPRING else (),
         lambda member: member in faint,
+        lambda member, beside: None if member in beside else unnamed,
     )
 
 
@@ -169,6 +171,20 @@ def test_a_name_that_surely_harms_is_left_out_with_a_note() -> None:
     (note,) = result.notes
     assert "spring of joint 2" in note
     assert "left out" in note
+
+
+@pytest.mark.parametrize("shown", [HELPS, HARMS])
+def test_what_a_refuted_name_was_for_is_told_as_unexplained(shown: Shown) -> None:
+    """A free function takes its place: in the model where unseen data bear it out, else beside it."""
+    free = _member("pattern:load:0:odd", 2)
+    bench = _bench(spring=HARMS)
+    bench.shows[free.hypothesis.label] = shown
+    result = _borne(bench, Found(SPRING, 1e-9, ()), Found(STRIBECK, 1e-5, ()), unnamed=(free, 1e-7))
+    assert [found.member for found in result.founds] == [STRIBECK]
+    assert result.members == ((STRIBECK, free) if shown is HELPS else (STRIBECK,))
+    assert result.p_values == ((1e-5, 1e-7) if shown is HELPS else (1e-5,))
+    assert [member for member, *_ in result.spoiling] == ([] if shown is HELPS else [free])
+    assert result.refuted
 
 
 @pytest.mark.parametrize(
