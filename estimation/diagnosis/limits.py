@@ -111,7 +111,8 @@ def _limit(
         return _none(hypothesis, UNSURE if unsure else HIDDEN)
     picked = [showing[k] for k in _spread(len(showing), SHAPES)]
     bounds = hypothesis.effect.bounds(problem.situation, hypothesis.joint)
-    free = [k for k, (low, high) in enumerate(bounds) if high > low]
+    # What an effect is whole without is none of its parameters where it just shows.
+    free = [k for k, (low, high) in enumerate(bounds) if high > low and not hypothesis.effect.shapes[k].beside]
 
     def size(at: int) -> float:
         assumed = hypothesis.effect.likely(

@@ -114,11 +114,13 @@ def refine(
     situation = problem.sees(hypothesis.effect)
     bounds = hypothesis.effect.bounds(situation, hypothesis.joint)
     scales = [shape.scale for shape in hypothesis.effect.shapes]
-    free = [k for k, (low, high) in enumerate(bounds) if high > low]
+    loose = [k for k, (low, high) in enumerate(bounds) if high > low]
     moments = [shape.moment for shape in hypothesis.effect.shapes]
     best: list[Member] = []
 
-    def evaluate(shape: tuple[float, ...], fitted: int = len(free)) -> float:
+    def evaluate(shape: tuple[float, ...], fitted: int | None = None) -> float:
+        if fitted is None:
+            fitted = sum(not hypothesis.effect.shapes[k].is_left(shape[k]) for k in loose)
         group = problem.measured(hypothesis, shape)
         result = score(problem, group, accepted)
         gain, coefficients = result.bounded(*hypothesis.coefficient_bounds(situation.robot, shape))
@@ -126,13 +128,10 @@ def refine(
         worth = member.bic(problem.rows)
         if not best or worth > best[0].bic(problem.rows):
             best[:] = [member]
-        return worth
+        # What is climbed has no step where a parameter that costs begins to count.
+        return gain
 
-    if hypothesis.effect.last:
-        # What is known now may have been free where the search comes from.
-        start = tuple(min(max(value, low), high) for value, (low, high) in zip(start, bounds, strict=True))
-    evaluate(start)
-    if free and effort:
+    def search(free: list[int], start: tuple[float, ...]) -> None:
         at = list(start)
         steps = {k: _spacing(hypothesis.effect.grid(situation, hypothesis.joint), k, start) for k in free if moments[k]}
 
@@ -156,11 +155,22 @@ def refine(
                 worths = [evaluate(slope) for slope in slopes]
                 at[:] = slopes[int(np.argmax(worths))]
                 climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)
+
+    if hypothesis.effect.last:
+        # What is known now may have been free where the search comes from.
+        start = tuple(min(max(value, low), high) for value, (low, high) in zip(start, bounds, strict=True))
+    evaluate(start)
+    if loose and effort:
+        # What the effect is whole without comes last, from where the rest led.
+        later = [k for k in loose if hypothesis.effect.shapes[k].is_left(start[k])]
+        search([k for k in loose if k not in later], start)
+        if later:
+            search(loose, best[0].shape)
     if effort:
         refined = best[0]
         for known in hypothesis.effect.likely(situation, hypothesis.joint, refined.shape, refined.coefficients):
             shape = tuple(own if value is None else value for value, own in zip(known, refined.shape, strict=True))
-            evaluate(shape, sum(known[k] is None for k in free))
+            evaluate(shape, sum(known[k] is None for k in loose))
     found = best[0]
     if hypothesis.effect.alike:
         return _agreed(problem, found, accepted)

@@ -79,6 +79,8 @@ def _parameters(
     errors = np.sqrt(np.maximum(np.diag(extension.covariance), 0.0))
     result = []
     for own, value, error, sure in zip(described, values, errors, known, strict=True):
+        if isinstance(own, Shape) and own.is_left(value):
+            continue
         interval = (value - 1.96 * error, value + 1.96 * error)
         if isinstance(own, Shape) and own.scale == "log" and np.isfinite(error) and value > 0:
             factor = float(np.exp(1.96 * error / value))

@@ -50,6 +50,8 @@ class Shape:
         inexact: standard error that the formula itself has, beside that of the data: no change is quite sudden, no push
             has quite that form. In the parameter's unit; a share of the value on a logarithmic scale.
         default: what it is where a description does not say; None where it must be said.
+        beside: whether the effect is whole without it: it is sought once the others are found, and is one of its
+            parameters only where it is not the default.
     """
 
     name: str
@@ -60,11 +62,16 @@ class Shape:
     grid: tuple[float, ...] = ()
     inexact: float = 0.0
     default: float | None = None
+    beside: bool = False
 
     @property
     def moment(self) -> bool:
         """Whether it is a moment of the logs' clock."""
         return self.unit == "s" and self.lower == -np.inf
+
+    def is_left(self, value: float) -> bool:
+        """Whether a value says that the effect is whole without it."""
+        return self.beside and value == self.default
 
     def unit_at(self, robot: Robot, joint: Place) -> str:
         """Gives its unit where the effect acts: that of a linear axis' positions and forces on one."""

@@ -18,17 +18,29 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class ThermalFriction(HeatEffect):
-    """tau = -x (a sign(dq) + b dq), dx/dt = P - x / T: x is the heat kept of the friction power P.
+SLOWER = 12.0
+"""Times the gear's time constant, with which the housing that it heats goes cold: only a log of hours tells which."""
+MIDDLE = 400.0
+FADES = 5.0
+"""Largest fading times the heat kept with a middling time constant: friction is as good as gone there."""
 
-    Temperature is heat over capacity; without a sensor, capacity and the friction's change per degree cannot be told
-    apart, so coefficients are per kilojoule. One heat node: the gear's; the housing's is its slower limit.
+
+class ThermalFriction(HeatEffect):
+    """tau = -f (a sign(dq) + b dq), f = (1 - exp(-k x)) / k, x = y + w z / c, dy/dt = P - y / T, dz/dt = P - z / (c T).
+
+    x is the heat kept of the friction power P. Temperature is heat over capacity; without a sensor, capacity and the
+    friction's change per degree cannot be told apart, so coefficients are per kilojoule. Two heat nodes, gear and
+    housing, answer with two exponentials: the slow one, of weight w where both have settled, is little of a log, but
+    most of what a pause leaves. A lubricant's viscosity falls exponentially: the first kilojoule takes more than the
+    next. Where the data do not ask for them, w and k are zero.
     """
 
     name: ClassVar[str] = "thermal_friction"
     title: ClassVar[str] = "friction that falls as the joint warms up"
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("time_constant", "s", 5.0, 7200.0, "log", (15.0, 45.0, 135.0, 400.0, 1200.0, 3600.0), 0.05),
+        Shape("housing_weight", "", 0.0, 5.0, "linear", (0.0,), default=0.0, beside=True),
+        Shape("fading", "1/kJ", 0.0, np.inf, "linear", (0.0,), default=0.0, beside=True),
     )
     rivals: ClassVar[tuple[str, ...]] = ("friction_step", "torque_sensor_drift", "torque_constant_heat", "load_heat")
     experiments: ClassVar[tuple[str, ...]] = ("pause", "single_joint", "static_hold")
@@ -44,8 +56,19 @@ class ThermalFriction(HeatEffect):
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates -x sign(dq) and -x dq, x in kJ."""
-        x = heat(situation, joint, shape[0])
+        x = _kept(situation, joint, shape)
         return np.column_stack([-x * situation.sign[:, joint - 1], -x * situation.dq[:, joint - 1]])
+
+    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
+        """Lets friction fade no faster than the heat of these logs can show."""
+        assert joint is not None
+        time, weight, _ = super().bounds(situation, joint)
+        most = float(heat(situation, joint, MIDDLE).max(initial=0.0))
+        return time, weight, (0.0, FADES / most if most > 0 else 0.0)
+
+    def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists time constants with housings that stay cold, and that warm up as much as the gear or more."""
+        return tuple((time, weight, 0.0) for time, *_ in self.grid(situation, joint) for weight in (0.0, 1.0, 3.0))
 
     def describe(
         self,
@@ -60,13 +83,27 @@ class ThermalFriction(HeatEffect):
         return (
             f"Joint {joint} loses friction as it warms up: {coefficients[0]:.3g} {force} of Coulomb and "
             f"{coefficients[1]:.3g} {force} s/{length} of viscous friction per kJ of its own friction heat; the heat "
-            f"goes with a time constant of {shape[0]:.0f} s."
+            f"goes with a time constant of {shape[0]:.0f} s{_more(shape)}."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the heat kept."""
         assert joint is not None
-        return f"friction heat kept in joint {joint} [kJ]", heat(situation, joint, shape[0])
+        return f"friction heat kept in joint {joint} [kJ]", _kept(situation, joint, shape)
+
+
+def _more(shape: tuple[float, ...]) -> str:
+    _, weight, fading = shape
+    slow = f", and {weight:.2g} times as much with one {SLOWER:.0f} times as long" if weight > 0 else ""
+    return slow + (f"; the fall fades as exp(-x {fading:.2g}/kJ)" if fading > 0 else "")
+
+
+def _kept(situation: Situation, joint: int, shape: tuple[float, ...]) -> Array:
+    time, weight, fading = shape
+    x = heat(situation, joint, time)
+    if weight > 0:
+        x = x + weight / SLOWER * heat(situation, joint, SLOWER * time)
+    return -np.expm1(-fading * x) / fading if fading > 0 else x
 
 
 def heat(situation: Situation, joint: int, time_constant: float) -> Array:

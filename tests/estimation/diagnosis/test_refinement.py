@@ -206,3 +206,42 @@ def test_a_search_starts_again_from_other_summits(far: bool, expected: float, mo
     effect = _Summits(far)
     member = refinement.refine(problem, Hypothesis(effect, 1), (0.08,), None)  # type: ignore[arg-type]
     assert member.shape[0] == pytest.approx(expected, rel=0.05)
+
+
+class _More(Stribeck):
+    """A shape parameter, and one that the effect is whole without."""
+
+    shapes = (
+        Shape("place", "rad", 1e-4, 1.0, "log", (0.08,)),
+        Shape("more", "", 0.0, 2.0, "linear", (0.0,), default=0.0, beside=True),
+    )
+
+    def likely(self, *_: object) -> tuple[tuple[float | None, ...], ...]:
+        return ()
+
+    def elsewhere(self, *_: object) -> tuple[tuple[tuple[float, ...], ...], ...]:
+        return ()
+
+
+@pytest.mark.parametrize(("brings", "place", "more", "degrees"), [(5.0, 0.1, 0.0, 2), (60.0, 0.03, 1.0, 3)])
+def test_what_an_effect_is_whole_without_is_a_parameter_only_where_it_pays(
+    brings: float, place: float, more: float, degrees: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With more of it the place is another: worth ln 5000 = 8.5 it is fitted, else the place is as without it."""
+
+    def score(problem: object, shape: tuple[float, ...], accepted: object) -> SimpleNamespace:
+        top = -1.0 + shape[1] * (np.log10(0.03) + 1.0)
+        gain = 100 - 400 * (np.log10(shape[0]) - top) ** 2 + brings * (1 - (shape[1] - 1) ** 2)
+        return SimpleNamespace(bounded=lambda *_: (float(gain), np.ones(1)), degrees=1, visible=1.0)
+
+    monkeypatch.setattr(refinement, "score", score)
+    monkeypatch.setattr(Hypothesis, "coefficient_bounds", lambda *_: ((-np.inf, np.inf),))
+
+    class _Shape(tuple):  # type: ignore[type-arg]
+        joints = (0,)
+
+    situation = SimpleNamespace(robot=None)
+    problem = SimpleNamespace(sees=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
+    member = refinement.refine(problem, Hypothesis(_More(), 1), (0.08, 0.0), None)  # type: ignore[arg-type]
+    assert member.shape == (pytest.approx(place, rel=0.05), pytest.approx(more, abs=0.05))
+    assert member.degrees == degrees

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from robots.terms.effects import EFFECTS
 from robots.terms.effects.situation import situation
 from robots.terms.effects.states import bristle, change_times
-from robots.terms.effects.thermal_friction import heat
+from robots.terms.effects.thermal_friction import SLOWER, heat
 
 
 @pytest.mark.parametrize("travel", [0.02, 2e-4])
@@ -63,6 +63,37 @@ def test_heat_is_kept_and_lost(seen, time_constant):
     got = heat(now, 2, time_constant)
     # The uneven log is interpolated to an even one, by its own spacing.
     np.testing.assert_allclose(got, np.concatenate([first, second]), atol=1e-3 * first.max())
+
+
+def test_a_warm_housing_keeps_heat_through_a_pause(seen):
+    """Gear and housing of two heat nodes: their two exponentials give the gear's heat, in a log and after a pause."""
+    even = 0.02 * np.arange(3000)
+    now = seen(times=np.concatenate([even, 200 + even]), starts=(0, 3000))
+    power = np.maximum(now.friction[:, 1] * now.dq[:, 1], 0) / 1000
+    # Two nodes whose eigenvalues are -1 / T and -1 / (c T): y' = p - a y + b z, z' = d (y - z).
+    fast, weight = 20.0, 1.5
+    slow = SLOWER * fast
+    share = weight / SLOWER
+    # Laplace: x = p (1 / (s + 1/T) + share / (s + 1/(c T))) = p (1 + share) (s + zero) / ((s + 1/T) (s + 1/(c T))).
+    zero = (1 / slow + share / fast) / (1 + share)
+
+    def integrate(t, p, start):
+        def rate(s, x):
+            return [x[1], -x[0] / (fast * slow) - x[1] * (1 / fast + 1 / slow) + np.interp(s, t, p)]
+
+        return solve_ivp(rate, (t[0], t[-1]), start, t_eval=t, rtol=1e-9, atol=1e-14, max_step=0.05).y
+
+    first = integrate(even, power[:3000], [0.0, 0.0])
+    cooled = integrate(np.linspace(even[-1], 200.0, 200), np.zeros(200), first[:, -1])[:, -1]
+    both = np.hstack([first, integrate(200 + even, power[3000:], cooled)])
+    exact = (1 + share) * (both[1] + zero * both[0])
+    effect = EFFECTS["thermal_friction"]
+    X = effect.columns(now, 2, (fast, weight, 0.0))
+    np.testing.assert_allclose(X[:, 1, 1], -exact * now.dq[:, 1], atol=1e-3 * np.abs(X[:, 1, 1]).max())
+    # A kilojoule takes ever less; at first as much.
+    faded = effect.columns(now, 2, (fast, weight, 2.0))
+    wanted = -(1 - np.exp(-2.0 * exact)) / 2.0 * now.dq[:, 1]
+    np.testing.assert_allclose(faded[:, 1, 1], wanted, atol=1e-3 * np.abs(wanted).max())
 
 
 def test_change_times_cover_the_data_and_its_pauses(seen):
@@ -219,6 +250,6 @@ def test_the_documentation_lists_every_effect():
 def test_heat_has_forms_of_all_time_constants_that_a_log_may_show(seen, name):
     """Two minutes and a half tell time constants up to three times that: unseen data may choose of those."""
     now, effect = seen(2, times=0.1 * np.arange(1501)), EFFECTS[name]
-    told = [value for (value,) in effect.forms(now, 2)]
+    told = list(dict.fromkeys(shape[0] for shape in effect.forms(now, 2)))
     assert told == [value for value in effect.shapes[0].grid if value <= 450.0]
     assert len(told) > 1
