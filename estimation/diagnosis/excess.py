@@ -32,7 +32,8 @@ def residual_shares(problem: Problem) -> Array:
     for run, cycle in zip(recording.runs, recording.cycles, strict=True):
         if cycle is None or cycle.count < FEWEST:
             continue
-        own = problem.remainder[run][cycle.start : cycle.stop]
+        # Where friction turns round, what is left is the doubt of when: it would repeat, but it is no effect.
+        own = (problem.remainder[run] * ~recording.unsure[run])[cycle.start : cycle.stop]
         period = cycle.period / recording.step
         mean = period_mean(own, period, cycle.count)
         differences = period_differences(own, period, cycle.count)

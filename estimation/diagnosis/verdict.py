@@ -128,7 +128,7 @@ def _possible(problem: Problem, found: Found) -> Found:
 def _believable(problem: Problem, member: Member) -> bool:
     """Whether a machine may have what was fitted."""
     place, robot = member.hypothesis, problem.situation.robot
-    return place.effect.believable(robot, place.joint, member.coefficients)
+    return place.effect.believable(robot, place.joint, member.coefficients, member.shape)
 
 
 def _holds(

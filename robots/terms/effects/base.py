@@ -143,8 +143,8 @@ class Effect(ABC):
         """Gives the range of each coefficient at some shape values: as described, where shapes do not narrow it."""
         return tuple((coefficient.lower, coefficient.upper) for coefficient in self.parameters(robot, joint))
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array) -> bool:
-        """Whether a machine may have these values.
+    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+        """Whether a machine may have these values, of a shape where that is given.
 
         One that is stopped by its largest size wants to be more still, and one below its least is none.
         """

@@ -41,7 +41,7 @@ class CurrentClipping(JointEffect):
         """Gives what a limit takes of the torque beyond its level: of less, another bends it."""
         return ((LEAST, 1.0),)
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array) -> bool:
+    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Gives true for all of the range: a torque that is cut off is all lost."""
         return float(coefficients[0]) > LEAST
 

@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from robots.terms.effects.base import JointEffect, Place
 from robots.terms.effects.situation import Situation
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+LEAST = 1.01
+"""Times the shortest time constant: a faster one is wanted below, and that is none of heat."""
 
 
 class HeatEffect(JointEffect):
     """An effect of one joint whose first shape is the time constant of a heat that is kept."""
 
     depends_on: ClassVar[Literal["state", "time"]] = "time"
+
+    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+        """Tells what follows its source within seconds from heat."""
+        slow = not shape or shape[0] > LEAST * self.shapes[0].lower
+        return slow and super().believable(robot, joint, coefficients)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists time constants up to three times the data's duration: all slower ones look like the slowest."""

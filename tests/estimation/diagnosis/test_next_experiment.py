@@ -166,7 +166,10 @@ def test_one_cause_needs_no_experiment(problem):
 
 def test_the_plan_is_plain_data(problem):
     """The plan as data is what a diagnosis file holds."""
-    causes = [_guess(problem, "thermal_friction", 4, (20.0,), 0.01), _guess(problem, "friction_step", 4, (10.0,), 0.01)]
+    causes = [
+        _guess(problem, "thermal_friction", 4, (20.0, 0.0, 0.0), 0.01),
+        _guess(problem, "friction_step", 4, (10.0,), 0.01),
+    ]
     data = plan_next(problem, causes).to_dict()
     assert {"kind", "why", "resolves"} <= set(data)
     assert 0 <= data["resolves"] <= 1

@@ -173,5 +173,8 @@ def test_a_value_at_the_edge_of_what_machines_have_is_no_name(
     problem = SimpleNamespace(situation=SimpleNamespace(robot=arm))
     member = replace(_member(name, 1, 300.0, 1), coefficients=np.array([value]))
     assert verdict._believable(problem, member) is believed  # type: ignore[arg-type]
+    for seconds in (5.0, 20.0):
+        hot = replace(_member("torque_constant_heat", 1, 300.0, 1), coefficients=np.array([-0.1]), shape=(seconds,))
+        assert verdict._believable(problem, hot) is (seconds > 5.0)  # type: ignore[arg-type]
     assert EFFECTS["backlash"].believable(arm, 1, np.full(1, 1e-6))
     assert not EFFECTS["backlash"].believable(arm, 1, np.full(1, 1e-7))

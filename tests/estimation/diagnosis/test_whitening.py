@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from estimation.diagnosis.band import Band
-from estimation.diagnosis.excess import period_differences, period_mean
+from estimation.diagnosis.excess import period_differences, period_mean, residual_shares
 from estimation.diagnosis.gaps import find_gaps
 from estimation.diagnosis.noise import estimate_whitening, quiet_joints
 from estimation.diagnosis.orthonormal import orthonormal
+from estimation.diagnosis.periods import Cycle
 from estimation.diagnosis.states import Recording
 from estimation.diagnosis.whitening import Whitening
 
@@ -236,6 +238,20 @@ def test_differences_between_repetitions_hold_the_noise_and_nothing_that_repeats
     # 1,750 degrees of freedom: a standard error of 1.7 % of the deviation.
     assert differences.std() == pytest.approx(1.0, abs=0.07)
     assert np.abs(period_mean(series, 250.0, 8) - wave).max() < 5 / np.sqrt(8)
+
+
+def test_what_reversals_leave_does_not_repeat_as_an_effect_does() -> None:
+    """Ten periods of noise: a sign that errs beside reversals adds nothing, a wave as large as the noise half."""
+    rows, period = 10_000, 1000
+    recording = replace(_recording(rows), cycles=(Cycle(0, rows, period * STEP, 10),))
+    noise, phase = np.random.default_rng(4).standard_normal((rows, 2)), np.arange(rows) % period
+    turns = np.isin(phase, (100, 101, 600, 601))
+    noise[turns] += 20.0
+    noise[:, 1] += np.sqrt(2) * np.sin(6 * np.pi * phase / period)
+    unsure = np.repeat(turns[:, None], 2, axis=1)
+    shares = residual_shares(SimpleNamespace(recording=replace(recording, unsure=unsure), remainder=noise))  # type: ignore[arg-type]
+    np.testing.assert_allclose(shares, [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0]], atol=0.03)
+    assert residual_shares(SimpleNamespace(recording=recording, remainder=noise))[0, 1] > 0.5  # type: ignore[arg-type]
 
 
 def test_an_orthonormal_basis_leaves_out_what_is_not_determined() -> None:

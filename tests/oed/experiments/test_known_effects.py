@@ -23,7 +23,7 @@ WIDTH = 0.02
 SPRING = PlantEffect(effect="spring", joint=2, coefficients=(40.0, 15.0, -8.0, 0.0), shape=(0.0, 0.0))
 STRIBECK = PlantEffect(effect="stribeck", joint=2, coefficients=(12.0,), shape=(0.2, 2.0))
 LOADED = PlantEffect(effect="load_dependent_friction", joint=3, coefficients=(0.1, 0.05), shape=(1.0, 0.0))
-HEAT = PlantEffect(effect="thermal_friction", joint=1, coefficients=(5.0, 1.0), shape=(100.0,))
+HEAT = PlantEffect(effect="thermal_friction", joint=1, coefficients=(5.0, 1.0), shape=(100.0, 0.0, 0.0))
 
 
 @pytest.fixture(scope="module")
