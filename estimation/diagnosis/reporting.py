@@ -42,6 +42,8 @@ Array = NDArray[np.float64]
 
 # Error on unseen data that is worth a word: so many times that of the fit, and more than this share of the torque.
 STRANGE, ODD = 3.0, 0.2
+# Unseen speeds beyond the fitted ones by this factor are worth one, too.
+FASTER = 1.3
 SHOWN = 4000  # rows of the curves kept for pictures
 CLIPPING = CurrentClipping()
 
@@ -124,7 +126,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         next_experiment=_next(problem, founds) if verdict == "ambiguous" else None,
         model=replace(fitted.model, extensions=(*fitted.model.extensions, *added)),
         how_unseen=unseen.how,
-        notes=(*told.notes, *_notes(told, findings, before, after), *held.notes, *lost),
+        notes=(*told.notes, *_notes(told, findings, before, after), *_faster(problem, seen), *held.notes, *lost),
         trace=_trace(unseen, seen.coordinates, twisted),
         simulation=simulation,
     )
@@ -238,6 +240,23 @@ def _strange(problem: Problem, before: Array) -> dict[int, str]:
         "some of them do not tell its parameters."
         for j in np.flatnonzero(before > np.maximum(STRANGE * fitted, ODD))
     }
+
+
+def _faster(problem: Problem, seen: Measured) -> list[str]:
+    """Says which joints are faster on unseen data than their friction's polynomial was fitted for."""
+    if seen.whole is problem.recording or not any(column.symbol == "f4" for column in problem.baseline.base.columns):
+        return []
+    known, there = (np.abs(r.dq).max(axis=0) for r in (problem.recording, cut(seen.whole, slice(seen.first, None))))
+    ratio = there / np.maximum(known, 1e-9)
+    fast = np.flatnonzero(ratio > FASTER)
+    names = ", ".join(str(j + 1) for j in fast)
+    return [_FASTER.format("s" if len(fast) > 1 else "", names, ratio[fast].max())] if len(fast) else []
+
+
+_FASTER = (
+    "Joint{} {}: up to {:.1f} times as fast on the unseen data as in the logs of the fit. What a polynomial fitted to "
+    "slower motion says of friction there may be far off, and with it error and gain; coulomb-viscous errs less."
+)
 
 
 def _trace(unseen: Unseen, seen_as: Sequence[Array], windups: Sequence[Windup]) -> Trace:

@@ -163,6 +163,26 @@ def test_noise_that_is_a_third_of_the_torque_is_said(arm: Robot, fourier_motion:
     assert note.startswith("Joint 2: ")
 
 
+def test_unseen_motion_that_is_faster_than_friction_was_fitted_for_is_said(
+    arm: Robot, fourier_motion: Callable, arm_plant: Callable
+) -> None:
+    """The same path in half the time; with friction that has no polynomial there is nothing to warn of."""
+    motion = fourier_motion(arm, 0)
+    half = np.asarray(motion.t) / 2.0
+    fast = replace(motion, t=half, dq=2.0 * motion.dq, ddq=4.0 * motion.ddq)
+    plant = arm_plant(torque_noise=0.02)
+    log, unseen = simulate(plant, motion, seed=0), simulate(plant, replace(fast, t=half + 100.0), seed=1)
+
+    def told(friction: str, held_out: Log) -> list[str]:
+        result = diagnose(arm, log, held_out=held_out, candidates=("payload_change",), friction=friction)
+        return [note for note in result.notes if "times as fast" in note]
+
+    (note,) = told("polynomial", unseen)
+    assert note.startswith("Joints 1, 2: up to 2.0 times")
+    assert told(SIMPLE, unseen) == []
+    assert told("polynomial", simulate(plant, replace(motion, t=2 * half + 100.0), seed=2)) == []
+
+
 def test_a_finding_that_is_no_part_of_the_model_is_shown(stepped: tuple[Diagnosis, Log]) -> None:
     """A page shows a free function that errs on unseen data too, though it has no coordinate of its own."""
     result, _ = stepped
