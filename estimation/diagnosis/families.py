@@ -15,7 +15,8 @@ from robots.terms.effects import Situation
 Array = NDArray[np.float64]
 
 HARMONICS = (1, 2, 3, 4)
-MEMORIES = (0.1, 0.3, 1.0, 3.0)  # [s]
+# Of what remembers velocity, of a sensor that creeps, and of a supply that sags [s].
+MEMORIES, CREEPS, SUPPLIES = (0.1, 0.3, 1.0, 3.0), (1.0, 3.0, 10.0, 30.0), (0.03, 0.15, 0.7)
 KNOTS = 8
 
 
@@ -115,14 +116,27 @@ def _acceleration(s: Situation, joint: int, other: int, shape: tuple[float, ...]
 
 
 def _memory(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
-    columns = []
-    for memory in MEMORIES:
+    return _followers(s, s.dq[:, joint - 1], MEMORIES)
+
+
+def _creep(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    return _followers(s, s.torque[:, joint - 1], CREEPS)
+
+
+def _supply(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    power = np.sum(s.torque * s.dq, axis=1)
+    power = _followers(s, power / max(float(np.abs(power).max(initial=0.0)), 1e-300), SUPPLIES)
+    return s.torque[:, joint - 1, None] * np.hstack([power, np.abs(power)])
+
+
+def _followers(s: Situation, source: Array, memories: tuple[float, ...]) -> Array:
+    """What follows a source (N,) with some time constants [s], (N, k), each log anew."""
+    columns = np.zeros((len(s), len(memories)))
+    for k, memory in enumerate(memories):
         keep = float(np.exp(-s.period / memory))
-        column = np.zeros(len(s))
         for run in s.runs:
-            column[run] = lfilter([1 - keep], [1.0, -keep], s.dq[run, joint - 1])
-        columns.append(column)
-    return np.column_stack(columns)
+            columns[run, k] = lfilter([1 - keep], [1.0, -keep], source[run])
+    return columns
 
 
 def _time(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
@@ -180,6 +194,8 @@ FAMILIES: dict[str, Family] = {
         "rad/s2 or m/s2",
     ),
     "memory": Family(_memory, 4, "remembers the velocity of the joint for a while"),
+    "creep": Family(_creep, 4, "remembers the torque of the joint for a while"),
+    "supply": Family(_supply, 6, "depends on its own torque and the power that all joints draw together"),
     "time": Family(_time, KNOTS, "changes slowly with time"),
     "ringing": Family(_ringing, 4, "rings at {point} Hz after the motion"),
     "vibration": Family(_vibration, 8, "vibrates at {point} Hz whatever the motion"),

@@ -168,7 +168,8 @@ def all_patterns(robot: Robot) -> tuple[Effect, ...]:
     """Lists the patterns to look for on every joint, and on the robot as a whole."""
     joints = range(1, robot.n + 1)
     own = [Pattern("speed"), Pattern("speed", odd=True), Pattern("load"), Pattern("load", odd=True)]
-    own += [Pattern("torque"), Pattern("acceleration"), Pattern("memory"), Pattern("time"), Pattern("time", odd=True)]
+    own += [Pattern("torque"), Pattern("acceleration"), Pattern("memory"), Pattern("creep"), Pattern("supply")]
+    own += [Pattern("time"), Pattern("time", odd=True)]
     own += [Pattern("ringing"), Pattern("vibration"), Pattern("sway"), Pattern("sway", odd=True), Pattern("turns")]
     each = [Pattern("angle", k, odd) for k in joints for odd in (False, True)]
     each += [Pattern("angles", k) for k in joints] if robot.n > 1 else []

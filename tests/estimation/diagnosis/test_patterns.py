@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from estimation import diagnose
 from robots.plants import simulate
@@ -14,25 +15,37 @@ from robots.robot import Robot
 from robots.signals import Motion
 
 
-def _swing(motion: Motion, size: float) -> np.ndarray:
+def _swing(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
     return size * np.sin(2 * np.pi * 0.27 * np.asarray(motion.t) + 1.0)
 
 
-def _bend(motion: Motion, size: float) -> np.ndarray:
+def _bend(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
     ddq = np.asarray(motion.ddq)[:, 1]
     return size * (ddq / np.abs(ddq).max()) ** 3
 
 
-def _rub(motion: Motion, size: float) -> np.ndarray:
+def _rub(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
     return size * np.sin(2 * np.pi * 1.13 * np.asarray(motion.t)) * np.sign(np.asarray(motion.dq)[:, 1])
 
 
-def _catch(motion: Motion, size: float) -> np.ndarray:
+def _catch(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
     return size * np.exp(-0.5 * ((np.asarray(motion.q)[:, 1] - 0.2) / 0.05) ** 2)
 
 
-def _grind(motion: Motion, size: float) -> np.ndarray:
-    return _catch(motion, size) * np.sign(np.asarray(motion.dq)[:, 1])
+def _grind(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
+    return _catch(motion, size, tau) * np.sign(np.asarray(motion.dq)[:, 1])
+
+
+def _creep(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
+    step = float(motion.t[1] - motion.t[0])
+    slow = lfilter([step / 5.0], [1.0, step / 5.0 - 1.0], tau[:, 1])
+    return size * slow / slow.std()
+
+
+def _sag(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
+    step = float(motion.t[1] - motion.t[0])
+    power = lfilter([step / 0.3], [1.0, step / 0.3 - 1.0], (tau * motion.dq).sum(axis=1))
+    return size * tau[:, 1] / tau[:, 1].std() * np.tanh(power / power.std())
 
 
 @pytest.mark.parametrize(
@@ -43,10 +56,12 @@ def _grind(motion: Motion, size: float) -> np.ndarray:
         (_swing, 0.1, "pattern:sway:0:even"),
         (_rub, 0.1, "pattern:sway:0:odd"),
         (_bend, 0.2, "pattern:acceleration:0:even"),
+        (_creep, 0.1, "pattern:creep:0:even"),
+        (_sag, 0.1, "pattern:supply:0:even"),
     ],
 )
 def test_a_stranger_is_told_by_what_it_depends_on(
-    stranger: Callable[[Motion, float], np.ndarray],
+    stranger: Callable[[Motion, float, np.ndarray], np.ndarray],
     share: float,
     pattern: str,
     arm: Robot,
@@ -61,7 +76,7 @@ def test_a_stranger_is_told_by_what_it_depends_on(
     log = simulate(arm_plant(torque_noise=0.02), motion, seed=0)
     assert log.tau is not None
     size = share * np.sqrt(np.mean(log.tau[:, 1] ** 2))
-    tau = log.tau + np.column_stack([np.zeros(len(log.t)), stranger(motion, size)])
+    tau = log.tau + np.column_stack([np.zeros(len(log.t)), stranger(motion, size, log.tau)])
     result = diagnose(arm, replace(log, tau=tau))
     assert result.verdict == "unexplained"
     assert (result.findings[0].joint, result.findings[0].pattern) == (2, pattern)
