@@ -152,8 +152,8 @@ def refine(
             summit = best[0]
             others = hypothesis.effect.elsewhere(situation, hypothesis.joint, summit.shape, summit.coefficients)
             for slopes in others:
-                worths = [evaluate(slope) for slope in slopes]
-                at[:] = slopes[int(np.argmax(worths))]
+                gains = [evaluate(slope) for slope in slopes]
+                at[:] = slopes[int(np.argmax(gains))]
                 climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)
 
     if hypothesis.effect.last:
@@ -224,8 +224,8 @@ def _zoom(
     """Looks for a moment on points that get closer and closer: no method that climbs finds the top of a random walk."""
     for count, reach in looks:
         points = np.clip(start + width * np.linspace(-reach, reach, count), *bounds)
-        worth = [evaluate(float(point)) for point in points]
-        start, width = float(points[int(np.argmax(worth))]), 2 * reach * width / (count - 1)
+        gains = [evaluate(float(point)) for point in points]
+        start, width = float(points[int(np.argmax(gains))]), 2 * reach * width / (count - 1)
 
 
 def climb(
