@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from estimation.diagnosis.findings import Gain
-from estimation.diagnosis.patterns import PREFIX
+from estimation.diagnosis.patterns import PREFIX, is_of_time
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found
 from estimation.diagnosis.unseen import Measured
-from estimation.diagnosis.verdict import CLOSE, Judgement
+from estimation.diagnosis.verdict import CLOSE, SURE, Judgement
 from robots.terms.effects import Effect
 
 LEFT = 0.2  # share of an effect's gain that stretches left out must show
@@ -77,7 +77,13 @@ def bear_out(
     while harmful := [i for i, member in enumerate(members) if _harms(seen, i, member, beyond)]:
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         label = members[worst].hypothesis.label
-        if worst >= len(founds):
+        if len(members) == 1 > len(founds) and p_values[0] > SURE and not is_of_time(members[0].hypothesis.effect):
+            # All that stood out, and hardly: unseen data against it are the odds that it is noise.
+            own = members[0].hypothesis.joint
+            notes.append(_FAINT.format(f"a free function of {f'joint {own}' if own else _WHOLE}"))
+            members.clear()
+            p_values.clear()
+        elif worst >= len(founds):
             # A free function that errs elsewhere is no model; that something is unexplained is as true as before.
             spoiling.append((members.pop(worst), p_values.pop(worst), seen.gains[worst]))
         elif instead := _instead(founds[worst], worst, members, measure, beyond, forms):
@@ -97,13 +103,14 @@ def bear_out(
                 p_values.append(free[1])
         seen = measure(members)
     joints = sorted({member.hypothesis.joint or 0 for member, _, _ in spoiling})
-    notes += [_SPOILING.format(f"joint {joint}" if joint else "the robot as a whole") for joint in joints]
+    notes += [_SPOILING.format(f"joint {joint}" if joint else _WHOLE) for joint in joints]
     return BorneOut(tuple(founds), tuple(members), tuple(p_values), seen, tuple(spoiling), tuple(notes), refuted)
 
 
 _FAINT = "A fit of {} hardly stood out of the noise, and unseen data do not speak for it: left out."
 _DROPPED = "A fit of {} stood out of the noise, but does not help on unseen data: left out."
 _REPLACED = "A fit of {} stood out of the noise, but does not help on unseen data; {}, which fits about as well, does."
+_WHOLE = "the robot as a whole"
 _SPOILING = (
     "On {} something is unexplained, but the free function that shows it errs on unseen data: it is no part of the "
     "extended model."

@@ -215,7 +215,7 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
         if finding.gain.ci95[0] <= 0:
             where = f"{finding.effect} of joint {finding.joint}" if finding.joint else finding.effect
             notes.append(f"The gain of {where} on unseen data is not sure: its interval begins below zero.")
-    open_ = sorted({member.hypothesis.joint for member in told.judgement.patterns if member.hypothesis.joint})
+    open_ = sorted({finding.joint for finding in findings if finding.effect == "unexplained" and finding.joint})
     if open_:
         names = ", ".join(map(str, open_))
         notes.append(

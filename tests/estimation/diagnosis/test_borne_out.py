@@ -173,6 +173,29 @@ def test_a_name_that_surely_harms_is_left_out_with_a_note() -> None:
     assert "left out" in note
 
 
+@pytest.mark.parametrize(
+    ("p_value", "kind", "named", "told"),
+    [
+        (1e-4, "load", False, False),
+        (1e-10, "load", False, True),
+        (1e-4, "time", False, True),
+        (1e-4, "load", True, True),
+    ],
+)
+def test_a_faint_free_function_that_unseen_data_deny_is_noise(
+    p_value: float, kind: str, named: bool, told: bool
+) -> None:
+    """Where nothing else stands out, and it is no function of time, of which other logs say nothing."""
+    free = _member(f"pattern:{kind}:0:even", 3)
+    bench = _bench()
+    bench.shows[free.hypothesis.label] = HARMS
+    founds = (Found(STRIBECK, 1e-5, ()),) if named else ()
+    result = _borne(bench, *founds, free=[free], p_values=[p_value])
+    assert [member for member, *_ in result.spoiling] == ([free] if told else [])
+    assert not result.refuted
+    assert len(result.notes) == 1
+
+
 @pytest.mark.parametrize("shown", [HELPS, HARMS])
 def test_what_a_refuted_name_was_for_is_told_as_unexplained(shown: Shown) -> None:
     """A free function takes its place: in the model where unseen data bear it out, else beside it."""
@@ -272,7 +295,7 @@ def test_a_free_function_that_errs_is_told_and_no_part_of_the_model() -> None:
 
 def test_what_errs_on_all_joints_is_told_of_the_whole_robot() -> None:
     """What swings at the flange has no joint to name."""
-    result = _borne(_bench(swinging=HARMS), free=[SWING], p_values=[1e-4])
+    result = _borne(_bench(swinging=HARMS), free=[SWING], p_values=[1e-10])
     assert [member for member, _, _ in result.spoiling] == [SWING]
     assert result.notes[0].startswith("On the robot as a whole something is unexplained")
 
