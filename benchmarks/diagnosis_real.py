@@ -90,13 +90,13 @@ SETS: dict[str, Callable[[Path, Path], Given]] = {
 def say(name: str, folder: Path) -> None:
     """Diagnoses one set and prints what is said of it."""
     with tempfile.TemporaryDirectory() as out:
-        given = SETS[name](folder, Path(out))
         print(f"\n{name}: {(SETS[name].__doc__ or '').splitlines()[0]}", flush=True)
         start = time.perf_counter()
         try:
+            given = SETS[name](folder, Path(out))
             found = diagnose(given.robot, given.logs, held_out=given.unseen)
         except OedError as error:
-            print(f"refused: {error}")
+            print(error)
             return
         print(found.summary())
         print(f"error over torque RMS on {found.how_unseen}:")
@@ -111,6 +111,8 @@ def main() -> int:
     parser.add_argument("--sets", nargs="+", default=list(SETS), choices=list(SETS))
     options = parser.parse_args()
     warnings.simplefilter("ignore", AssumedValueWarning)
+    if not options.folder.is_dir():
+        parser.error(f"no folder {options.folder}")
     for name in options.sets:
         say(name, options.folder)
     return 0
