@@ -133,7 +133,7 @@ def diagnose_case(case: Case, robot: Robot) -> tuple[Any, dict[str, Any]]:
     if unseen and case.effects:
         # On the same rows: the diagnosis leaves out ends, where filters err, and rows whose direction it does not know.
         counted = [_counted(diagnosis.trace, log) for log in unseen]
-        oracle = ask_oracle(case, counted)
+        oracle = ask_oracle(case, counted, logged=True)
         squares = [(log.tau**2 * counts).sum(axis=0) for log, counts in zip(unseen, counted, strict=True)]
         size = np.sum(squares, axis=0) / np.sum([counts.sum(axis=0) for counts in counted], axis=0)
         for name in ("before", "after", "as_measured"):

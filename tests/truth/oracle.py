@@ -27,21 +27,22 @@ class Oracle:
 
     The base model's columns are those of the motion as it was. ``after`` has each effect's own torque along that motion
     as one column more; ``as_measured`` along the motion that the logged positions tell, which is all that any model of
-    the effect could be given: low-passed without lag, at the cut-off that fits the logs best.
+    the effect could be given: low-passed without lag, at the cut-off that fits the logs best. None where not asked for.
     """
 
     before: np.ndarray
     after: np.ndarray
-    as_measured: np.ndarray
+    as_measured: np.ndarray | None = None
 
 
-def ask_oracle(case: Case, counted: Sequence[np.ndarray] | None = None) -> Oracle:
+def ask_oracle(case: Case, counted: Sequence[np.ndarray] | None = None, *, logged: bool = False) -> Oracle:
     """Measures what a case's true effects bring, their own formulas being known.
 
     Args:
         case: with unseen logs.
         counted: rows (N, n) of each unseen log that count; by default all but those beside a joint's reversal: from
             a log nobody knows which sign its friction has there.
+        logged: whether to ask along the logged positions, too: that is most of the work.
     """
     chosen = counted or [_away_from_reversals(record.v_true) for record in case.unseen]
     counts = np.concatenate([rows[::EVERY] for rows in chosen])
@@ -52,23 +53,23 @@ def ask_oracle(case: Case, counted: Sequence[np.ndarray] | None = None) -> Oracl
 
     Y = base_regressor(case.machine.known, *(rows(lambda record, key=key: getattr(record, key)) for key in MOTION))
     y = rows(lambda record: record.tau)
-    training = slice(0, len(y) - len(counts))
+    training, others = slice(len(y) - len(counts)), slice(len(y) - len(counts), None)
 
     def errors(columns: np.ndarray) -> tuple[float, np.ndarray]:
         """The weighted sum of squares on the logs, and the mean squares (n,) on the unseen ones."""
         squares = (y - columns @ Projection(columns[training], level).fit(y[training])) ** 2
-        unseen = (squares[len(y) - len(counts) :] * counts).sum(axis=0) / counts.sum(axis=0)
+        unseen = (squares[others] * counts).sum(axis=0) / counts.sum(axis=0)
         return float((squares[training] / level**2).sum()), unseen
 
     def beside(parts: np.ndarray) -> tuple[float, np.ndarray]:
         return errors(np.concatenate([Y, parts], axis=2))
 
     true = [rows(lambda record, k=k: record.parts[k]) for k in range(len(case.effects))]
-    measured = (beside(_parts_as_measured(case, cut_off)) for cut_off in CUT_OFFS)
+    tried = [beside(_parts_as_measured(case, cut_off)) for cut_off in CUT_OFFS] if logged else []
     return Oracle(
         before=errors(Y)[1],
         after=beside(np.stack(true, axis=2))[1],
-        as_measured=min(measured, key=lambda pair: pair[0])[1],
+        as_measured=min(tried, key=lambda pair: pair[0])[1] if tried else None,
     )
 
 

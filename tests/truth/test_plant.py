@@ -190,11 +190,12 @@ def test_a_stranger_shows_beyond_the_base_model_and_its_own_column_brings_a_gain
     """An effect outside every catalogue shows beyond the base model, on motion that the fit has not seen, too."""
     case = draw_case(17, hide=[CrossWave], size=0.03, kind="er3a", periodic=True, duration=20.0, unseen=20.0)
     assert case.visible()[0] == pytest.approx(0.03, rel=0.15)
-    told = ask_oracle(case)
+    told = ask_oracle(case, logged=True)
     # 3 % squared is 9e-4 in the logs; another motion shows more or less of it, and 20 s of noise change it by 1e-4.
     gain = ((told.before - told.after) / case.level() ** 2)[case.effects[0].j]
     assert 3e-4 < gain < 5e-3
     # A wave over the joints' angles is as well known from encoders.
+    assert told.as_measured is not None
     assert ((told.before - told.as_measured) / case.level() ** 2)[case.effects[0].j] == pytest.approx(gain, rel=0.05)
 
 
