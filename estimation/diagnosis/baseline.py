@@ -26,6 +26,8 @@ WIDEST, SHARE = 0.065, 0.05
 ROUNDS = 3
 # Directions of the column-scaled regressor below this share of the largest are not determined by the log.
 FAINT = 1e-7
+# Of the squares of what a sharper sign would change, the rows that count must show this share.
+SHOWN = 1e-3
 CHUNK = 4096
 
 
@@ -93,13 +95,18 @@ def build_baseline(base: BaseParameters, recording: Recording, residual_scale: A
 
 
 def _nuisance(recording: Recording, chosen: tuple[float, ...] | None) -> Array:
-    """How each joint's sign would change if it were less sharp (N, n, n): its derivative by the logarithm of v0."""
+    """How each joint's sign would change if it were less sharp (N, n, n): its derivative by the logarithm of v0.
+
+    Of a joint whose rows that count hardly show it, nothing: its value would be any, and so the torque in the others.
+    """
     if chosen is None:
         return np.zeros((len(recording), recording.n, 0))
     result = np.zeros((len(recording), recording.n, recording.n))
     for j, v0 in enumerate(chosen):
         x = recording.dq[:, j] / v0
-        result[:, j, j] = x / np.cosh(np.clip(x, -300, 300)) ** 2
+        change = x / np.cosh(np.clip(x, -300, 300)) ** 2
+        if np.sum(change[~recording.unsure[:, j]] ** 2) > SHOWN * np.sum(change**2):
+            result[:, j, j] = change
     return result
 
 
