@@ -27,7 +27,7 @@ from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.regularisation import free, held, loosened, pull_of
 from estimation.diagnosis.reporting import Told, assemble
 from estimation.diagnosis.scan import Entry, measure
-from estimation.diagnosis.selection import Selection, select
+from estimation.diagnosis.selection import Selection, select, with_rivals
 from estimation.diagnosis.settling import Settled, calmer, moved, settle
 from estimation.diagnosis.states import Recording, record
 from estimation.diagnosis.upper import WIDER, pose_upper
@@ -52,8 +52,16 @@ QUIETEST = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """One search through the catalogue with one noise model."""
+    """One search through the catalogue with one noise model.
 
+    Attributes:
+        posed: what was searched.
+        problem: that, its state composed with the effects found.
+        entries: the catalogue, measured.
+        selection: what was found.
+    """
+
+    posed: Problem
     problem: Problem
     entries: list[Entry]
     selection: Selection
@@ -245,7 +253,8 @@ def _search(
         # A delay made the sign of friction look less sharp than it is.
         blurred = any(found.member.hypothesis.effect.blurs for found in search.selection.found)
     assert search is not None
-    return search
+    told = with_rivals(search.posed, search.entries, search.selection, np.random.default_rng(seed))
+    return replace(search, selection=told)
 
 
 def _relied_on(base: BaseParameters, recording: Recording) -> Recording:
@@ -295,7 +304,7 @@ def _searched(
     advance = _noter(bar, share + 0.25)
     selection = select(problem, entries, false_alarm=false_alarm, rng=rng, advance=advance)
     members = [found.member for found in selection.found]
-    return Search(composed(problem, members, hypotheses), entries, selection)
+    return Search(problem, composed(problem, members, hypotheses), entries, selection)
 
 
 def _teller(bar: Progress, start: float, share: float) -> Callable[[float], None]:

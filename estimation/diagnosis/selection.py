@@ -37,12 +37,13 @@ class Found:
     Attributes:
         member: the effect, its shape, measured beside the other effects found.
         p_value: family-wise, of the step that found it.
-        rivals: other hypotheses in its place, the closest first, with how much worse their BIC is.
+        rivals: other hypotheses in its place, the closest first, with how much worse their BIC is; none before they
+            are asked for (`with_rivals`).
     """
 
     member: Member
     p_value: float
-    rivals: tuple[tuple[Member, float], ...]
+    rivals: tuple[tuple[Member, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +52,14 @@ class Selection:
 
     Attributes:
         found: the effects, strongest first.
+        seen: what the torque as logged shows by itself, whatever explains it.
         first: the scan before any was found.
         last: the scan beside all that were found.
         accepted: all found, joined.
     """
 
     found: tuple[Found, ...]
+    seen: frozenset[Hypothesis]
     first: Scan
     last: Scan
     accepted: Accepted
@@ -116,7 +119,10 @@ def select(
         elif now in visited:
             break
         visited.append(now)
-    found = _found(problem, entries, members, p_values, seen, rng)
+    found = [
+        Found(_measured(problem, member, _beside(problem, members, i)), p_value)
+        for i, (member, p_value) in enumerate(zip(members, p_values, strict=True))
+    ]
     others, alone = members[1:], SURE * false_alarm if len(members) == 1 else 0.0
     kept = [
         f
@@ -127,7 +133,34 @@ def select(
     ]
     order = sorted(kept, key=lambda f: -f.member.gain)
     last = result if members else first
-    return Selection(tuple(order), first, last, accept(problem, tuple(f.member.group for f in order)))
+    return Selection(tuple(order), frozenset(seen), first, last, accept(problem, tuple(f.member.group for f in order)))
+
+
+def with_rivals(
+    problem: Problem, entries: Sequence[Entry], selection: Selection, rng: np.random.Generator
+) -> Selection:
+    """Measures what else could be in each effect's place, beside the others.
+
+    What was seen in the torque as logged has no rivals, whatever else explains as little of it.
+    """
+    members = [found.member for found in selection.found]
+    told = []
+    for i, found in enumerate(selection.found):
+        rivals: list[tuple[Member, float]] = []
+        if found.member.hypothesis not in selection.seen:
+            beside, reference = _beside(problem, members, i), found.member.bic(problem.rows)
+            result = scan(problem, entries, beside, rng, nulls=False)
+            near = contenders(problem, result, [*members[:i], *members[i + 1 :]], reference)
+            rest = [o for o in near if o.hypothesis != found.member.hypothesis]
+            able = [rival for rival in _best(problem, rest, beside) if rival.gain >= NEAR * found.member.gain]
+            rivals = [(rival, reference - rival.bic(problem.rows)) for rival in able]
+        told.append(replace(found, rivals=tuple(rivals)))
+    return replace(selection, found=tuple(told))
+
+
+def _beside(problem: Problem, members: Sequence[Member], i: int) -> Accepted:
+    """All members but one, accepted."""
+    return accept(problem, tuple(m.group for k, m in enumerate(members) if k != i))
 
 
 def _seen(
@@ -263,35 +296,6 @@ def _polished(
             break
     keep = [i for i, m in enumerate(members) if m.hypothesis in seen or m.worth(problem.rows) > LEAST]
     return [members[i] for i in keep], [p_values[i] for i in keep]
-
-
-def _found(
-    problem: Problem,
-    entries: Sequence[Entry],
-    members: Sequence[Member],
-    p_values: Sequence[float],
-    seen: Collection[Hypothesis],
-    rng: np.random.Generator,
-) -> list[Found]:
-    """Measures each member beside the others, and its rivals in its place.
-
-    What was seen in the torque as logged has none, whatever else explains as little of it.
-    """
-    found = []
-    for i, member in enumerate(members):
-        others = [m for k, m in enumerate(members) if k != i]
-        beside = accept(problem, tuple(m.group for m in others))
-        measured = _measured(problem, member, beside)
-        reference = measured.bic(problem.rows)
-        rest: list[Outcome] = []
-        if member.hypothesis not in seen:
-            result = scan(problem, entries, beside, rng, nulls=False)
-            near = contenders(problem, result, others, reference)
-            rest = [o for o in near if o.hypothesis != member.hypothesis]
-        able = [rival for rival in _best(problem, rest, beside) if rival.gain >= NEAR * measured.gain]
-        rivals = [(rival, reference - rival.bic(problem.rows)) for rival in able]
-        found.append(Found(measured, p_values[i], tuple(rivals)))
-    return found
 
 
 def _measured(problem: Problem, member: Member, beside: Accepted) -> Member:

@@ -47,8 +47,11 @@ def _searching(
     )
     for name in ("_worth_it", "_sure", "_beyond"):
         replace(name, lambda *args: True)
-    replace("_polished", lambda problem, entries, members, p_values, seen, won, rng: (polished(members), p_values))
-    replace("_found", lambda problem, entries, members, *args: [SimpleNamespace(member=m) for m in members])
+    replace(
+        "_polished",
+        lambda problem, entries, members, p_values, seen, won, rng: (kept := polished(members), p_values[: len(kept)]),
+    )
+    replace("_measured", lambda problem, member, beside: member)
     return scans
 
 
@@ -136,12 +139,13 @@ def test_what_the_torque_shows_by_itself_has_no_rivals(monkeypatch: pytest.Monke
     monkeypatch.setattr(selection, "scan", lambda *args, **options: SimpleNamespace(outcomes=[]))
     monkeypatch.setattr(selection, "contenders", lambda *args: [SimpleNamespace(hypothesis=B)])
     monkeypatch.setattr(selection, "_best", lambda problem, rest, beside: [member(o.hypothesis) for o in rest])
-    (found,) = selection._found(
-        SimpleNamespace(rows=1000),  # type: ignore[arg-type]
-        [],
-        [member(A)],  # type: ignore[list-item]
-        [1e-30],
-        {A} if shown else set(),
-        np.random.default_rng(0),
+    chosen = selection.Selection(
+        found=(selection.Found(member(A), 1e-30),),  # type: ignore[arg-type]
+        seen=frozenset({A} if shown else ()),
+        first=None,  # type: ignore[arg-type]
+        last=None,  # type: ignore[arg-type]
+        accepted=None,  # type: ignore[arg-type]
     )
-    assert [rival.hypothesis for rival, _ in found.rivals] == ([] if shown else [B])
+    problem = SimpleNamespace(rows=1000)
+    told = selection.with_rivals(problem, [], chosen, np.random.default_rng(0))  # type: ignore[arg-type]
+    assert [rival.hypothesis for rival, _ in told.found[0].rivals] == ([] if shown else [B])
