@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 FALL = 1.353
 # Bisections of the logarithm: the bound is found to 2 %.
 STEPS = 7
+# Where the rest is at its bounds, IPOPT goes on for ever about a cost that it has long found.
+ITERATIONS = 400
 
 
 def slow_bound(
@@ -46,7 +48,9 @@ def slow_bound(
     current = solution.coordinates
 
     def kept(constant: float) -> Solution:
-        return solve(problem, current, free, weights, prior, slow=(power, float(np.exp(constant))), max_iterations=1500)
+        return solve(
+            problem, current, free, weights, prior, slow=(power, float(np.exp(constant))), max_iterations=ITERATIONS
+        )
 
     for _ in range(STEPS):
         middle = (low + high) / 2.0

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import expm
 
 from robots.common.errors import InputError
+from robots.common.parallel import one_blas_thread
 from robots.thermal.checks import checked_ambient, checked_power, checked_steps
 from robots.thermal.parameters import Inputs, ThermalParameter
 
@@ -291,7 +292,9 @@ class ThermalModel(ABC):
         augmented = np.zeros((len(A), 2 * size, 2 * size))
         augmented[:, :size, :size] = A * h[:, None, None]
         augmented[:, :size, size:] = np.eye(size) * h[:, None, None]
-        full = expm(augmented)
+        # One small matrix after another: threads would wait for each other hundreds of times as long as they work.
+        with one_blas_thread():
+            full = expm(augmented)
         return full[:, :size, :size], full[:, :size, size:]
 
     def _ambient(self, ambient: ArrayLike | None) -> Array:
