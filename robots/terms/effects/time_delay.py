@@ -50,6 +50,10 @@ class TimeDelay(Effect):
         """Keeps the delay near that of the reversals, of which the torque's own is a difference quotient."""
         return near(shape[0])
 
+    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+        """Whether a machine may have these values: reversals and all else must tell one delay."""
+        return super().believable(robot, joint, coefficients, shape) and not torn(coefficients, shape)
+
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the change of torque per delay."""
         return lateness(situation, shape[0])[:, :, None]
@@ -126,6 +130,11 @@ def near(shift: float) -> tuple[tuple[float, float], ...]:
     """
     low, high = sorted((shift / APART, shift * APART))
     return ((low - SMALL, high + SMALL),)
+
+
+def torn(coefficients: Array, shape: tuple[float, ...]) -> bool:
+    """Whether a delay (1,) [s] stands where its reversals' lets it come no closer to what all else says."""
+    return any(bool(np.isclose(coefficients[0], end, rtol=1e-6, atol=0.0)) for shift in shape for end in near(shift)[0])
 
 
 def as_late(coefficients: Array) -> tuple[tuple[float, ...], ...]:

@@ -329,3 +329,12 @@ def test_a_delay_of_less_than_friction_tells_is_none(random_robot, name, joint):
     robot = random_robot(2, 3)
     believed = [EFFECTS[name].believable(robot, joint, np.array([delay])) for delay in (8e-5, 5e-4, 0.05)]
     assert believed == [False, True, False]
+
+
+@pytest.mark.parametrize(("name", "joint"), [("time_delay", None), ("current_lag", 1)])
+def test_a_delay_that_reversals_and_all_else_tell_otherwise_is_none(random_robot, name, joint):
+    """A filter may be a little other for a step than for a ramp; one that stops where it must is two things."""
+    robot, effect, shape = random_robot(2, 3), EFFECTS[name], (0.01,)
+    low, high = effect.ranges(robot, joint, shape)[0]
+    believed = [effect.believable(robot, joint, np.array([lag]), shape) for lag in (low, 0.008, 0.01, 0.013, high)]
+    assert believed == [False, True, True, True, False]
