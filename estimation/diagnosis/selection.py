@@ -273,7 +273,7 @@ def _polished(
         changed = False
         for i in range(len(members)):
             others = [m for k, m in enumerate(members) if k != i]
-            beside = accept(problem, tuple(m.group for m in others))
+            beside = _beside(problem, members, i)
             now = composed(problem, members, [members[i].hypothesis])
             reached = _measured(problem, members[i], beside)
             before = won.get(members[i].hypothesis)
