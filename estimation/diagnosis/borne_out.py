@@ -28,7 +28,8 @@ class BorneOut:
         seen: what the members bring on unseen data.
         spoiling: free functions that err on unseen data, with p-value and gain.
         notes: what was left out, in words.
-        refuted: whether unseen data speak against a name that stood out clearly: then it is no cause, but there is one.
+        refuted: names that stood out clearly and that unseen data speak against, with p-value and gain: they are no
+            cause, but there is one.
     """
 
     founds: tuple[Found, ...]
@@ -37,7 +38,7 @@ class BorneOut:
     seen: Measured
     spoiling: tuple[tuple[Member, float, Gain], ...]
     notes: tuple[str, ...]
-    refuted: bool
+    refuted: tuple[tuple[Member, float, Gain], ...]
 
 
 def bear_out(
@@ -67,7 +68,7 @@ def bear_out(
     p_values = [*(found.p_value for found in founds), *judgement.p_values]
     spoiling: list[tuple[Member, float, Gain]] = []
     notes: list[str] = []
-    refuted = False
+    refuted: list[tuple[Member, float, Gain]] = []
     seen = measure(members)
     while idle := [i for i in range(len(founds)) if _idle(seen, i, members[i], beyond, faint)]:
         notes.append(_FAINT.format(members[idle[0]].hypothesis.label))
@@ -93,18 +94,17 @@ def bear_out(
                 notes.append(_REPLACED.format(label, members[worst].hypothesis.label))
             continue
         else:
-            refused = members[worst]
-            for items in (founds, members, p_values):
-                items.pop(worst)
+            founds.pop(worst)
+            refused = members.pop(worst)
+            refuted.append((refused, p_values.pop(worst), seen.gains[worst]))
             notes.append(_DROPPED.format(label))
-            refuted = True
             if (free := unnamed(refused, members)) is not None:
                 members.append(free[0])
                 p_values.append(free[1])
         seen = measure(members)
     joints = sorted({member.hypothesis.joint or 0 for member, _, _ in spoiling})
     notes += [_SPOILING.format(f"joint {joint}" if joint else _WHOLE) for joint in joints]
-    return BorneOut(tuple(founds), tuple(members), tuple(p_values), seen, tuple(spoiling), tuple(notes), refuted)
+    return BorneOut(tuple(founds), tuple(members), tuple(p_values), seen, tuple(spoiling), tuple(notes), tuple(refuted))
 
 
 _FAINT = "A fit of {} hardly stood out of the noise, and unseen data do not speak for it: left out."

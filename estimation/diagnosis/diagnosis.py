@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.findings import Finding, Parameter, finite, number, read_finding
-from estimation.diagnosis.limits import Limit
+from estimation.diagnosis.limits import Limit, told_in_one
 from estimation.diagnosis.next_experiment import NextExperiment
 from estimation.diagnosis.simulation import Simulation, read_simulation
 from estimation.model import Model, load_model
@@ -96,6 +96,8 @@ class Diagnosis:
         """Says what was found, what it brings, and what stays open."""
         robot = self.model.robot
         lines = [f"{robot.name}: {_VERDICTS[self.verdict]}"]
+        if self.verdict == "none" and (seen := told_in_one(self.limits)):
+            lines.append(f"  {seen[0].lower()}{seen[1:]}")
         for finding in self.findings:
             where = f"joint {finding.joint}" if finding.joint else "whole robot"
             gain = finding.gain

@@ -25,6 +25,10 @@ FEW = "of {} kinds of it that were tried only {} show, from {:.2g} % of the torq
 RESTING = 0.02
 """Share of a log from which it is said that nothing is seen in rests."""
 RESTS = "{:.0f} % of the log the arm stands, where its torque is that of a friction nobody knows: nothing is seen there"
+STILL = 1e-3
+"""Travel of a joint [rad or m] below which it hardly moves."""
+MOST = 0.9
+"""Share of effects and places whose limits a sentence covers."""
 SHAPES = 3
 """Shapes of an effect that its limit is the median of."""
 RIVAL_SHAPES = 4
@@ -88,11 +92,30 @@ def find_limits(problem: Problem, entries: Sequence[Entry], *, false_alarm: floa
     for hypothesis in all_hypotheses(problem.situation.robot, list(EFFECTS.values())):
         entry = known.get((hypothesis.name, hypothesis.joint))
         if entry is None:
-            note = "joint hardly moves" if hypothesis.joint else "nothing of it shows in this motion"
-            limits.append(_none(hypothesis, note))
+            limits.append(_none(hypothesis, _why_nothing(problem, hypothesis)))
         else:
             limits.append(_limit(problem, entry, known, tries, false_alarm))
     return tuple(limits)
+
+
+def told_in_one(limits: Sequence[Limit]) -> str:
+    """Says in one sentence, without its stop, what logs would have shown; empty where they would show nothing."""
+    sizes = [limit.detectable for limit in limits if np.isfinite(limit.detectable)]
+    if not sizes:
+        return ""
+    half, most = (f"{100 * float(size):.1f} %" for size in np.quantile(sizes, (0.5, MOST)))
+    hidden = len(limits) - len(sizes)
+    rest = f", {hidden} more at no size" if hidden else ""
+    return (
+        f"Of {len(sizes)} effects and places half would have shown from {half} of the joint's torque on, nine in ten "
+        f"from {most}{rest}"
+    )
+
+
+def _why_nothing(problem: Problem, hypothesis: Hypothesis) -> str:
+    joint = hypothesis.joint
+    still = joint is not None and np.ptp(problem.recording.q[:, joint - 1]) < STILL
+    return "joint hardly moves" if still else "nothing of it shows in this motion"
 
 
 def _limit(

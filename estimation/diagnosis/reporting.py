@@ -18,7 +18,7 @@ from estimation.diagnosis.forms import alike_forms
 from estimation.diagnosis.gain import Unseen
 from estimation.diagnosis.hidden_springs import hidden_springs
 from estimation.diagnosis.hypotheses import all_hypotheses
-from estimation.diagnosis.limits import Limit
+from estimation.diagnosis.limits import STILL, Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.patterns import all_patterns
 from estimation.diagnosis.problem import Problem
@@ -30,7 +30,7 @@ from estimation.diagnosis.unseen import Measured, measure_unseen, simulate_unsee
 from estimation.diagnosis.verdict import CLOSE, Judgement, is_open, strongest_pattern
 from estimation.diagnosis.windup import EFFECT as ELASTICITY
 from estimation.diagnosis.windup import Windup, measure_windups
-from estimation.diagnosis.wording import word_finding
+from estimation.diagnosis.wording import no_part, word_finding
 from estimation.provenance import describe_logs
 from robots.robot import Robot
 from robots.signals import Log
@@ -76,7 +76,10 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         lambda member: member.worth(problem.rows) <= LEAST,
         partial(_unnamed, robot, told),
     )
-    members, founds, seen, spoiling = held.members, held.founds, held.seen, held.spoiling
+    members, founds, seen = held.members, held.founds, held.seen
+    twisted = _windups(told, seen)
+    # Where nothing else is left, a name that unseen data refuted shows at least where something is unexplained.
+    spoiling = held.spoiling if members or twisted else (*held.spoiling, *held.refuted)
     verdict = judgement.verdict
     if len(members) > len(founds) or spoiling:
         verdict = "unexplained"
@@ -101,11 +104,10 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     if spoiling:
         fit = fit_extended(problem, [*members, *(member for member, _, _ in spoiling)], {})
         findings += tuple(
-            word_finding(robot, problem, member, fit, i, p_value, None, gain)
+            no_part(word_finding(robot, problem, member, fit, i, p_value, None, gain))
             for i, (member, p_value, gain) in enumerate(spoiling, start=len(members))
         )
-    unseen = seen.unseen
-    twisted = _windups(told, seen)
+    unseen, apart = seen.unseen, findings[len(members) :]
     if twisted and not members and not spoiling:
         verdict = "named"
     findings += tuple(windup.finding for windup in twisted)
@@ -126,7 +128,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         next_experiment=_next(problem, founds) if verdict == "ambiguous" else None,
         model=replace(fitted.model, extensions=(*fitted.model.extensions, *added)),
         how_unseen=unseen.how,
-        notes=(*told.notes, *_notes(told, findings, before, after), *_faster(problem, seen), *held.notes, *lost),
+        notes=(*told.notes, *_notes(told, findings, apart, before, after), *_faster(problem, seen), *held.notes, *lost),
         trace=_trace(unseen, seen.coordinates, twisted),
         simulation=simulation,
     )
@@ -181,10 +183,12 @@ _AT_LIMIT = (
 )
 
 
-def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array) -> tuple[str, ...]:
+def _notes(
+    told: Told, findings: Sequence[Finding], apart: Sequence[Finding], before: Array, after: Array
+) -> tuple[str, ...]:
     recording = told.problem.recording
     notes = []
-    still = [j + 1 for j in range(recording.n) if np.ptp(recording.q[:, j]) < 1e-3]
+    still = [j + 1 for j in range(recording.n) if np.ptp(recording.q[:, j]) < STILL]
     if still:
         names = ", ".join(map(str, still))
         notes.append(
@@ -212,7 +216,8 @@ def _notes(told: Told, findings: Sequence[Finding], before: Array, after: Array)
                 f"{parameter.name} of {finding.effect} is not determined by {recording.duration:.0f} s of logs: the "
                 f"value {parameter.value:.3g} s is one of many that fit."
             )
-        if finding.gain.ci95[0] <= 0:
+        # What is no part of the model says so itself.
+        if finding.gain.ci95[0] <= 0 and finding not in apart:
             where = f"{finding.effect} of joint {finding.joint}" if finding.joint else finding.effect
             notes.append(f"The gain of {where} on unseen data is not sure: its interval begins below zero.")
     open_ = sorted({finding.joint for finding in findings if finding.effect == "unexplained" and finding.joint})

@@ -58,13 +58,18 @@ class Simulation:
     note: str = ""
     curves: Curves | None = field(default=None, repr=False)
 
+    @property
+    def telling(self) -> int:
+        """The joint, from 0, whose loop what was found changes most, for better or worse."""
+        return int(np.argmax(np.abs(np.nan_to_num(self.torque[0] - self.torque[1]))))
+
     def summary(self, lengths: Sequence[str]) -> str:
         """Says in one sentence what was simulated and what it brought.
 
         Args:
             lengths: the unit of each joint's position (n,).
         """
-        joint = int(np.argmax(np.nan_to_num(self.torque[0] - self.torque[1])))
+        joint = self.telling
         (old, new), (far, near) = (tuple(part[joint] for part in pair) for pair in (self.torque, self.motion))
         return (
             f"simulated forward from {self.start:.1f} to {self.end:.1f} s, driven by the measured torque under an "

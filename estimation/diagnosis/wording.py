@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,7 @@ from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found
 from robots.robot import Robot
 from robots.terms.base import force_unit, length_unit
+from robots.terms.effects import EFFECTS
 from robots.terms.effects.base import Coefficient, Shape
 
 # A parameter that an effect is not linear in is determined where its interval reaches no farther than this share of it;
@@ -69,6 +72,21 @@ def word_finding(
     )
 
 
+def no_part(finding: Finding) -> Finding:
+    """Words what shows that something is unexplained, but is no part of the extended model."""
+    if finding.pattern:
+        return replace(finding, sentence=f"{finding.sentence} {_ERRS}")
+    told = _DENIED.format(EFFECTS[finding.effect].title)
+    return replace(finding, effect="unexplained", parameters=(), rivals=(), sentence=told)
+
+
+_ERRS = "On unseen data that function errs: it shows where something is unexplained, and is no part of the model."
+_DENIED = (
+    "Something stands out of the noise that looks like {}, but unseen data speak against that: what it is, is not "
+    "known. The model has no part of it."
+)
+
+
 def _parameters(
     robot: Robot, member: Member, fitted: Fitted, i: int, known: NDArray[np.bool_]
 ) -> tuple[Parameter, ...]:
@@ -85,6 +103,8 @@ def _parameters(
         if isinstance(own, Shape) and own.scale == "log" and np.isfinite(error) and value > 0:
             factor = float(np.exp(1.96 * error / value))
             interval = (value / factor, value * factor)
+        # No machine has what lies beyond, whatever the data leave open.
+        interval = (min(max(interval[0], own.lower), value), max(min(interval[1], own.upper), value))
         result.append(
             Parameter(
                 name=own.name,

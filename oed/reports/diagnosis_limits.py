@@ -96,10 +96,18 @@ def _notes(limits: Sequence[Limit]) -> list[str]:
             places.setdefault(limit.note, []).append(limit)
     result = []
     for note, those in places.items():
-        names = dict.fromkeys(EFFECTS[limit.effect].title for limit in those)
-        joints = sorted({limit.joint for limit in those if limit.joint is not None})
-        where = f" on joint {', '.join(map(str, joints))}" if joints else ""
-        result.append(f"{'; '.join(names)}{where}: {note}.")
+        # Effects of the same joints are told together: a list of effects beside one of joints would be their product.
+        joints: dict[str, list[int]] = {}
+        for limit in those:
+            joints.setdefault(EFFECTS[limit.effect].title, []).extend([limit.joint] if limit.joint else [])
+        names: dict[tuple[int, ...], list[str]] = {}
+        for title, on in joints.items():
+            names.setdefault(tuple(sorted(on)), []).append(title)
+        told = [
+            "; ".join(titles) + (f" on joint{'s' if len(on) > 1 else ''} {', '.join(map(str, on))}" if on else "")
+            for on, titles in names.items()
+        ]
+        result.append(f"{' / '.join(told)}: {note}.")
     return result
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.diagnosis import Diagnosis
+from estimation.diagnosis.limits import told_in_one
 from oed.reports.diagnosis_limits import limits_section
 from oed.reports.diagnosis_pictures import cause_picture, gain_picture
 from oed.reports.diagnosis_simulation import simulation_section
@@ -53,11 +54,8 @@ def diagnosis_page(view: DiagnosisView) -> Page:
 
 def _verdict(view: DiagnosisView) -> str:
     if view.verdict == "none":
-        smallest = [limit.detectable for limit in view.limits if np.isfinite(limit.detectable)]
-        seen = (
-            f" Effects of {100 * float(np.median(smallest)):.1f} % of the torque would have been." if smallest else ""
-        )
-        return f"Nothing that the model leaves out was found.{seen}"
+        seen = told_in_one(view.limits)
+        return f"Nothing that the model leaves out was found.{f' {seen}.' if seen else ''}"
     if not view.findings:
         return "The model leaves something out that no effect of the catalogue explains."
     first = view.findings[0].sentence
@@ -189,12 +187,19 @@ def _finding(view: DiagnosisView, index: int) -> Section:
     )
 
 
+_NO_EXPERIMENT = {
+    "none": "Nothing is left to tell apart.",
+    "named": "No further experiment is needed to name the cause.",
+    "ambiguous": "No experiment that was thought of would tell the causes apart.",
+    "unexplained": "Part of the error has no name, and no experiment of the catalogue gives it one. Look at its joint: "
+    "move it alone, slowly and fast, through the same range at several loads, and see whether the residual stays with "
+    "the position, the speed or the time that the findings above name.",
+}
+
+
 def _next(view: DiagnosisView) -> Section:
     if not view.next_kind:
-        text = (
-            "No further experiment is needed to name the cause." if view.findings else "Nothing is left to tell apart."
-        )
-        return Section(title="Next step", paragraphs=(text,))
+        return Section(title="Next step", paragraphs=(_NO_EXPERIMENT[view.verdict],))
     paragraphs = [f"Make {view.next_kind}: {view.next_why}." if view.next_why else f"Make {view.next_kind}."]
     rows: Sequence[tuple[Cell, ...]] = tuple(
         (kind, round(100 * chance), round(duration)) for kind, chance, duration in view.next_ranking

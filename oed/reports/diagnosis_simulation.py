@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from estimation.diagnosis.simulation import Simulation
 from oed.reports.joint_units import joint_titles, joint_units
 from oed.reports.page import Cell, Section, Table
@@ -13,7 +11,7 @@ from oed.reports.pictures import Line, Panel, Picture, Series
 
 
 def simulation_section(simulation: Simulation, names: Sequence[str], kinds: Sequence[str]) -> Section:
-    """Builds the section: a table of all joints, and the curves of the joint that gains most.
+    """Builds the section: a table of all joints, and the curves of the joint that changes most.
 
     Args:
         simulation: just made, or loaded without its curves.
@@ -52,7 +50,7 @@ def simulation_section(simulation: Simulation, names: Sequence[str], kinds: Sequ
 def simulation_picture(
     simulation: Simulation, names: Sequence[str], kinds: Sequence[str], *, name: str = "simulation"
 ) -> Picture:
-    """Shows, of the joint that gains most, torque and deviation of the motion without and with what was found.
+    """Shows, of the joint that changes most, torque and deviation of the motion without and with what was found.
 
     Args:
         simulation: with its curves.
@@ -66,7 +64,7 @@ def simulation_picture(
     curves = simulation.curves
     if curves is None:
         raise ValueError("a simulation that was loaded from a file has no curves")
-    j = int(np.argmax(np.nan_to_num(simulation.torque[0] - simulation.torque[1])))
+    j = simulation.telling
     unit, title = joint_units(kinds, len(names))[j], joint_titles(names, len(names))[j]
     roles = (("base model", "residual"), ("with what was found", "good"))
     torque = [Series(x=curves.t, y=curves.measured[:, j], name="measured", role="measured")]
@@ -91,5 +89,5 @@ def simulation_picture(
                 lines=(Line(value=0.0, role="neutral", dash="solid"),),
             ),
         ),
-        caption="Of all joints, the one whose loop is relieved most.",
+        caption="Of all joints, the one whose loop changes most.",
     )

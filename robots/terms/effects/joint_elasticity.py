@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 DAMPING = 0.05
 """Of the resonance, of its critical one."""
+INEXACT = 0.05
+"""Share by which the stiffness by the dynamics errs besides: it is as right as the inertia and the damping are."""
 SCANNED = (3.5, 4.2, 5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 18.0, 30.0, 300.0)
 """Resonances [Hz] of a scan, at the log's mean inertia: dense where a motion may excite them, for they are narrow."""
 LIGHTEST = 0.02
@@ -39,7 +41,10 @@ class JointElasticity(Effect):
     name: ClassVar[str] = "joint_elasticity"
     title: ClassVar[str] = "a gear that winds up under load (elasticity)"
     kicks: ClassVar[bool] = True
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("dynamic_stiffness", "N m/rad", 1e-6, 1e12, "log"), ROTOR)
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("dynamic_stiffness", "N m/rad", 1e-6, 1e12, "log", inexact=INEXACT),
+        ROTOR,
+    )
     rivals: ClassVar[tuple[str, ...]] = ("backlash", "time_delay", "current_lag", "encoder_offset")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "payload")
 

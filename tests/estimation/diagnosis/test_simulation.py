@@ -55,6 +55,14 @@ def test_the_simulated_robot_comes_nearer_with_what_was_found(found: Diagnosis) 
     assert "on joint 2 the loop adds" in found.summary()
 
 
+def test_what_grows_worse_is_told_before_what_hardly_grows_better() -> None:
+    """The sentence is of the joint that changes most, whichever way."""
+    still = np.zeros(2)
+    torque = (np.array([0.0231, 0.042]), np.array([0.0230, 0.051]))
+    made = Simulation(start=0.0, end=5.0, loop=Loop(), torque=torque, motion=(still, still))
+    assert "on joint 2 the loop adds 4.20 -> 5.10 %" in made.summary(["rad", "rad"])
+
+
 def test_it_is_written_and_read(found: Diagnosis, tmp_path: object) -> None:
     """`diagnosis.json` holds its numbers, and gives them back."""
     found.save(tmp_path)  # type: ignore[arg-type]

@@ -9,13 +9,14 @@ import pytest
 
 from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.simulation import Curves, Simulation
-from oed.reports.diagnosis_limits import limits_page
+from oed.reports.diagnosis_limits import limits_page, limits_section
 from oed.reports.diagnosis_pictures import binned, cause_picture, gain_picture
 from oed.reports.diagnosis_report import diagnosis_page
 from oed.reports.diagnosis_view import DiagnosisView, FindingView
 from oed.reports.page import render
 from robots.common.errors import InputError
 from robots.plants.closed_loop import Loop
+from robots.terms.effects import EFFECTS
 
 N = 400
 LIMITS = tuple(
@@ -87,21 +88,59 @@ def test_the_page_tells_all(view):
 
 
 @pytest.mark.parametrize(
-    ("verdict", "expected"),
+    ("verdict", "expected", "following"),
     [
-        ("none", "Nothing that the model leaves out was found. Effects of 1.0 % of the torque would have been."),
-        ("unexplained", "no effect of the catalogue explains"),
+        (
+            "none",
+            "Nothing that the model leaves out was found. Of 3 effects and places half would have shown from 1.0 % of "
+            "the joint's torque on, nine in ten from 1.8 %, 1 more at no size.",
+            "Nothing is left to tell apart.",
+        ),
+        ("unexplained", "no effect of the catalogue explains", "no experiment of the catalogue gives it one"),
     ],
 )
-def test_a_page_without_findings(verdict, expected, view):
-    """Where nothing is named, the verdict says so, and what would have been seen."""
+def test_a_page_without_findings(verdict, expected, following, view):
+    """Where nothing is named, the verdict says so, what would have been seen, and what to do."""
     page = diagnosis_page(replace(view, verdict=verdict, findings=(), next_kind=""))
     assert expected in page.verdict
-    assert "Nothing is left to tell apart." in render(page)
+    assert following in render(page)
+
+
+def test_what_has_no_name_is_not_told_to_need_no_experiment(view):
+    """Findings without a name leave the cause open: the page says how to look for it."""
+    named, unexplained = (
+        render(diagnosis_page(replace(view, verdict=verdict, next_kind=""))) for verdict in ("named", "unexplained")
+    )
+    assert "No further experiment is needed" in named
+    assert "No further experiment is needed" not in unexplained
+    assert "move it alone" in unexplained
+
+
+def test_a_note_is_told_of_the_places_it_is_of():
+    """Effects that one note is of on different joints are not told as if it were of all of them on all joints."""
+    hidden = [
+        Limit(
+            effect=effect,
+            joint=joint,
+            detectable=np.inf,
+            at_worst=np.inf,
+            attributable=np.inf,
+            toughest=None,
+            visible=0.0,
+            note="nothing shows",
+        )
+        for effect, joint in (("backlash", 2), ("backlash", 3), ("encoder_offset", 1), ("encoder_eccentricity", 1))
+    ]
+    (note,) = limits_section(hidden).paragraphs[1:]
+    titles = {name: EFFECTS[name].title for name in ("backlash", "encoder_offset", "encoder_eccentricity")}
+    assert note == (
+        f"{titles['backlash']} on joints 2, 3 / {titles['encoder_offset']}; {titles['encoder_eccentricity']} on joint "
+        "1: nothing shows."
+    )
 
 
 def test_the_simulated_motion_is_told(view):
-    """The page says what was simulated under which loop, per joint in its unit, and draws the joint that gains most."""
+    """The page says what was simulated under which loop, per joint in its unit, and draws the joint that changes."""
     t = 0.01 * np.arange(N)
     two = np.column_stack([np.sin(t), np.cos(t)])
     curves = Curves(t=t, measured=two, torque=(0.9 * two, two), deviation=(1e-3 * two, 1e-4 * two))
