@@ -103,10 +103,9 @@ class Diagnosis:
             gain = finding.gain
             lines.append(f"  {finding.effect} ({where}), p {_p(finding.p_value)}: {finding.sentence}")
             of = "wind-up" if finding.measured_by else "torque"
-            lines.append(
-                f"    unseen error {100 * gain.nrmse_before:.2f} % -> {100 * gain.nrmse_after:.2f} % of the {of} "
-                f"(fall {100 * gain.ci95[0]:.2f} to {100 * gain.ci95[1]:.2f} %)"
-            )
+            before, after = (f"{100 * value:.2f} %" for value in (gain.nrmse_before, gain.nrmse_after))
+            fall = " to ".join(f"{100 * value:.2f}" for value in gain.ci95)
+            lines.append(f"    unseen error{finding.elsewhere} {before} -> {after} of the {of} (fall {fall} %)")
             # Coefficients of a free function mean nothing each.
             named = finding.effect != "unexplained"
             open_ = [_open(parameter) for parameter in finding.parameters if named and not parameter.determined]

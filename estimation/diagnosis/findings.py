@@ -43,17 +43,19 @@ class Parameter:
 
 @dataclass(frozen=True, kw_only=True)
 class Gain:
-    """What an effect brings on unseen data, on its joint, or averaged over the joints of the whole robot.
+    """What an effect brings on unseen data, averaged over the joints on which it shows.
 
     Attributes:
         nrmse_before: residual RMS over torque RMS without it.
         nrmse_after: with it.
         ci95: interval of the fall.
+        joints: those joints, from 1; none where older files do not say.
     """
 
     nrmse_before: float
     nrmse_after: float
     ci95: tuple[float, float]
+    joints: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +91,14 @@ class Finding:
     pattern: str = ""
     measured_by: str = ""
 
+    @property
+    def elsewhere(self) -> str:
+        """Says on which joints the gain is, where those are not the finding's own; begins with a space, or is empty."""
+        joints = self.gain.joints
+        if self.joint is None or joints in ((), (self.joint,)):
+            return ""
+        return f" of joint{'s' if len(joints) > 1 else ''} {', '.join(map(str, joints))}"
+
     def to_dict(self) -> dict[str, Any]:
         """Writes it as plain data."""
         return {
@@ -101,6 +111,7 @@ class Finding:
                 "nrmse_before": self.gain.nrmse_before,
                 "nrmse_after": self.gain.nrmse_after,
                 "ci95": list(self.gain.ci95),
+                "joints": list(self.gain.joints),
             },
             "rivals": [[name, worse] for name, worse in self.rivals],
             "sentence": self.sentence,
@@ -137,6 +148,7 @@ def read_finding(item: dict[str, Any]) -> Finding:
             nrmse_before=float(gain["nrmse_before"]),
             nrmse_after=float(gain["nrmse_after"]),
             ci95=(float(gain["ci95"][0]), float(gain["ci95"][1])),
+            joints=tuple(int(joint) for joint in gain.get("joints", ())),
         ),
         rivals=tuple((str(name), float(worse)) for name, worse in item["rivals"]),
         sentence=item["sentence"],

@@ -40,8 +40,9 @@ from robots.version import VERSION
 
 Array = NDArray[np.float64]
 
-# Error on unseen data that is worth a word: so many times that of the fit, and more than this share of the torque.
-STRANGE, ODD = 3.0, 0.2
+# Error on unseen data that is worth a word: so many times that of the fit and more than this share of the torque, or
+# more than the second share, whatever the fit's.
+STRANGE, FAR, ODD = 3.0, 0.05, 0.2
 # Unseen speeds beyond the fitted ones by this factor are worth one, too.
 FASTER = 1.3
 SHOWN = 4000  # rows of the curves kept for pictures
@@ -128,7 +129,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         next_experiment=_next(problem, founds) if verdict == "ambiguous" else None,
         model=replace(fitted.model, extensions=(*fitted.model.extensions, *added)),
         how_unseen=unseen.how,
-        notes=(*told.notes, *_notes(told, findings, apart, before, after), *_faster(problem, seen), *held.notes, *lost),
+        notes=(*told.notes, *_notes(told, findings, apart, after), *_faster(problem, seen), *held.notes, *lost),
         trace=_trace(unseen, seen.coordinates, twisted),
         simulation=simulation,
     )
@@ -183,9 +184,7 @@ _AT_LIMIT = (
 )
 
 
-def _notes(
-    told: Told, findings: Sequence[Finding], apart: Sequence[Finding], before: Array, after: Array
-) -> tuple[str, ...]:
+def _notes(told: Told, findings: Sequence[Finding], apart: Sequence[Finding], after: Array) -> tuple[str, ...]:
     recording = told.problem.recording
     notes = []
     still = [j + 1 for j in range(recording.n) if np.ptp(recording.q[:, j]) < STILL]
@@ -199,7 +198,7 @@ def _notes(
     for j in sorted({*range(1, recording.n + 1)} - told_of):
         if CLIPPING.chance(told.problem.sees(CLIPPING), j, recording.tau) < CERTAIN:
             notes.append(_AT_LIMIT.format(j, float(np.abs(recording.tau[:, j - 1]).max())))
-    strange = _strange(told.problem, before)
+    strange = _strange(told.problem, after)
     notes += strange.values()
     notes += [
         f"Joint {j + 1}: {100 * after[j]:.0f} % of the torque that no fit has seen is left. What cannot be told from "
@@ -233,17 +232,19 @@ def _notes(
     return tuple(notes)
 
 
-def _strange(problem: Problem, before: Array) -> dict[int, str]:
-    """Says where the base model predicts logs far worse than it fits them: a verdict of none is then worth little."""
+def _strange(problem: Problem, after: Array) -> dict[int, str]:
+    """Says where the model predicts logs far worse than it fits them: there is more in them than was found."""
     counts = ~problem.recording.unsure
     number = np.maximum(counts.sum(axis=0), 1)
     torque = np.sqrt((problem.recording.tau**2 * counts).sum(axis=0) / number)
     fitted = np.sqrt((problem.remainder**2 * counts).sum(axis=0) / number) / np.maximum(torque, 1e-12)
     return {
-        int(j): f"Joint {j + 1}: the base model leaves {100 * fitted[j]:.0f} % of the torque that it was fitted to and "
-        f"{100 * before[j]:.0f} % of the torque that it was not. The logs differ in something that was not found, or "
+        int(
+            j
+        ): f"Joint {j + 1}: {100 * after[j]:.3g} % of the torque that no fit has seen is left, where the base model "
+        f"leaves {100 * fitted[j]:.2g} % of what it was fitted to. The logs differ in something that was not found, or "
         "some of them do not tell its parameters."
-        for j in np.flatnonzero(before > np.maximum(STRANGE * fitted, ODD))
+        for j in np.flatnonzero(after > np.maximum(STRANGE * fitted, FAR))
     }
 
 

@@ -33,6 +33,8 @@ SHORTEST_UNSEEN = 1.0  # [s] of held-out logs
 # Of this many seconds of unseen data the motion is simulated, by a fit to at most so many rows.
 STRETCH = 5.0
 ENOUGH_ROWS = 12_000
+# A joint tells an effect of another, or of its own, by this share of the gain and more.
+TELLING = 0.1
 # An effect lives in one log that holds more than this share of its energy.
 ALONE = 0.9
 
@@ -223,7 +225,7 @@ def _fits(problem: Problem, measured: Measured, left_out: slice | None) -> tuple
 
 
 def _gain(unseen: Unseen, i: int, member: Member, rng: np.random.Generator) -> Gain:
-    """The fall of the error by one member, on its joint, or over all it acts on."""
+    """The fall of the error by one member, over the joints on which it is told."""
     joints = _joints(member)
     last = len(unseen.errors) - 1
     low, high = unseen.interval(i + 1, last, joints, rng)
@@ -231,13 +233,20 @@ def _gain(unseen: Unseen, i: int, member: Member, rng: np.random.Generator) -> G
         nrmse_before=float(unseen.nrmse(i + 1)[joints].mean()),
         nrmse_after=float(unseen.nrmse(last)[joints].mean()),
         ci95=(low, high),
+        joints=tuple(j + 1 for j in joints),
     )
 
 
 def _joints(member: Member) -> list[int]:
-    """The joints, counted from 0, on which a member's gain is told."""
-    own = member.hypothesis.joint
-    return [own - 1] if own is not None else list(member.group.joints)
+    """The joints, counted from 0, on which a member's gain is told.
+
+    What is wrong with one joint may show on others above all: an encoder's zero on those that gravity pulls beyond it.
+    """
+    if member.hypothesis.joint is None:
+        return list(member.group.joints)
+    gains = {j: member.gain_on([j]) for j in member.group.joints}
+    told = [j for j, gain in gains.items() if gain > TELLING * sum(gains.values())]
+    return told or [member.hypothesis.joint - 1]
 
 
 def _rise(unseen: Unseen, i: int, member: Member) -> float:

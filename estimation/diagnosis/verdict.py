@@ -13,6 +13,7 @@ from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scan import Entry, scan
 from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.selection import Found, Selection
+from estimation.diagnosis.spotting import Spot
 
 # Named effects that explain less than this share of what stands out of the noise, or of what free functions do in their
 # place, do not explain it; nor do those that fit worse than one of those and explain less than the second share of it.
@@ -20,6 +21,7 @@ ENOUGH, NEARLY = 0.7, 0.9
 # Rivals within this of the best BIC stay possible.
 CLOSE = 10.0
 MOST_PATTERNS = 3
+CONTENDERS = 3
 # A name of the whole robot is not owed to a joint where a free function there leaves it this share of its gain.
 STAYS = 0.75
 # A pattern beside named effects counts when it explains this share of what they do on its joint: formulas are true to
@@ -155,6 +157,13 @@ def _holds(
         return False
     if len(own) > 1 and not _thriftier(problem, own, others, free, LEAST):
         return False
+    if len(own) == 1 and own[0].hypothesis.effect.waves:
+        # Waves over a joint's range are no more than one place of it where that explains nearly as much with less.
+        free, _ = _patterns(
+            problem, [e for e in here if isinstance(e.hypothesis.effect, Spot)], others, false_alarm, rng
+        )
+        if free and free[0].degrees < degrees and _worth(free[0]) > NEARLY * (gain - degrees):
+            return False
     if any(member.hypothesis.effect.passing for member in own):
         # What comes and goes follows nearly any torque: functions of the motion that do so with less refute it.
         moving = [entry for entry in here if not is_of_time(entry.hypothesis.effect)]
@@ -275,11 +284,12 @@ def _patterns(
         result = scan(problem, patterns, accepted, rng)
         if not result.outcomes:
             break
-        best = result.outcomes[0]
-        p = result.p_value(best.evidence)
+        p = result.p_value(result.outcomes[0].evidence)
         if not p <= false_alarm:
             break
-        member = refine(problem, best.hypothesis, best.shape, accepted)
+        # A grid tells narrow functions of few parameters less well than wide ones of many.
+        near = [refine(problem, o.hypothesis, o.shape, accepted) for o in result.outcomes[:CONTENDERS] if o.degrees]
+        member = max(near, key=lambda m: m.bic(problem.rows))
         before = (*named, *members)
         if _worth(member) < BEYOND * sum(m.gain_on(member.group.joints) for m in before):
             break

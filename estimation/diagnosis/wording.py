@@ -103,6 +103,7 @@ def _parameters(
         if isinstance(own, Shape) and own.scale == "log" and np.isfinite(error) and value > 0:
             factor = float(np.exp(1.96 * error / value))
             interval = (value / factor, value * factor)
+        rough = isinstance(own, Shape) and _roughly(own, value, interval)
         # No machine has what lies beyond, whatever the data leave open.
         interval = (min(max(interval[0], own.lower), value), max(min(interval[1], own.upper), value))
         result.append(
@@ -112,7 +113,7 @@ def _parameters(
                 unit=own.unit_at(robot, extension.joint) if isinstance(own, Shape) else own.unit,
                 standard_error=float(error) if np.isfinite(error) else float("nan"),
                 ci95=(float(interval[0]), float(interval[1])) if np.isfinite(error) else (-np.inf, np.inf),
-                determined=bool(sure) and not (isinstance(own, Shape) and _roughly(own, value, interval)),
+                determined=bool(sure) and not rough,
             )
         )
     return tuple(result)

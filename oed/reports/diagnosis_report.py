@@ -154,7 +154,7 @@ def _finding(view: DiagnosisView, index: int) -> Section:
     if np.isfinite(finding.before):
         evidence.append(
             (
-                "error on unseen data",
+                f"error{finding.elsewhere} on unseen data",
                 f"{100 * finding.before:.3g} → {100 * finding.after:.3g} % of the {finding.of} RMS",
             )
         )

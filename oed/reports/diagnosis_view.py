@@ -38,6 +38,7 @@ class FindingView:
         residual_after: with all findings (N,).
         of: what before and after are the error of.
         unit: of the residuals where they are no torques.
+        elsewhere: joints on which before and after are, where those are not its own; begins with a space, or is empty.
     """
 
     title: str
@@ -57,6 +58,7 @@ class FindingView:
     residual_after: Array
     of: str = "torque"
     unit: str = ""
+    elsewhere: str = ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -176,6 +178,9 @@ def _finding(finding: Finding, trace: Trace, coordinate: Array) -> FindingView:
     effect = EFFECTS.get(finding.effect)
     title = effect.title if effect is not None else "a pattern without a known cause"
     joint = finding.joint if finding.joint is not None else _most(trace)
+    if finding.elsewhere and joint not in finding.gain.joints:
+        # What is wrong with one joint is shown where it shows.
+        joint = max(finding.gain.joints, key=lambda k: _fall(trace)[k - 1])
     known = bool(np.isfinite(coordinate).any())
     return FindingView(
         title=title,
@@ -193,10 +198,16 @@ def _finding(finding: Finding, trace: Trace, coordinate: Array) -> FindingView:
         coordinate=coordinate if known else trace.t,
         residual_before=trace.before[:, joint - 1],
         residual_after=trace.after[:, joint - 1],
+        elsewhere=finding.elsewhere,
     )
 
 
 def _most(trace: Trace) -> int:
     """The joint, from 1, whose error falls most."""
+    return 1 + int(np.argmax(_fall(trace)))
+
+
+def _fall(trace: Trace) -> Array:
+    """By what share of the torque each joint's error falls (n,)."""
     before, after = (np.sqrt(np.nanmean(part**2, axis=0)) for part in (trace.before, trace.after))
-    return 1 + int(np.argmax((before - after) / np.maximum(np.sqrt(np.nanmean(trace.measured**2, axis=0)), 1e-12)))
+    return np.asarray((before - after) / np.maximum(np.sqrt(np.nanmean(trace.measured**2, axis=0)), 1e-12))

@@ -114,6 +114,7 @@ class Effect(ABC):
         kicks: whether it acts by changes of acceleration: they are largest, and least known, where a joint turns round.
         fast: whether its torque owes nothing to accelerations: it is looked for above the frequencies of those, too.
         blurs: whether it lets friction turn round later or over some time: how sharp its sign is shows beside it only.
+        waves: whether it goes up and down over the joint's range, as a spot of it does once.
         last: whether it acts on all of the torque, that of other effects too (`Situation.beyond`).
         shapes: the parameters that the columns are not linear in.
         rivals: effects that resemble it, the closest first.
@@ -130,6 +131,7 @@ class Effect(ABC):
     kicks: ClassVar[bool] = False
     fast: ClassVar[bool] = False
     blurs: ClassVar[bool] = False
+    waves: ClassVar[bool] = False
     last: ClassVar[bool] = False
     shapes: ClassVar[tuple[Shape, ...]] = ()
     rivals: ClassVar[tuple[str, ...]] = ()

@@ -11,7 +11,6 @@ from scipy.ndimage import median_filter
 
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effects.base import Coefficient, Place, Shape, Situation
-from robots.terms.effects.states import torque_reference
 from robots.terms.effects.static import Instant, StaticJointEffect
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ class TorqueRipple(StaticJointEffect):
 
     Of a linear axis h is a wave number [rad/m]: a ball screw's, a rack's teeth's, the poles' of its motor.
 
-    l is the load, as a share of the joint's torque limit (of 100 N m where it has none): teeth mesh harder under it.
+    l is the load [N m or N]: teeth mesh harder under it, and a motor's constant ripples by a share of its torque.
     p = q - dq T is the position a moment T before: a ripple of 50 Hz and more turns with what delays the torque's log.
 
     Orders are those that the data resolve, known gear or not. Below 3 per turn, or two waves over the joint's range,
@@ -51,13 +50,15 @@ class TorqueRipple(StaticJointEffect):
     )
     rivals: ClassVar[tuple[str, ...]] = ("position_dependent_friction", "spring", "encoder_eccentricity")
     fast: ClassVar[bool] = True
+    waves: ClassVar[bool] = True
     experiments: ClassVar[tuple[str, ...]] = ("sweep",)
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the two phases' amplitudes, and their growth with the load."""
         assert joint is not None
         force = force_unit(robot, joint - 1)
-        return tuple(Coefficient(name, force) for name in ("cosine", "sine", "loaded_cosine", "loaded_sine"))
+        units = {"cosine": force, "sine": force, "cosine_per_load": "1", "sine_per_load": "1"}
+        return tuple(Coefficient(name, unit) for name, unit in units.items())
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists orders half a resolution apart, up to what a tenth of the samples is slow enough for.
@@ -133,7 +134,7 @@ class TorqueRipple(StaticJointEffect):
         """Builds cos(h p) and sin(h p), by themselves and times the load."""
         angle = at.shape[0] * (at.q - at.dq * at.shape[1])
         wave = casadi.horzcat(casadi.cos(angle), casadi.sin(angle))
-        return casadi.horzcat(wave, wave * at.rigid / torque_reference(robot, joint))
+        return casadi.horzcat(wave, wave * at.rigid)
 
     def describe(
         self,
@@ -145,9 +146,10 @@ class TorqueRipple(StaticJointEffect):
         length: str = "rad",
     ) -> str:
         """Says what the values mean."""
-        size = np.hypot(coefficients[0], coefficients[1])
+        size, share = np.hypot(*coefficients[:2]), 100 * np.hypot(*coefficients[2:])
         often = f"{shape[0]:.4g} times a turn" if length == "rad" else f"every {2000 * np.pi / shape[0]:.4g} mm"
-        return f"The torque of joint {joint} ripples by {size:.3g} {force} up and down, {often}."
+        much = f"{size:.3g} {force} and {share:.2g} % of its load"
+        return f"The torque of joint {joint} ripples by {much} up and down, {often}."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the angle within the ripple's period."""

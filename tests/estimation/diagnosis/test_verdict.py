@@ -14,6 +14,7 @@ from estimation.diagnosis.patterns import Pattern
 from estimation.diagnosis.problem import Group
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found
+from estimation.diagnosis.spotting import Spot
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
 
@@ -53,6 +54,37 @@ def test_a_name_of_the_whole_robot_may_be_what_a_name_on_a_joint_left(
     problem = SimpleNamespace(rows=ROWS)
     assert verdict._holds(problem, 1, [ripple, push], [], [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
     assert (free - 8 * PRICE < 400.0 - 10 * PRICE) is (free == 310.0)
+
+
+@pytest.mark.parametrize(
+    ("spot", "degrees", "name", "holds"),
+    [
+        (280.0, 3, "torque_ripple", False),  # a catch at one angle explains what five parameters of waves do
+        (260.0, 3, "torque_ripple", True),  # the waves explain more than the catch
+        (280.0, 5, "torque_ripple", True),  # as many parameters are no less
+        (280.0, 3, "spring", True),  # a spring does not go up and down
+    ],
+)
+def test_waves_are_no_catch_at_one_angle(
+    spot: float, degrees: int, name: str, holds: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A ripple of a gain of 300 and five parameters, beside a spot of the joint's range in its place."""
+    own = _member(name, 1, 300.0, 5)
+    catch = replace(_member("spring", 1, spot, degrees), hypothesis=Hypothesis(Spot(), 1))
+    gains = {id(own.group): 300.0, id(catch.group): spot}
+    monkeypatch.setattr(
+        verdict, "accept", lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups))
+    )
+    spots = [SimpleNamespace(hypothesis=catch.hypothesis), SimpleNamespace(hypothesis=Hypothesis(Pattern("turns"), 1))]
+
+    def patterns(problem: object, entries: list[SimpleNamespace], *rest: object) -> tuple[list[Member], list[float]]:
+        # Among all free functions another one comes first: that of most parameters.
+        wide = replace(_member("spring", 1, 250.0, 9), hypothesis=Hypothesis(Pattern("turns"), 1))
+        return [wide if len(entries) > 1 else catch], []
+
+    monkeypatch.setattr(verdict, "_patterns", patterns)
+    problem = SimpleNamespace(rows=ROWS)
+    assert verdict._holds(problem, 1, [own], spots, [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,20 @@
-"""Specification of what a finding calls determined."""
+"""Specification of what a finding says of its parameters and of its place."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from estimation.diagnosis.wording import _roughly
+from estimation.diagnosis.extension import Extension
+from estimation.diagnosis.findings import Finding, Gain, Parameter
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.refinement import Member
+from estimation.diagnosis.wording import _parameters, _roughly, no_part
+from robots.robot import Robot
 from robots.terms.effects import EFFECTS
 
 
@@ -29,3 +38,58 @@ def test_a_fifth_of_a_value_or_of_a_second(
 ) -> None:
     """A nonlinear parameter is known roughly where its interval is wider, a moment by the clock."""
     assert _roughly(EFFECTS[effect].shapes[shape], value, interval) is roughly
+
+
+def test_an_interval_holds_what_machines_may_have(arm: Robot) -> None:
+    """What the data leave open below zero is no stiffness; a value that is rough stays so, however little is left."""
+    hypothesis = Hypothesis(EFFECTS["stribeck"], 1)
+    member = Member(hypothesis, (0.05, 1.0), None, 100.0, np.array([7.9]), 3, 1.0)  # type: ignore[arg-type]
+    extension = Extension(
+        effect="stribeck",
+        joint=1,
+        shape=member.shape,
+        coefficients=member.coefficients,
+        covariance=np.diag([5.3, 0.001, 0.4]) ** 2,
+    )
+    fitted: Any = SimpleNamespace(model=SimpleNamespace(extensions=[extension]))
+    torque, _, exponent = _parameters(arm, member, fitted, 0, np.array([False, True, True]))
+    assert torque.ci95 == (0.0, pytest.approx(7.9 + 1.96 * 5.3))
+    assert exponent.ci95[0] >= EFFECTS["stribeck"].shapes[1].lower
+    assert not exponent.determined
+
+
+def test_what_is_no_part_of_the_model_says_so() -> None:
+    """A free function that errs, and a name that unseen data refuted: neither may be taken for a cause."""
+    finding = Finding(
+        effect="joint_elasticity",
+        joint=2,
+        parameters=(Parameter(name="x", value=1.0, unit="1", standard_error=0.1, ci95=(0.8, 1.2), determined=True),),
+        p_value=1e-9,
+        delta_bic=50.0,
+        gain=Gain(nrmse_before=0.02, nrmse_after=0.03, ci95=(-0.02, -0.01), joints=(2, 3)),
+        rivals=(("backlash", 3.0),),
+        sentence="It winds up.",
+        visible=0.5,
+    )
+    refuted = no_part(finding)
+    assert (refuted.effect, refuted.joint, refuted.parameters, refuted.rivals) == ("unexplained", 2, (), ())
+    assert "looks like a gear that winds up under load" in refuted.sentence
+    assert "no part of it" in refuted.sentence
+    assert "errs" in no_part(finding_of("pattern:load:0:odd", finding)).sentence
+
+
+def finding_of(pattern: str, finding: Finding) -> Finding:
+    """The same as an unexplained pattern."""
+    return replace(finding, effect="unexplained", pattern=pattern)
+
+
+def test_a_gain_elsewhere_is_told_with_its_joints() -> None:
+    """What is wrong with one joint and shows on others is told on those; on its own it needs no word."""
+    gain = Gain(nrmse_before=0.02, nrmse_after=0.01, ci95=(0.0, 0.02))
+    bare: Any = {"effect": "encoder_offset", "parameters": (), "p_value": 0.0, "delta_bic": 9.0, "rivals": ()}
+    bare |= {"sentence": "", "visible": 1.0}
+    told = {
+        joints: Finding(joint=4, gain=replace(gain, joints=joints), **bare).elsewhere
+        for joints in ((), (4,), (5, 6), (5,))
+    }
+    assert told == {(): "", (4,): "", (5, 6): " of joints 5, 6", (5,): " of joint 5"}

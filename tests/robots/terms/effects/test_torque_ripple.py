@@ -140,3 +140,9 @@ def test_friction_by_the_position_of_a_linear_axis_goes_by_waves_over_its_range(
     for waves in (1.0, 3.0):
         assert np.min(np.abs(orders - 2 * np.pi * waves / 0.1)) * 0.1 < 1.5
     assert "every 50 mm" in effect.describe(2, np.ones(2), (2 * np.pi / 0.05,), force="N", length="m")
+
+
+def test_the_sentence_tells_what_grows_with_the_load():
+    """A motor's constant that ripples does so by a share of its torque: that is no small ripple."""
+    told = RIPPLE.describe(3, np.array([0.003, 0.004, 0.03, -0.04]), (12.0, 0.0))
+    assert told == "The torque of joint 3 ripples by 0.005 N m and 5 % of its load up and down, 12 times a turn."
