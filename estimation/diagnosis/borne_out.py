@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from estimation.diagnosis.findings import Gain
+from estimation.diagnosis.free_functions import SURE
 from estimation.diagnosis.patterns import PREFIX, is_of_time
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found
 from estimation.diagnosis.unseen import Measured
-from estimation.diagnosis.verdict import CLOSE, SURE, Judgement
+from estimation.diagnosis.verdict import CLOSE, Judgement
 from robots.terms.effects import Effect
 
 LEFT = 0.2  # share of an effect's gain that stretches left out must show

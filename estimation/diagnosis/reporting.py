@@ -15,6 +15,7 @@ from estimation.diagnosis.diagnosis import Diagnosis, Trace
 from estimation.diagnosis.extending import fit_extended
 from estimation.diagnosis.findings import Finding
 from estimation.diagnosis.forms import alike_forms
+from estimation.diagnosis.free_functions import strongest_pattern
 from estimation.diagnosis.gain import Unseen
 from estimation.diagnosis.hidden_springs import hidden_springs
 from estimation.diagnosis.hypotheses import all_hypotheses
@@ -27,7 +28,7 @@ from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.scan import measure
 from estimation.diagnosis.selection import LEAST, Found, Selection
 from estimation.diagnosis.unseen import Measured, measure_unseen, simulate_unseen
-from estimation.diagnosis.verdict import CLOSE, Judgement, is_open, strongest_pattern
+from estimation.diagnosis.verdict import CLOSE, Judgement, is_open
 from estimation.diagnosis.windup import EFFECT as ELASTICITY
 from estimation.diagnosis.windup import Windup, measure_windups
 from estimation.diagnosis.wording import no_part, word_finding

@@ -50,7 +50,7 @@ def test_a_name_of_the_whole_robot_may_be_what_a_name_on_a_joint_left(
     )
     monkeypatch.setattr(verdict, "score", lambda problem, group, beside: SimpleNamespace(gain=left))
     found = replace(ripple, gain=free, degrees=8, group=replace(ripple.group))
-    monkeypatch.setattr(verdict, "_patterns", lambda *arguments: ([found] if push not in arguments[2] else [], []))
+    monkeypatch.setattr(verdict, "free_functions", lambda *arguments: ([found] if push not in arguments[2] else [], []))
     problem = SimpleNamespace(rows=ROWS)
     assert verdict._holds(problem, 1, [ripple, push], [], [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
     assert (free - 8 * PRICE < 400.0 - 10 * PRICE) is (free == 310.0)
@@ -82,7 +82,7 @@ def test_waves_are_no_catch_at_one_angle(
         wide = replace(_member("spring", 1, 250.0, 9), hypothesis=Hypothesis(Pattern("turns"), 1))
         return [wide if len(entries) > 1 else catch], []
 
-    monkeypatch.setattr(verdict, "_patterns", patterns)
+    monkeypatch.setattr(verdict, "free_functions", patterns)
     problem = SimpleNamespace(rows=ROWS)
     assert verdict._holds(problem, 1, [own], spots, [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
 
@@ -112,7 +112,7 @@ def test_a_drift_is_a_free_function_of_time(
     ) -> tuple[list[Member], list[float]]:
         return ([free] if entries else []), []
 
-    monkeypatch.setattr(verdict, "_patterns", patterns)
+    monkeypatch.setattr(verdict, "free_functions", patterns)
     problem = SimpleNamespace(rows=ROWS)
     entries = [SimpleNamespace(hypothesis=pattern)]
     assert verdict._holds(problem, 2, [drift], entries, [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
@@ -141,7 +141,7 @@ def test_a_formula_is_not_named_for_what_is_unexplained_on_joints_that_it_reache
         verdict, "accept", lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups))
     )
     monkeypatch.setattr(verdict, "score", lambda problem, group, beside: SimpleNamespace(gain=left))
-    monkeypatch.setattr(verdict, "_patterns", lambda *arguments, **kind: ([free], [1e-30]))
+    monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: ([free], [1e-30]))
     monkeypatch.setattr(verdict, "_holds", lambda *arguments: True)
     monkeypatch.setattr(verdict, "_believable", lambda *arguments: True)
     found = Found(offset, 1e-9, ())
@@ -168,7 +168,7 @@ def test_a_name_of_the_whole_robot_is_weighed_against_functions_of_a_joint(
     tilt = _member("base_tilt", None, 500.0, 2)
     pattern = Hypothesis(Pattern("drag", 3), 1)
     other = replace(_member("spring", 1, free, degrees), hypothesis=pattern)
-    monkeypatch.setattr(verdict, "_patterns", lambda *arguments, **kind: ([other], [1e-30]))
+    monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: ([other], [1e-30]))
     found = Found(tilt, 1e-9, ())
     problem = SimpleNamespace(rows=ROWS)
     held = verdict._holds_alone(problem, found, [tilt], [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
@@ -186,7 +186,7 @@ def test_several_names_on_one_joint_must_fit_better_than_one_free_function(monke
     problem = SimpleNamespace(rows=ROWS)
 
     def held(functions: list[Member]) -> bool:
-        monkeypatch.setattr(verdict, "_patterns", lambda *arguments, **kind: (functions, []))
+        monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: (functions, []))
         return verdict._holds(problem, 1, pair, [], [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
 
     assert 309.0 - 5 * PRICE - (299.0 - 4 * PRICE) < verdict.LEAST
@@ -210,3 +210,32 @@ def test_a_value_at_the_edge_of_what_machines_have_is_no_name(
         assert verdict._believable(problem, hot) is (seconds > 5.0)  # type: ignore[arg-type]
     assert EFFECTS["backlash"].believable(arm, 1, np.full(1, 1e-6))
     assert not EFFECTS["backlash"].believable(arm, 1, np.full(1, 1e-7))
+
+
+def test_small_names_beside_one_that_holds_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three names on a joint are beaten by free functions; the strongest by itself is not: the others were its rest."""
+    stribeck, spring, push = (
+        _member("stribeck", 3, 700.0, 3),
+        _member("spring", 3, 90.0, 4),
+        _member("spring", 2, 9.0, 4),
+    )
+    seen: list[tuple[str, ...]] = []
+
+    def holds(problem: object, joint: int, named: list[Member], *rest: object) -> bool:
+        seen.append(tuple(m.hypothesis.label for m in named if m.hypothesis.joint == joint))
+        return len(seen[-1]) == 1
+
+    monkeypatch.setattr(verdict, "accept", lambda problem, groups: SimpleNamespace(gain=800.0))
+    monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: ([], []))
+    monkeypatch.setattr(verdict, "refine", lambda problem, hypothesis, shape, beside: replace(stribeck, gain=705.0))
+    monkeypatch.setattr(verdict, "_holds", holds)
+    monkeypatch.setattr(verdict, "_believable", lambda *arguments: True)
+    found = tuple(Found(member, 1e-9, ()) for member in (stribeck, spring, push))
+    selection = SimpleNamespace(found=found, accepted=SimpleNamespace(gain=800.0))
+    said = verdict.judge(SimpleNamespace(rows=ROWS), selection, [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
+    assert said.verdict == "named"
+    assert [(f.member.hypothesis.label, f.member.gain) for f in said.kept] == [
+        ("stribeck of joint 3", 705.0),
+        ("spring of joint 2", 9.0),
+    ]
+    assert seen == [("spring of joint 2",), ("stribeck of joint 3", "spring of joint 3"), ("stribeck of joint 3",)]
