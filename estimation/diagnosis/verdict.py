@@ -62,7 +62,9 @@ def judge(
     left, p_values = free_functions(problem, patterns, named, false_alarm, rng, alone=True)
     explained, rest = selection.accepted.gain, sum(map(worth, left))
     share = explained / (explained + rest) if explained + rest > 0 else 1.0
-    kept = tuple(_possible(problem, found) for found in selection.found if _believable(problem, found.member))
+    able = [_buildable(problem, found, named) for found in selection.found]
+    named = [member if found is None else found.member for member, found in zip(named, able, strict=True)]
+    kept = tuple(_possible(problem, found) for found in able if found is not None)
     if share < ENOUGH:
         kept = tuple(found for found in kept if found.member.hypothesis.joint is not None)
     kept = tuple(found for found in kept if _holds_alone(problem, found, named, patterns, false_alarm, rng))
@@ -115,6 +117,24 @@ def _possible(problem: Problem, found: Found) -> Found:
     """Leaves out rivals that no machine has."""
     rivals = tuple(pair for pair in found.rivals if _believable(problem, pair[0]))
     return found if len(rivals) == len(found.rivals) else replace(found, rivals=rivals)
+
+
+def _buildable(problem: Problem, found: Found, named: Sequence[Member]) -> Found | None:
+    """Gives what was found as a machine may have it: as fitted, or in a likely form that is worth it; None if neither.
+
+    A delay beside which another friction acts at reversals, which it delays too, may be told later or sooner by them.
+    """
+    own = found.member
+    if _believable(problem, own):
+        return found
+    effect, joint = own.hypothesis.effect, own.hypothesis.joint
+    beside = accept(problem, tuple(m.group for m in named if m is not own))
+    for known in effect.likely(problem.sees(effect), joint, own.shape, own.coefficients):
+        shape = tuple(was if value is None else value for value, was in zip(known, own.shape, strict=True))
+        member = refine(problem, own.hypothesis, shape, beside, effort=0)
+        if _believable(problem, member) and member.worth(problem.rows) > max(LEAST, STAYS * own.worth(problem.rows)):
+            return replace(found, member=member)
+    return None
 
 
 def _believable(problem: Problem, member: Member) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from estimation.diagnosis.selection import Found
 from estimation.diagnosis.spotting import Spot
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
+from robots.terms.effects.time_delay import near
 
 ROWS = 5000
 PRICE = float(np.log(ROWS))
@@ -239,3 +241,34 @@ def test_small_names_beside_one_that_holds_are_left_out(monkeypatch: pytest.Monk
         ("spring of joint 2", 9.0),
     ]
     assert seen == [("spring of joint 2",), ("stribeck of joint 3", "spring of joint 3"), ("stribeck of joint 3",)]
+
+
+@pytest.mark.parametrize(
+    ("worth", "believed", "kept"),
+    [
+        (90.0, True, True),  # with reversals as late as all else it explains nearly as much: a machine may have that
+        (60.0, True, False),  # without its torn reversals it is another effect
+        (90.0, False, False),  # that form is no machine's either
+    ],
+)
+def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
+    worth: float, believed: bool, kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A delay of a gain of 100 stands at the end of the range that its reversals allow it."""
+    torn = replace(_member("time_delay", None, 100.0, 0), shape=(0.004,), coefficients=np.array([near(0.004)[0][1]]))
+
+    def refined(
+        problem: object, hypothesis: Hypothesis, shape: tuple[float, ...], beside: object, *, effort: int
+    ) -> Member:
+        assert effort == 0
+        return replace(
+            torn, shape=shape, gain=worth, coefficients=np.array([shape[0] if believed else near(shape[0])[0][1]])
+        )
+
+    monkeypatch.setattr(verdict, "accept", lambda problem, groups: SimpleNamespace(gain=0.0))
+    monkeypatch.setattr(verdict, "refine", refined)
+    problem: Any = SimpleNamespace(rows=ROWS, sees=lambda effect: None, situation=SimpleNamespace(robot=None))
+    given = verdict._buildable(problem, Found(torn, 1e-9, ()), [torn])
+    assert (given is not None) is kept
+    if given is not None:
+        assert given.member.shape == (near(0.004)[0][1],)
