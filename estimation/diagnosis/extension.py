@@ -52,12 +52,13 @@ class Extension:
 
     def parameters(self, robot: Robot) -> list[dict[str, Any]]:
         """Lists its parameters with standard errors: the linear ones, then the shape."""
-        described = _described(self.source, robot, self.joint)
+        described = _described(self.source, robot, self.joint, self.shape)
         values = [*self.coefficients.tolist(), *self.shape]
         errors = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         return [
             {"name": name, "unit": unit, "value": float(value), "standard_error": _finite(error)}
             for (name, unit), value, error in zip(described, values, errors, strict=True)
+            if name
         ]
 
     def to_dict(self, robot: Robot) -> dict[str, Any]:
@@ -88,7 +89,7 @@ def read_extension(data: Mapping[str, Any], robot: Robot) -> Extension:
     covariance = np.array(rows, dtype=float).reshape(len(rows), len(rows))
     count = len(effect.parameters(robot, joint))
     names = [str(parameter["name"]) for parameter in data.get("parameters", ())]
-    known = [name for name, _ in _described(effect, robot, joint)]
+    known = [name for name, _ in _described(effect, robot, joint, shape) if name]
     if names and names != known:
         raise InputError(
             f"extension {effect.name} has the parameters {', '.join(names)}",
@@ -134,9 +135,9 @@ def extension_torque(extensions: Sequence[Extension], state: Situation) -> Array
     return total + sum((e.torque(whole) for e in extensions if e.source.last), start=np.zeros_like(total))
 
 
-def _described(effect: Effect, robot: Robot, joint: int | None) -> list[tuple[str, str]]:
+def _described(effect: Effect, robot: Robot, joint: int | None, shape: tuple[float, ...]) -> list[tuple[str, str]]:
     """Lists names and units: the linear parameters, then the shape."""
-    linear = [(c.name, c.unit) for c in effect.parameters(robot, joint)]
+    linear = [(c.name, c.unit) for c in effect.described(robot, joint, shape)]
     return linear + [(s.name, s.unit_at(robot, joint)) for s in effect.shapes]
 
 

@@ -92,12 +92,15 @@ def _parameters(
 ) -> tuple[Parameter, ...]:
     extension = fitted.model.extensions[i]
     effect = member.hypothesis.effect
-    described: list[Coefficient | Shape] = [*effect.parameters(robot, extension.joint), *effect.shapes]
+    described: list[Coefficient | Shape] = [
+        *effect.described(robot, extension.joint, extension.shape),
+        *effect.shapes,
+    ]
     values = [*extension.coefficients.tolist(), *extension.shape]
     errors = np.sqrt(np.maximum(np.diag(extension.covariance), 0.0))
     result = []
     for own, value, error, sure in zip(described, values, errors, known, strict=True):
-        if isinstance(own, Shape) and own.is_left(value):
+        if not own.name or (isinstance(own, Shape) and own.is_left(value)):
             continue
         interval = (value - 1.96 * error, value + 1.96 * error)
         if isinstance(own, Shape) and own.scale == "log" and np.isfinite(error) and value > 0:

@@ -141,6 +141,10 @@ class Effect(ABC):
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the k linear coefficients, in the order of the columns."""
 
+    def described(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[Coefficient, ...]:
+        """Describes them at some shape values, where those say what they mean; one of no use there has no name."""
+        return self.parameters(robot, joint)
+
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
         """Gives the range of each coefficient at some shape values: as described, where shapes do not narrow it."""
         return tuple((coefficient.lower, coefficient.upper) for coefficient in self.parameters(robot, joint))

@@ -17,13 +17,20 @@ Array = NDArray[np.float64]
 
 
 BETWEEN = 0.6  # hardness of a push that is neither a half sine nor a hold
+HOLD = 0.1  # of one that lasts
+# A push that lasts while the arm moves looks like a brief one of constant torques where it moves least: so many times
+# as long, and from there, its middle or its end, it is looked for.
+LONGER = (1.0, 2.0, 4.0, 8.0)
+FROM = (0.0, 0.5, 1.0)
+WRENCH = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
 
 
 class ExternalContact(Effect):
     """tau_j = c_j p(t): a pulse of each joint's torque from the time t_0 for the duration d, p = sin(pi s)^h.
 
     A force anywhere on the arm: during so short a time the pose, and with it what each joint feels, stays nearly the
-    same. The hardness h makes it a half sine (1), a hold (near 0), or what lies between.
+    same. The hardness h makes it a half sine (1), a hold (near 0), or what lies between. One that lasts while the arm
+    moves is tau = J(q)' w p(t) instead: a force and a moment on the flange, constant in the base frame.
     """
 
     name: ClassVar[str] = "external_contact"
@@ -35,18 +42,27 @@ class ExternalContact(Effect):
         Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.03),
         Shape("duration", "s", 0.03, 60.0, "log", (0.2, 0.5, 1.25, 3.2), 0.05),
         Shape("hardness", "", 0.05, 2.0, "log", (BETWEEN,), 0.1, BETWEEN),
+        Shape("on_the_flange", "", 0.0, 1.0, "linear", (0.0,), default=0.0),
     )
     rivals: ClassVar[tuple[str, ...]] = ("payload_change", "hand_guiding", "friction_step", "torque_sensor_drift")
     experiments: ClassVar[tuple[str, ...]] = ("repeat",)
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes what each joint feels at the peak."""
-        return tuple(Coefficient(f"peak_on_joint_{j + 1}", force_unit(robot, j)) for j in range(robot.n))
+        return self.described(robot, joint, ())
+
+    def described(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[Coefficient, ...]:
+        """Describes what each joint feels at the peak, or the force and the moment on the flange."""
+        if on_the_flange(shape):
+            told = [Coefficient(name, "N" if name.startswith("force") else "N m") for name in WRENCH]
+        else:
+            told = [Coefficient(f"peak_on_joint_{j + 1}", force_unit(robot, j)) for j in range(robot.n)]
+        return (*told, *(Coefficient("", "") for _ in range(_count(robot.n) - len(told))))
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists durations, each starting every half of it."""
         return tuple(
-            (float(start), duration, BETWEEN)
+            (float(start), duration, BETWEEN, 0.0)
             for duration in self.shapes[1].grid
             for run in situation.runs
             for start in np.arange(situation.t[run.start], situation.t[run.stop - 1] - duration / 2, duration / 2)
@@ -56,13 +72,36 @@ class ExternalContact(Effect):
         """Keeps the contact within the data."""
         first, last = float(situation.t[0]), float(situation.t[-1])
         longest = min(self.shapes[1].upper, max(last - first, 0.1))
-        return (first, last), (self.shapes[1].lower, longest), (self.shapes[2].lower, self.shapes[2].upper)
+        hardness = (self.shapes[2].lower, self.shapes[2].upper)
+        return (first, last), (self.shapes[1].lower, longest), hardness, (0.0, 0.0)
+
+    def elsewhere(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[tuple[float, ...], ...], ...]:
+        """Gives pushes on the flange that last, of which this may be the part in which the arm moves least."""
+        (first, last), (_, longest), *_ = self.bounds(situation, joint)
+        start, duration, hardness = shape[:3]
+        lasting = [min(duration * factor, longest) for factor in LONGER]
+        return (
+            tuple(
+                (float(np.clip(start - share * (length - duration), first, last)), length, hard, 1.0)
+                for length in dict.fromkeys(lasting)
+                for share in (FROM if length > duration else FROM[:1])
+                for hard in (hardness, HOLD)
+            ),
+        )
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates a pulse on each joint."""
-        n = situation.robot.n
-        X = np.zeros((len(situation), n, n))
-        X[:, range(n), range(n)] = pulse(situation.t, shape)[:, None]
+        """Evaluates a pulse on each joint, or the joints' torques of one on the flange (N, n, k), k = n or 6."""
+        n, during = situation.robot.n, pulse(situation.t, shape)
+        X = np.zeros((len(situation), n, _count(n)))
+        if on_the_flange(shape):
+            acts = np.flatnonzero(during)
+            X[acts, :, : len(WRENCH)] = during[acts, None, None] * situation.sensitivity("jacobian")[acts].transpose(
+                0, 2, 1
+            )
+        else:
+            X[:, range(n), range(n)] = during[:, None]
         return X
 
     def propose(
@@ -73,7 +112,7 @@ class ExternalContact(Effect):
         if len(grid) <= count:
             return grid
         sums = np.concatenate([np.zeros((1, residual.shape[1])), np.cumsum(residual, axis=0)])
-        starts, durations, _ = np.array(grid).T
+        starts, durations = np.array(grid).T[:2]
         first = np.searchsorted(situation.t, starts + 0.1 * durations)
         last = np.searchsorted(situation.t, starts + 0.9 * durations)
         energies = (sums[last] - sums[first]) ** 2
@@ -95,12 +134,25 @@ class ExternalContact(Effect):
         length: str = "rad",
     ) -> str:
         """Says what the values mean."""
+        when = f"from t = {shape[0]:.2f} s for {shape[1]:.2g} s"
+        if on_the_flange(shape):
+            pushed = np.linalg.norm(coefficients[:3])
+            return f"Something pushed the flange {when}, with a force of {pushed:.3g} N that stayed the same."
         size = np.abs(coefficients)
         most, last = int(np.argmax(size)) + 1, int(np.flatnonzero(size > 0.05 * size.max())[-1]) + 1
         return (
-            f"Something pushed the arm from t = {shape[0]:.2f} s for {shape[1]:.2g} s: joint {most} felt "
-            f"{size.max():.3g} {force}, and joint {last} is the last that felt it."
+            f"Something pushed the arm {when}: joint {most} felt {size.max():.3g} {force}, and joint {last} is the "
+            "last that felt it."
         )
+
+
+def _count(joints: int) -> int:
+    return max(joints, len(WRENCH))
+
+
+def on_the_flange(shape: tuple[float, ...]) -> bool:
+    """Whether a push is a force on the flange that lasts while the arm moves."""
+    return len(shape) > 3 and shape[3] > 0.5
 
 
 def pulse(t: Array, shape: tuple[float, ...]) -> Array:

@@ -137,10 +137,44 @@ def test_a_push_anywhere_is_felt_by_each_joint(now, twin):
         torque[i] = jacobian.T @ wrench
     X = EFFECTS["external_contact"].columns(now, None, shape)
     assert not X[now.t >= 2.3].any()
-    flat = X.reshape(-1, 5)
+    flat = X.reshape(-1, 6)
     left = torque.reshape(-1) - flat @ np.linalg.lstsq(flat, torque.reshape(-1), rcond=None)[0]
     # The pulse lies between a half sine and a hold: 2 % of a half sine's energy, and what the pose changes.
     assert np.sum(left**2) < 0.1 * np.sum(torque**2)
+
+
+def test_a_push_that_lasts_is_a_wrench_on_the_flange(now, twin):
+    """A force and a moment that stay the same in the base frame, by pinocchio, whatever the arm does meanwhile."""
+    pin = pytest.importorskip("pinocchio")
+    push = EFFECTS["external_contact"]
+    model = twin(now.robot).model
+    data = model.createData()
+    wrench = np.array([30.0, -10.0, 20.0, 2.0, -1.0, 3.0])
+    X = push.columns(now, None, (1.0, 1.5, 0.1, 1.0))
+    during = np.flatnonzero((now.t > 1.1) & (now.t < 2.4))[::20]
+    strength = np.sin(np.pi * (now.t[during] - 1.0) / 1.5) ** 0.1
+    flange = now.sensitivity("flange")[during][:, :, 0]
+    for i, p, place in zip(during, strength, flange, strict=True):
+        # Of the frame in the base's directions whose origin is the flange's.
+        pin.computeJointJacobians(model, data, now.q[i])
+        own = pin.getJointJacobian(model, data, model.njoints - 1, pin.LOCAL_WORLD_ALIGNED)
+        lever = place - data.oMi[model.njoints - 1].translation
+        moment = wrench[3:] + np.cross(lever, wrench[:3])
+        np.testing.assert_allclose(X[i] @ wrench, p * own.T @ np.concatenate([wrench[:3], moment]), atol=1e-6)
+    assert [c.name for c in push.described(now.robot, None, (1.0, 1.5, 0.1, 1.0))][:3] == [
+        "force_x",
+        "force_y",
+        "force_z",
+    ]
+    assert "force of 37.4 N" in push.describe(None, wrench, (1.0, 1.5, 0.1, 1.0))
+
+
+def test_a_push_that_lasts_is_looked_for_about_a_brief_one(now):
+    """From the part in which the arm moves least the whole is found: so long before, about and after it."""
+    (points,) = EFFECTS["external_contact"].elsewhere(now, None, (2.0, 0.3, 0.6, 0.0), np.zeros(6))
+    assert all(0.0 <= start <= now.t[-1] and flange == 1.0 for start, _, _, flange in points)
+    spans = {(round(start, 3), round(start + duration, 3)) for start, duration, *_ in points}
+    assert {(2.0, 2.3), (2.0, 3.2), (1.1, 2.3), (1.55, 2.75)} <= spans
 
 
 def test_a_search_for_pushes_finds_the_moment(now):
@@ -151,14 +185,14 @@ def test_a_search_for_pushes_finds_the_moment(now):
     """
     rng = np.random.default_rng(1)
     X = EFFECTS["external_contact"].columns(now, None, (3.1, 0.8))
-    torque = X @ np.array([20.0, 30.0, -10.0, 5.0, 5.0])
+    torque = X @ np.array([20.0, 30.0, -10.0, 5.0, 5.0, 0.0])
     size = np.sqrt(np.mean(torque**2, axis=0))
     slow = lfilter([0.01], [1, -0.99], rng.normal(size=torque.shape), axis=0)
     for noise in (2 * rng.normal(size=torque.shape), slow):
         left = torque + size * noise
         left[now.t < 2.5] = 0.0
         left[:, 3] = 0.0
-        start, duration, _ = EFFECTS["external_contact"].propose(now, None, left, 3)[0]
+        start, duration, *_ = EFFECTS["external_contact"].propose(now, None, left, 3)[0]
         assert abs(start + duration / 2 - 3.5) < 0.4
 
 
