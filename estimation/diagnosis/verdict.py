@@ -22,7 +22,7 @@ ENOUGH, NEARLY = 0.7, 0.9
 # Rivals within this of the best BIC stay possible.
 CLOSE = 10.0
 # A name of the whole robot is not owed to a joint where a free function there leaves it this share of its gain.
-STAYS = 0.75
+STAYS, HALF = 0.75, 0.5
 # Several names on a joint must fit better than free functions do by so much (Schwarz): formulas are not exact.
 LEAST = 10.0
 
@@ -259,10 +259,18 @@ def _stays(
     false_alarm: float,
     rng: np.random.Generator,
 ) -> bool:
-    """Whether a name keeps its gain beside free functions that were chosen without it."""
+    """Whether a name keeps its gain beside free functions that were chosen without it, or does more than they do.
+
+    Flexible functions, each on a joint, imitate much of what acts on all: there are many of them then, none of which
+    does half of what the name does. A name that borrows does so from one.
+    """
     others = _beside(kept, found)
     free, _ = free_functions(problem, patterns, others, false_alarm, rng, alone=True)
-    return _keep(problem, [found.member], [*others, *free])
+    own = found.member
+    each = [worth(member) / max(worth(own), 1e-300) for member in free]
+    if sum(each) < NEARLY and max(each, default=0.0) < HALF and _thriftier(problem, [own], others, free):
+        return True
+    return _keep(problem, [own], [*others, *free])
 
 
 def _beside(kept: Sequence[Found], found: Found) -> list[Member]:

@@ -102,6 +102,9 @@ def _parameters(
     for own, value, error, sure in zip(described, values, errors, known, strict=True):
         if not own.name or (isinstance(own, Shape) and own.is_left(value)):
             continue
+        if isinstance(own, Coefficient) and value == 0.0 and not np.isfinite(error):
+            # A column that is none in these logs, such as a knot of a short drift.
+            continue
         interval = (value - 1.96 * error, value + 1.96 * error)
         if isinstance(own, Shape) and own.scale == "log" and np.isfinite(error) and value > 0:
             factor = float(np.exp(1.96 * error / value))

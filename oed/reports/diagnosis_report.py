@@ -23,6 +23,9 @@ from robots.common.files import ResultFolder
 
 Array = NDArray[np.float64]
 
+SMALL = 1e-12
+"""Probability below which no number is told: the noise's distribution is not known that far out."""
+
 
 def save_diagnosis_report(diagnosis: Diagnosis, folder: ResultFolder, *, png: bool = False) -> None:
     """Writes the page of a diagnosis, and its pictures as PNG on request."""
@@ -89,8 +92,15 @@ def _facts(view: DiagnosisView) -> tuple[Fact, ...]:
         )
     if view.findings:
         chance = max(finding.p_value for finding in view.findings)
-        facts.append(Fact(label="Chance of a false alarm", value=f"{100 * chance:.2g} %", note="the weakest finding"))
+        facts.append(
+            Fact(label="Chance of a false alarm", value=_chance(chance, 100.0) + " %", note="the weakest finding")
+        )
     return tuple(facts)
+
+
+def _chance(p: float, times: float = 1.0) -> str:
+    """Writes a probability; of one that no sample could tell from zero, that it is smaller than any that matters."""
+    return f"{times * p:.2g}" if p >= SMALL else f"< {times * SMALL:.0g}"
 
 
 def _pooled(values: Array) -> float:
@@ -148,7 +158,7 @@ def _finding(view: DiagnosisView, index: int) -> Section:
         )
     ]
     evidence: list[tuple[Cell, ...]] = [
-        ("chance that noise alone looks like this", f"{finding.p_value:.2g}"),
+        ("chance that noise alone looks like this", _chance(finding.p_value)),
         ("better than without it, in BIC", significant(finding.delta_bic, digits=3)),
     ]
     if np.isfinite(finding.before):

@@ -36,6 +36,8 @@ FARTHEST = 0.1
 LEAST, MOST = 1 / 8, 8.0
 """Shares of the gap that the time of its crossing tells: the time, whose cube that is, is true to a factor of two."""
 
+INEXACT = 0.05
+"""Share by which a play errs besides: no link flies quite freely, nor does it stop at once on the other flank."""
 SMALLEST = 5e-7
 """Half a play below which there is none [rad or m]: at a radius of a tenth of a metre, what teeth are rough by."""
 
@@ -66,7 +68,7 @@ class Backlash(Effect):
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes half the play."""
         assert joint is not None
-        return (Coefficient("half_play", length_unit(robot, joint - 1), 0.0, 0.05, least=SMALLEST),)
+        return (Coefficient("half_play", length_unit(robot, joint - 1), 0.0, 0.05, INEXACT, SMALLEST),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
         """Ties the play that the torque's size tells to the gap that the crossings' time tells."""

@@ -22,11 +22,14 @@ class HeatEffect(JointEffect):
     """An effect of one joint whose first shape is the time constant of a heat that is kept."""
 
     depends_on: ClassVar[Literal["state", "time"]] = "time"
+    falls: ClassVar[bool] = False
+    """Whether its coefficients are falls of friction: what warms up loses some of it, none gains both kinds."""
 
     def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
-        """Tells what follows its source within seconds from heat."""
+        """Tells what follows its source within seconds from heat, and what grows from what heat makes fall."""
         slow = not shape or shape[0] > LEAST * self.shapes[0].lower
-        return slow and super().believable(robot, joint, coefficients)
+        rises = self.falls and bool((np.asarray(coefficients) < 0).all())
+        return slow and not rises and super().believable(robot, joint, coefficients)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists time constants up to three times the data's duration: all slower ones look like the slowest."""

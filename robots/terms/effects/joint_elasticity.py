@@ -21,6 +21,8 @@ DAMPING = 0.05
 """Of the resonance, of its critical one."""
 INEXACT = 0.05
 """Share by which the stiffness by the dynamics errs besides: it is as right as the inertia and the damping are."""
+OWN = 0.03
+"""Share by which the compliance does: load and inertia of the link are those of a fit that winds up, too."""
 SCANNED = (3.5, 4.2, 5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 18.0, 30.0, 300.0)
 """Resonances [Hz] of a scan, at the log's mean inertia: dense where a motion may excite them, for they are narrow."""
 LIGHTEST = 0.02
@@ -52,7 +54,7 @@ class JointElasticity(Effect):
         """Describes the compliance; softer than a turn per the gravity of a small robot is no gear."""
         assert joint is not None
         force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
-        return (Coefficient("compliance", f"{length}/({force})", 0.0, 0.1),)
+        return (Coefficient("compliance", f"{length}/({force})", 0.0, 0.1, OWN),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists the stiffnesses of some resonances, of the link without a rotor that is not known, too."""

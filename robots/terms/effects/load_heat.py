@@ -25,6 +25,7 @@ class LoadHeat(HeatEffect):
     title: ClassVar[str] = "friction that falls as the motor's current heats the joint"
     rare: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("time_constant", "s", 5.0, 7200.0, "log", (45.0, 400.0, 3600.0)),)
+    falls: ClassVar[bool] = True
     rivals: ClassVar[tuple[str, ...]] = ("thermal_friction", "friction_step", "torque_constant_heat")
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "pause")
 

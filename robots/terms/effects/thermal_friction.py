@@ -42,6 +42,7 @@ class ThermalFriction(HeatEffect):
         Shape("housing_weight", "", 0.0, 5.0, "linear", (0.0,), default=0.0, beside=True),
         Shape("fading", "1/kJ", 0.0, np.inf, "linear", (0.0,), default=0.0, beside=True),
     )
+    falls: ClassVar[bool] = True
     rivals: ClassVar[tuple[str, ...]] = ("friction_step", "torque_sensor_drift", "torque_constant_heat", "load_heat")
     experiments: ClassVar[tuple[str, ...]] = ("pause", "single_joint", "static_hold")
 

@@ -214,6 +214,26 @@ def test_a_value_at_the_edge_of_what_machines_have_is_no_name(
     assert not EFFECTS["backlash"].believable(arm, 1, np.full(1, 1e-7))
 
 
+@pytest.mark.parametrize(
+    ("gains", "stays"), [((300.0, 250.0, 250.0), True), ((490.0, 450.0), False), ((600.0,), False)]
+)
+def test_what_does_more_than_free_functions_does_not_borrow_from_them(
+    gains: tuple[float, ...], stays: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A delay of a gain of 1000, of which ringing joints imitate more than it keeps beside them."""
+    delay = _member("time_delay", None, 1000.0, 2)
+    free = [
+        replace(_member("spring", k, gain, 5), hypothesis=Hypothesis(Pattern("ringing"), k))
+        for k, gain in enumerate(gains, start=1)
+    ]
+    monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: (free, []))
+    monkeypatch.setattr(verdict, "accept", lambda problem, groups: SimpleNamespace(gain=1000.0 * len(groups)))
+    monkeypatch.setattr(verdict, "score", lambda problem, group, beside: SimpleNamespace(gain=450.0))
+    found = Found(delay, 1e-9, ())
+    problem: Any = SimpleNamespace(rows=ROWS)
+    assert verdict._stays(problem, found, (found,), [], 0.01, np.random.default_rng(0)) is stays
+
+
 def test_small_names_beside_one_that_holds_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Three names on a joint are beaten by free functions; the strongest by itself is not: the others were its rest."""
     stribeck, spring, push = (

@@ -93,3 +93,13 @@ def test_a_gain_elsewhere_is_told_with_its_joints() -> None:
         for joints in ((), (4,), (5, 6), (5,))
     }
     assert told == {(): "", (4,): "", (5, 6): " of joints 5, 6", (5,): " of joint 5"}
+
+
+@pytest.mark.parametrize("effect", ["thermal_friction", "load_heat"])
+def test_what_warms_up_gains_no_friction(arm: Robot, effect: str) -> None:
+    """One kind of friction may rise while the other falls; where both rise with time, it is not heat that does it."""
+    shape = tuple(400.0 if own.name == "time_constant" else 0.0 for own in EFFECTS[effect].shapes)
+    believed = [
+        EFFECTS[effect].believable(arm, 1, np.array(falls), shape) for falls in ((3.0, 1.0), (-1.0, 2.0), (-3.3, -1.6))
+    ]
+    assert believed == [True, True, False]

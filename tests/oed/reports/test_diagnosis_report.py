@@ -106,6 +106,14 @@ def test_a_page_without_findings(verdict, expected, following, view):
     assert following in render(page)
 
 
+def test_no_chance_is_told_that_nobody_knows(view):
+    """What the smallest number of a computer says of a probability is no probability."""
+    sure = replace(view, findings=(replace(view.findings[0], p_value=2.2e-308),))
+    text = render(diagnosis_page(sure))
+    assert "e-308" not in text
+    assert "1e-12" in text
+
+
 def test_what_has_no_name_is_not_told_to_need_no_experiment(view):
     """Findings without a name leave the cause open: the page says how to look for it."""
     named, unexplained = (
