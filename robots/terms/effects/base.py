@@ -100,6 +100,10 @@ class Coefficient:
     least: float = 0.0
 
 
+STOPPED = 0.02
+"""Share of its largest size within which a value is stopped by that: beside others it is told a little otherwise."""
+
+
 class Effect(ABC):
     """A physical effect that the base model leaves out: torque = columns @ coefficients.
 
@@ -159,7 +163,7 @@ class Effect(ABC):
         if any(abs(value) < c.least for value, c in zip(coefficients, described, strict=True)):
             return False
         return not any(
-            limit and np.isclose(value, limit, rtol=1e-6)
+            limit and np.isclose(value, limit, rtol=STOPPED)
             for value, pair in zip(coefficients, limits, strict=True)
             for limit in pair
         )

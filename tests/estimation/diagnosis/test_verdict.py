@@ -198,7 +198,12 @@ def test_several_names_on_one_joint_must_fit_better_than_one_free_function(monke
 
 @pytest.mark.parametrize(
     ("name", "value", "believed"),
-    [("encoder_offset", 0.5, False), ("encoder_offset", -0.02, True), ("current_clipping", 1.0, True)],
+    [
+        ("encoder_offset", 0.5, False),
+        ("encoder_offset", -0.495, False),
+        ("encoder_offset", -0.02, True),
+        ("current_clipping", 1.0, True),
+    ],
 )
 def test_a_value_at_the_edge_of_what_machines_have_is_no_name(
     name: str, value: float, believed: bool, arm: Robot
