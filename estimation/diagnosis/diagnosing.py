@@ -240,7 +240,16 @@ def _search(
             upper = pose_upper(recording, baseline, remainder, settled.residual, whitening.bands, wide)
         rng = np.random.default_rng(seed)
         search = _searched(
-            pose(recording, baseline, whitening, draws=DRAWS, rng=rng, extra=settled.extra, upper=upper),
+            pose(
+                recording,
+                baseline,
+                whitening,
+                draws=DRAWS,
+                rng=rng,
+                extra=settled.extra,
+                upper=upper,
+                followed=settled.followed,
+            ),
             hypotheses,
             false_alarm,
             rng,

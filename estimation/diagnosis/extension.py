@@ -125,14 +125,17 @@ def find_effect(name: str) -> Effect:
 def extension_torque(extensions: Sequence[Extension], state: Situation) -> Array:
     """Evaluates the extensions of a model in what its base model says of a motion (N, n) [N m or N].
 
-    What acts on all of the torque comes after the others.
+    What acts on all of the torque comes after the others: what makes it late, then what cuts it off.
     """
     total = np.zeros_like(state.q)
+    after = [[e for e in extensions if e.source.blurs and not e.source.last], [e for e in extensions if e.source.last]]
     for extension in extensions:
-        if not extension.source.last:
+        if not any(extension in stage for stage in after):
             total += extension.torque(state)
-    whole = replace(state, beyond=total)
-    return total + sum((e.torque(whole) for e in extensions if e.source.last), start=np.zeros_like(total))
+    for stage in after:
+        whole = replace(state, beyond=total)
+        total = total + sum((e.torque(whole) for e in stage), start=np.zeros_like(total))
+    return total
 
 
 def _described(effect: Effect, robot: Robot, joint: int | None, shape: tuple[float, ...]) -> list[tuple[str, str]]:

@@ -65,8 +65,8 @@ class Leaning(Effect):
         """Says what is seen."""
         if coefficients[int(np.argmax(np.abs(coefficients[:2])))] < 0:
             return (
-                "The residual torque of all joints changes with the moment of the robot's weight about its base, but not as "
-                "that of a base that gives way does: it has the other sign."
+                "The residual torque of all joints changes with the moment of the robot's weight about its base, but "
+                "not as that of a base that gives way does: it has the other sign."
             )
         return (
             "The residual torque of all joints is that of a base that leans to where the robot reaches: by up to "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +29,7 @@ def pose(
     extra: Array | None = None,
     pull: Pull | None = None,
     upper: Upper | None = None,
+    followed: Array | None = None,
 ) -> Problem:
     """Fits the base model to white data and prepares the null.
 
@@ -39,6 +42,7 @@ def pose(
         extra: torque (N, n) of effects that are known already, taken off before the base model's situation is computed.
         pull: what holds base parameters that the data leave open; by default `pull_of`, loosened.
         upper: the frequencies above the bands.
+        followed: that part (N, n) of the known effects' torque which others may make late.
     """
     n = recording.n
     root = np.linalg.cholesky(whitening.precision)  # P = L L'
@@ -72,11 +76,12 @@ def pose(
     values = held(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
     alone = values if extra is None else fit_values(baseline, scales, recording.unsure, recording.tau, pull)
     remainder = recording.tau - baseline.regressor @ alone
+    now = baseline.situation(recording, values)
     return Problem(
         recording=recording,
         baseline=baseline,
         whitening=whitening,
-        situation=baseline.situation(recording, values),
+        situation=now,
         mixed=np.ascontiguousarray(np.einsum("jk,nkb->jnb", root, Q, optimize=True), dtype=np.float32),
         residual=tilted @ root.T,
         white=np.linalg.solve(root.T, tilted.T).T,
@@ -85,6 +90,7 @@ def pose(
         remainder=remainder,
         pull=pull,
         upper=upper,
+        followed=None if followed is None else replace(now, beyond=followed),
     )
 
 

@@ -75,6 +75,7 @@ class Problem:
         pull: what holds base parameters that the data leave open, in units of rows over the noise's scale.
         upper: the frequencies above the bands; None where nothing is asked of them.
         whole: what effects depend on that act on all of the torque, as far as that is known; None where none is seen.
+        followed: what those depend on that make all of it late, with the other effects found before; None without any.
     """
 
     recording: Recording
@@ -90,10 +91,13 @@ class Problem:
     pull: Pull
     upper: Upper | None = None
     whole: Situation | None = None
+    followed: Situation | None = None
 
     def sees(self, effect: Effect) -> Situation:
         """Gives what an effect depends on."""
-        return self.whole if effect.last and self.whole is not None else self.situation
+        if effect.last and self.whole is not None:
+            return self.whole
+        return self.followed if effect.blurs and self.followed is not None else self.situation
 
     @property
     def n(self) -> int:

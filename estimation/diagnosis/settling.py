@@ -40,12 +40,14 @@ class Settled:
         values: base parameters (b,).
         extra: torque of the effects (N, n) [N m or N]; None without any.
         degrees: parameters of the effects.
+        followed: torque (N, n) of those that others among them make late; None without such others.
     """
 
     residual: Array
     values: Array
     extra: Array | None = None
     degrees: int = 0
+    followed: Array | None = None
 
     def without_effects(self, tau: Array) -> Array:
         """Takes the torque of the effects off the measured one (N, n)."""
@@ -66,11 +68,13 @@ def settle(problem: Problem, members: Sequence[Member]) -> Settled:
         members = [_again(problem, members, k) if k in cut else member for k, member in enumerate(members)]
     values, left, full = fit(problem, members)
     known = len(problem.pull.target)
+    plain = np.concatenate([np.repeat(not m.hypothesis.effect.blurs, len(m.coefficients)) for m in members])
     return Settled(
         residual=left,
         values=values[: problem.baseline.base.size],
         extra=full[:, :, known:] @ values[known:],
         degrees=sum(member.degrees for member in members),
+        followed=None if plain.all() else full[:, :, known:] @ (values[known:] * plain),
     )
 
 

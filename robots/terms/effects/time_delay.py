@@ -85,9 +85,10 @@ class TimeDelay(Effect):
 
 
 def lateness(situation: Situation, shift: float) -> Array:
-    """Gives the change of the base model's torque per delay (N, n) [N m/s], as it was `shift` [s] before.
+    """Gives the change of the torque per delay (N, n) [N m/s], as it was `shift` [s] before.
 
-    Of a small shift, and of a robot that hardly turns round, this is -dtau/dt.
+    Of a small shift, and of a robot that hardly turns round, this is -dtau/dt. The torque is the base model's, and that
+    of other effects where the situation has it: what breaks loose at low speed is logged late, too.
     """
 
     def evaluate() -> Array:
@@ -100,10 +101,15 @@ def lateness(situation: Situation, shift: float) -> Array:
             t = situation.t[run]
             past = np.clip(t - step, t[0], t[-1])
             before[run], dq[run] = torque(past), velocity(past)
+            if situation.beyond is not None:
+                # It may jump between two samples.
+                beyond = make_interp_spline(t, situation.beyond[run], min(1, run.stop - run.start - 1))
+                before[run] += beyond(past) - situation.beyond[run]
         return (before - smooth + situation.friction_at(dq) - situation.friction) / step
 
     # Joints share the points of the grid; those of a search are as many as they are brief.
-    return situation.cached(("lateness", shift), evaluate) if shift in SHIFT.grid else evaluate()
+    known = ("lateness", shift, situation.beyond is None)
+    return situation.cached(known, evaluate) if shift in SHIFT.grid else evaluate()
 
 
 def _past(situation: Situation, smooth: Array) -> list[tuple[Callable[[Array], Array], Callable[[Array], Array]]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimation.diagnosis.extension import Extension, find_effect, read_extension
+from estimation.diagnosis.extension import Extension, extension_torque, find_effect, read_extension
 from estimation.diagnosis.leaning import Leaning
 from estimation.diagnosis.patterns import all_patterns, build_pattern
 from estimation.diagnosis.pulling import Pulling
@@ -92,6 +92,29 @@ def test_an_extension_survives_plain_data(arm: Robot, state: Situation) -> None:
     expected = (state.t >= 1.5) * (0.3 * state.sign[:, 1] + 0.1 * state.dq[:, 1])
     assert extension.torque(state)[:, 1] == pytest.approx(expected)
     assert [item["name"] for item in extension.parameters(arm)] == ["coulomb_step", "viscous_step", "change_time"]
+
+
+def test_what_is_late_is_all_that_comes_before_a_cut(arm: Robot, state: Situation) -> None:
+    """A drift is logged late with the rest, whatever the order of the file; and all of that is cut off by a limit."""
+
+    def extension(effect: str, joint: int | None, shape: tuple[float, ...], coefficients: list[float]) -> Extension:
+        size = len(shape) + len(coefficients)
+        values = np.array(coefficients)
+        return Extension(effect=effect, joint=joint, shape=shape, coefficients=values, covariance=np.eye(size))
+
+    delay, level = 0.02, 0.6 * float(np.abs(state.torque[:, 0]).max())
+    late = extension("time_delay", None, (delay,), [delay])
+    spring = extension("spring", 1, (0.0, 0.0), [3.0, 0.0, 0.0, 1.0])
+    cut = extension("current_clipping", 1, (level,), [1.0])
+    plain = spring.torque(state)
+    before = np.interp(state.t - delay, state.t, plain[:, 0])
+    for order in ([late, spring], [spring, late]):
+        told = extension_torque(order, state)[:, 0]
+        assert told[1:] == pytest.approx((late.torque(state)[:, 0] + before)[1:])
+    assert np.abs(before - plain[:, 0]).max() > 0.01
+    all_of_it = extension_torque([cut, late, spring], state) + state.torque
+    assert np.abs(all_of_it[:, 0]).max() == pytest.approx(level)
+    assert all_of_it[:, 1] == pytest.approx((extension_torque([late, spring], state) + state.torque)[:, 1])
 
 
 def test_a_damaged_extension_is_refused(arm: Robot) -> None:

@@ -173,6 +173,23 @@ def test_a_delayed_torque_is_the_one_before(seen, motion, delay, sharp):
     assert np.sqrt(np.mean(error[2:-3] ** 2)) < 0.01 * np.sqrt(np.mean(change**2))
 
 
+def test_what_other_effects_do_is_late_as_well(seen):
+    """A torque beside the base model's is the one of a moment before, too; none of it leaves the column as it was."""
+    now = seen(velocity_scale=2e-3)
+    delay, rate = 0.006, np.array([2.0, 3.0, 5.0, 7.0])
+    plain = EFFECTS["time_delay"].columns(now, None, (delay,))[:, :, 0]
+    both = replace(now, beyond=np.sin(rate * now.t[:, None]))
+    late = EFFECTS["time_delay"].columns(both, None, (delay,))[:, :, 0]
+    change = np.sin(rate * (now.t[:, None] - delay)) - both.beyond
+    # Straight lines between the samples, which are 4 ms apart: what jumps must not swing.
+    np.testing.assert_allclose(delay * (late - plain)[5:], change[5:], atol=(0.004 * rate.max()) ** 2 / 8 * 1.01)
+    # What is kept for all joints is kept of each situation.
+    shift = EFFECTS["time_delay"].shapes[0].grid[-1]
+    kept = [EFFECTS["time_delay"].columns(state, None, (shift,)) for state in (now, both, now)]
+    assert np.array_equal(kept[0], kept[2])
+    assert not np.array_equal(kept[0], kept[1])
+
+
 def test_friction_of_a_joint_that_breaks_loose_is_late_as_well(seen):
     """A joint that creeps and breaks loose at 8 rad/s2 had crept a moment before: it had not turned round."""
     still = seen(velocity_scale=2e-3)
