@@ -30,14 +30,18 @@ STEP = 1e-3
 def composed(problem: Problem, members: Sequence[Member], hypotheses: Sequence[Hypothesis]) -> Problem:
     """Lets effects that act on all of the torque know what it is: base model and other members, fitted together.
 
-    Where no log shows by itself that samples are useless as measurements, the problem stays as it is: what is cut off
-    elsewhere is little of all.
+    What makes all of the torque late knows that of the other members as they are. Where no log shows by itself that
+    samples are useless as measurements, no more is told: what is cut off elsewhere is little of all.
 
     Args:
         problem: the data.
         members: what is known to act.
         hypotheses: of which some may act on all of the torque.
     """
+    others = [member for member in members if not member.hypothesis.effect.blurs]
+    if others and any(hypothesis.effect.blurs for hypothesis in hypotheses):
+        beyond = np.sum([dense(problem, m.hypothesis, m.shape) @ m.coefficients for m in others], axis=0)
+        problem = replace(problem, followed=replace(problem.situation, beyond=beyond))
     useless = np.zeros_like(problem.recording.unsure)
     for hypothesis in hypotheses:
         if hypothesis.effect.last:
