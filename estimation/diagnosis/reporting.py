@@ -239,14 +239,14 @@ def _strange(problem: Problem, after: Array) -> dict[int, str]:
     number = np.maximum(counts.sum(axis=0), 1)
     torque = np.sqrt((problem.recording.tau**2 * counts).sum(axis=0) / number)
     fitted = np.sqrt((problem.remainder**2 * counts).sum(axis=0) / number) / np.maximum(torque, 1e-12)
-    return {
-        int(
-            j
-        ): f"Joint {j + 1}: {100 * after[j]:.3g} % of the torque that no fit has seen is left, where the base model "
-        f"leaves {100 * fitted[j]:.2g} % of what it was fitted to. The logs differ in something that was not found, or "
-        "some of them do not tell its parameters."
-        for j in np.flatnonzero(after > np.maximum(STRANGE * fitted, FAR))
-    }
+    far = np.flatnonzero(after > np.maximum(STRANGE * fitted, FAR))
+    return {int(j): _STRANGE.format(j + 1, 100 * after[j], 100 * fitted[j]) for j in far}
+
+
+_STRANGE = (
+    "Joint {}: {:.3g} % of the torque that no fit has seen is left, where the base model leaves {:.2g} % of what it "
+    "was fitted to. The logs differ in something that was not found, or some of them do not tell its parameters."
+)
 
 
 def _faster(problem: Problem, seen: Measured) -> list[str]:
