@@ -135,12 +135,12 @@ def columns_on(
     model = problem.situation.model
     now = situation_on(recording, model, unloaded(problem))
     states, columns = [now] * len(members), [_dense(now, member) for member in members]
-    plain = [X @ m.coefficients for X, m in zip(columns, members, strict=True) if not m.hypothesis.effect.blurs]
-    if problem.followed is not None and plain:
+    late = [k for k, member in enumerate(members) if member.hypothesis.effect.blurs]
+    if problem.followed is not None and 0 < len(late) < len(members):
+        plain = [columns[k] @ member.coefficients for k, member in enumerate(members) if k not in late]
         followed = replace(now, beyond=np.sum(plain, axis=0))
-        for k, member in enumerate(members):
-            if member.hypothesis.effect.blurs:
-                states[k], columns[k] = followed, _dense(followed, member)
+        for k in late:
+            states[k], columns[k] = followed, _dense(followed, members[k])
     if problem.whole is not None:
         whole = situation_on(recording, model, unloaded(replace(problem, situation=problem.whole)))
         parts = [X @ m.coefficients for X, m in zip(columns, members, strict=True) if not m.hypothesis.effect.last]

@@ -128,14 +128,15 @@ def extension_torque(extensions: Sequence[Extension], state: Situation) -> Array
     What acts on all of the torque comes after the others: what makes it late, then what cuts it off.
     """
     total = np.zeros_like(state.q)
-    after = [[e for e in extensions if e.source.blurs and not e.source.last], [e for e in extensions if e.source.last]]
-    for extension in extensions:
-        if not any(extension in stage for stage in after):
-            total += extension.torque(state)
-    for stage in after:
-        whole = replace(state, beyond=total)
-        total = total + sum((e.torque(whole) for e in stage), start=np.zeros_like(total))
+    for stage in range(3):
+        now = replace(state, beyond=total) if stage else state
+        own = [extension for extension in extensions if _stage(extension.source) == stage]
+        total = total + sum((extension.torque(now) for extension in own), start=np.zeros_like(total))
     return total
+
+
+def _stage(effect: Effect) -> int:
+    return 2 if effect.last else int(effect.blurs)
 
 
 def _described(effect: Effect, robot: Robot, joint: int | None, shape: tuple[float, ...]) -> list[tuple[str, str]]:

@@ -81,7 +81,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     members, founds, seen = held.members, held.founds, held.seen
     twisted = _windups(told, seen)
     # Where nothing else is left, a name that unseen data refuted shows at least where something is unexplained.
-    spoiling = held.spoiling if members or twisted else (*held.spoiling, *held.refuted)
+    spoiling = held.spoiling or (() if members or twisted else held.refuted)
     verdict = judgement.verdict
     if len(members) > len(founds) or spoiling:
         verdict = "unexplained"

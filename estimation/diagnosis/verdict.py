@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.diagnosis.free_functions import criterion, free_functions, worth
+from estimation.diagnosis.free_functions import LEAST, criterion, free_functions, worth
 from estimation.diagnosis.patterns import is_of_time
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member, refine
@@ -23,8 +23,6 @@ ENOUGH, NEARLY = 0.7, 0.9
 CLOSE = 10.0
 # A name of the whole robot is not owed to a joint where a free function there leaves it this share of its gain.
 STAYS, HALF = 0.75, 0.5
-# Several names on a joint must fit better than free functions do by so much (Schwarz): formulas are not exact.
-LEAST = 10.0
 
 
 @dataclass(frozen=True, eq=False)
