@@ -23,12 +23,15 @@ from robots.regressor import TorqueModel
 from robots.signals import Motion
 from robots.terms.effects import situation
 from robots.terms.effects.base_tilt import level_axes
-from robots.terms.effects.situation import joined
+from robots.terms.effects.heat import HeatEffect
+from robots.terms.effects.situation import Situation, joined
 
 Array = NDArray[np.float64]
 
-LATER = 3600.0
-"""Time from the logs to the experiment [s]: the robot has cooled."""
+SOON, LATER = 2.0, 3600.0
+"""Times from the logs to the experiment [s]: the robot is as warm as they left it, or has cooled. Nobody says which."""
+WARMING = 25
+"""Every so many samples of the logs are enough to tell how warm they leave the robot."""
 ARM = 0.1
 """Distance of a payload's centre from the flange [m]."""
 
@@ -71,44 +74,52 @@ class Grams:
         effects = [c.hypothesis.effect.columns(now, c.hypothesis.joint, c.shape) for c in self.causes]
         return self._gram(regressor_on(self.base, self.problem.recording), effects, self.problem.whitening)
 
+    @cached_property
+    def heated(self) -> bool:
+        """Whether a cause depends on how warm the logs left the robot."""
+        return any(isinstance(c.hypothesis.effect, HeatEffect) for c in self.causes)
+
     def chance(self, stages: Sequence[Stage]) -> float:
         """Gives the chance that each cause, were it true, would be told from every other."""
-        return self.chance_of(self.later(stages))
+        return float(self.chances_of(self.later(stages)).min())
 
-    def later(self, stages: Sequence[Stage]) -> Array:
-        """Does what `of` does for an experiment made after the logs."""
-        return self.of(stages, float(self.problem.recording.t[-1]) + LATER)
+    def later(self, stages: Sequence[Stage]) -> tuple[Array, ...]:
+        """Does what `of` does for an experiment made after the logs: once it has cooled, and with warm joints."""
+        end = float(self.problem.recording.t[-1])
+        cold = self.of(stages, end + LATER)
+        return (cold, self.of(stages, end + SOON, warm=True)) if self.heated else (cold,)
 
-    def chance_of(self, new: Array) -> float:
-        """Does what `chance` does, by the Gram matrix of the experiment."""
-        return float(self.chances_of(new).min())
-
-    def chances_of(self, new: Array) -> Array:
+    def chances_of(self, new: Sequence[Array], times: int = 1) -> Array:
         """Gives the chance that each cause (row), were it true, would be told from each rival (column); one of itself.
 
-        By the Gram matrix of the experiment.
+        By the Gram matrices of the experiment, made so often; the least chance where there are several.
         """
-        total = self.old + new
         result = np.ones((len(self.causes),) * 2)
-        for true, rival in permutations(range(len(self.causes)), 2):
-            result[true, rival] = chance_to_resolve(self._left(total, true, rival))
+        for gram in new:
+            total = self.old + times * gram
+            for true, rival in permutations(range(len(self.causes)), 2):
+                chance = chance_to_resolve(self._left(total, true, rival))
+                result[true, rival] = min(result[true, rival], chance)
         return result
 
-    def of(self, stages: Sequence[Stage], begin: float = 0.0) -> Array:
-        """Evaluates an experiment that begins at a time [s] of the logs' clock: the Gram matrix of all columns."""
+    def of(self, stages: Sequence[Stage], begin: float = 0.0, *, warm: bool = False) -> Array:
+        """Evaluates an experiment that begins at a time [s] of the logs' clock: the Gram matrix of all columns.
+
+        Heat begins at zero, or `warm` as the logs leave it, until a payload or another base pose is changed.
+        """
         bases: list[Array] = []
         effects: list[list[Array]] = [[] for _ in self.causes]
         starts: list[int] = []
         t0, rows = begin, 0
-        for part in _joined(stages):
+        for number, part in enumerate(_joined(stages)):
             model = self.model.under(self.problem.recording.gravities[-1] if part.gravity is None else part.gravity)
-            motion = (part.motion.q, part.motion.dq, part.motion.ddq)
-            carried = self._parameters(part.payload)
-            played = situation(model, carried, t0 + part.motion.t, *motion, starts=part.starts)
+            before = self._logged if warm and not number else None
+            played, first = self._played(model, part, t0, before)
             now = joined([played], self.model)
-            bases.append(model.regressor(now.q, now.dq, now.ddq, columns=self.columns))
+            bases.append(model.regressor(now.q[first:], now.dq[first:], now.ddq[first:], columns=self.columns))
             for columns, cause in zip(effects, self.causes, strict=True):
-                columns.append(cause.hypothesis.effect.columns(now, cause.hypothesis.joint, cause.shape))
+                values = cause.hypothesis.effect.columns(now, cause.hypothesis.joint, cause.shape)
+                columns.append(values[first:])
             starts += [rows + s for s in part.starts]
             rows += len(part.motion)
             t0 = float(now.t[-1]) + 60.0
@@ -122,6 +133,30 @@ class Grams:
         edges = len(self.columns) + np.concatenate([[0], np.cumsum(self.sizes)])
         own = slice(int(edges[cause]), int(edges[cause + 1]))
         return gram[own, own]
+
+    @cached_property
+    def _logged(self) -> tuple[Motion, tuple[int, ...]]:
+        """The logs' motion and where each begins, thinned out: what warms the robot."""
+        recording = self.problem.recording
+        rows = np.concatenate([np.arange(run.start, run.stop, WARMING) for run in recording.runs])
+        starts = np.searchsorted(rows, recording.starts)
+        motion = Motion(recording.t[rows], recording.q[rows], recording.dq[rows], recording.ddq[rows])
+        return motion, tuple(int(s) for s in starts)
+
+    def _played(
+        self, model: TorqueModel, part: _Part, begin: float, before: tuple[Motion, tuple[int, ...]] | None
+    ) -> tuple[Situation, int]:
+        """What an experiment's part does, after the logs where they are given; and the row at which it begins."""
+        motion, starts, first = part.motion, part.starts, 0
+        t = begin + motion.t
+        if before is not None:
+            logged, ahead = before
+            first = len(logged)
+            t = np.concatenate([logged.t, t])
+            motion = Motion.concatenate([logged, Motion(t[first:], motion.q, motion.dq, motion.ddq)])
+            starts = (*ahead, *(first + s for s in starts))
+        parameters = self._parameters(part.payload)
+        return situation(model, parameters, t, motion.q, motion.dq, motion.ddq, starts=starts), first
 
     def _parameters(self, payload: float) -> Array:
         return with_body(self.model, unloaded(self.problem), point_mass(payload, (0.0, 0.0, ARM)))

@@ -89,11 +89,11 @@ class NextExperiment:
 
 @dataclass(frozen=True, eq=False)
 class _Choice:
-    """A kind of experiment, its motions made so often; what that tells (b + k, b + k), and of which cause (K, K)."""
+    """A kind of experiment, its motions made so often; what they tell (b + k, b + k), and of which cause (K, K)."""
 
     kind: str
     stages: tuple[Stage, ...]
-    gram: Array
+    grams: tuple[Array, ...]
     chances: Array
     times: int = 1
 
@@ -183,12 +183,12 @@ def repeated(stages: Sequence[Stage], times: int) -> tuple[Stage, ...]:
 
 def _made(grams: Grams, room: Room, joint: int, kind: str, variant: int = 0) -> _Choice:
     stages = MAKERS[kind](room, joint, variant)
-    gram = grams.later(stages)
-    return _Choice(kind, stages, gram, grams.chances_of(gram))
+    later = grams.later(stages)
+    return _Choice(kind, stages, later, grams.chances_of(later))
 
 
 def _times(grams: Grams, choice: _Choice, times: int) -> _Choice:
-    return replace(choice, times=times, chances=grams.chances_of(times * choice.gram))
+    return replace(choice, times=times, chances=grams.chances_of(choice.grams, times))
 
 
 def _longer(grams: Grams, choice: _Choice) -> _Choice:

@@ -258,8 +258,8 @@ MAKERS: dict[str, Callable[[Room, int, int], tuple[Stage, ...]]] = {
     "micro_reversals": micro_reversals,
     "multisine": multisine,
     "static_hold": static_hold,
-    "payload": payload,
     "pause": pause,
+    "payload": payload,
     "second_base_pose": second_base_pose,
 }
 """By kind, the least trouble first: each makes the stages for a joint, counted from 0, in several variants."""

@@ -11,7 +11,7 @@ from estimation.diagnosis.carried import point_mass, situation_on
 from estimation.diagnosis.experiment_grams import Grams
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.next_experiment import LONGEST, plan_next, repeated
-from estimation.diagnosis.next_experiment_motions import MADE, MAKERS, room_of
+from estimation.diagnosis.next_experiment_motions import MADE, MAKERS, Stage, room_of
 from estimation.diagnosis.planned import planned_problem
 from robots.loading import load_robot
 from robots.plants import Sensors
@@ -92,6 +92,33 @@ def test_a_payload_tells_a_torque_constant(problem):
     assert "torque constant error of joint 4" in plan.why
     assert {p.kind for p in plan.ranking} == set(EXPERIMENTS)
     assert max(p.resolves for p in plan.ranking if p.kind not in ("payload", "second_base_pose")) < 0.5
+
+
+def test_heat_is_not_told_by_going_on_at_once(problem):
+    """A joint that lost friction by heat has not cooled where the same motion follows at once: a pause must."""
+    end = float(problem.recording.t[-1])
+    step = _guess(problem, "friction_step", 2, (0.5 * end,), 0.015)
+    causes = [_guess(problem, "thermal_friction", 2, (0.2 * end, 0.0, 0.0), 0.015), step]
+    grams = Grams(problem, causes)
+    room = room_of(problem.situation.robot, problem.recording)
+    cold, warm = (grams.chances_of([gram])[0, 1] for gram in grams.later(MAKERS["repeat"](room, 1, 0)))
+    assert cold > 0.95
+    assert warm < 0.9
+    plan = plan_next(problem, causes)
+    assert plan.kind != "repeat"
+    assert plan.resolves > 0.99
+
+
+def test_heat_of_the_logs_goes_on_in_the_experiment(problem):
+    """An experiment on a warm robot shows what it would as the last part of one that began with the logs' motion."""
+    recording = problem.recording
+    logged = Stage(motion=Motion(recording.t - recording.t[0], recording.q, recording.dq, recording.ddq))
+    grams = Grams(problem, [_guess(problem, "thermal_friction", 2, (30.0, 0.0, 0.0), 0.02)])
+    (stage,) = MAKERS["repeat"](room_of(problem.situation.robot, recording), 1, 0)
+    cold, warm = (grams.block(gram, 0) for gram in grams.later([stage]))
+    both = grams.block(grams.of([logged, stage]), 0) - grams.block(grams.of([logged]), 0)
+    np.testing.assert_allclose(warm, both, atol=0.03 * np.abs(both).max())
+    assert np.trace(cold) < 0.7 * np.trace(warm)
 
 
 def test_levels_of_the_logs_are_not_those_of_experiments_to_come(problem):
