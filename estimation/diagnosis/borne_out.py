@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.free_functions import SURE
-from estimation.diagnosis.patterns import PREFIX, is_of_time
+from estimation.diagnosis.patterns import PREFIX, is_of_time, swings_by_itself
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found
 from estimation.diagnosis.unseen import Measured
@@ -15,6 +15,7 @@ from estimation.diagnosis.verdict import CLOSE, Judgement
 from robots.terms.effects import Effect
 
 LEFT = 0.2  # share of an effect's gain that stretches left out must show
+BY_ITSELF = 1e-5  # chance from which on a swing of which unseen data cannot say is taken for noise
 HARM = 1.05  # times the unseen error: an effect that makes it so much larger is left out, sure or not
 
 
@@ -79,7 +80,7 @@ def bear_out(
     while harmful := [i for i, member in enumerate(members) if _harms(seen, i, member, beyond)]:
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         label = members[worst].hypothesis.label
-        if len(members) == 1 > len(founds) and p_values[0] > SURE and not is_of_time(members[0].hypothesis.effect):
+        if len(members) == 1 > len(founds) and _unsure(members[0].hypothesis.effect, p_values[0]):
             # All that stood out, and hardly: unseen data against it are the odds that it is noise.
             own = members[0].hypothesis.joint
             notes.append(_FAINT.format(f"a free function of {f'joint {own}' if own else _WHOLE}"))
@@ -144,6 +145,14 @@ def _instead(
             rest = tuple((other, more - worse) for other, more in close[k + 1 :])
             return Found(rival, found.p_value, rest), seen
     return harmless[0] if harmless else None
+
+
+def _unsure(free: Effect, p_value: float) -> bool:
+    """Whether a free function that is alone stands out so little that unseen data against it are the odds against it.
+
+    Of what knows nothing of the motion they can say nothing.
+    """
+    return not is_of_time(free) and p_value > (BY_ITSELF if swings_by_itself(free) else SURE)
 
 
 def _idle(

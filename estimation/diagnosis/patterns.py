@@ -184,5 +184,10 @@ def is_of_time(effect: object) -> bool:
     return isinstance(effect, Pattern) and effect.kind == "time"
 
 
+def swings_by_itself(effect: object) -> bool:
+    """Whether a pattern goes to and fro in time, not with the motion: where it is in its swing in other data is open."""
+    return isinstance(effect, Pattern) and effect.kind in SWAYING
+
+
 def _duration(situation: Situation) -> float:
     return max(float(situation.t[-1] - situation.t[0]), 1.0)

@@ -220,7 +220,8 @@ def _notes(told: Told, findings: Sequence[Finding], apart: Sequence[Finding], af
         if finding.gain.ci95[0] <= 0 and finding not in apart:
             where = f"{finding.effect} of joint {finding.joint}" if finding.joint else finding.effect
             notes.append(f"The gain of {where} on unseen data is not sure: its interval begins below zero.")
-    open_ = sorted({finding.joint for finding in findings if finding.effect == "unexplained" and finding.joint})
+    part = [finding for finding in findings if finding not in apart]
+    open_ = sorted({finding.joint for finding in part if finding.effect == "unexplained" and finding.joint})
     if open_:
         names = ", ".join(map(str, open_))
         notes.append(

@@ -179,13 +179,18 @@ def test_a_name_that_surely_harms_is_left_out_with_a_note() -> None:
         (1e-4, "load", False, False),
         (1e-10, "load", False, True),
         (1e-4, "time", False, True),
+        (1e-4, "sway", False, False),
+        (1e-6, "sway", False, True),
         (1e-4, "load", True, True),
     ],
 )
 def test_a_faint_free_function_that_unseen_data_deny_is_noise(
     p_value: float, kind: str, named: bool, told: bool
 ) -> None:
-    """Where nothing else stands out, and it is no function of time, of which other logs say nothing."""
+    """Where nothing else stands out, and it is no function of time, of which other logs say nothing.
+
+    Nor where in its swing what swings by itself is then; but such a function finds its frequency in any noise.
+    """
     free = _member(f"pattern:{kind}:0:even", 3)
     bench = _bench()
     bench.shows[free.hypothesis.label] = HARMS
