@@ -185,7 +185,7 @@ def is_of_time(effect: object) -> bool:
 
 
 def swings_by_itself(effect: object) -> bool:
-    """Whether a pattern goes to and fro in time, not with the motion: nobody knows where in its swing it is elsewhere."""
+    """Whether a pattern goes to and fro in time, not with the motion: where in its swing it is elsewhere is open."""
     return isinstance(effect, Pattern) and effect.kind in SWAYING
 
 

@@ -23,6 +23,8 @@ OPEN = 3.84
 CHANGED = 7.35
 # It is followed each way in growing steps, until so many in a row drop by twice as much.
 FIRST, GROWING, MANY, LOST = 1.5, 1.3, 24, 3
+# A choice is made where another explains less by so much: strong evidence.
+CHOSEN = 10.0
 # Of two shapes one is followed in steps that grow by this, so often at most, the other refitted in so many evaluations.
 WIDENING, FEW, REFITTED = 1.5, 10, 12
 # Values of a shape that is left as assumed at which the likelihood is asked.
@@ -32,7 +34,7 @@ POINTS = 21
 def shape_errors(problem: Problem, member: Member, others: Accepted) -> list[float]:
     """Finds each shape parameter's standard error by its profile; infinite where the likelihood hardly drops.
 
-    One whose bounds are equal is known.
+    One whose bounds are equal is known, unless it is a choice and another would do about as well.
     """
     situation = problem.sees(member.hypothesis.effect)
     bounds = member.hypothesis.effect.bounds(situation, member.hypothesis.joint)
@@ -41,7 +43,7 @@ def shape_errors(problem: Problem, member: Member, others: Accepted) -> list[flo
         zip(member.shape, bounds, member.hypothesis.effect.shapes, strict=True)
     ):
         if low == high:
-            steps.append(0.0)
+            steps.append(0.0 if _chosen(problem, member, k, others) else np.inf)
             continue
         best = _gain(problem, member, member.shape, others)
         room = (high - low) if np.isfinite(high - low) else max(abs(value), 1.0)
@@ -74,6 +76,13 @@ def shape_errors(problem: Problem, member: Member, others: Accepted) -> list[flo
             found = max(found, _along_ridge(problem, member, k, others, found) / 1.96)
         steps.append(found if found <= (abs(value) if shape.scale == "log" else 0.3 * room) else np.inf)
     return steps
+
+
+def _chosen(problem: Problem, member: Member, k: int, others: Accepted) -> bool:
+    """Whether the data tell the only value that a shape parameter may have from others that machines have."""
+    rest = [value for value in member.hypothesis.effect.shapes[k].choices if value != member.shape[k]]
+    gains = [_gain(problem, member, with_value(member.shape, k, value), others) for value in rest]
+    return max(gains, default=-np.inf) < _gain(problem, member, member.shape, others) - CHOSEN
 
 
 def _assumed(problem: Problem, member: Member, others: Accepted, best: float, bounds: tuple[float, float]) -> float:

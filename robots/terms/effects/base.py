@@ -52,6 +52,7 @@ class Shape:
         default: what it is where a description does not say; None where it must be said.
         beside: whether the effect is whole without it: it is sought once the others are found, and is one of its
             parameters only where it is not the default.
+        choices: the only values that machines have, where these are few: `likely` lists them, and nothing is searched.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Shape:
     inexact: float = 0.0
     default: float | None = None
     beside: bool = False
+    choices: tuple[float, ...] = ()
 
     @property
     def moment(self) -> bool:
@@ -213,8 +215,8 @@ class Effect(ABC):
         return tuple(points)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Gives the range of each shape parameter in which this data allow it to be refined."""
-        return tuple((shape.lower, shape.upper) for shape in self.shapes)
+        """Gives the range of each shape parameter in which this data allow it to be refined; none of a choice."""
+        return tuple(shape.choices[:1] * 2 if shape.choices else (shape.lower, shape.upper) for shape in self.shapes)  # type: ignore[misc]
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array

@@ -35,7 +35,8 @@ class TorqueRipple(StaticJointEffect):
 
     Of a linear axis h is a wave number [rad/m]: a ball screw's, a rack's teeth's, the poles' of its motor.
 
-    l is the load [N m or N]: teeth mesh harder under it, and a motor's constant ripples by a share of its torque.
+    l is the load [N m or N]: teeth mesh harder under it. A motor's constant ripples by a share of the motor's torque,
+    which has all of the friction in it (`friction_share` 1, else 0: machines have the one or the other).
     p = q - dq T is the position a moment T before: a ripple of 50 Hz and more turns with what delays the torque's log.
 
     Orders are those that the data resolve, known gear or not. Below 3 per turn, or two waves over the joint's range,
@@ -47,6 +48,7 @@ class TorqueRipple(StaticJointEffect):
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("order", "periods per turn", 2.5, HIGHEST["m"], "linear"),
         Shape("late", "s", -0.01, 0.01, "linear", (0.0,), default=0.0),
+        Shape("friction_share", "", 0.0, 1.0, "linear", (0.0,), default=0.0, choices=(0.0, 1.0)),
     )
     rivals: ClassVar[tuple[str, ...]] = ("position_dependent_friction", "spring", "encoder_eccentricity")
     fast: ClassVar[bool] = True
@@ -78,15 +80,16 @@ class TorqueRipple(StaticJointEffect):
         # Whole orders are the likely ones: the nearest point of the grid moves to each.
         whole = {float(h) for h in range(3, 13) if low <= h <= top}
         return tuple(
-            (order, 0.0)
+            (order, 0.0, 0.0)
             for order in sorted({o for o in orders if all(abs(o - h) > spacing / 2 for h in whole)} | whole)
         )
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Keeps the order within what the samples resolve."""
         assert joint is not None
-        lowest, late = self._lowest(situation, joint), self.shapes[1]
-        return (lowest, max(self._resolution(situation, joint)[1], lowest + 0.5)), (late.lower, late.upper)
+        lowest = self._lowest(situation, joint)
+        _, *others = super().bounds(situation, joint)
+        return (lowest, max(self._resolution(situation, joint)[1], lowest + 0.5)), *others
 
     def _lowest(self, situation: Situation, joint: int) -> float:
         """Gives the least order: fewer waves over the joint's range are no ripple but any smooth function."""
@@ -97,7 +100,10 @@ class TorqueRipple(StaticJointEffect):
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Lists whole orders up to 12, and those of a known gear, within the resolution of an order; none is late."""
+        """Lists whole orders up to 12, and those of a known gear, within the resolution of an order; none is late.
+
+        Each by the load and by the motor's torque.
+        """
         assert joint is not None
         spacing = self._resolution(situation, joint)[0]
         ratio = abs(float(situation.robot.gear_ratio[joint - 1]))
@@ -105,7 +111,8 @@ class TorqueRipple(StaticJointEffect):
         built |= {h * ratio for h in (1, 2, 4) if ratio > 1}
         low, high = self.bounds(situation, joint)[0]
         near = [order for order in sorted(built) if abs(order - shape[0]) <= spacing and low <= order <= high]
-        return (None, 0.0), *((order, late) for order in near for late in (None, 0.0))
+        forms = [(None, None), (None, 0.0), *((order, late) for order in near for late in (None, 0.0))]
+        return tuple((*form, share) for share in self.shapes[2].choices for form in forms)
 
     def _resolution(self, situation: Situation, joint: int) -> tuple[float, float]:
         """Gives the grid's spacing and its highest order; zeros for a joint that does not move."""
@@ -126,15 +133,15 @@ class TorqueRipple(StaticJointEffect):
         grid = self.grid(situation, joint)
         if len(grid) <= count:
             return grid
-        orders = np.array([order for order, _ in grid])
+        orders = np.array([order for order, *_ in grid])
         power = angle_spectrum(situation.q[:, joint - 1], residual[:, joint - 1], orders, level=True)
         return tuple(grid[i] for i in np.argsort(-power)[:count])
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
-        """Builds cos(h p) and sin(h p), by themselves and times the load."""
+        """Builds cos(h p) and sin(h p), by themselves and times the load or the motor's torque."""
         angle = at.shape[0] * (at.q - at.dq * at.shape[1])
         wave = casadi.horzcat(casadi.cos(angle), casadi.sin(angle))
-        return casadi.horzcat(wave, wave * at.rigid)
+        return casadi.horzcat(wave, wave * (at.rigid + at.shape[2] * (at.torque - at.rigid)))
 
     def describe(
         self,
@@ -148,7 +155,7 @@ class TorqueRipple(StaticJointEffect):
         """Says what the values mean."""
         size, share = np.hypot(*coefficients[:2]), 100 * np.hypot(*coefficients[2:])
         often = f"{shape[0]:.4g} times a turn" if length == "rad" else f"every {2000 * np.pi / shape[0]:.4g} mm"
-        much = f"{size:.3g} {force} and {share:.2g} % of its load"
+        much = f"{size:.3g} {force} and {share:.2g} % of its {'motor torque' if shape[2] else 'load'}"
         return f"The torque of joint {joint} ripples by {much} up and down, {often}."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

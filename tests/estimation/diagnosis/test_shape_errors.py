@@ -49,3 +49,21 @@ def test_a_velocity_is_as_uncertain_as_its_exponent_lets_it_be(
     assert told == pytest.approx(wanted, abs=0.03)
     assert told > 1.2 * narrow
     assert abs(np.log(velocity / SPEED)) < told
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.0, True), (1.0, True), (0.0, False)])
+def test_a_choice_is_told_where_the_other_explains_less(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], share: float, told: bool
+) -> None:
+    """A ripple by the load is told from one by the motor's torque; one that does not grow with either is not."""
+    recording = record(arm, [arm_log(torque_noise=0.02)])
+    ripple = Hypothesis(EFFECTS["torque_ripple"], 1)
+    now = pose_arm(recording).situation
+    X = ripple.effect.columns(now, 1, (40.0, 0.0, share))
+    coefficients = np.array([0.02, 0.0, 0.2, 0.1]) if told else np.array([0.5, 0.3, 0.0, 0.0])
+    problem = pose_arm(replace(recording, tau=recording.tau + X @ coefficients))
+    member = refine(problem, ripple, (40.0, 0.0, 0.0), accept(problem, ()))
+    error = shape_errors(problem, member, accept(problem, ()))[2]
+    assert error == (0.0 if told else np.inf)
+    if told:
+        assert member.shape[2] == share

@@ -25,7 +25,7 @@ from robots.signals import Log
 from robots.terms.effects import EFFECTS
 
 RIPPLE = Hypothesis(EFFECTS["torque_ripple"], 1)
-SHAPE = (150.0, 0.0)
+SHAPE = (150.0, 0.0, 0.0)
 NOISE = 0.1  # of the torque, white [N m]
 SIZE = 0.02  # of the ripple, a fifth of it
 

@@ -56,7 +56,7 @@ def test_fewer_than_two_waves_are_no_ripple(seen):
     now = seen(2, seed=2)
     for joint in (1, 2):
         lowest = 2 * 2 * np.pi / np.ptp(now.q[:, joint - 1])
-        assert min(order for order, _ in RIPPLE.grid(now, joint)) >= min(lowest, 500.0)
+        assert min(order for order, *_ in RIPPLE.grid(now, joint)) >= min(lowest, 500.0)
         assert RIPPLE.bounds(now, joint)[0][0] == pytest.approx(max(lowest, 2.5))
 
 
@@ -64,7 +64,7 @@ def test_a_known_gear_gives_its_orders(random_robot, seen):
     """Once, twice and four times a motor turn are on the grid, where the samples resolve them."""
     robot = replace(random_robot(3, 4), gear_ratio=np.full(4, 30.0))
     now = seen(robot=robot)
-    assert {30.0, 60.0, 120.0} <= {order for order, _ in RIPPLE.grid(now, 2)}
+    assert {30.0, 60.0, 120.0} <= {order for order, *_ in RIPPLE.grid(now, 2)}
 
 
 def test_an_order_too_fast_for_the_samples_is_left_out(seen):
@@ -88,10 +88,10 @@ def test_orders_of_a_known_gear_and_whole_ones_are_likely(random_robot, seen):
     joint = 1 + int(np.argmax(np.ptp(now.q, axis=0)))
     resolution = np.pi / np.ptp(now.q[:, joint - 1])
     waves = np.ones(4)
-    prompt = (None, 0.0)
-    assert RIPPLE.likely(now, joint, (61.0 + 0.5 * resolution, 0.001), waves) == (prompt, (61.0, None), (61.0, 0.0))
-    assert RIPPLE.likely(now, joint, (61.0 + 1.5 * resolution, 0.001), waves) == (prompt,)
-    assert RIPPLE.likely(now, joint, (45.3, 0.001), waves) == (prompt,)
+    for away, known in ((0.5, [(61.0, None), (61.0, 0.0)]), (1.5, [])):
+        found = RIPPLE.likely(now, joint, (61.0 + away * resolution, 0.001, 0.0), waves)
+        assert found == tuple((*form, share) for share in (0.0, 1.0) for form in [(None, None), (None, 0.0), *known])
+    assert all(order is None for order, *_ in RIPPLE.likely(now, joint, (45.3, 0.001, 0.0), waves))
 
 
 def test_a_late_ripple_is_the_one_before(seen):
@@ -99,11 +99,11 @@ def test_a_late_ripple_is_the_one_before(seen):
     late, order, joint = 0.002, 60.0, 2
     now = seen()
     before = seen(times=now.t - late)
-    change = RIPPLE.columns(now, joint, (order, late))[:, joint - 1, :2]
-    wanted = RIPPLE.columns(before, joint, (order, 0.0))[:, joint - 1, :2]
+    change = RIPPLE.columns(now, joint, (order, late, 0.0))[:, joint - 1, :2]
+    wanted = RIPPLE.columns(before, joint, (order, 0.0, 0.0))[:, joint - 1, :2]
     turned = order * np.abs(now.ddq[:, joint - 1]).max() * late**2 / 2
     assert np.abs(change - wanted).max() < 1.1 * turned
-    assert np.abs(RIPPLE.columns(now, joint, (order, 0.0))[:, joint - 1, :2] - wanted).max() > 5 * turned
+    assert np.abs(RIPPLE.columns(now, joint, (order, 0.0, 0.0))[:, joint - 1, :2] - wanted).max() > 5 * turned
 
 
 @pytest.fixture(scope="module")
@@ -125,9 +125,9 @@ def test_a_ripple_of_a_linear_axis_is_one_of_its_length(sliding):
     residual[:, 1] += np.cos(order * now.q[:, 1] + 0.7)
     found = RIPPLE.propose(now, 2, residual, 8)
     assert min(abs(point[0] - order) for point in found[:3]) <= np.pi / 0.1
-    assert "every 3 mm" in RIPPLE.describe(2, np.ones(4), (order, 0.0), force="N", length="m")
-    assert [shape.unit_at(now.robot, 2) for shape in RIPPLE.shapes] == ["rad/m", "s"]
-    assert [shape.unit_at(now.robot, 1) for shape in RIPPLE.shapes] == ["periods per turn", "s"]
+    assert "every 3 mm" in RIPPLE.describe(2, np.ones(4), (order, 0.0, 0.0), force="N", length="m")
+    assert [shape.unit_at(now.robot, 2) for shape in RIPPLE.shapes] == ["rad/m", "s", ""]
+    assert [shape.unit_at(now.robot, 1) for shape in RIPPLE.shapes] == ["periods per turn", "s", ""]
 
 
 def test_friction_by_the_position_of_a_linear_axis_goes_by_waves_over_its_range(sliding):
@@ -144,5 +144,17 @@ def test_friction_by_the_position_of_a_linear_axis_goes_by_waves_over_its_range(
 
 def test_the_sentence_tells_what_grows_with_the_load():
     """A motor's constant that ripples does so by a share of its torque: that is no small ripple."""
-    told = RIPPLE.describe(3, np.array([0.003, 0.004, 0.03, -0.04]), (12.0, 0.0))
-    assert told == "The torque of joint 3 ripples by 0.005 N m and 5 % of its load up and down, 12 times a turn."
+    for share, what in ((0.0, "load"), (1.0, "motor torque")):
+        told = RIPPLE.describe(3, np.array([0.003, 0.004, 0.03, -0.04]), (12.0, 0.0, share))
+        assert told == f"The torque of joint 3 ripples by 0.005 N m and 5 % of its {what} up and down, 12 times a turn."
+
+
+def test_a_motors_constant_ripples_by_all_of_its_torque(seen):
+    """What a motor's constant makes of its torque, friction included, is the wave times what was logged of it."""
+    now, joint, order = seen(), 2, 12.0
+    whole, wave = now.torque[:, joint - 1], np.cos(order * now.q[:, joint - 1])
+    X = RIPPLE.columns(now, joint, (order, 0.0, 1.0))[:, joint - 1]
+    np.testing.assert_allclose(X[:, 2], wave * whole, atol=1e-9 * np.abs(whole).max())
+    gear = RIPPLE.columns(now, joint, (order, 0.0, 0.0))[:, joint - 1]
+    np.testing.assert_allclose(gear[:, 2], wave * now.rigid[:, joint - 1], atol=1e-9 * np.abs(whole).max())
+    assert np.abs(X[:, 2] - gear[:, 2]).max() > 0.01 * np.abs(whole).max()
