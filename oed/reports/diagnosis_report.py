@@ -67,14 +67,24 @@ def _verdict(view: DiagnosisView) -> str:
     if view.verdict == "ambiguous":
         return f"Something is found, but not which of several causes. The likeliest: {first}{more}"
     if view.verdict == "unexplained":
-        return f"A part of the error is explained, another is not. {first}{more}"
+        helps = any(finding.interval[0] > 0 for finding in view.findings)
+        part = "A part of the error is explained, another is not." if helps else _STANDS_OUT
+        return f"{part} {first}{more}"
     return f"{first}{more}"
+
+
+_STANDS_OUT = "Something stands out of the noise that no effect of the catalogue explains."
 
 
 def _facts(view: DiagnosisView) -> tuple[Fact, ...]:
     facts = [Fact(label="Effects found", value=len(view.findings))]
     if np.isfinite(view.nrmse_before).any():
-        worst = int(np.nanargmax(np.nan_to_num(view.nrmse_before - view.nrmse_after)))
+        change = np.nan_to_num(view.nrmse_before - view.nrmse_after)
+        own = {finding.joint for finding in view.findings}
+        if own and None not in own:
+            # Of what is told: other joints differ by what the base model makes of it.
+            change[[j for j in range(len(change)) if j + 1 not in own]] = -np.inf
+        worst = int(np.argmax(change))
         facts.append(
             Fact(
                 label=f"Error of joint {worst + 1}, unseen data",

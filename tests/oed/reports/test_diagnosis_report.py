@@ -114,6 +114,24 @@ def test_no_chance_is_told_that_nobody_knows(view):
     assert "1e-12" in text
 
 
+@pytest.mark.parametrize(("interval", "told"), [((0.03, 0.07), True), ((-0.01, 0.02), False)])
+def test_what_brings_nothing_explains_nothing(interval, told, view):
+    """A free function that stands out of the noise and does not surely help elsewhere explains no part of the error."""
+    finding = replace(view.findings[0], interval=interval)
+    page = diagnosis_page(replace(view, verdict="unexplained", findings=(finding,)))
+    assert page.verdict.startswith("A part of the error is explained") == told
+    assert page.verdict.endswith(finding.sentence)
+
+
+def test_the_error_told_is_that_of_a_joint_with_a_finding(view):
+    """Another joint may change by more, for what the base model makes of it: that is not what was found."""
+    page = diagnosis_page(replace(view, nrmse_before=np.array([0.2, 0.1]), nrmse_after=np.array([0.1, 0.11])))
+    assert page.facts[1].label == "Error of joint 2, unseen data"
+    whole = replace(view.findings[0], joint=None)
+    page = diagnosis_page(replace(view, findings=(whole,), nrmse_before=np.array([0.2, 0.1])))
+    assert page.facts[1].label == "Error of joint 1, unseen data"
+
+
 def test_what_has_no_name_is_not_told_to_need_no_experiment(view):
     """Findings without a name leave the cause open: the page says how to look for it."""
     named, unexplained = (
