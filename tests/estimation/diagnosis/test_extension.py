@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.extension import Extension, extension_torque, find_effect, read_extension
+from estimation.diagnosis.fading import Fading
 from estimation.diagnosis.leaning import Leaning
 from estimation.diagnosis.patterns import all_patterns, build_pattern
 from estimation.diagnosis.pulling import Pulling
@@ -28,7 +29,7 @@ def state(arm: Robot) -> Situation:
 
 def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(arm: Robot, state: Situation) -> None:
     """A pattern in a model file is the pattern that was found; all its values are finite."""
-    *own, swinging, pulling, leaning = all_patterns(arm)
+    *own, swinging, pulling, leaning, fading = all_patterns(arm)
     for pattern in own:
         assert build_pattern(pattern.name) == pattern
         for shape in pattern.grid(state, 1)[:2]:
@@ -50,6 +51,7 @@ def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(
         assert type(build_pattern(effect.name)) is type(effect) is kind
         assert effect.joints(arm) == (None,)
         assert effect.columns(state, None).shape == (300, 2, len(effect.parameters(arm, None)))
+    assert type(build_pattern(fading.name)) is type(fading) is Fading
     for whole in (swinging, pulling, leaning):
         text = whole.describe(None, np.zeros(12), whole.grid(state, None)[0])
         assert text.startswith("The residual torque of all joints")
