@@ -60,6 +60,8 @@ class Band:
         if not len(self.taps) and after is None:
             return series[:: self.stride].astype(kind, copy=False)
         rows = -(-len(series) // self.stride)
+        if not series.size:  # a joint that does not move has no columns
+            return np.zeros((rows, *series.shape[1:]), dtype=kind)
         columns = np.ascontiguousarray(series.T if series.ndim > 1 else series[None])
         # Two real columns are one complex one, the filters being real; as large as each other, so that the rounding of
         # neither shows in the other, and zeros stay zeros.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,16 +66,32 @@ def mended(robot: Robot, log: Log, which: str) -> Mended:
         which: what notes call it.
 
     Raises:
-        InputError: a log that says nothing of the robot: positions in degrees, times in milliseconds, absurd values.
+        InputError: a log that says nothing of the robot: positions in degrees, times in milliseconds, absurd values,
+            torques of the motors.
     """
     gate = check_log(robot, log)
-    replace(gate, findings=tuple(f for f in gate.findings if f.name not in TOLD)).raise_if_refused()
-    notes = [
+    sizes = [f for f in gate.findings if f.name == "unit_of_torque" and f.joint is not None]
+    strange = 2 * len(sizes) > robot.n
+    told = TOLD - {"unit_of_torque"} if strange else TOLD
+    replace(gate, findings=tuple(f for f in gate.findings if f.name not in told)).raise_if_refused()
+    notes = [_SIZES.format(which, _range([f.value for f in sizes]))] if strange else []
+    notes += [
         f"{which}{_BY_FIT if finding.name in TOLD else ''}: {finding}."
         for finding in gate.findings
         if _is_told(finding)
     ]
     return Mended(_stretches(_filled(log) if len(gate.spikes) else log, gate), tuple(notes))
+
+
+_SIZES = (
+    "{}: most joints' torques are {} times those of the robot's description: check unit and gear ratios (a mapping "
+    "states them) before anything else that is said here; they are right if the description is that wrong."
+)
+
+
+def _range(values: Sequence[float]) -> str:
+    low, high = (f"{value:.2g}" for value in (min(values), max(values)))
+    return low if low == high else f"{low} to {high}"
 
 
 def _is_told(finding: Finding) -> bool:
@@ -101,9 +118,9 @@ def _filled(log: Log) -> Log:
 
 
 def _stretches(log: Log, gate: GateReport) -> tuple[Log, ...]:
-    """Cuts a log at its gaps; it is left whole where no stretch is long enough to stand alone."""
+    """Cuts a log at its gaps and where a column hung; it is left whole where no stretch is long enough by itself."""
     spans = [(first, stop) for first, stop in gate.parts if log.t[stop - 1] - log.t[first] >= SHORTEST]
-    if len(gate.parts) == 1 or not spans:
+    if gate.parts == ((0, len(log)),) or not spans:
         return (log,)
     parts = (log.rows(slice(first, stop)) for first, stop in spans)
     return tuple(

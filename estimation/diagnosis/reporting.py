@@ -191,9 +191,9 @@ def _notes(told: Told, findings: Sequence[Finding], apart: Sequence[Finding], af
     still = [j + 1 for j in range(recording.n) if np.ptp(recording.q[:, j]) < STILL]
     if still:
         names = ", ".join(map(str, still))
+        whose = f"Joints {names} hardly moved: their" if len(still) > 1 else f"Joint {names} hardly moved: its"
         notes.append(
-            f"Joint{'s' if len(still) > 1 else ''} {names} hardly moved: their friction, gears and rotors cannot be "
-            "judged; what gravity and the other joints ask of them can."
+            f"{whose} friction, gears and rotors cannot be judged; what gravity and the other joints ask of them can."
         )
     told_of = {finding.joint for finding in findings if finding.effect == CLIPPING.name}
     for j in sorted({*range(1, recording.n + 1)} - told_of):

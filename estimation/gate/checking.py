@@ -22,7 +22,7 @@ from estimation.gate.resolution import check_clipping, check_resolution
 from estimation.gate.scales import check_scales, check_size
 from estimation.gate.signs import check_signs
 from estimation.gate.spikes import check_spikes
-from estimation.gate.timing import Timing, check_repeats, check_timing
+from estimation.gate.timing import Timing, check_repeats, check_timing, without_hung
 from estimation.gate.units import beyond_findings, check_speed, suspect_position_unit
 from estimation.gate.values import (
     absurd_values,
@@ -102,7 +102,7 @@ def check_log(robot: Robot, log: Log) -> GateReport:
         duration=duration,
         period=timing.period,
         findings=worst_first(once(findings)),
-        parts=timing.parts,
+        parts=without_hung(timing.parts, findings),
         spikes=spikes,
         **dynamics,
     )

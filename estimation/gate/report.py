@@ -34,7 +34,8 @@ class GateReport:
         duration: [s].
         period: median sample period [s].
         findings: the worst first.
-        parts: (first, stop) sample indices of the stretches without a gap; what lies between is not bridged.
+        parts: (first, stop) sample indices of the stretches without a gap, and in which no column hung; what lies
+            between is not bridged.
         spikes: indices of single rows that stick out of their neighbours, which a fit must leave out.
         delay: by which the torque lags the position (n,) [s], NaN where the log does not tell.
         delay_error: its standard error (n,) [s].
@@ -107,7 +108,7 @@ class GateReport:
         """
         if len(log) != self.samples:
             raise InputError(f"{len(log)} rows", allowed=f"{self.samples}, as the log that was checked")
-        if len(self.parts) == 1 and not len(self.spikes):
+        if self.parts == ((0, len(log)),) and not len(self.spikes):
             return (log,)
         kept = np.ones(len(log), dtype=bool)
         kept[self.spikes] = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -27,6 +28,8 @@ JITTER = 0.05
 REPEATED = 0.02
 # A column jumps with a step of so many times its hundredth-largest.
 JUMP = 3.0
+# The jump is one, too, beyond this times the largest step in so many rows on either side.
+STRAY, BESIDE = 10.0, 20
 
 
 @dataclass(frozen=True)
@@ -181,20 +184,28 @@ def _stuck(columns: Columns, moving: NDArray[np.bool_]) -> list[Finding]:
             share = float(held.mean())
             if share > 0.5 or not held.any():
                 continue  # coarse or standing: other checks speak of it
-            start, length = longest_run(held & moving)
             # With a share p of equal neighbours, N rows hold a run of log(N) / log(1/p) by chance; thrice that is not.
             chance = np.log(len(column)) / np.log(1.0 / max(share, 1.0 / len(column)))
-            after = start + length
-            jump = steps[after] if after < len(steps) else 0.0
             usual = JUMP * float(np.quantile(steps[:: max(1, len(steps) // 50_000)], 0.99))
-            if length < max(3.0 * chance, FEWEST) or jump <= usual:
+            # What hung may have stood for a part of that: rows in which the arm moves count.
+            starts, lengths = runs(held)
+            passed = np.concatenate([[0], np.cumsum(moving)])
+            long = passed[starts + lengths] - passed[starts] >= max(3.0 * chance, FEWEST)
+            hung = [
+                (int(length), int(start))
+                for start, length in zip(starts[long], lengths[long], strict=True)
+                # A torque may be that of a brake, until it is let go.
+                if _step(steps, start + length) > (min(usual, _about(steps, start, length)) if prefix == "q" else usual)
+            ]
+            if not hung:
                 continue
+            length, start = max(hung)
             findings.append(
                 Finding(
                     name="stuck",
                     severity="warning",
                     text=f"holds one value for {length + 1} rows while the arm moves, and jumps then",
-                    action="cut these rows out, and repair the logger",
+                    action="the log is cut there; repair the logger",
                     value=float(length + 1),
                     unit="rows",
                     column=f"{prefix}{joint + 1}",
@@ -205,11 +216,43 @@ def _stuck(columns: Columns, moving: NDArray[np.bool_]) -> list[Finding]:
     return findings
 
 
+def without_hung(parts: Sequence[tuple[int, int]], findings: Sequence[Finding]) -> tuple[tuple[int, int], ...]:
+    """Cuts stretches (first, stop) where a column hung: its rows there are not of that time."""
+    rest = list(parts)
+    for finding in findings:
+        if finding.name != "stuck" or finding.row is None:
+            continue
+        first, stop = finding.row, finding.row + int(finding.value) - 1
+        pieces = [piece for a, b in rest for piece in ((a, min(b, first)), (max(a, stop), b))]
+        rest = [(a, b) for a, b in pieces if a < b]
+    return tuple(rest)
+
+
+def _step(steps: Array, row: int) -> float:
+    return float(steps[row]) if row < len(steps) else 0.0
+
+
+def _about(steps: Array, start: int, length: int) -> float:
+    """The size of a step after a run of rows that no motion beside that run comes near; infinite where nothing moves.
+
+    A slow joint that goes on as slowly as it came has jumped, however fast it is elsewhere.
+    """
+    stop = start + length
+    beside = np.concatenate([steps[max(start - BESIDE, 0) : start], steps[stop + 1 : stop + 1 + BESIDE]])
+    most = float(beside.max(initial=0.0))
+    return STRAY * most if most > 0 else np.inf
+
+
+def runs(flags: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Finds the runs of True: their starts and their lengths."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return edges[::2], edges[1::2] - edges[::2]
+
+
 def longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
     """Finds the longest run of True: its start and its length, (0, 0) without any."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    if not len(edges):
+    starts, lengths = runs(flags)
+    if not len(starts):
         return 0, 0
-    lengths = edges[1::2] - edges[::2]
     best = int(np.argmax(lengths))
-    return int(edges[2 * best]), int(lengths[best])
+    return int(starts[best]), int(lengths[best])

@@ -67,8 +67,26 @@ def test_hung_column_is_told(good, spoilt):
     """A torque that holds one value while the arm moves, and jumps then, hung."""
     tau = good().tau.copy()
     tau[1000:1400, 0] = tau[1000, 0]
-    (finding,) = found(spoilt(tau=tau), "stuck")
+    report = spoilt(tau=tau)
+    (finding,) = found(report, "stuck")
     assert (finding.column, finding.row) == ("tau1", 1001)
+    assert report.parts == ((0, 1001), (1400, len(tau)))
+    first, second = report.usable(replace(good(), tau=tau))
+    assert (len(first), len(second)) == (1001, len(tau) - 1400)
+
+
+def test_a_slow_joint_that_hung_is_told(good, spoilt):
+    """A position that hangs while the joint creeps is told by the creep about it, however fast the joint may be."""
+    q = good().q.copy()
+    rows = np.arange(len(q))
+    # A twentieth of the speed for 800 rows: what the hang leaves out is a step that is usual elsewhere.
+    way = np.cumsum(np.where(np.abs(rows - 2500) < 400, 0.05, 1.0))
+    q[:, 1] = np.interp(way, rows, q[:, 1])
+    q[2450:2550, 1] = q[2450, 1]
+    step = np.abs(np.diff(q[:, 1]))
+    assert step[2549] < 3 * np.quantile(step, 0.99)
+    (finding,) = found(spoilt(q=q), "stuck")
+    assert (finding.column, finding.row) == ("q2", 2451)
 
 
 def test_position_that_jumps_is_refused(good, spoilt):
