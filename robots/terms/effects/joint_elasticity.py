@@ -27,6 +27,8 @@ SCANNED = (3.5, 4.2, 5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 18.0, 30.0, 300.0)
 """Resonances [Hz] of a scan, at the log's mean inertia: dense where a motion may excite them, for they are narrow."""
 LIGHTEST = 0.02
 """Of a joint's largest inertia, the least that an arm makes it in any pose."""
+APART = 5.0
+"""Times by which the stiffness by the dynamics and that by the compliance differ at most: they are of one gear."""
 LOWEST, HIGHEST = 3.0, 1000.0
 """Resonances [Hz] that a gear may have."""
 
@@ -79,6 +81,11 @@ class JointElasticity(Effect):
             return plain
         stiffness = float(np.clip(1.0 / coefficients[0], *self.bounds(situation, joint)[0]))
         return (stiffness, KNOWN), *plain, *((stiffness, None) for _ in plain)
+
+    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+        """Tells a gear from what swings as if on a spring of another stiffness than it winds up by."""
+        ratio = float(coefficients[0]) * shape[0] if shape else 1.0
+        return 1.0 / APART < ratio < APART and super().believable(robot, joint, coefficients, shape)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per compliance of one."""

@@ -6,7 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from robots.terms.effects.joint_elasticity import SCANNED, _inertia, followed
+from robots import load_robot
+from robots.terms.effects import EFFECTS
+from robots.terms.effects.joint_elasticity import APART, SCANNED, _inertia, followed
 
 
 def test_a_wrist_whose_inertia_is_fitted_negative_swings_all_the_same() -> None:
@@ -21,3 +23,13 @@ def test_a_wrist_whose_inertia_is_fitted_negative_swings_all_the_same() -> None:
     for resonance in SCANNED:
         stiffness = (2 * np.pi * resonance) ** 2 * float(inertia.mean())
         assert np.abs(followed(situation, load, stiffness, inertia)).max() < 20.0  # type: ignore[arg-type]
+
+
+def test_a_gear_has_one_stiffness() -> None:
+    """What winds up by one stiffness and swings by another, far from it, is no gear."""
+    gear, robot = EFFECTS["joint_elasticity"], load_robot("ur10")
+    compliance = np.array([1e-4])
+    assert gear.believable(robot, 2, compliance, (1e4, 0.0))
+    assert gear.believable(robot, 2, compliance, (0.9 * APART * 1e4, 0.0))
+    for ratio in (1.1 * APART, 1 / (1.1 * APART)):
+        assert not gear.believable(robot, 2, compliance, (ratio * 1e4, 0.0))
