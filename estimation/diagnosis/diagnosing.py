@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
@@ -218,6 +218,7 @@ def _search(
     tau = recording.tau
     search: Search | None = None
     blurred = False
+    known: dict[Hypothesis, tuple[float, ...]] = {}
     for attempt in range(2):
         share = 0.1 + 0.3 * attempt
         inertia = inertia_of(baseline, recording, settled.values)
@@ -255,7 +256,9 @@ def _search(
             rng,
             bar,
             share,
+            known,
         )
+        known = {found.member.hypothesis: found.member.shape for found in search.selection.found}
         if not search.selection.found:
             break
         settled = settle(search.problem, [found.member for found in search.selection.found])
@@ -307,11 +310,12 @@ def _searched(
     rng: np.random.Generator,
     bar: Progress,
     share: float,
+    known: Mapping[Hypothesis, tuple[float, ...]],
 ) -> Search:
     entries = measure(problem, hypotheses, _teller(bar, share, 0.2))
     give_back()
     advance = _noter(bar, share + 0.25)
-    selection = select(problem, entries, false_alarm=false_alarm, rng=rng, advance=advance)
+    selection = select(problem, entries, false_alarm=false_alarm, rng=rng, advance=advance, known=known)
     members = [found.member for found in selection.found]
     return Search(problem, composed(problem, members, hypotheses), entries, selection)
 

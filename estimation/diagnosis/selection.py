@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -72,11 +72,13 @@ def select(
     false_alarm: float,
     rng: np.random.Generator,
     advance: Callable[[str], None] = lambda note: None,
+    known: Mapping[Hypothesis, tuple[float, ...]] | None = None,
 ) -> Selection:
     """Adds effects while the strongest is significant, refining and swapping before each next step.
 
-    One that the others make unnecessary once they are refined beside it is not tried again, and no set of effects is
-    built on twice: the search would go round in a circle.
+    Shapes that are `known` from another search are refined from there, too. One that the others make unnecessary once
+    they are refined beside it is not tried again, and no set of effects is built on twice: the search would go round in
+    a circle.
     """
     members, p_values = _seen(problem, entries, false_alarm, rng, ())
     seen = {member.hypothesis for member in members}
@@ -94,7 +96,7 @@ def select(
         if not chances[result.outcomes[0].hypothesis] <= false_alarm:
             break
         advance(f"{result.outcomes[0].hypothesis.label}")
-        refined = _best(problem, contenders(problem, result, members), accepted)
+        refined = _best(problem, contenders(problem, result, members), accepted, known)
         chance = {member.hypothesis: chances.get(member.hypothesis, 1.0) for member in refined}
         able = [m for m in refined if chance[m.hypothesis] <= false_alarm and m.hypothesis not in spurned]
         alone = SURE * false_alarm if not members else 0.0
@@ -189,11 +191,21 @@ def _seen(
     return found, p_values
 
 
-def _best(problem: Problem, outcomes: Sequence[Outcome], accepted: Accepted) -> list[Member]:
-    """Refines contenders, the best BIC first."""
+def _best(
+    problem: Problem,
+    outcomes: Sequence[Outcome],
+    accepted: Accepted,
+    known: Mapping[Hypothesis, tuple[float, ...]] | None = None,
+) -> list[Member]:
+    """Refines contenders, from shapes that are known too, the best BIC first."""
+    starts = [(o.hypothesis, o.shape) for o in outcomes]
+    starts += [(o.hypothesis, known[o.hypothesis]) for o in outcomes if known and o.hypothesis in known]
     with ThreadPoolExecutor(min(4, available_cores())) as pool:
-        refined = list(pool.map(lambda o: refine(problem, o.hypothesis, o.shape, accepted), outcomes))
-    return sorted(refined, key=lambda member: -member.bic(problem.rows))
+        refined = list(pool.map(lambda start: refine(problem, start[0], start[1], accepted), starts))
+    best: dict[Hypothesis, Member] = {}
+    for member in sorted(refined, key=lambda member: -member.bic(problem.rows)):
+        best.setdefault(member.hypothesis, member)
+    return list(best.values())
 
 
 def _worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
