@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.experiment_grams import Cause, Grams
+from estimation.diagnosis.experiment_grams import ARM, Cause, Grams
 from estimation.diagnosis.next_experiment_motions import MAKERS, VARIED, Room, Stage, room_of
 from estimation.diagnosis.problem import Problem
+from robots.robot import Robot
 from robots.terms.effects import EXPERIMENTS
 
 Array = NDArray[np.float64]
@@ -110,7 +111,7 @@ class _Choice:
         """
         if self.chance >= ENOUGH:
             return -ENOUGH, self.times
-        return -self.chance - TIE * float(self.chances.mean()), self.times
+        return -(1.0 - TIE) * self.chance - TIE * float(self.chances.mean()), self.times
 
     @property
     def duration(self) -> float:
@@ -160,6 +161,7 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
         why += f"most of them apart, but hardly {_and([names[k] for k in sorted(alike)])}: no experiment tried does"
     else:
         why += f"them apart with a chance of {100 * chance:.0f} %"
+    why += _by_hand(robot, best.stages)
     return NextExperiment(
         kind=best.kind,
         joint=joint,
@@ -169,6 +171,19 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
         ranking=tuple(choice.proposal() for choice in ranking),
         times=best.times,
     )
+
+
+def _by_hand(robot: Robot, stages: Sequence[Stage]) -> str:
+    """Says what is to be hung on the flange, and by how much the base is to be tilted; nothing where neither is."""
+    load = max(stage.payload for stage in stages)
+    down = np.asarray(robot.chain.gravity, dtype=float)
+    angles = [float(np.arccos(_along(down, stage.gravity))) for stage in stages if stage.gravity is not None]
+    told = f"; the payload is {load:.2g} kg, {ARM:g} m ahead of the flange" if load else ""
+    return told + (f"; the base is tilted by {np.degrees(max(angles)):.0f} degrees" if angles else "")
+
+
+def _along(one: Array, other: Array) -> float:
+    return float(np.clip(one @ other / max(float(np.linalg.norm(one) * np.linalg.norm(other)), 1e-300), -1.0, 1.0))
 
 
 def _and(names: Sequence[str]) -> str:

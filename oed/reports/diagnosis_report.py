@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.diagnosis import Diagnosis
 from estimation.diagnosis.limits import told_in_one
+from estimation.diagnosis.verdict import CLOSE
 from oed.reports.diagnosis_limits import limits_section
 from oed.reports.diagnosis_pictures import cause_picture, gain_picture
 from oed.reports.diagnosis_simulation import simulation_section
@@ -187,7 +188,7 @@ def _finding(view: DiagnosisView, index: int) -> Section:
             Table(
                 headings=("instead of it", "worse by, in BIC"),
                 rows=tuple((title, round(margin, 1)) for title, margin in finding.rivals),
-                caption="Below 10 the rival remains possible.",
+                caption=f"Below {CLOSE:g} the rival remains possible.",
             )
         )
     picture = cause_picture(
@@ -207,6 +208,10 @@ def _finding(view: DiagnosisView, index: int) -> Section:
     )
 
 
+_UNLESS = (
+    "No further experiment is needed to name the cause, unless the robot may have what few have and what fits about "
+    "as well: {}. That is then to be ruled out by itself."
+)
 _NO_EXPERIMENT = {
     "none": "Nothing is left to tell apart.",
     "named": "No further experiment is needed to name the cause.",
@@ -219,7 +224,9 @@ _NO_EXPERIMENT = {
 
 def _next(view: DiagnosisView) -> Section:
     if not view.next_kind:
-        return Section(title="Next step", paragraphs=(_NO_EXPERIMENT[view.verdict],))
+        rare = [title for finding in view.findings for title, worse in finding.rivals if worse < CLOSE]
+        text = _UNLESS.format(", ".join(rare)) if view.verdict == "named" and rare else _NO_EXPERIMENT[view.verdict]
+        return Section(title="Next step", paragraphs=(text,))
     paragraphs = [f"Make {view.next_kind}: {view.next_why}." if view.next_why else f"Make {view.next_kind}."]
     rows: Sequence[tuple[Cell, ...]] = tuple(
         (kind, round(100 * chance), round(duration)) for kind, chance, duration in view.next_ranking

@@ -10,7 +10,7 @@ import pytest
 from estimation.diagnosis.carried import point_mass, situation_on
 from estimation.diagnosis.experiment_grams import Grams
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.next_experiment import LONGEST, plan_next, repeated
+from estimation.diagnosis.next_experiment import ENOUGH, LONGEST, _Choice, plan_next, repeated
 from estimation.diagnosis.next_experiment_motions import MADE, MAKERS, Stage, room_of
 from estimation.diagnosis.planned import planned_problem
 from robots.loading import load_robot
@@ -89,6 +89,7 @@ def test_a_payload_tells_a_torque_constant(problem):
     assert plan.kind == "payload"
     assert plan.resolves > 0.9
     assert plan.joint == 4
+    assert f"the payload is {max(stage.payload for stage in plan.stages):.2g} kg" in plan.why
     assert "torque constant error of joint 4" in plan.why
     assert {p.kind for p in plan.ranking} == set(EXPERIMENTS)
     assert max(p.resolves for p in plan.ranking if p.kind not in ("payload", "second_base_pose")) < 0.5
@@ -140,6 +141,14 @@ def test_the_least_trouble_is_proposed_where_several_would_do(problem):
         _guess(problem, "presliding_hysteresis", 4, (0.003,), 0.02),
     ]
     assert plan_next(problem, causes).kind == "repeat"
+
+
+def test_what_is_nearly_sure_goes_after_what_is(problem):
+    """A chance just short of enough is no better than enough, however the other causes stand."""
+    grams, stages = np.zeros((1, 1)), ()
+    chances = [np.full((2, 2), enough) for enough in (ENOUGH - 1e-3, ENOUGH)]
+    nearly, enough = (_Choice("payload", stages, (grams,), each) for each in chances)
+    assert enough.rank < nearly.rank
 
 
 def test_what_once_does_not_tell_is_made_several_times(problem):

@@ -41,7 +41,7 @@ def _searching(
     replace("contenders", lambda problem, result, members: result.outcomes)
     replace(
         "_best",
-        lambda problem, outcomes, accepted: [
+        lambda problem, outcomes, accepted, known=None: [
             SimpleNamespace(hypothesis=o.hypothesis, group=o.hypothesis, gain=1.0) for o in outcomes
         ],
     )
@@ -53,6 +53,24 @@ def _searching(
     )
     replace("_measured", lambda problem, member, beside: member)
     return scans
+
+
+def test_a_shape_that_is_known_is_refined_from_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two tops of one effect, the one that is higher counts, whichever start leads to it; others start once."""
+    starts = []
+
+    def refine(problem, hypothesis, shape, accepted):
+        starts.append((hypothesis, shape))
+        return SimpleNamespace(hypothesis=hypothesis, shape=shape, bic=lambda rows: 10.0 * shape[0])
+
+    monkeypatch.setattr(selection, "refine", refine)
+    outcomes = [SimpleNamespace(hypothesis=A, shape=(1.0,)), SimpleNamespace(hypothesis=B, shape=(2.0,))]
+    problem = SimpleNamespace(rows=100)
+    best = selection._best(problem, outcomes, None, {A: (3.0,), C: (9.0,)})  # type: ignore[arg-type]
+    assert [(m.hypothesis, m.shape) for m in best] == [(A, (3.0,)), (B, (2.0,))]
+    assert len(starts) == 3
+    worse = selection._best(problem, outcomes, None, {A: (0.5,)})  # type: ignore[arg-type]
+    assert [(m.hypothesis, m.shape) for m in worse] == [(B, (2.0,)), (A, (1.0,))]
 
 
 def _selected() -> set[Hypothesis]:

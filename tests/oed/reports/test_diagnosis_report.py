@@ -142,6 +142,14 @@ def test_what_has_no_name_is_not_told_to_need_no_experiment(view):
     assert "move it alone" in unexplained
 
 
+def test_a_rare_rival_that_fits_as_well_is_not_passed_over(view):
+    """A cause is named although what few robots have fits about as well: the next step says so."""
+    close = replace(view.findings[0], rivals=(("shear thinning", 7.9), ("presliding", 40.0)))
+    text = render(diagnosis_page(replace(view, findings=(close,), next_kind="")))
+    assert "unless the robot may have" in text
+    assert "about as well: shear thinning." in text
+
+
 def test_a_note_is_told_of_the_places_it_is_of():
     """Effects that one note is of on different joints are not told as if it were of all of them on all joints."""
     hidden = [
