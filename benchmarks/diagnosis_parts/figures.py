@@ -51,6 +51,7 @@ def figures(rows: Sequence[Row]) -> str:
         share("  nothing false named beside it", one, lambda row: not spurious(row), ""),
         share("detected, of those above the limit that is stated", filter(within_limits, half + one), detected, "95 %"),
         share("two effects at 3 %: both named", of["two"], both, "95 %"),
+        share("  of those above the limits that are stated", filter(within_limits, of["two"]), both, ""),
         share("  a spurious one", of["two"], spurious, "2 % or less"),
         share(
             "outside the catalogue at 1 %: unexplained",

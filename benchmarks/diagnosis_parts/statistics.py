@@ -85,9 +85,15 @@ def spurious(row: Row) -> bool:
 
 
 def within_limits(row: Row) -> bool:
-    """Whether the one hidden effect is as large as the smallest that its own report says it would have shown."""
-    stated = [limit["detectable"] for limit in row.get("limits") or () if _pair(limit) == _pair(row["truth"][0])]
-    return any(size is not None and row["truth"][0]["visible"] >= size for size in stated)
+    """Whether each hidden effect is as large as the smallest that its own report says it would have shown."""
+    stated = [
+        [limit["detectable"] for limit in row.get("limits") or () if _pair(limit) == _pair(effect)]
+        for effect in row["truth"]
+    ]
+    return all(
+        any(size is not None and effect["visible"] >= size for size in sizes)
+        for effect, sizes in zip(row["truth"], stated, strict=True)
+    )
 
 
 def gain_ratios(rows: Iterable[Row], oracle: str = "oracle_after") -> np.ndarray:

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-QUICKEST, SLOWEST = 0.004, 0.1
+QUICKEST, SLOWEST = 0.004, 0.3
 """Times [s] between which a crossing of the gap takes; a log shows nothing quicker than a sample."""
-SCANNED = (0.006, 0.012, 0.025, 0.05)
+SCANNED = (0.006, 0.012, 0.025, 0.05, 0.1, 0.2)
 """Times [s] of a scan."""
 ASIDE = (-0.03, -0.015, 0.0, 0.015, 0.03)
 """Loads of a scan at which the link changes sides, as shares of the load's root mean square."""

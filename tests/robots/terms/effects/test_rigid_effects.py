@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from robots.geometry.chain import Chain
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
+from robots.terms.effects.backlash import SLOWEST
 from robots.terms.effects.base_tilt import level_axes
 from robots.terms.effects.joint_elasticity import followed
 
@@ -295,6 +296,22 @@ def test_size_and_time_of_a_crossing_tell_one_play(seen):
     assert EFFECTS["joint_elasticity"].ranges(robot, 1, (10.0, 0.0)) == tuple((c.lower, c.upper) for c in described)
 
 
+def test_gaps_are_looked_for_that_take_from_a_sample_to_a_fifth_of_a_second(seen):
+    """A slow load of a heavy link crosses late: half of the crossings of the largest gap of the scan take that long."""
+    now = seen(5, seed=1)
+    effect = EFFECTS["backlash"]
+    turns = [np.count_nonzero(np.diff(np.sign(now.load[:, joint - 1]))) for joint in range(1, 6)]
+    joint = 1 + int(np.argmax(turns))
+    load = now.load[:, joint - 1]
+    i = np.flatnonzero((load[:-1] * load[1:] < 0) & (np.abs(np.diff(load)) > 1e-4 * np.abs(load).max()))
+    quickness = np.abs(load[i + 1] - load[i]) / 0.004 / now.sensitivity("inertia")[i, joint - 1, joint - 1]
+    gaps = sorted({gap for gap, *_ in effect.grid(now, joint)})
+    flights = [float(np.median((6 * gap / quickness) ** (1 / 3))) for gap in gaps]
+    assert flights[-1] == pytest.approx(0.2, rel=0.05)
+    assert flights[0] < 0.03
+    assert flights[-1] < SLOWEST
+
+
 def test_a_gap_too_large_for_its_time_may_be_crossed_with_the_motor(seen):
     """Free flight in a time asks for a gap; where the torque tells a larger one, the motor may set the time."""
     now = seen(5, seed=1)
@@ -318,7 +335,7 @@ def test_size_of_an_effect_tells_its_time(seen):
     bare = seen(5, seed=1, robot=replace(now.robot, rotor_inertia=np.zeros(5)))
     for known, at, count in ((True, now, 7), (False, bare, 15)):
         crossings = EFFECTS["backlash"].likely(at, 2, (1e-3, 0.07, 0.2, 0.0), np.array([2e-4]))
-        assert crossings[0] == (4e-4, 0.1, 0.0, 0.0)
+        assert crossings[0] == (4e-4, SLOWEST, 0.0, 0.0)
         assert len(set(crossings)) == count
         assert (None,) * 4 not in crossings
         assert ((None, None, None, 0.0) in crossings) is not known
