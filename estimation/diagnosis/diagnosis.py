@@ -257,6 +257,7 @@ def _next(item: dict[str, Any]) -> NextExperiment:
         ranking=(),
         # Older files have none.
         times=int(item.get("times", 1)),
+        logged=str(item.get("logged", "")),
     )
 
 

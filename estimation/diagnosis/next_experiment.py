@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.experiment_grams import ARM, Cause, Grams
-from estimation.diagnosis.next_experiment_motions import MAKERS, VARIED, Room, Stage, room_of
+from estimation.diagnosis.next_experiment_motions import MADE, MAKERS, VARIED, Room, Stage, room_of
 from estimation.diagnosis.problem import Problem
 from robots.robot import Robot
+from robots.signals import Motion
 from robots.terms.effects import EXPERIMENTS
 
 Array = NDArray[np.float64]
@@ -64,6 +65,7 @@ class NextExperiment:
             last log.
         ranking: all kinds, the best first.
         times: how often each motion is made, one after the other; all are among the stages.
+        logged: which motion of the logs is repeated, in words; empty where the motions are new.
     """
 
     kind: str
@@ -73,6 +75,26 @@ class NextExperiment:
     stages: tuple[Stage, ...]
     ranking: tuple[Proposal, ...]
     times: int = 1
+    logged: str = ""
+
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """Its different motions, in the order in which they are first made."""
+        return tuple(dict.fromkeys(stage.motion for stage in self.stages))
+
+    @property
+    def runs(self) -> list[dict[str, Any]]:
+        """What to play, one after the other: the motion's number from 1, the rest before it, payload and base pose."""
+        numbers = {motion: number for number, motion in enumerate(self.motions, start=1)}
+        return [
+            {
+                "motion": numbers[stage.motion],
+                "pause_s": stage.pause,
+                "payload_kg": stage.payload,
+                "gravity": None if stage.gravity is None else [float(g) for g in stage.gravity],
+            }
+            for stage in self.stages
+        ]
 
     def to_dict(self) -> dict[str, Any]:
         """Writes it as plain data, without the motions."""
@@ -82,6 +104,8 @@ class NextExperiment:
             "why": self.why,
             "resolves": self.resolves,
             "times": self.times,
+            "logged": self.logged,
+            "runs": self.runs,
             "alternatives": [
                 {"kind": p.kind, "resolves": p.resolves, "duration": p.duration, "times": p.times} for p in self.ranking
             ],
@@ -170,6 +194,7 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
         stages=stages,
         ranking=tuple(choice.proposal() for choice in ranking),
         times=best.times,
+        logged="" if best.kind in MADE else room.logged,
     )
 
 

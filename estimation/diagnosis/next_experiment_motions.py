@@ -58,6 +58,7 @@ class Room:
         speed: largest speed (n,).
         acceleration: largest acceleration (n,).
         reference: a motion of the logs.
+        logged: which that is, in words.
         step: sample period [s].
         payload: mass of a payload that the robot carries well [kg].
     """
@@ -70,6 +71,7 @@ class Room:
     reference: Motion
     step: float
     payload: float
+    logged: str = ""
 
     @property
     def middle(self) -> Array:
@@ -79,12 +81,15 @@ class Room:
 
 def room_of(robot: Robot, recording: Recording) -> Room:
     """Measures the room that the logs have shown; limits of the robot that are tighter count."""
-    run = max(recording.runs, key=lambda part: part.stop - part.start)
+    lengths = [part.stop - part.start for part in recording.runs]
+    longest = int(np.argmax(lengths))
+    run = recording.runs[longest]
     rows = slice(run.start, min(run.stop, run.start + round(REFERENCE / recording.step)))
     t = recording.t[rows] - recording.t[rows.start]
     limits = robot.limits
     speed = np.abs(recording.dq).max(axis=0)
     acceleration = np.abs(recording.ddq).max(axis=0)
+    first, last = recording.t[rows][[0, -1]]
     mass = float(np.nansum(robot.inertia[:, 0])) if robot.has_inertia else 40.0
     return Room(
         robot=robot,
@@ -95,6 +100,7 @@ def room_of(robot: Robot, recording: Recording) -> Room:
         reference=Motion(t, recording.q[rows], recording.dq[rows], recording.ddq[rows]),
         step=recording.step,
         payload=0.8 * robot.payload if robot.payload else max(0.05 * mass, 0.1),
+        logged=f"{recording.names[longest]} from t = {first:.4g} to {last:.4g} s",
     )
 
 

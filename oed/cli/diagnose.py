@@ -182,10 +182,10 @@ def _diagnosis(
     force: bool,
     progress: Progress,
 ) -> tuple[str, dict[str, Any]]:
-    """Diagnoses logs: diagnosis.json, model.json, report.html and, where new motions are proposed, those."""
+    """Diagnoses logs: diagnosis.json, model.json, report.html and the motions of the next experiment."""
     from estimation import on_one_clock, read_logs
     from estimation.diagnosis.diagnosing import diagnose as run
-    from estimation.diagnosis.next_experiment_motions import MADE, at_rate
+    from estimation.diagnosis.next_experiment_motions import at_rate
     from oed.exports import write_trajectory
     from oed.reports import save_diagnosis_report
     from robots.common.files import ResultFolder
@@ -201,10 +201,8 @@ def _diagnosis(
         result = run(robot, read, held_out=other or None, friction=friction, seed=seed, progress=progress)
         result.save(folder.path("diagnosis.json").parent)
         following = result.next_experiment
-        if following is not None and following.kind in MADE:
-            # A motion that is made several times is written once.
-            motions = dict.fromkeys(stage.motion for stage in following.stages)
-            for number, made in enumerate(motions, start=1):
+        if following is not None:
+            for number, made in enumerate(following.motions, start=1):
                 path = folder.path(f"next_experiment_{number}.csv")
                 motion = at_rate(made, robot.period)
                 write_trajectory(path, motion, {"robot": robot.name, "experiment": following.kind})

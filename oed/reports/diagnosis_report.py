@@ -242,4 +242,31 @@ def _next(view: DiagnosisView) -> Section:
         if rows
         else ()
     )
-    return Section(title="Next step", paragraphs=tuple(paragraphs), tables=tables)
+    if view.next_logged:
+        paragraphs.append(
+            f"The motion is that of {view.next_logged}. Where it begins or ends in motion, let the program of that log "
+            "run instead."
+        )
+    return Section(title="Next step", paragraphs=tuple(paragraphs), tables=(*tables, *_runs(view)))
+
+
+def _runs(view: DiagnosisView) -> tuple[Table, ...]:
+    """What to play, one after the other."""
+    if not view.next_runs:
+        return ()
+    rows: list[tuple[Cell, ...]] = [
+        (
+            f"next_experiment_{run['motion']}.csv",
+            run["pause_s"],
+            run["payload_kg"] or None,
+            "as it stands" if run["gravity"] is None else ", ".join(f"{g:.4g}" for g in run["gravity"]),
+        )
+        for run in view.next_runs
+    ]
+    return (
+        Table(
+            headings=("play", "after a rest of [s]", "payload [kg]", "base: gravity in its frame [m/s2]"),
+            rows=tuple(rows),
+            align=("left", "right", "right", "left"),
+        ),
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +84,8 @@ class DiagnosisView:
         next_why: why.
         next_resolves: its chance.
         next_ranking: kind in words, chance and duration [s], the best first.
+        next_logged: which motion of the logs it repeats, in words; empty for a new one.
+        next_runs: what to play, as `NextExperiment.runs` has it.
         unexplained: what is left, in words.
         warnings: what a reader must know.
         simulation: the motion simulated without and with what was found; None where nothing was.
@@ -105,6 +108,8 @@ class DiagnosisView:
     next_why: str = ""
     next_resolves: float = float("nan")
     next_ranking: tuple[tuple[str, float, float], ...] = ()
+    next_logged: str = ""
+    next_runs: tuple[dict[str, Any], ...] = ()
     unexplained: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     simulation: Simulation | None = None
@@ -140,6 +145,8 @@ def view_of(diagnosis: Diagnosis) -> DiagnosisView:
         next_ranking=()
         if following is None
         else tuple((_experiment(p.kind, p.times), p.resolves, p.duration) for p in following.ranking),
+        next_logged="" if following is None else following.logged,
+        next_runs=() if following is None else tuple(following.runs),
         unexplained=tuple(f"{f.sentence}" for f in left),
         warnings=diagnosis.notes,
         simulation=diagnosis.simulation,

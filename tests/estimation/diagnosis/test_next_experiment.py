@@ -143,6 +143,19 @@ def test_the_least_trouble_is_proposed_where_several_would_do(problem):
     assert plan_next(problem, causes).kind == "repeat"
 
 
+def test_what_to_play_is_told(problem):
+    """A payload's experiment: the logged motion, once without and once with it, as files of their own would have it."""
+    causes = [_guess(problem, "torque_constant_error", 4, (), 0.02), _guess(problem, "encoder_offset", 4, (), 0.02)]
+    plan = plan_next(problem, causes)
+    assert len(plan.motions) == 1
+    without, with_it = plan.runs[0], plan.runs[-1]
+    assert (without["motion"], without["payload_kg"], without["gravity"]) == (1, 0.0, None)
+    assert with_it["motion"] == 1
+    assert with_it["payload_kg"] == plan.stages[-1].payload > 0
+    assert plan.logged.endswith("from t = 0 to 23.99 s")
+    assert plan.to_dict()["runs"] == plan.runs
+
+
 def test_what_is_nearly_sure_goes_after_what_is(problem):
     """A chance just short of enough is no better than enough, however the other causes stand."""
     grams, stages = np.zeros((1, 1)), ()

@@ -150,6 +150,15 @@ def test_a_rare_rival_that_fits_as_well_is_not_passed_over(view):
     assert "about as well: shear thinning." in text
 
 
+def test_what_to_play_next_is_told(view):
+    """The page lists which motion is played when, with what payload and base, and where the motion comes from."""
+    run = {"motion": 1, "pause_s": 2.0, "payload_kg": 0.0, "gravity": None}
+    tilted = run | {"pause_s": 60.0, "payload_kg": 4.5, "gravity": [2.54, 0.0, -9.475]}
+    text = render(diagnosis_page(replace(view, next_logged="monday from t = 0 to 40 s", next_runs=(run, tilted))))
+    for part in ("next_experiment_1.csv", "2.54, 0, -9.475", "4.5", "The motion is that of monday from t = 0 to 40 s"):
+        assert part in text, part
+
+
 def test_a_note_is_told_of_the_places_it_is_of():
     """Effects that one note is of on different joints are not told as if it were of all of them on all joints."""
     hidden = [
