@@ -114,8 +114,8 @@ _DROPPED = "A fit of {} stood out of the noise, but does not help on unseen data
 _REPLACED = "A fit of {} stood out of the noise, but does not help on unseen data; {}, which fits about as well, does."
 _WHOLE = "the robot as a whole"
 _SPOILING = (
-    "On {} something is unexplained, but the free function that shows it errs on unseen data: it is no part of the "
-    "extended model."
+    "On {} something is unexplained, but unseen data do not bear out the free function that shows it: it is no part of "
+    "the extended model."
 )
 
 

@@ -142,7 +142,12 @@ class Pattern(JointEffect):
         length: str = "rad",
     ) -> str:
         """Says what the residual depends on."""
-        return self.sentence(joint, shape)
+        text = self.sentence(joint, shape)
+        if self.kind != "turns" or length == "rad":
+            return text
+        return text.replace(
+            f"repeats {shape[0]:.3g} times a turn of the joint", f"repeats every {2000 * np.pi / shape[0]:.3g} mm"
+        )
 
     def sentence(self, joint: int | None, shape: tuple[float, ...] = ()) -> str:
         """Says in words which joint's residual depends on what."""

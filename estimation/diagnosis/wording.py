@@ -80,7 +80,9 @@ def no_part(finding: Finding) -> Finding:
     return replace(finding, effect="unexplained", parameters=(), rivals=(), sentence=told)
 
 
-_ERRS = "On unseen data that function errs: it shows where something is unexplained, and is no part of the model."
+_ERRS = (
+    "Unseen data do not bear that function out: it shows where something is unexplained, and is no part of the model."
+)
 _DENIED = (
     "Something stands out of the noise that looks like {}, but unseen data speak against that: what it is, is not "
     "known. The model has no part of it."

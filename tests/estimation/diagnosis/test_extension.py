@@ -57,6 +57,15 @@ def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(
         assert text.startswith("The residual torque of all joints")
 
 
+def test_what_repeats_along_a_linear_axis_does_so_by_millimetres() -> None:
+    """A wave number is told as a length; of a joint that turns it stays a number per turn."""
+    turns = build_pattern("pattern:turns:0:even")
+    assert turns is not None
+    shape = (2 * np.pi / 0.04,)
+    assert "repeats every 40 mm and grows" in turns.describe(1, np.zeros(8), shape, force="N", length="m")
+    assert "repeats 157 times a turn of the joint" in turns.describe(1, np.zeros(8), shape)
+
+
 def test_an_odd_pattern_turns_round_with_the_motion(arm: Robot, state: Situation) -> None:
     """It is its even sibling times the sign of the velocity."""
     even, odd = build_pattern("pattern:angle:2:even"), build_pattern("pattern:angle:2:odd")

@@ -75,7 +75,7 @@ def test_what_is_no_part_of_the_model_says_so() -> None:
     assert (refuted.effect, refuted.joint, refuted.parameters, refuted.rivals) == ("unexplained", 2, (), ())
     assert "looks like a gear that winds up under load" in refuted.sentence
     assert "no part of it" in refuted.sentence
-    assert "errs" in no_part(finding_of("pattern:load:0:odd", finding)).sentence
+    assert "do not bear that function out" in no_part(finding_of("pattern:load:0:odd", finding)).sentence
 
 
 def finding_of(pattern: str, finding: Finding) -> Finding:
