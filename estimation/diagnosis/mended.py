@@ -90,7 +90,7 @@ _SIZES = (
 
 
 def _range(values: Sequence[float]) -> str:
-    low, high = (f"{value:.2g}" for value in (min(values), max(values)))
+    low, high = (f"{float(f'{value:.2g}'):g}" for value in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"
 
 

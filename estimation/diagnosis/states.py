@@ -90,7 +90,13 @@ def record(
     lengths = [len(part[0]) for part in parts]
     total = sum(lengths) * step
     if total < shortest:
-        raise InputError(f"{total:.1f} s of logs", allowed=f"{shortest:g} s or more", remedy="record a longer log")
+        recorded = sum(log.log.duration for log in prepared)
+        raise InputError(
+            f"{total:.1f} s of logs without the ends, where filters err ({recorded:.1f} s with them)",
+            file=prepared[0].log.metadata.get("file", prepared[0].log.name or None) if len(prepared) == 1 else None,
+            allowed=f"{shortest:g} s or more",
+            remedy="record a longer log",
+        )
     joined = [np.concatenate([part[k] for part in parts]) for k in range(5)]
     return Recording(
         t=joined[0],
