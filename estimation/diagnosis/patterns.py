@@ -61,6 +61,11 @@ class Pattern(JointEffect):
         return self.kind == "vibration"
 
     @property
+    def unmoved(self) -> bool:  # type: ignore[override]
+        """Whether the arm's motion answers to it, and not it to the motion."""
+        return self.kind == "vibration"
+
+    @property
     def shapes(self) -> tuple[Shape, ...]:  # type: ignore[override]
         """A frequency or an order where the family has one, or what its input is measured by."""
         if self.kind == "ringing":
@@ -119,8 +124,10 @@ class Pattern(JointEffect):
         power = np.abs(np.fft.rfft(series * np.hanning(rows), 4 * rows)) ** 2
         width = 401
         level = np.convolve(np.pad(power, width // 2, mode="reflect"), np.ones(width) / width, mode="valid")
-        contrast = np.interp([point for (point,) in grid], f, power / np.maximum(level, 1e-300))
-        return tuple(grid[i] for i in np.argsort(-contrast)[:count])
+        points = np.array(grid)[:, 0]
+        contrast = np.interp(points, f, power / np.maximum(level, 1e-300))
+        # Of a line that lasts, a search from beside its top would leave as much as it takes.
+        return tuple((_top(np.asarray(f), power, float(points[i])),) for i in np.argsort(-contrast)[:count])
 
     @property
     def _fastest(self) -> float:
@@ -193,6 +200,15 @@ def is_of_time(effect: object) -> bool:
 def swings_by_itself(effect: object) -> bool:
     """Whether a pattern goes to and fro in time, not with the motion: where in its swing it is elsewhere is open."""
     return isinstance(effect, Pattern) and effect.kind in SWAYING
+
+
+def _top(f: Array, power: Array, near: float) -> float:
+    """The frequency of a spectrum's (K,) top at or beside a point, by the parabola through three values."""
+    k = int(np.clip(round(near / f[1]), 2, len(f) - 3))
+    k += int(np.argmax(power[k - 1 : k + 2])) - 1
+    low, middle, high = np.log(np.maximum(power[k - 1 : k + 2], 1e-300))
+    bend = low - 2 * middle + high
+    return float(f[k] + (0.5 * (low - high) / bend * f[1] if bend < 0 and middle >= max(low, high) else 0.0))
 
 
 def _duration(situation: Situation) -> float:

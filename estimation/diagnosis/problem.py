@@ -127,10 +127,22 @@ class Problem:
     @cached_property
     def steep(self) -> Array:
         """The slope (N0, n) for what is `fast`: with the frequencies above the bands."""
+        return self._steep(bare=False)
+
+    @cached_property
+    def steepest(self) -> Array:
+        """The slope (N0, n) for what is `unmoved` besides."""
+        return self._steep(bare=True)
+
+    def _steep(self, *, bare: bool) -> Array:
         if self.upper is None:
             return self.slope
         rows = len(self.recording)
-        return self.slope + np.column_stack([self.upper.slope(j, rows) for j in range(self.n)])
+        return self.slope + np.column_stack([self.upper.slope(j, rows, bare=bare) for j in range(self.n)])
+
+    def slope_of(self, effect: Effect) -> Array:
+        """Gives the slope (N0, n) by which the points of an effect's grid are ranked."""
+        return self.steepest if effect.unmoved else self.steep if effect.fast else self.slope
 
     def columns_of(self, hypothesis: Hypothesis, shape: tuple[float, ...]) -> tuple[tuple[int, ...], tuple[Array, ...]]:
         """Evaluates a hypothesis: the joints it acts on, and its columns (N, k) on each."""
@@ -157,20 +169,23 @@ class Problem:
         k = total // count
         P = self.whitening.precision
         power = [sum(P[j, j] * _squares(part) for j, part in zip(joints, kind, strict=True)) for kind in (white, whole)]
+        above: list[Array] = []
+        if self.upper is not None and effect is not None and effect.fast:
+            how = {"calm": effect.kicks, "bare": effect.unmoved}
+            above = [self.upper.columns(part, j, **how) for j, part in zip(joints, columns, strict=True)]
+            above = above if any(map(len, above)) else []
+        # What acts above the bands counts there, however little of it those let through.
+        power = [own + sum(map(_squares, above)) for own in power]
         raw = np.where(power[0] > COUNTED * power[1], power[0], np.inf)
         doubtful = np.flatnonzero(np.isinf(raw) & (power[0] > FAINT * power[1]))
         if effect is not None and effect.alike and len(doubtful):
             known = self._known(joints, [part[:, doubtful] for part in columns])
             raw[doubtful] = np.where(known > KNOWN * power[0][doubtful], power[0][doubtful], np.inf)
         against, cross, gram = self._products(joints, white, count)
-        above: list[Array] = []
-        if self.upper is not None and effect is not None and effect.fast:
-            above = [self.upper.columns(part, j, calm=effect.kicks) for j, part in zip(joints, columns, strict=True)]
-            above = above if any(map(len, above)) else []
         for j, part in zip(joints, above, strict=False):
             assert self.upper is not None
-            cross += self.upper.cross(part, j)
-            raw += _squares(part)
+            assert effect is not None
+            cross += self.upper.cross(part, j, bare=effect.unmoved)
             apart = part.T.reshape(count, k, -1)
             gram += apart @ apart.transpose(0, 2, 1)
         high = [np.asfortranarray(part, dtype=np.float32) for part in above]

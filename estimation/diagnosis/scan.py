@@ -127,7 +127,7 @@ def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
     shapes = hypothesis.effect.grid(situation, hypothesis.joint)
     tries = len(shapes)
     if tries > LONG:
-        slope = problem.steep if hypothesis.effect.fast else problem.slope
+        slope = problem.slope_of(hypothesis.effect)
         shapes = hypothesis.effect.propose(situation, hypothesis.joint, slope, PROPOSED)
     kept: list[tuple[float, ...]] = []
     batches: dict[tuple[int, ...], list[tuple[int, tuple[Array, ...]]]] = {}

@@ -40,13 +40,15 @@ class Above:
         passing: lets through what is above, at the white rows, and levels its noise.
         counts: weights of the rows (N',): none for those whose direction of motion is not known.
         base: orthonormal columns of the base model (N', b).
-        residual: white torque that the base model leaves (N',).
+        residual: white torque that the base model leaves, fitted anew (N',).
+        bare: what it leaves as it was fitted to the band (N',).
     """
 
     passing: Band
     counts: Array
     base: Array
     residual: Array
+    bare: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +56,8 @@ class Upper:
     """A second regression, in the frequencies above each joint's band, for effects that are `fast`.
 
     The noise is the residual's own there, with what unknown accelerations add to it. Each joint's columns of the base
-    model are fitted anew, for what is left of friction and inertia there is not what they are below.
+    model are fitted anew, for what is left of friction and inertia there is not what they are below; but not for what
+    shakes the arm by itself: the arm answers to that, and an inertia fitted to the answer would take all of it.
 
     Attributes:
         whitening: makes the noise white in a band that is far wider.
@@ -66,29 +69,33 @@ class Upper:
     joints: tuple[Above | None, ...]
     calm: NDArray[np.bool_]
 
-    def columns(self, series: Array, joint: int, *, calm: bool = False) -> Array:
+    def columns(self, series: Array, joint: int, *, calm: bool = False, bare: bool = False) -> Array:
         """Whitens columns (N, k) of a joint, from 0, above its band and projects the base model out (N', k).
 
         Those that are to be `calm` count where no joint turns round: all feel what is not known of its acceleration.
+        From those that are `bare` nothing is projected.
         """
         above = self.joints[joint]
         if above is None:
             return np.zeros((0, series.shape[1]))
         counts = above.counts * self.calm if calm else above.counts
         white = _passed(self.whitening, series, joint, above.passing) * counts[:, None]
-        return np.asarray(white - above.base @ (above.base.T @ white))
+        return white if bare else np.asarray(white - above.base @ (above.base.T @ white))
 
-    def cross(self, columns: Array, joint: int) -> Array:
+    def cross(self, columns: Array, joint: int, *, bare: bool = False) -> Array:
         """Gives the products (k,) of such columns with the residual."""
         above = self.joints[joint]
-        return np.zeros(columns.shape[1]) if above is None else np.asarray(columns.T @ above.residual)
+        if above is None:
+            return np.zeros(columns.shape[1])
+        return np.asarray(columns.T @ (above.bare if bare else above.residual))
 
-    def slope(self, joint: int, rows: int) -> Array:
+    def slope(self, joint: int, rows: int, *, bare: bool = False) -> Array:
         """Gives what torque in each of a joint's rows (N,) has to do with the residual above its band."""
         above = self.joints[joint]
         if above is None:
             return np.zeros(rows)
-        runs = _runs(above.counts * above.residual, self.whitening.starts, rows, self.whitening.stride)
+        left = above.counts * (above.bare if bare else above.residual)
+        runs = _runs(left, self.whitening.starts, rows, self.whitening.stride)
         # Without delay, what is above is let through alike from either side.
         return self.whitening.unfiltered(np.concatenate([above.passing.passed(run) for run in runs]), joint, rows)
 
@@ -136,7 +143,7 @@ def pose_upper(
         own = np.concatenate([baseline.regressor[:, j], baseline.nuisance[:, j]], axis=1)
         base = orthonormal(_passed(wide, own[:, own.any(axis=0)], j, passing) * counts[:, None], FAINT)
         white = _passed(wide, remainder[:, j, None], j, passing)[:, 0] * counts
-        joints.append(Above(passing, counts, base, white - base @ (base.T @ white)))
+        joints.append(Above(passing, counts, base, white - base @ (base.T @ white), white))
     return Upper(wide, tuple(joints), recording.calm(wide.stride))
 
 

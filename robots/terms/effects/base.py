@@ -119,6 +119,7 @@ class Effect(ABC):
         alike: whether it has one coefficient, that all joints share: each joint tells it, and they must agree.
         kicks: whether it acts by changes of acceleration: they are largest, and least known, where a joint turns round.
         fast: whether its torque owes nothing to accelerations: it is looked for above the frequencies of those, too.
+        unmoved: whether the arm's motion answers to it, and not it to the motion: no base model is fitted to that.
         blurs: whether it lets friction turn round later or over some time: how sharp its sign is shows beside it only.
         waves: whether it goes up and down over the joint's range, as a spot of it does once.
         last: whether it acts on all of the torque, that of other effects too (`Situation.beyond`).
@@ -136,6 +137,7 @@ class Effect(ABC):
     alike: ClassVar[bool] = False
     kicks: ClassVar[bool] = False
     fast: ClassVar[bool] = False
+    unmoved: ClassVar[bool] = False
     blurs: ClassVar[bool] = False
     waves: ClassVar[bool] = False
     last: ClassVar[bool] = False

@@ -10,9 +10,12 @@ import pytest
 from scipy.signal import lfilter
 
 from estimation import diagnose
+from estimation.diagnosis.patterns import build_pattern
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.states import record
 from robots.plants import simulate
 from robots.robot import Robot
-from robots.signals import Motion
+from robots.signals import Log, Motion
 
 
 def _swing(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
@@ -88,3 +91,18 @@ def test_a_stranger_is_told_by_what_it_depends_on(
     if "sway" in pattern:
         values = {parameter.name: parameter.value for parameter in result.findings[0].parameters}
         assert values["frequency"] == pytest.approx(1.13 if "odd" in pattern else 0.27, abs=0.01)
+
+
+def test_a_line_is_proposed_at_its_top(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
+) -> None:
+    """To a fiftieth of what the log resolves: from half of that beside it, a search would leave as much as it takes."""
+    recording = record(arm, [arm_log(torque_noise=0.02)])
+    problem = pose_arm(recording)
+    vibration = build_pattern("pattern:vibration:0:even")
+    assert vibration is not None
+    for frequency in (3.1234, 7.0071, 11.0):
+        residual = np.random.default_rng(0).normal(size=recording.tau.shape)
+        residual[:, 0] += np.sin(2 * np.pi * frequency * recording.t + 0.4)
+        ((first,), *_) = vibration.propose(problem.situation, 1, residual, 4)
+        assert abs(first - frequency) < 0.02 / recording.duration

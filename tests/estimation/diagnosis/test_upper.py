@@ -12,7 +12,7 @@ import pytest
 from estimation.diagnosis.band import TRANSITION
 from estimation.diagnosis.extending import fit_extended
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.patterns import Pattern
+from estimation.diagnosis.patterns import Pattern, build_pattern
 from estimation.diagnosis.periods import Cycle
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import Recording, cut, following
@@ -20,6 +20,7 @@ from estimation.diagnosis.refinement import refine
 from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.states import record
 from estimation.diagnosis.upper import WIDER
+from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import EFFECTS
@@ -28,6 +29,7 @@ RIPPLE = Hypothesis(EFFECTS["torque_ripple"], 1)
 SHAPE = (150.0, 0.0, 0.0)
 NOISE = 0.1  # of the torque, white [N m]
 SIZE = 0.02  # of the ripple, a fifth of it
+SHAKEN = 17.3  # [Hz]
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +85,7 @@ def test_the_slope_has_the_products_of_an_effect_with_the_residual(
     """In the bands, and above them of what is fast: what moments and orders are ranked by is what they explain."""
     problem = pose_arm(_rippled(recording), wider=WIDER)
     hypothesis, shape = (RIPPLE, SHAPE) if name == "torque_ripple" else (Hypothesis(EFFECTS[name], 1), ())
-    slope = problem.steep if hypothesis.effect.fast else problem.slope
+    slope = problem.slope_of(hypothesis.effect)
     joints, columns = problem.columns_of(hypothesis, shape)
     products = np.sum([part.T @ slope[:, j] for j, part in zip(joints, columns, strict=True)], axis=0)
     group = problem.measured(hypothesis, shape)
@@ -91,6 +93,29 @@ def test_the_slope_has_the_products_of_an_effect_with_the_residual(
     np.testing.assert_allclose(products, group.cross, atol=0.05 * np.sqrt(np.diag(group.gram)).max())
     if hypothesis is RIPPLE:
         assert abs(group.cross[0]) > 4 * np.sqrt(group.gram[0, 0])
+
+
+def test_what_shakes_the_arm_is_no_inertia(arm: Robot, recording: Recording, pose_arm: Callable[..., Problem]) -> None:
+    """The arm answers to a vibration above the band: an inertia that was fitted to the answer would take most of it."""
+    model = default_model(arm)
+    wave = np.sin(2 * np.pi * SHAKEN * recording.t)
+    answer = np.zeros_like(recording.ddq)
+    answer[:, 0] = -1.0 * wave
+    moves = [model.torque(recording.q, recording.dq, a, model.nominal) for a in (recording.ddq + answer, recording.ddq)]
+    tau = recording.tau + moves[0] - moves[1]
+    tau[:, 0] += SIZE * wave
+    problem = pose_arm(replace(recording, ddq=recording.ddq + answer, tau=tau), wider=WIDER)
+    vibration = Hypothesis(build_pattern("pattern:vibration:0:even"), 1)  # type: ignore[arg-type]
+    assert problem.whitening.bands[0].cutoff < SHAKEN < problem.upper.whitening.bands[0].cutoff  # type: ignore[union-attr]
+    known, taken = (problem.upper.columns(wave[:, None], 0, bare=bare) for bare in (True, False))  # type: ignore[union-attr]
+    assert np.sum(taken**2) < 0.3 * np.sum(known**2)
+    found = refine(
+        problem, vibration, vibration.effect.propose(problem.situation, 1, problem.steepest, 4)[0], accept(problem, ())
+    )
+    assert found.shape[0] == pytest.approx(SHAKEN, abs=0.01)
+    # As if nothing but noise were about it: by the wave's own energy, over that of the noise.
+    assert found.gain == pytest.approx(SIZE**2 * np.sum(known**2), rel=0.3)
+    assert found.gain > 30.0  # noise does as much once in 10,000
 
 
 def test_only_fast_effects_are_measured_there(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
