@@ -42,10 +42,17 @@ def spike_rows(values: Array, share: float, *, noisy: bool) -> NDArray[np.intp]:
     if noisy:
         usual = usual[usual > 0]
     noise = OUT * float(np.median(usual)) if len(usual) else 0.0
-    level = max(noise, share * float(high - low), FLICKER * lattice_step(values))
+    level = max(noise, share * float(high - low), FLICKER * (lattice_step(values) or _between_two(values)))
     if not level > 0:
         return np.empty(0, dtype=np.intp)
     return np.flatnonzero(back > level) + 1
+
+
+def _between_two(values: Array) -> float:
+    """The step of a sensor at rest that flickers between two values, too often for accidents; 0 for any other."""
+    low, high = float(values.min()), float(values.max())
+    at = [int(np.count_nonzero(values == value)) for value in (low, high)]
+    return high - low if low < high and sum(at) == len(values) and min(at) > MANY * len(values) else 0.0
 
 
 def dropouts(values: Array, q: Array) -> NDArray[np.intp]:

@@ -44,6 +44,15 @@ def test_spikes_are_left_out(good, spoilt):
     assert np.abs(usable.tau).max() < 1e3
 
 
+def test_a_joint_that_rests_may_flicker_by_a_count(good, spoilt):
+    """An encoder between two counts goes back and forth as long as it stands there: that is no garbled message."""
+    q = good().q.copy()
+    q[:, 3] = 0.3 + 1e-5 * (np.random.default_rng(0).random(len(q)) < 0.3)
+    report = spoilt(q=q)
+    assert not found(report, "spikes")
+    assert not len(report.spikes)
+
+
 def test_lost_torques_are_left_out(good, spoilt):
     """Exact zeros in a torque that is never zero are lost messages."""
     tau = good().tau.copy()
