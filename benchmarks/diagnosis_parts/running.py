@@ -138,7 +138,7 @@ def diagnose_case(case: Case, robot: Robot) -> tuple[Any, dict[str, Any]]:
         size = np.sum(squares, axis=0) / np.sum([counts.sum(axis=0) for counts in counted], axis=0)
         for name in ("before", "after", "as_measured"):
             row[f"oracle_{name}"] = (getattr(oracle, name) / size).tolist()
-        told = (np.square(said["baseline"]["nrmse"]), np.square(said["extended"]["nrmse"]))
+        told = [np.square(np.array(said[name]["nrmse"], dtype=float)) for name in ("baseline", "extended")]
         row["before"], row["after_extension"] = told[0].tolist(), told[1].tolist()
     return diagnosis, row
 

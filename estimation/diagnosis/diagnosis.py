@@ -114,8 +114,10 @@ class Diagnosis:
             close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]
             if close:
                 lines.append(f"    not told apart from: {', '.join(close)}")
-        before = " ".join(f"{100 * value:.2f}" for value in self.baseline)
-        after = " ".join(f"{100 * value:.2f}" for value in self.extended)
+        before, after = (
+            " ".join(f"{100 * value:.2f}" if np.isfinite(value) else "-" for value in errors)
+            for errors in (self.baseline, self.extended)
+        )
         lines.append(f"  unseen error per joint [% of torque RMS]: {before}")
         if self.findings:
             lines.append(f"                          with the extension: {after}")
@@ -156,8 +158,8 @@ class Diagnosis:
         return {
             "verdict": self.verdict,
             "findings": [finding.to_dict() for finding in self.findings],
-            "baseline": {"nrmse": self.baseline.tolist()},
-            "extended": {"nrmse": self.extended.tolist()},
+            "baseline": {"nrmse": list(map(finite, self.baseline.tolist()))},
+            "extended": {"nrmse": list(map(finite, self.extended.tolist()))},
             "explained": self.explained,
             "excess": [
                 dict(zip(("noise", "state", "time"), map(finite, row), strict=True)) for row in self.excess.tolist()

@@ -69,7 +69,7 @@ class Unseen:
             for errors in (self.fitted, self.errors)
             for k in (model, -1)
         )
-        return 1.0 if before - after < WORTH * before else (unseen[0] - unseen[1]) / (before - after)
+        return 1.0 if before - after <= WORTH * before else (unseen[0] - unseen[1]) / (before - after)
 
     def astray(self, joint: int) -> bool:
         """Whether the extended model errs on unseen rows of a joint, from 0, far more than where it has seen them."""

@@ -85,10 +85,10 @@ def find_gaps(unsure: NDArray[np.bool_], starts: tuple[int, ...], longest: int =
         pieces = []
         for start, stop in pairwise((*starts, len(column))):
             rows, good = np.flatnonzero(flags[start:stop]), np.flatnonzero(~flags[start:stop])
-            if not len(rows) or flags.all():
-                continue  # a joint that stands in all logs: nothing to bridge from
+            if not len(rows):
+                continue
             if not len(good):
-                good = rows[:1]  # one that stands in this log: a constant, which does not count
+                good = rows[:1]  # a joint that stands in this log: a constant, which does not count
             at = np.searchsorted(good, rows)
             before, after = good[np.maximum(at - 1, 0)], good[np.minimum(at, len(good) - 1)]
             before = np.where(at == 0, after, before)

@@ -117,8 +117,9 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     added = [windup.extension for windup in twisted if windup.extension.joint not in known]
     simulation = simulate_unseen(problem, members, seen, bool(told.held_out)) if members else None
     lost = (_LOST,) if members and simulation is None else ()
-    before = unseen.nrmse(0)
-    after = unseen.nrmse(len(unseen.errors) - 1)
+    # Of a joint that rests in all of them unseen data say nothing: that is no error of zero.
+    shown = unseen.counts.any(axis=0)
+    before, after = (np.where(shown, unseen.nrmse(model), np.nan) for model in (0, len(unseen.errors) - 1))
     return Diagnosis(
         verdict=verdict,
         findings=findings,

@@ -123,8 +123,12 @@ def measure(
 
 
 def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
+    joint = hypothesis.joint
+    if joint is not None and problem.recording.unsure[:, joint - 1].all():
+        # A joint that rests throughout: friction holds against whatever acts there.
+        return None
     situation = problem.sees(hypothesis.effect)
-    shapes = hypothesis.effect.grid(situation, hypothesis.joint)
+    shapes = hypothesis.effect.grid(situation, joint)
     tries = len(shapes)
     if tries > LONG:
         slope = problem.slope_of(hypothesis.effect)

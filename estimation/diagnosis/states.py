@@ -86,7 +86,8 @@ def record(
     highest = np.max([[spectrum.cutoff() for spectrum in own] for own in found], axis=0)
     cap = believable_cutoff(robot, prepared, highest)
     parts = [_part(log, step, cap, of, own) for log, of, own in zip(prepared, spectra, found, strict=True)]
-    parts = _standing(parts, still_joints([part[1] for part in parts], travel))
+    never = np.all([np.ptp(part[1], axis=0) == 0 for part in parts], axis=0)
+    parts = _standing(parts, still_joints([part[1] for part in parts], travel) | never)
     lengths = [len(part[0]) for part in parts]
     total = sum(lengths) * step
     if total < shortest:

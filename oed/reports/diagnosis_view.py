@@ -216,5 +216,12 @@ def _most(trace: Trace) -> int:
 
 def _fall(trace: Trace) -> Array:
     """By what share of the torque each joint's error falls (n,)."""
-    before, after = (np.sqrt(np.nanmean(part**2, axis=0)) for part in (trace.before, trace.after))
-    return np.asarray((before - after) / np.maximum(np.sqrt(np.nanmean(trace.measured**2, axis=0)), 1e-12))
+    before, after, size = (_rms(part) for part in (trace.before, trace.after, trace.measured))
+    return np.asarray((before - after) / np.maximum(size, 1e-12))
+
+
+def _rms(values: Array) -> Array:
+    """Root mean square of what is known of each column (n,); 0 where nothing is."""
+    known = np.isfinite(values)
+    sums = np.where(known, values, 0.0) ** 2
+    return np.asarray(np.sqrt(sums.sum(axis=0) / np.maximum(known.sum(axis=0), 1)))
