@@ -13,14 +13,13 @@ from estimation.diagnosis.borne_out import bear_out
 from estimation.diagnosis.carried import situation_on, unloaded
 from estimation.diagnosis.diagnosis import Diagnosis, Trace
 from estimation.diagnosis.extending import fit_extended
-from estimation.diagnosis.findings import Finding
 from estimation.diagnosis.forms import alike_forms
 from estimation.diagnosis.free_functions import strongest_pattern
 from estimation.diagnosis.gain import Unseen
-from estimation.diagnosis.hidden_springs import hidden_springs
 from estimation.diagnosis.hypotheses import all_hypotheses
-from estimation.diagnosis.limits import STILL, Limit
+from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
+from estimation.diagnosis.notes import faster_joints, notes_of, worse_joints
 from estimation.diagnosis.patterns import all_patterns
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import cut
@@ -35,19 +34,12 @@ from estimation.diagnosis.wording import no_part, word_finding
 from estimation.provenance import describe_logs
 from robots.robot import Robot
 from robots.signals import Log
-from robots.terms.effects import EFFECTS, Effect
-from robots.terms.effects.current_clipping import CERTAIN, CurrentClipping
+from robots.terms.effects import Effect
 from robots.version import VERSION
 
 Array = NDArray[np.float64]
 
-# Error on unseen data that is worth a word: so many times that of the fit and more than this share of the torque, or
-# more than the second share, whatever the fit's.
-STRANGE, FAR, ODD = 3.0, 0.05, 0.2
-# Unseen speeds beyond the fitted ones by this factor are worth one, too.
-FASTER = 1.3
 SHOWN = 4000  # rows of the curves kept for pictures
-CLIPPING = CurrentClipping()
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +123,14 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         next_experiment=_next(problem, founds) if verdict == "ambiguous" else None,
         model=replace(fitted.model, extensions=(*fitted.model.extensions, *added)),
         how_unseen=unseen.how,
-        notes=(*told.notes, *_notes(told, findings, apart, after), *_faster(problem, seen), *held.notes, *lost),
+        notes=(
+            *told.notes,
+            *notes_of(problem, told.false_alarm, findings, apart, after),
+            *worse_joints(before, after),
+            *faster_joints(problem, seen),
+            *held.notes,
+            *lost,
+        ),
         trace=_trace(unseen, seen.coordinates, twisted),
         simulation=simulation,
     )
@@ -178,94 +177,6 @@ def _next(problem: Problem, founds: Sequence[Found]) -> NextExperiment | None:
         if close:
             return plan_next(problem, [found.member, *close])
     return None
-
-
-_AT_LIMIT = (
-    "The torque of joint {} is at its largest, {:.4g}, in samples in a row, several times: its drive is at its limit "
-    "there. What that cuts off is too little to show."
-)
-
-
-def _notes(told: Told, findings: Sequence[Finding], apart: Sequence[Finding], after: Array) -> tuple[str, ...]:
-    recording = told.problem.recording
-    notes = []
-    still = [j + 1 for j in range(recording.n) if np.ptp(recording.q[:, j]) < STILL]
-    if still:
-        names = ", ".join(map(str, still))
-        whose = f"Joints {names} hardly moved: their" if len(still) > 1 else f"Joint {names} hardly moved: its"
-        notes.append(
-            f"{whose} friction, gears and rotors cannot be judged; what gravity and the other joints ask of them can."
-        )
-    told_of = {finding.joint for finding in findings if finding.effect == CLIPPING.name}
-    for j in sorted({*range(1, recording.n + 1)} - told_of):
-        if CLIPPING.chance(told.problem.sees(CLIPPING), j, recording.tau) < CERTAIN:
-            notes.append(_AT_LIMIT.format(j, float(np.abs(recording.tau[:, j - 1]).max())))
-    strange = _strange(told.problem, after)
-    notes += strange.values()
-    notes += [
-        f"Joint {j + 1}: {100 * after[j]:.0f} % of the torque that no fit has seen is left. What cannot be told from "
-        "noise counts as noise, and an effect has to stand out of it: look at the logs one by one."
-        for j in np.flatnonzero(after > ODD)
-        if j not in strange
-    ]
-    for finding in findings:
-        shapes = EFFECTS[finding.effect].shapes if finding.effect in EFFECTS else ()
-        assumed = {(shape.name, shape.default) for shape in shapes}
-        lost = [p for p in finding.parameters if not p.determined and p.unit == "s" and np.isnan(p.standard_error)]
-        for parameter in (p for p in lost if (p.name, p.value) not in assumed):
-            notes.append(
-                f"{parameter.name} of {finding.effect} is not determined by {recording.duration:.0f} s of logs: the "
-                f"value {parameter.value:.3g} s is one of many that fit."
-            )
-        # What is no part of the model says so itself.
-        if finding.gain.ci95[0] <= 0 and finding not in apart:
-            where = f"{finding.effect} of joint {finding.joint}" if finding.joint else finding.effect
-            notes.append(f"The gain of {where} on unseen data is not sure: its interval begins below zero.")
-    part = [finding for finding in findings if finding not in apart]
-    open_ = sorted({finding.joint for finding in part if finding.effect == "unexplained" and finding.joint})
-    if open_:
-        names = ", ".join(map(str, open_))
-        notes.append(
-            f"No effect of the catalogue explains what stands out of the noise on joint{'s' if len(open_) > 1 else ''} "
-            f"{names}: a free function of the inputs named above was fitted there instead. It predicts where the robot "
-            "has been, and says nothing elsewhere."
-        )
-    sprung = {finding.joint for finding in findings if finding.effect == "spring"}
-    notes += [text for joint, text in hidden_springs(told.problem, told.false_alarm) if joint not in sprung]
-    return tuple(notes)
-
-
-def _strange(problem: Problem, after: Array) -> dict[int, str]:
-    """Says where the model predicts logs far worse than it fits them: there is more in them than was found."""
-    counts = ~problem.recording.unsure
-    number = np.maximum(counts.sum(axis=0), 1)
-    torque = np.sqrt((problem.recording.tau**2 * counts).sum(axis=0) / number)
-    fitted = np.sqrt((problem.remainder**2 * counts).sum(axis=0) / number) / np.maximum(torque, 1e-12)
-    far = np.flatnonzero(after > np.maximum(STRANGE * fitted, FAR))
-    return {int(j): _STRANGE.format(j + 1, 100 * after[j], 100 * fitted[j]) for j in far}
-
-
-_STRANGE = (
-    "Joint {}: {:.3g} % of the torque that no fit has seen is left, where the base model leaves {:.2g} % of what it "
-    "was fitted to. The logs differ in something that was not found, or some of them do not tell its parameters."
-)
-
-
-def _faster(problem: Problem, seen: Measured) -> list[str]:
-    """Says which joints are faster on unseen data than their friction's polynomial was fitted for."""
-    if seen.whole is problem.recording or not any(column.symbol == "f4" for column in problem.baseline.base.columns):
-        return []
-    known, there = (np.abs(r.dq).max(axis=0) for r in (problem.recording, cut(seen.whole, slice(seen.first, None))))
-    ratio = there / np.maximum(known, 1e-9)
-    fast = np.flatnonzero(ratio > FASTER)
-    names = ", ".join(str(j + 1) for j in fast)
-    return [_FASTER.format("s" if len(fast) > 1 else "", names, ratio[fast].max())] if len(fast) else []
-
-
-_FASTER = (
-    "Joint{} {}: up to {:.1f} times as fast on the unseen data as in the logs of the fit. What a polynomial fitted to "
-    "slower motion says of friction there may be far off, and with it error and gain; coulomb-viscous errs less."
-)
 
 
 def _trace(unseen: Unseen, seen_as: Sequence[Array], windups: Sequence[Windup]) -> Trace:

@@ -1,0 +1,139 @@
+"""What a person must know besides: joints that rest or err, values not told, what unseen data do not bear out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.findings import Finding
+from estimation.diagnosis.hidden_springs import hidden_springs
+from estimation.diagnosis.limits import STILL
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.recording import cut
+from estimation.diagnosis.unseen import Measured
+from robots.terms.effects import EFFECTS
+from robots.terms.effects.current_clipping import CERTAIN, CurrentClipping
+
+Array = NDArray[np.float64]
+
+# Error on unseen data that is worth a word: so many times that of the fit and more than this share of the torque, or
+# more than the second share, whatever the fit's.
+STRANGE, FAR, ODD = 3.0, 0.05, 0.2
+# Unseen speeds beyond the fitted ones by this factor are worth one, too.
+FASTER = 1.3
+# So is a joint on which the extended model errs by so many times what the base model does, and so much more.
+WORSE, LITTLE = 1.1, 0.001
+CLIPPING = CurrentClipping()
+
+
+_AT_LIMIT = (
+    "The torque of joint {} is at its largest, {:.4g}, in samples in a row, several times: its drive is at its limit "
+    "there. What that cuts off is too little to show."
+)
+
+
+def notes_of(
+    problem: Problem, false_alarm: float, findings: Sequence[Finding], apart: Sequence[Finding], after: Array
+) -> tuple[str, ...]:
+    """Says what the logs and the findings leave open.
+
+    Args:
+        problem: the logs.
+        false_alarm: chance of one.
+        findings: all of them.
+        apart: those that are no part of the extended model.
+        after: error of that model over torque RMS on unseen data (n,).
+    """
+    recording = problem.recording
+    notes = []
+    still = [j + 1 for j in range(recording.n) if np.ptp(recording.q[:, j]) < STILL]
+    if still:
+        names = ", ".join(map(str, still))
+        whose = f"Joints {names} hardly moved: their" if len(still) > 1 else f"Joint {names} hardly moved: its"
+        notes.append(
+            f"{whose} friction, gears and rotors cannot be judged; what gravity and the other joints ask of them can."
+        )
+    told_of = {finding.joint for finding in findings if finding.effect == CLIPPING.name}
+    for j in sorted({*range(1, recording.n + 1)} - told_of):
+        if CLIPPING.chance(problem.sees(CLIPPING), j, recording.tau) < CERTAIN:
+            notes.append(_AT_LIMIT.format(j, float(np.abs(recording.tau[:, j - 1]).max())))
+    strange = _strange(problem, after)
+    notes += strange.values()
+    notes += [
+        f"Joint {j + 1}: {100 * after[j]:.0f} % of the torque that no fit has seen is left. What cannot be told from "
+        "noise counts as noise, and an effect has to stand out of it: look at the logs one by one."
+        for j in np.flatnonzero(after > ODD)
+        if j not in strange
+    ]
+    for finding in findings:
+        shapes = EFFECTS[finding.effect].shapes if finding.effect in EFFECTS else ()
+        assumed = {(shape.name, shape.default) for shape in shapes}
+        lost = [p for p in finding.parameters if not p.determined and p.unit == "s" and np.isnan(p.standard_error)]
+        for parameter in (p for p in lost if (p.name, p.value) not in assumed):
+            notes.append(
+                f"{parameter.name} of {finding.effect} is not determined by {recording.duration:.0f} s of logs: the "
+                f"value {parameter.value:.3g} s is one of many that fit."
+            )
+        # What is no part of the model says so itself.
+        if finding.gain.ci95[0] <= 0 and finding not in apart:
+            where = f"{finding.effect} of joint {finding.joint}" if finding.joint else finding.effect
+            notes.append(f"The gain of {where} on unseen data is not sure: its interval begins below zero.")
+    part = [finding for finding in findings if finding not in apart]
+    open_ = sorted({finding.joint for finding in part if finding.effect == "unexplained" and finding.joint})
+    if open_:
+        names = ", ".join(map(str, open_))
+        notes.append(
+            f"No effect of the catalogue explains what stands out of the noise on joint{'s' if len(open_) > 1 else ''} "
+            f"{names}: a free function of the inputs named above was fitted there instead. It predicts where the robot "
+            "has been, and says nothing elsewhere."
+        )
+    sprung = {finding.joint for finding in findings if finding.effect == "spring"}
+    notes += [text for joint, text in hidden_springs(problem, false_alarm) if joint not in sprung]
+    return tuple(notes)
+
+
+def _strange(problem: Problem, after: Array) -> dict[int, str]:
+    """Says where the model predicts logs far worse than it fits them: there is more in them than was found."""
+    counts = ~problem.recording.unsure
+    number = np.maximum(counts.sum(axis=0), 1)
+    torque = np.sqrt((problem.recording.tau**2 * counts).sum(axis=0) / number)
+    fitted = np.sqrt((problem.remainder**2 * counts).sum(axis=0) / number) / np.maximum(torque, 1e-12)
+    far = np.flatnonzero(after > np.maximum(STRANGE * fitted, FAR))
+    return {int(j): _STRANGE.format(j + 1, 100 * after[j], 100 * fitted[j]) for j in far}
+
+
+_STRANGE = (
+    "Joint {}: {:.3g} % of the torque that no fit has seen is left, where the base model leaves {:.2g} % of what it "
+    "was fitted to. The logs differ in something that was not found, or some of them do not tell its parameters."
+)
+
+
+def worse_joints(before: Array, after: Array) -> list[str]:
+    """Says on which joints the extended model errs more on unseen data than the base model does, by their NRMSE (n,).
+
+    What helps on one joint moves base parameters of others.
+    """
+    worse = np.flatnonzero(after > np.maximum(WORSE * before, before + LITTLE))
+    told = ", ".join(f"{j + 1} ({100 * before[j]:.3g} -> {100 * after[j]:.3g} %)" for j in worse)
+    return [f"The extended model errs more than the base model on joint{'s' if len(worse) > 1 else ''} {told}."] * bool(
+        len(worse)
+    )
+
+
+def faster_joints(problem: Problem, seen: Measured) -> list[str]:
+    """Says which joints are faster on unseen data than their friction's polynomial was fitted for."""
+    if seen.whole is problem.recording or not any(column.symbol == "f4" for column in problem.baseline.base.columns):
+        return []
+    known, there = (np.abs(r.dq).max(axis=0) for r in (problem.recording, cut(seen.whole, slice(seen.first, None))))
+    ratio = there / np.maximum(known, 1e-9)
+    fast = np.flatnonzero(ratio > FASTER)
+    names = ", ".join(str(j + 1) for j in fast)
+    return [_FASTER.format("s" if len(fast) > 1 else "", names, ratio[fast].max())] if len(fast) else []
+
+
+_FASTER = (
+    "Joint{} {}: up to {:.1f} times as fast on the unseen data as in the logs of the fit. What a polynomial fitted to "
+    "slower motion says of friction there may be far off, and with it error and gain; coulomb-viscous errs less."
+)
