@@ -243,7 +243,10 @@ def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> b
         for j in candidate.group.joints
         if candidate.gain_on([j])
         >= max(
-            (m.hypothesis.effect.leaves(robot, j) * m.gain_on([j]) * candidate.share_beside(m, j) for m in members),
+            (
+                m.hypothesis.effect.leaves(robot, j, m.shape) * m.gain_on([j]) * candidate.share_beside(m, j)
+                for m in members
+            ),
             default=0.0,
         )
     ]

@@ -243,7 +243,7 @@ class Effect(ABC):
         """Lists shapes that a log may not tell apart though other motions do; the likeliest is taken of those."""
         return ()
 
-    def leaves(self, robot: Robot, joint: int) -> float:
+    def leaves(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
         """Gives the share of what the effect explains on a joint, from 0, that its formula may leave unexplained there.
 
         What is left must not be taken for another effect: formulas are true to some per cent of an effect.

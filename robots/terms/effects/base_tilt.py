@@ -54,9 +54,10 @@ class BaseTilt(Effect):
         """Names the whole robot, if there is gravity."""
         return (None,) if np.any(robot.chain.gravity) else ()
 
-    def leaves(self, robot: Robot, joint: int) -> float:
-        """Gives half of it for an upright first axis: where its own moments are too small to be told, they show."""
-        return 0.5 if joint == 0 and upright(robot) else super().leaves(robot, joint)
+    def leaves(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
+        """Gives half of it for an upright first axis whose own moments are too small to be told: they show."""
+        hidden = joint == 0 and upright(robot) and not (shape and shape[0] > 0)
+        return 0.5 if hidden else super().leaves(robot, joint, shape)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per angle, and of the first joint per N m of its own moments."""
