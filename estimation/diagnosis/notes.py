@@ -116,10 +116,10 @@ def worse_joints(before: Array, after: Array) -> list[str]:
     What helps on one joint moves base parameters of others.
     """
     worse = np.flatnonzero(after > np.maximum(WORSE * before, before + LITTLE))
+    if not len(worse):
+        return []
     told = ", ".join(f"{j + 1} ({100 * before[j]:.3g} -> {100 * after[j]:.3g} %)" for j in worse)
-    return [f"The extended model errs more than the base model on joint{'s' if len(worse) > 1 else ''} {told}."] * bool(
-        len(worse)
-    )
+    return [f"The extended model errs more than the base model on joint{'s' if len(worse) > 1 else ''} {told}."]
 
 
 def faster_joints(problem: Problem, seen: Measured) -> list[str]:

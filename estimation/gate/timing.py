@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from estimation.gate.columns import Columns
 from estimation.gate.finding import Finding
 from estimation.gate.report import FEWEST
+from robots.common.stretches import ends
 from robots.signals import Log
 
 Array = NDArray[np.float64]
@@ -188,14 +189,14 @@ def _stuck(columns: Columns, moving: NDArray[np.bool_]) -> list[Finding]:
             chance = np.log(len(column)) / np.log(1.0 / max(share, 1.0 / len(column)))
             usual = JUMP * float(np.quantile(steps[:: max(1, len(steps) // 50_000)], 0.99))
             # What hung may have stood for a part of that: rows in which the arm moves count.
-            starts, lengths = runs(held)
+            starts, stops = ends(held)
             passed = np.concatenate([[0], np.cumsum(moving)])
-            long = passed[starts + lengths] - passed[starts] >= max(3.0 * chance, FEWEST)
+            long = passed[stops] - passed[starts] >= max(3.0 * chance, FEWEST)
             hung = [
-                (int(length), int(start))
-                for start, length in zip(starts[long], lengths[long], strict=True)
+                (int(stop - start), int(start))
+                for start, stop in zip(starts[long], stops[long], strict=True)
                 # A torque may be that of a brake, until it is let go.
-                if _step(steps, start + length) > (min(usual, _about(steps, start, length)) if prefix == "q" else usual)
+                if _step(steps, stop) > (min(usual, _about(steps, start, stop)) if prefix == "q" else usual)
             ]
             if not hung:
                 continue
@@ -232,27 +233,20 @@ def _step(steps: Array, row: int) -> float:
     return float(steps[row]) if row < len(steps) else 0.0
 
 
-def _about(steps: Array, start: int, length: int) -> float:
+def _about(steps: Array, start: int, stop: int) -> float:
     """The size of a step after a run of rows that no motion beside that run comes near; infinite where nothing moves.
 
     A slow joint that goes on as slowly as it came has jumped, however fast it is elsewhere.
     """
-    stop = start + length
     beside = np.concatenate([steps[max(start - BESIDE, 0) : start], steps[stop + 1 : stop + 1 + BESIDE]])
     most = float(beside.max(initial=0.0))
     return STRAY * most if most > 0 else np.inf
 
 
-def runs(flags: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Finds the runs of True: their starts and their lengths."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    return edges[::2], edges[1::2] - edges[::2]
-
-
 def longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
     """Finds the longest run of True: its start and its length, (0, 0) without any."""
-    starts, lengths = runs(flags)
+    starts, stops = ends(flags)
     if not len(starts):
         return 0, 0
-    best = int(np.argmax(lengths))
-    return int(starts[best]), int(lengths[best])
+    best = int(np.argmax(stops - starts))
+    return int(starts[best]), int(stops[best] - starts[best])
