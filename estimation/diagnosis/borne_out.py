@@ -9,13 +9,14 @@ from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.free_functions import SURE
 from estimation.diagnosis.patterns import PREFIX, is_of_time, swings_by_itself
 from estimation.diagnosis.refinement import Member
-from estimation.diagnosis.selection import Found
+from estimation.diagnosis.selection import LEAST, Found
 from estimation.diagnosis.unseen import Measured
 from estimation.diagnosis.verdict import CLOSE, Judgement
 from robots.terms.effects import Effect
 
 LEFT = 0.2  # share of an effect's gain that stretches left out must show
 BY_ITSELF = 1e-5  # chance from which on a swing of which unseen data cannot say is taken for noise
+SLIGHT = 0.1  # share of the strongest name's worth below which another hardly stands out beside it
 HARM = 1.05  # times the unseen error: an effect that makes it so much larger is left out, sure or not
 
 
@@ -48,7 +49,7 @@ def bear_out(
     measure: Callable[[Sequence[Member]], Measured],
     beyond: Callable[[Effect], bool],
     forms: Callable[[Sequence[Member], int], Sequence[Member]],
-    faint: Callable[[Member], bool],
+    worth: Callable[[Member], float],
     unnamed: Callable[[Member, Sequence[Member]], tuple[Member, float] | None],
 ) -> BorneOut:
     """Leaves out what makes unseen errors larger, one after the other, the surest first.
@@ -61,8 +62,8 @@ def bear_out(
         measure: measures members on unseen data.
         beyond: tells of which effects those data can say nothing.
         forms: lists other forms of one of some members, the likeliest first.
-        faint: tells which names hardly stand out of the noise: unseen data that do not speak for one are the odds
-            against it.
+        worth: how clearly a name stands out of the noise, by its BIC. Of one that hardly does, or hardly beside a far
+            stronger one, whose formula may leave as much, unseen data that do not speak for it are the odds against it.
         unnamed: finds a free function of what a name that is left out was for, beside other members; with its p-value.
     """
     founds = list(judgement.kept)
@@ -72,7 +73,8 @@ def bear_out(
     notes: list[str] = []
     refuted: list[tuple[Member, float, Gain]] = []
     seen = measure(members)
-    while idle := [i for i in range(len(founds)) if _idle(seen, i, members[i], beyond, faint)]:
+    strongest = max((worth(found.member) for found in founds), default=0.0)
+    while idle := [i for i in range(len(founds)) if _idle(seen, i, members[i], beyond, worth, strongest)]:
         notes.append(_FAINT.format(members[idle[0]].hypothesis.label))
         for items in (founds, members, p_values):
             items.pop(idle[0])
@@ -109,7 +111,7 @@ def bear_out(
     return BorneOut(tuple(founds), tuple(members), tuple(p_values), seen, tuple(spoiling), tuple(notes), tuple(refuted))
 
 
-_FAINT = "A fit of {} hardly stood out of the noise, and unseen data do not speak for it: left out."
+_FAINT = "A fit of {} hardly stood out, and unseen data do not speak for it: left out."
 _DROPPED = "A fit of {} stood out of the noise, but does not help on unseen data: left out."
 _REPLACED = "A fit of {} stood out of the noise, but does not help on unseen data; {}, which fits about as well, does."
 _WHOLE = "the robot as a whole"
@@ -160,11 +162,18 @@ def _idle(
     i: int,
     member: Member,
     beyond: Callable[[Effect], bool],
-    faint: Callable[[Member], bool],
+    worth: Callable[[Member], float],
+    strongest: float,
 ) -> bool:
-    """Whether a name that hardly stands out brings nothing on unseen data that it should be seen in."""
-    gain = seen.gains[i]
-    return faint(member) and not beyond(member.hypothesis.effect) and gain.nrmse_after >= gain.nrmse_before
+    """Whether a name that hardly stands out brings nothing on unseen data that it should be seen in.
+
+    One that stands out of the noise, and hardly beside another, may move base parameters to where they err there, and
+    be true: then those data speak for it.
+    """
+    if beyond(member.hypothesis.effect) or seen.gains[i].nrmse_after < seen.gains[i].nrmse_before:
+        return False
+    slight = worth(member) < SLIGHT * strongest and seen.speaks[i] < LEFT
+    return slight or worth(member) <= LEAST
 
 
 def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bool]) -> bool:

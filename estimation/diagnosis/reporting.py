@@ -25,7 +25,7 @@ from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import cut
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.scan import measure
-from estimation.diagnosis.selection import LEAST, Found, Selection
+from estimation.diagnosis.selection import Found, Selection
 from estimation.diagnosis.unseen import Measured, measure_unseen, simulate_unseen
 from estimation.diagnosis.verdict import CLOSE, Judgement, is_open
 from estimation.diagnosis.windup import EFFECT as ELASTICITY
@@ -67,7 +67,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         lambda members: measure_unseen(robot, problem, members, told.held_out, told.seed + 3),
         partial(_is_beyond, told),
         partial(alike_forms, problem),
-        lambda member: member.worth(problem.rows) <= LEAST,
+        lambda member: member.worth(problem.rows),
         partial(_unnamed, robot, told),
     )
     members, founds, seen = held.members, held.founds, held.seen

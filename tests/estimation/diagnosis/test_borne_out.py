@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from estimation.diagnosis.borne_out import HARM, LEFT, BorneOut, bear_out
+from estimation.diagnosis.borne_out import HARM, LEFT, SLIGHT, BorneOut, bear_out
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.patterns import build_pattern
@@ -98,6 +98,7 @@ def _borne(
     held_out: bool = True,
     forms: Sequence[Member] = (),
     faint: Sequence[Member] = (),
+    worths: Mapping[Member, float] | None = None,
     unnamed: tuple[Member, float] | None = None,
 ) -> BorneOut:
     judgement = Judgement("named", founds, tuple(free), tuple(p_values), 1.0)
@@ -110,7 +111,7 @@ def _borne(
         bench,  # type: ignore[arg-type]
         beyond,
         lambda members, i: forms if members[i] is SPRING else (),
-        lambda member: member in faint,
+        lambda member: (worths or {}).get(member, 1.0 if member in faint else 100.0),
         lambda member, beside: None if member in beside else unnamed,
     )
 
@@ -326,3 +327,22 @@ def test_a_faint_name_needs_unseen_data_that_speak_for_it(shown: Shown, stays: b
         assert bool(result.notes) is (not kept)
     # A push is over when the unseen log begins.
     assert _borne(_bench(external_contact=slightly), Found(PUSH, 1e-3, ()), faint=[PUSH]).members == (PUSH,)
+
+
+@pytest.mark.parametrize(
+    ("strength", "shown", "stays"),
+    [
+        (0.9, Shown(-0.003, 0.002, 1.001), True),
+        (1.1, Shown(-0.003, 0.002, 1.001), False),
+        (1.1, Shown(-0.003, 0.002, 1.001, speaks=LEFT), True),
+        (1.1, Shown(-0.002, 0.003, 0.999), True),
+    ],
+)
+def test_a_name_that_is_slight_beside_another_needs_unseen_data_that_speak_for_it(
+    strength: float, shown: Shown, stays: bool
+) -> None:
+    """As much as a tenth of it may be what the stronger one's formula leaves: clear of the noise, and no cause."""
+    bench = _bench(stribeck=shown)
+    worths = {SPRING: strength * 300.0 / SLIGHT, STRIBECK: 300.0}
+    result = _borne(bench, Found(SPRING, 1e-9, ()), Found(STRIBECK, 1e-9, ()), worths=worths)
+    assert result.members == ((SPRING, STRIBECK) if stays else (SPRING,))
