@@ -19,6 +19,9 @@ SHARE_OF_POSITION, SHARE_OF_SIGNAL = 0.01, 0.1
 FLICKER = 3.0
 # Share of rows above which they are no accident: of a torque they count as noise then, of a position they spoil it.
 MANY = 0.03
+# Rows of torque so close to where any joint turns round are no accident, where most that stick out are there: friction
+# that turns round jerks the arm, and a sharp fall of it makes a peak.
+BESIDE, MOST = 4, 0.5
 
 
 def spike_rows(values: Array, share: float, *, noisy: bool) -> NDArray[np.intp]:
@@ -83,8 +86,23 @@ def stray_rows(columns: Columns) -> dict[tuple[str, int], NDArray[np.intp]]:
         found["q", joint] = spike_rows(column, SHARE_OF_POSITION, noisy=False)
     for joint, column in enumerate(() if columns.signal is None else columns.signal):
         lost = dropouts(column, columns.q[joint])
-        found[columns.prefix, joint] = np.union1d(spike_rows(column, SHARE_OF_SIGNAL, noisy=True), lost)
+        peaks = _away_from_reversals(spike_rows(column, SHARE_OF_SIGNAL, noisy=True), columns)
+        found[columns.prefix, joint] = np.union1d(peaks, lost)
     return {place: rows for place, rows in found.items() if len(rows)}
+
+
+def _away_from_reversals(rows: NDArray[np.intp], columns: Columns) -> NDArray[np.intp]:
+    """Leaves out rows of torque beside reversals of any joint, where most of them are and chance puts few."""
+    if not len(rows):
+        return rows
+    turning = np.zeros(len(columns.q[0]), dtype=bool)
+    for q in columns.q:
+        # Over some rows, for the noise of an encoder turns no motion round.
+        way = np.sign(q[BESIDE:] - q[:-BESIDE])
+        turns = np.flatnonzero(way[1:] != way[:-1]) + BESIDE // 2
+        turning[np.unique(np.clip(turns[:, None] + np.arange(-BESIDE, BESIDE + 1), 0, len(q) - 1))] = True
+    beside = turning[rows]
+    return rows[~beside] if beside.mean() > MOST > 2 * turning.mean() else rows
 
 
 def are_accidents(rows: NDArray[np.intp], samples: int) -> bool:

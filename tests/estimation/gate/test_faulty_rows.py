@@ -44,6 +44,20 @@ def test_spikes_are_left_out(good, spoilt):
     assert np.abs(usable.tau).max() < 1e3
 
 
+def test_kicks_at_reversals_are_no_accidents(good, spoilt):
+    """Friction that falls sharply makes a peak where its joint turns round, and the arm jerks on others: it is torque.
+
+    A row elsewhere is an accident, and so are as many rows that have nothing to do with reversals.
+    """
+    log = good()
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(log.q[:, 1]))) != 0) + 1
+    assert len(turns) > 4
+    for rows, left_out in ((turns, []), (np.append(turns, 900), [900]), (turns - 40, (turns - 40).tolist())):
+        tau = log.tau.copy()
+        tau[np.ix_(rows, [1, 2])] += 5 * np.ptp(tau[:, [1, 2]], axis=0)
+        assert spoilt(tau=tau).spikes.tolist() == left_out
+
+
 def test_a_joint_that_rests_may_flicker_by_a_count(good, spoilt):
     """An encoder between two counts goes back and forth as long as it stands there: that is no garbled message."""
     q = good().q.copy()
