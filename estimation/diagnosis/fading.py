@@ -37,8 +37,7 @@ class Fading(Effect):
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the base model's torque times each wave (N, n, KNOTS)."""
-        x = (situation.t - situation.t[0]) / max(float(situation.t[-1] - situation.t[0]), 1e-9)
-        return np.asarray(situation.torque[:, :, None] * _waves(x)[:, None])
+        return np.asarray(situation.torque[:, :, None] * waves(of_logs(situation))[:, None])
 
     def describe(
         self,
@@ -50,12 +49,18 @@ class Fading(Effect):
         length: str = "rad",
     ) -> str:
         """Says what is seen."""
-        share = _waves(np.linspace(0.0, 1.0, 201)) @ coefficients
+        share = waves(np.linspace(0.0, 1.0, 201)) @ coefficients
         return (
             "The torque of all joints changes slowly with time, by the same share of each: over the logs it differs by "
             f"{100 * float(np.ptp(share)):.2g} %. A supply, or what all amplifiers are measured by, does that."
         )
 
 
-def _waves(x: Array) -> Array:
-    return np.column_stack([np.cos(np.pi * k * x) for k in range(1, KNOTS + 1)])
+def waves(x: Array, count: int = KNOTS) -> Array:
+    """Gives half waves (N, count) of time x (N,), which goes from 0 to 1."""
+    return np.column_stack([np.cos(np.pi * k * x) for k in range(1, count + 1)])
+
+
+def of_logs(situation: Situation) -> Array:
+    """Gives time (N,) from 0 at the first row to 1 at the last."""
+    return (situation.t - situation.t[0]) / max(float(situation.t[-1] - situation.t[0]), 1e-9)

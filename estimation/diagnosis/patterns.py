@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.draining import Draining
 from estimation.diagnosis.fading import Fading
 from estimation.diagnosis.families import FAMILIES
 from estimation.diagnosis.leaning import Leaning
@@ -27,7 +28,7 @@ SLOWEST, RUBBING = 0.6, 2.0
 SWINGS = 5.0
 SWAYING = ("vibration", "sway")
 # What acts on all joints at once.
-WHOLE: tuple[Effect, ...] = (Swinging(), Pulling(), Leaning(), Fading())
+WHOLE: tuple[Effect, ...] = (Swinging(), Pulling(), Leaning(), Fading(), Draining())
 SPOTS = (Spot(), Spot(odd=True))
 
 
@@ -193,8 +194,8 @@ def all_patterns(robot: Robot) -> tuple[Effect, ...]:
 
 
 def is_of_time(effect: object) -> bool:
-    """Whether a pattern's function knows nothing of the motion but, at most, its direction."""
-    return isinstance(effect, Fading) or (isinstance(effect, Pattern) and effect.kind == "time")
+    """Whether a pattern's function goes by time: of the motion it knows what it acts on, or the direction."""
+    return isinstance(effect, (Fading, Draining)) or (isinstance(effect, Pattern) and effect.kind == "time")
 
 
 def swings_by_itself(effect: object) -> bool:
