@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.fading import of_logs, waves
+from estimation.diagnosis.fading import FEWEST, of_logs, waves
 from robots.robot import Robot
 from robots.terms.effects import Coefficient, Effect, Situation
 
@@ -31,6 +31,10 @@ class Draining(Effect):
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes mass and first moments of each half wave."""
         return tuple(Coefficient(f"{part}_{k}", unit) for k in range(1, KNOTS + 1) for part, unit in _PARTS)
+
+    def joints(self, robot: Robot) -> tuple[int | None, ...]:
+        """Names the whole robot where it has joints enough for their torques to be one body's."""
+        return (None,) if robot.n >= FEWEST else ()
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of a unit body times each wave (N, n, 4 KNOTS)."""

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 HARMONICS = (1, 2, 3, 4)
 # Of what remembers velocity, of a sensor that creeps, and of a supply that sags [s].
 MEMORIES, CREEPS, SUPPLIES = (0.1, 0.3, 1.0, 3.0), (1.0, 3.0, 10.0, 30.0), (0.03, 0.15, 0.7)
-KNOTS = 8
+KNOTS, AGEING = 8, 3
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,13 @@ def _motion(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> A
     v = s.dq[:, other - 1]
     own = s.dq[:, joint - 1]
     return np.column_stack([v, np.abs(v), v * np.abs(v), s.sign[:, other - 1], v * own])
+
+
+def _push(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    if other == joint:
+        return np.zeros((len(s), 3))
+    q, a = s.q[:, joint - 1], s.ddq[:, other - 1]
+    return np.column_stack([a, a * np.cos(q), a * np.sin(q)])
 
 
 def _drag(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
@@ -144,6 +151,12 @@ def _time(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Arr
     return np.column_stack([np.cos(np.pi * k * x) for k in range(1, KNOTS + 1)])
 
 
+def _ageing(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    q = s.q[:, joint - 1]
+    slow = _time(s, joint, other, shape)[:, :AGEING]
+    return np.hstack([slow * wave[:, None] for wave in (np.cos(q), np.sin(q))])
+
+
 def _ringing(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     sources = np.column_stack([s.rigid[:, joint - 1], s.ddq[:, joint - 1]])
     for run in s.runs:
@@ -181,6 +194,7 @@ FAMILIES: dict[str, Family] = {
     "angle": Family(_angle, 8, "depends on the position of {who}"),
     "angles": Family(_angles, 16, "depends on its own position and that of {who} together"),
     "motion": Family(_motion, 5, "depends on the velocity of {who}"),
+    "push": Family(_push, 3, "depends on the acceleration of {who}"),
     "drag": Family(_drag, 8, "depends on its own position and the velocity of {who} together"),
     "posture": Family(_posture, 8, "depends on its own velocity and the position of {who} together"),
     "speed": Family(_speed, 6, "depends on the speed of the joint", _speed_of, "rad/s or m/s"),
@@ -197,6 +211,7 @@ FAMILIES: dict[str, Family] = {
     "creep": Family(_creep, 4, "remembers the torque of the joint for a while"),
     "supply": Family(_supply, 6, "depends on its own torque and the power that all joints draw together"),
     "time": Family(_time, KNOTS, "changes slowly with time"),
+    "ageing": Family(_ageing, 2 * AGEING, "depends on its own position, and changes slowly with time"),
     "ringing": Family(_ringing, 4, "rings at {point} Hz after the motion"),
     "vibration": Family(_vibration, 8, "vibrates at {point} Hz whatever the motion"),
     "sway": Family(_sway, 2, "swings to and fro at {point} Hz whatever the motion"),

@@ -183,11 +183,12 @@ def all_patterns(robot: Robot) -> tuple[Effect, ...]:
     joints = range(1, robot.n + 1)
     own = [Pattern("speed"), Pattern("speed", odd=True), Pattern("load"), Pattern("load", odd=True)]
     own += [Pattern("torque"), Pattern("acceleration"), Pattern("memory"), Pattern("creep"), Pattern("supply")]
-    own += [Pattern("time"), Pattern("time", odd=True)]
+    own += [Pattern("time"), Pattern("time", odd=True), Pattern("ageing")]
     own += [Pattern("ringing"), Pattern("vibration"), Pattern("sway"), Pattern("sway", odd=True), Pattern("turns")]
     each = [Pattern("angle", k, odd) for k in joints for odd in (False, True)]
     each += [Pattern("angles", k) for k in joints] if robot.n > 1 else []
     each += [Pattern("motion", k, odd) for k in joints for odd in (False, True)] if robot.n > 1 else []
+    each += [Pattern("push", k) for k in joints] if robot.n > 1 else []
     each += [Pattern("drag", k) for k in joints]
     each += [Pattern("posture", k) for k in joints] if robot.n > 1 else []
     return (*own, *SPOTS, *each, *WHOLE)
@@ -195,7 +196,7 @@ def all_patterns(robot: Robot) -> tuple[Effect, ...]:
 
 def is_of_time(effect: object) -> bool:
     """Whether a pattern's function goes by time: of the motion it knows what it acts on, or the direction."""
-    return isinstance(effect, (Fading, Draining)) or (isinstance(effect, Pattern) and effect.kind == "time")
+    return isinstance(effect, (Fading, Draining)) or (isinstance(effect, Pattern) and effect.kind in ("time", "ageing"))
 
 
 def swings_by_itself(effect: object) -> bool:

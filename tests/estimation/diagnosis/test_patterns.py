@@ -51,6 +51,16 @@ def _sag(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
     return size * tau[:, 1] / tau[:, 1].std() * np.tanh(power / power.std())
 
 
+def _push(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
+    ddq = np.asarray(motion.ddq)[:, 0]
+    return size * ddq / ddq.std() * np.sin(np.asarray(motion.q)[:, 1])
+
+
+def _leak(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
+    t = np.asarray(motion.t)
+    return 3 * size * np.exp(-t / 10.0) * np.cos(np.asarray(motion.q)[:, 1])
+
+
 @pytest.mark.parametrize(
     ("stranger", "share", "pattern"),
     [
@@ -61,6 +71,8 @@ def _sag(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
         (_bend, 0.2, "pattern:acceleration:0:even"),
         (_creep, 0.1, "pattern:creep:0:even"),
         (_sag, 0.1, "pattern:supply:0:even"),
+        (_push, 0.1, "pattern:push:1:even"),
+        (_leak, 0.2, "pattern:ageing:0:even"),
     ],
 )
 def test_a_stranger_is_told_by_what_it_depends_on(
