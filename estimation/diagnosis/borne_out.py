@@ -16,7 +16,8 @@ from robots.terms.effects import Effect
 
 LEFT = 0.2  # share of an effect's gain that stretches left out must show
 BY_ITSELF = 1e-5  # chance from which on a swing of which unseen data cannot say is taken for noise
-SLIGHT = 0.1  # share of the strongest name's worth below which another hardly stands out beside it
+SLIGHT, PLAIN = 0.1, 50.0  # share of the strongest name's worth, and BIC, below which another hardly stands out
+AGAINST = 0.1  # share of an effect's gain by which unseen data must speak against it
 HARM = 1.05  # times the unseen error: an effect that makes it so much larger is left out, sure or not
 
 
@@ -172,7 +173,7 @@ def _idle(
     """
     if beyond(member.hypothesis.effect) or seen.gains[i].nrmse_after < seen.gains[i].nrmse_before:
         return False
-    slight = worth(member) < SLIGHT * strongest and seen.speaks[i] < LEFT
+    slight = worth(member) < min(SLIGHT * strongest, PLAIN) and seen.speaks[i] < LEFT
     return slight or worth(member) <= LEAST
 
 
@@ -195,4 +196,6 @@ def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bo
     stored = any(shape.name == "time_constant" for shape in effect.shapes)
     # A free function claims no cause: what it brings elsewhere is all that it is good for.
     idle = effect.name.startswith(PREFIX) and seen.gains[i].ci95[1] < 0
-    return (seen.worse[i] and not stored) or idle or seen.rises[i] > HARM
+    # By less of its gain than this a base model that errs there, too, makes them speak against a cause.
+    against = seen.worse[i] and seen.speaks[i] < -AGAINST
+    return (against and not stored) or idle or seen.rises[i] > HARM

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from estimation.diagnosis.borne_out import HARM, LEFT, SLIGHT, BorneOut, bear_out
+from estimation.diagnosis.borne_out import AGAINST, HARM, LEFT, PLAIN, SLIGHT, BorneOut, bear_out
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.patterns import build_pattern
@@ -32,7 +32,7 @@ class Shown:
     astray: bool = False
 
 
-HELPS, IDLE, HARMS = Shown(), Shown(-0.001, 0.002, 1.0), Shown(-0.004, -0.001, 1.02)
+HELPS, IDLE, HARMS = Shown(), Shown(-0.001, 0.002, 1.0), Shown(-0.004, -0.001, 1.02, speaks=-0.5)
 
 
 @dataclass
@@ -343,6 +343,14 @@ def test_a_name_that_is_slight_beside_another_needs_unseen_data_that_speak_for_i
 ) -> None:
     """As much as a tenth of it may be what the stronger one's formula leaves: clear of the noise, and no cause."""
     bench = _bench(stribeck=shown)
-    worths = {SPRING: strength * 300.0 / SLIGHT, STRIBECK: 300.0}
-    result = _borne(bench, Found(SPRING, 1e-9, ()), Found(STRIBECK, 1e-9, ()), worths=worths)
-    assert result.members == ((SPRING, STRIBECK) if stays else (SPRING,))
+    for own, kept in ((0.9 * PLAIN, stays), (1.1 * PLAIN, True)):
+        worths = {SPRING: strength * own / SLIGHT, STRIBECK: own}
+        result = _borne(bench, Found(SPRING, 1e-9, ()), Found(STRIBECK, 1e-9, ()), worths=worths)
+        assert result.members == ((SPRING, STRIBECK) if kept else (SPRING,))
+
+
+@pytest.mark.parametrize(("speaks", "stays"), [(-0.9 * AGAINST, True), (-1.1 * AGAINST, False)])
+def test_unseen_data_speak_against_a_cause_by_a_share_of_its_gain(speaks: float, stays: bool) -> None:
+    """Where the base model errs on them, too, a true cause may bring a little less than nothing there, surely so."""
+    bench = _bench(spring=Shown(-0.004, -0.001, 1.02, speaks=speaks))
+    assert (_borne(bench, Found(SPRING, 1e-9, ())).members == (SPRING,)) is stays
