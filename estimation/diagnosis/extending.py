@@ -14,7 +14,7 @@ from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.regularisation import held, row_weight
 from estimation.diagnosis.scoring import accept
-from estimation.diagnosis.shape_errors import inexact, shape_errors, with_value
+from estimation.diagnosis.shape_errors import hidden_moments, inexact, shape_errors, with_value
 from estimation.diagnosis.shrinkage import pull_on
 from estimation.identification import NEGLIGIBLE, RELATIVE
 from estimation.model import Model
@@ -55,8 +55,9 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
     at = base.shape[2]
     for i, member in enumerate(members):
         X = dense(problem, member.hypothesis, member.shape)
-        others = accept(problem, tuple(m.group for k, m in enumerate(members) if k != i))
-        steps = shape_errors(problem, member, others)
+        rest = [m for k, m in enumerate(members) if k != i]
+        steps = shape_errors(problem, member, accept(problem, tuple(m.group for m in rest)))
+        steps = hidden_moments(problem, member, rest, steps)
         slopes = [_slope(problem, member, k, abs(step)) for k, step in enumerate(steps)]
         blocks += [X, *slopes]
         slices.append((at, X.shape[2], len(member.shape)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member, climb
 from estimation.diagnosis.scoring import Accepted, score
+from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
 
@@ -27,6 +28,10 @@ FIRST, GROWING, MANY, LOST = 1.5, 1.3, 24, 3
 CHOSEN = 10.0
 # Of two shapes one is followed in steps that grow by this, so often at most, the other refitted in so many evaluations.
 WIDENING, FEW, REFITTED = 1.5, 10, 12
+# A moment within this time [s] of rows that show no change may be anywhere in them.
+BORDER = 0.05
+# So much of what a drive loses at most it must lose in a row that shows none: the mean loss by noise has no end.
+LOST = 0.05
 # Values of a shape that is left as assumed at which the likelihood is asked.
 POINTS = 21
 
@@ -167,6 +172,33 @@ def _along_ridge(problem: Problem, member: Member, k: int, others: Accepted, ste
             distance *= WIDENING
         farthest = max(farthest, float(distance))
     return farthest
+
+
+def hidden_moments(problem: Problem, member: Member, others: Sequence[Member], errors: Sequence[float]) -> list[float]:
+    """Widens errors of moments of change beside rows that show none: where a drive is at its limit, all torque is that.
+
+    Args:
+        problem: the data.
+        member: whose shapes have the errors.
+        others: what else was found.
+        errors: by the profiles.
+    """
+    result = list(errors)
+    moments = [k for k, s in enumerate(member.hypothesis.effect.shapes) if s.unit == "s" and s.lower == -np.inf]
+    for other in others if moments else ():
+        if not other.hypothesis.effect.last:
+            continue
+        joints, columns = problem.columns_of(other.hypothesis, other.shape)
+        if member.hypothesis.joint is not None and member.hypothesis.joint - 1 not in joints:
+            continue
+        t = problem.recording.t
+        lost = [np.abs(X).max(axis=1) for X in columns]
+        for start, stop in spans(np.any([loss > LOST * loss.max() for loss in lost], axis=0)):
+            for k in moments:
+                if t[start] - BORDER <= member.shape[k] <= t[stop - 1] + BORDER:
+                    far = max(member.shape[k] - t[start], t[stop - 1] - member.shape[k])
+                    result[k] = max(result[k], float(far) / 1.96)
+    return result
 
 
 def inexact(problem: Problem, member: Member, coefficients: Array) -> Array:

@@ -12,8 +12,9 @@ from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import refine
 from estimation.diagnosis.scoring import accept, score
-from estimation.diagnosis.shape_errors import shape_errors
+from estimation.diagnosis.shape_errors import LOST, hidden_moments, shape_errors
 from estimation.diagnosis.states import record
+from robots.common.stretches import spans
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import EFFECTS
@@ -67,3 +68,34 @@ def test_a_choice_is_told_where_the_other_explains_less(
     assert error == (0.0 if told else np.inf)
     if told:
         assert member.shape[2] == share
+
+
+def test_a_moment_while_the_drive_is_at_its_limit_may_be_anywhere_there(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
+) -> None:
+    """A joint whose torque is cut off shows no change of it; before, after, and of another joint, it is as it was."""
+    recording = record(arm, [arm_log(torque_noise=0.02)])
+    tau = recording.tau.copy()
+    level = float(np.quantile(np.abs(tau[:, 0]), 0.8))
+    tau[:, 0] = np.clip(tau[:, 0], -level, level)
+    problem = pose_arm(replace(recording, tau=tau))
+    nothing = accept(problem, ())
+    limit = refine(problem, Hypothesis(EFFECTS["current_clipping"], 1), (level,), nothing)
+    away = np.flatnonzero(np.abs(tau[:, 0]) < 0.5 * level)
+    loss = np.abs(problem.columns_of(limit.hypothesis, limit.shape)[1][0][:, 0])
+    start, stop = max(spans(loss > LOST * loss.max()), key=lambda span: span[1] - span[0])
+    begins, ends = recording.t[start], recording.t[stop - 1]
+    assert ends - begins > 0.2
+    step = refine(
+        problem, Hypothesis(EFFECTS["friction_step"], 1), (float(recording.t[away[len(away) // 2]]),), nothing
+    )
+    for moment, wanted in (
+        (begins + 0.05, ends - begins - 0.05),
+        (ends + 0.02, ends + 0.02 - begins),
+        (float(recording.t[away[0]]), 1.96 * 0.01),
+    ):
+        there = replace(step, shape=(moment,))
+        assert 1.96 * hidden_moments(problem, there, [limit], [0.01])[0] == pytest.approx(wanted)
+        other = replace(there, hypothesis=Hypothesis(EFFECTS["friction_step"], 2))
+        assert hidden_moments(problem, other, [limit], [0.01]) == [0.01]
+        assert hidden_moments(problem, there, [there], [0.01]) == [0.01]
