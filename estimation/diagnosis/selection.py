@@ -18,6 +18,7 @@ from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scan import Entry, Outcome, Scan, measure, scan
 from estimation.diagnosis.scoring import Accepted, accept, score
 from estimation.diagnosis.shocks import beside_a_shock
+from estimation.diagnosis.together import together
 from robots.common.parallel import available_cores
 
 # A member whose gain is within this share of what it was when it won over its rivals wins over them still.
@@ -27,6 +28,7 @@ MOST = 4  # effects at once
 LEAST = 10.0
 # But for a single effect whose p-value is below this share of the false-alarm chance: it must be worth them at all.
 SURE = 0.2
+FAR_MORE = 1.5  # times the gain
 SHOWN = 40  # outcomes whose p-values are computed
 
 
@@ -102,8 +104,12 @@ def select(
         alone = SURE * false_alarm if not members else 0.0
         best = [m for m in able if _worth_it(problem, m, members) or _sure(problem, m, chance[m.hypothesis], alone)]
         best = [m for m in best if not m.hypothesis.effect.passing or _lasts(problem, m, accepted)]
-        if not best or not _beyond(problem, best[0], members):
+        if not best:
             break
+        if not _beyond(problem, best[0], members):
+            if (formed := _formed_anew(problem, best[0], members)) is None:
+                break
+            *members, best[0] = formed
         members.append(best[0])
         p_values.append(chance[best[0].hypothesis])
         won[best[0].hypothesis] = best[0].gain
@@ -121,6 +127,7 @@ def select(
         elif now in visited:
             break
         visited.append(now)
+    members = together(problem, members)
     found = [
         Found(_measured(problem, member, _beside(problem, members, i)), p_value)
         for i, (member, p_value) in enumerate(zip(members, p_values, strict=True))
@@ -252,6 +259,18 @@ def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> b
     ]
     lost = candidate.gain - candidate.gain_on(able)
     return not members or candidate.bic(problem.rows) - lost > LEAST
+
+
+def _formed_anew(problem: Problem, candidate: Member, members: Sequence[Member]) -> list[Member] | None:
+    """Gives members and a candidate refined together, if beside it they take forms that leave it far more; or None.
+
+    A gear that loses less when driven back follows a motor that saturates for most of what that does.
+    """
+    moved = together(problem, [*members, candidate])
+    own = _measured(problem, moved[-1], _beside(problem, moved, len(members)))
+    if own.gain < FAR_MORE * candidate.gain or not _beyond(problem, own, moved[:-1]):
+        return None
+    return [*moved[:-1], own]
 
 
 def _agreed(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:

@@ -31,7 +31,7 @@ WIDENING, FEW, REFITTED = 1.5, 10, 12
 # A moment within this time [s] of rows that show no change may be anywhere in them.
 BORDER = 0.05
 # So much of what a drive loses at most it must lose in a row that shows none: the mean loss by noise has no end.
-LOST = 0.05
+CUT = 0.05
 # Values of a shape that is left as assumed at which the likelihood is asked.
 POINTS = 21
 
@@ -193,7 +193,7 @@ def hidden_moments(problem: Problem, member: Member, others: Sequence[Member], e
             continue
         t = problem.recording.t
         lost = [np.abs(X).max(axis=1) for X in columns]
-        for start, stop in spans(np.any([loss > LOST * loss.max() for loss in lost], axis=0)):
+        for start, stop in spans(np.any([loss > CUT * loss.max() for loss in lost], axis=0)):
             for k in moments:
                 if t[start] - BORDER <= member.shape[k] <= t[stop - 1] + BORDER:
                     far = max(member.shape[k] - t[start], t[stop - 1] - member.shape[k])

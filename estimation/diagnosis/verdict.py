@@ -19,6 +19,8 @@ from estimation.diagnosis.spotting import Spot
 # Named effects that explain less than this share of what stands out of the noise, or of what free functions do in their
 # place, do not explain it; nor do those that fit worse than one of those and explain less than the second share of it.
 ENOUGH, NEARLY = 0.7, 0.9
+# Several names on a joint that explain this share of what as many free functions do are as good as those.
+AS_MUCH = 0.95
 # Rivals within this of the best BIC stay possible.
 CLOSE = 10.0
 # A name of the whole robot is not owed to a joint where a free function there leaves it this share of its gain.
@@ -163,7 +165,9 @@ def _holds(
         return False
     if _beaten(problem, gain, degrees, free):
         return False
-    if len(own) > 1 and not _thriftier(problem, own, others, free, LEAST):
+    # Free functions that are as many as the names claim as many causes, and have more freedom to follow each.
+    as_many = len(free) >= len(own) and gain - degrees > AS_MUCH * sum(map(worth, free))
+    if len(own) > 1 and not as_many and not _thriftier(problem, own, others, free, LEAST):
         return False
     if len(own) == 1 and own[0].hypothesis.effect.waves:
         # Waves over a joint's range are no more than one place of it where that explains nearly as much with less.

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+# The base model's torque, of which the formula is a power, has itself taken some of the error.
+INEXACT = 0.1
+
+
 class TorqueConstantSaturation(StaticJointEffect):
     """tau = c tau |tau / tau_r|^p: the logged torque, current times a constant, outgrows the true one.
 
@@ -36,7 +40,7 @@ class TorqueConstantSaturation(StaticJointEffect):
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the relative error at that torque."""
-        return (Coefficient("error", "1"),)
+        return (Coefficient("error", "1", inexact=INEXACT),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists exponents, at the largest torque."""

@@ -42,7 +42,7 @@ def _searching(
     replace(
         "_best",
         lambda problem, outcomes, accepted, known=None: [
-            SimpleNamespace(hypothesis=o.hypothesis, group=o.hypothesis, gain=1.0) for o in outcomes
+            SimpleNamespace(hypothesis=o.hypothesis, group=o.hypothesis, shape=(), gain=1.0) for o in outcomes
         ],
     )
     for name in ("_worth_it", "_sure", "_beyond"):

@@ -12,7 +12,7 @@ from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import refine
 from estimation.diagnosis.scoring import accept, score
-from estimation.diagnosis.shape_errors import LOST, hidden_moments, shape_errors
+from estimation.diagnosis.shape_errors import CUT, hidden_moments, shape_errors
 from estimation.diagnosis.states import record
 from robots.common.stretches import spans
 from robots.robot import Robot
@@ -83,7 +83,7 @@ def test_a_moment_while_the_drive_is_at_its_limit_may_be_anywhere_there(
     limit = refine(problem, Hypothesis(EFFECTS["current_clipping"], 1), (level,), nothing)
     away = np.flatnonzero(np.abs(tau[:, 0]) < 0.5 * level)
     loss = np.abs(problem.columns_of(limit.hypothesis, limit.shape)[1][0][:, 0])
-    start, stop = max(spans(loss > LOST * loss.max()), key=lambda span: span[1] - span[0])
+    start, stop = max(spans(loss > CUT * loss.max()), key=lambda span: span[1] - span[0])
     begins, ends = recording.t[start], recording.t[stop - 1]
     assert ends - begins > 0.2
     step = refine(
