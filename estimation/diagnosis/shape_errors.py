@@ -175,7 +175,9 @@ def _along_ridge(problem: Problem, member: Member, k: int, others: Accepted, ste
 
 
 def hidden_moments(problem: Problem, member: Member, others: Sequence[Member], errors: Sequence[float]) -> list[float]:
-    """Widens errors of moments of change beside rows that show none: where a drive is at its limit, all torque is that.
+    """Widens errors of moments of change, and of how long it lasts from there, beside rows that show none.
+
+    Those are rows in which a drive is at its limit, whose torque is all that, and in which the joints stand.
 
     Args:
         problem: the data.
@@ -183,21 +185,24 @@ def hidden_moments(problem: Problem, member: Member, others: Sequence[Member], e
         others: what else was found.
         errors: by the profiles.
     """
-    result = list(errors)
-    moments = [k for k, s in enumerate(member.hypothesis.effect.shapes) if s.unit == "s" and s.lower == -np.inf]
-    for other in others if moments else ():
-        if not other.hypothesis.effect.last:
-            continue
-        joints, columns = problem.columns_of(other.hypothesis, other.shape)
-        if member.hypothesis.joint is not None and member.hypothesis.joint - 1 not in joints:
-            continue
-        t = problem.recording.t
-        lost = [np.abs(X).max(axis=1) for X in columns]
-        for start, stop in spans(np.any([loss > CUT * loss.max() for loss in lost], axis=0)):
-            for k in moments:
-                if t[start] - BORDER <= member.shape[k] <= t[stop - 1] + BORDER:
-                    far = max(member.shape[k] - t[start], t[stop - 1] - member.shape[k])
-                    result[k] = max(result[k], float(far) / 1.96)
+    result, shapes = list(errors), member.hypothesis.effect.shapes
+    moments = [k for k, s in enumerate(shapes) if s.unit == "s" and s.lower == -np.inf]
+    if not moments:
+        return result
+    robot, t = problem.situation.robot, problem.recording.t
+    joints = member.hypothesis.effect.acts_on(robot, member.hypothesis.joint)
+    blind = [np.asarray(problem.recording.unsure[:, list(joints)].all(axis=1))]
+    for other in others:
+        if other.hypothesis.effect.last and set(other.group.joints) & set(joints):
+            lost = [np.abs(X).max(axis=1) for X in problem.columns_of(other.hypothesis, other.shape)[1]]
+            blind.append(np.asarray(np.any([loss > CUT * loss.max() for loss in lost], axis=0)))
+    for start, stop in (span for rows in blind for span in spans(rows) if t[span[1] - 1] - t[span[0]] > BORDER):
+        for k in moments:
+            if t[start] - BORDER <= member.shape[k] <= t[stop - 1] + BORDER:
+                far = max(member.shape[k] - t[start], t[stop - 1] - member.shape[k])
+                lasts = [i for i, s in enumerate(shapes) if s.name == "duration"]
+                for i in (k, *lasts):
+                    result[i] = max(result[i], float(far) / 1.96)
     return result
 
 

@@ -8,6 +8,7 @@ from scipy.ndimage import maximum_filter1d
 
 from estimation.gate.columns import Columns
 from estimation.gate.finding import Finding
+from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
 
@@ -15,6 +16,8 @@ Array = NDArray[np.float64]
 OUT, SHARE = 3.0, 0.005
 # ... and all other steps so many rows either way by so much: messages that come twice make steps of up to four.
 WINDOW, LOCAL = 10, 5.0
+# So many in a row at most: a value between the old and the new one is usual.
+AT_ONCE = 2
 # Share of the travel from which on a fit would be wrong.
 MUCH = 0.05
 
@@ -32,6 +35,9 @@ def jump_rows(t: Array, q: Array) -> NDArray[np.intp]:
     large = steps > max(OUT * usual, SHARE * float(q.max() - q.min()))
     if not large.any() or large.mean() > 0.01:
         return np.empty(0, dtype=np.intp)
+    # A joint that mostly stands has large steps one after the other when it goes: so it gathered speed.
+    for start, stop in spans(large):
+        large[start:stop] = stop - start <= AT_ONCE
     around = maximum_filter1d(np.where(large, 0.0, steps), 2 * WINDOW + 1)
     return np.flatnonzero(large & (steps > LOCAL * around)) + 1
 

@@ -56,9 +56,10 @@ class LoadStribeck(StaticJointEffect):
         length: str = "rad",
     ) -> str:
         """Says what the values mean."""
+        than = "more" if coefficients[0] > 0 else "less"
         return (
-            f"Joint {joint} needs {100 * coefficients[0]:.3g} % of its load more to break away; that fades as it "
-            f"speeds up past {shape[0]:.3g} {length}/s."
+            f"Joint {joint} needs {100 * abs(coefficients[0]):.3g} % of its load {than} to break away; that fades as "
+            f"it speeds up past {shape[0]:.3g} {length}/s."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

@@ -108,7 +108,8 @@ class Spring(StaticJointEffect):
             )
         return (
             f"A spring or cable acts on joint {joint}: {coefficients[0]:.3g} {force}/{length} at the middle of its "
-            f"range, and not linear ({coefficients[1]:.3g} {force}/{length}2, {coefficients[2]:.3g} {force}/{length}3)."
+            f"range; its quadratic and cubic parts are {coefficients[1]:.3g} {force}/{length}2 and "
+            f"{coefficients[2]:.3g} {force}/{length}3."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

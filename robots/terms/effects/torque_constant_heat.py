@@ -47,7 +47,8 @@ class TorqueConstantHeat(HeatEffect):
         length: str = "rad",
     ) -> str:
         """Says what the values mean."""
+        than = "less" if coefficients[0] > 0 else "more"
         return (
-            f"The motor of joint {joint} gives less torque per current as it warms up, with a time constant of "
+            f"The motor of joint {joint} gives {than} torque per current as it warms up, with a time constant of "
             f"{shape[0]:.0f} s."
         )

@@ -99,3 +99,24 @@ def test_a_moment_while_the_drive_is_at_its_limit_may_be_anywhere_there(
         other = replace(there, hypothesis=Hypothesis(EFFECTS["friction_step"], 2))
         assert hidden_moments(problem, other, [limit], [0.01]) == [0.01]
         assert hidden_moments(problem, there, [there], [0.01]) == [0.01]
+
+
+def test_a_moment_while_the_arm_stands_may_be_anywhere_there(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
+) -> None:
+    """Friction holds what pushes then; and how long it lasts from there is known as badly."""
+    recording = record(arm, [arm_log(torque_noise=0.02)])
+    stands = recording.unsure.copy()
+    stands[1000:1200] = True
+    problem = pose_arm(replace(recording, unsure=stands))
+    begins, ends = recording.t[1000], recording.t[1199]
+    push = refine(
+        problem, Hypothesis(EFFECTS["external_contact"], None), (begins + 0.1, 1.0, 0.5, 0.0), accept(problem, ())
+    )
+    there = replace(push, shape=(begins + 0.1, 1.0, 0.5, 0.0))
+    start, duration, *rest = hidden_moments(problem, there, [], [0.01, 0.02, 0.03, 0.0])
+    assert 1.96 * start == pytest.approx(ends - begins - 0.1)
+    assert duration == start
+    assert rest == [0.03, 0.0]
+    before = replace(push, shape=(begins - 0.2, 1.0, 0.5, 0.0))
+    assert hidden_moments(problem, before, [], [0.01, 0.02, 0.03, 0.0]) == [0.01, 0.02, 0.03, 0.0]

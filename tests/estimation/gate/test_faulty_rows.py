@@ -120,6 +120,21 @@ def test_position_that_jumps_is_refused(good, spoilt):
     assert (finding.severity, finding.joint, finding.row) == ("refuse", 5, 2501)
 
 
+def test_a_joint_that_stands_for_most_of_the_log_does_not_jump_when_it_goes(good, spoilt):
+    """A fast move of a fortieth of a second to and fro is one: its steps are large one after the other."""
+    log = good()
+    q = log.q.copy()
+    move = 0.5 * (1 - np.cos(np.linspace(0.0, np.pi, 10)))
+    q[:, 3] = 0.2
+    q[2000:2010, 3] += 0.1 * move
+    q[2010:2500, 3] += 0.1
+    q[2500:2510, 3] += 0.1 * move[::-1]
+    assert not found(spoilt(q=q), "jump")
+    q[2200:, 3] += 0.1
+    (finding,) = found(spoilt(q=q), "jump")
+    assert (finding.joint, finding.value) == (4, pytest.approx(0.1, abs=0.01))
+
+
 def test_quantised_position_and_torque_are_told(good, spoilt):
     """Steps that are coarse against what they measure are stated."""
     log = good()

@@ -182,3 +182,16 @@ def test_descriptions_and_coordinates_are_for_people(effect, seen):
         assert label.endswith("]")
         assert values.shape == (len(now),)
         assert np.isfinite(values).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "more", "less"),
+    [
+        ("torque_constant_heat", (30.0,), "gives less torque", "gives more torque"),
+        ("load_stribeck", (0.1,), "5 % of its load more", "5 % of its load less"),
+    ],
+)
+def test_words_follow_the_sign(name: str, shape: tuple[float, ...], more: str, less: str) -> None:
+    """A value below zero is told as what it means."""
+    for sign, words in ((1.0, more), (-1.0, less)):
+        assert words in EFFECTS[name].describe(1, np.array([0.05 * sign]), shape)
