@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from estimation.diagnosis.fading import of_logs, waves
 from estimation.diagnosis.resonance import resonance
 from robots.terms.effects import Situation
 
@@ -147,13 +148,12 @@ def _followers(s: Situation, source: Array, memories: tuple[float, ...]) -> Arra
 
 
 def _time(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
-    x = (s.t - s.t[0]) / max(float(s.t[-1] - s.t[0]), 1e-9)
-    return np.column_stack([np.cos(np.pi * k * x) for k in range(1, KNOTS + 1)])
+    return waves(of_logs(s), KNOTS)
 
 
 def _ageing(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     q = s.q[:, joint - 1]
-    slow = _time(s, joint, other, shape)[:, :AGEING]
+    slow = waves(of_logs(s), AGEING)
     return np.hstack([slow * wave[:, None] for wave in (np.cos(q), np.sin(q))])
 
 

@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Group, Problem
-from estimation.diagnosis.scoring import Accepted, score
+from estimation.diagnosis.scoring import Accepted, accept, score
 
 Array = NDArray[np.float64]
 
@@ -100,6 +100,11 @@ class Member:
         own, size = (np.abs(m.group.columns[m.group.joints.index(joint)] @ m.coefficients) for m in (self, other))
         acts = size > ACTS * size.max(initial=0.0)
         return float(np.sum(own[acts] ** 2) / max(np.sum(own**2), 1e-300))
+
+
+def all_but(problem: Problem, members: Sequence[Member], i: int) -> Accepted:
+    """Accepts all members but one."""
+    return accept(problem, tuple(m.group for k, m in enumerate(members) if k != i))
 
 
 def refine(

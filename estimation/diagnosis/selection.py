@@ -14,7 +14,7 @@ from estimation.diagnosis.contenders import NEAR, contenders
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.quiet_logs import profile_gain
-from estimation.diagnosis.refinement import Member, refine
+from estimation.diagnosis.refinement import Member, all_but, refine
 from estimation.diagnosis.scan import Entry, Outcome, Scan, measure, scan
 from estimation.diagnosis.scoring import Accepted, accept, score
 from estimation.diagnosis.shocks import beside_a_shock
@@ -129,7 +129,7 @@ def select(
         visited.append(now)
     members = together(problem, members)
     found = [
-        Found(_measured(problem, member, _beside(problem, members, i)), p_value)
+        Found(_measured(problem, member, all_but(problem, members, i)), p_value)
         for i, (member, p_value) in enumerate(zip(members, p_values, strict=True))
     ]
     others, alone = members[1:], SURE * false_alarm if len(members) == 1 else 0.0
@@ -157,7 +157,7 @@ def with_rivals(
     for i, found in enumerate(selection.found):
         rivals: list[tuple[Member, float]] = []
         if found.member.hypothesis not in selection.seen:
-            beside, reference = _beside(problem, members, i), found.member.bic(problem.rows)
+            beside, reference = all_but(problem, members, i), found.member.bic(problem.rows)
             result = scan(problem, entries, beside, rng, nulls=False)
             near = contenders(problem, result, [*members[:i], *members[i + 1 :]], reference)
             rest = [o for o in near if o.hypothesis != found.member.hypothesis]
@@ -165,11 +165,6 @@ def with_rivals(
             rivals = [(rival, reference - rival.bic(problem.rows)) for rival in able]
         told.append(replace(found, rivals=tuple(rivals)))
     return replace(selection, found=tuple(told))
-
-
-def _beside(problem: Problem, members: Sequence[Member], i: int) -> Accepted:
-    """All members but one, accepted."""
-    return accept(problem, tuple(m.group for k, m in enumerate(members) if k != i))
 
 
 def _seen(
@@ -267,7 +262,7 @@ def _formed_anew(problem: Problem, candidate: Member, members: Sequence[Member])
     A gear that loses less when driven back follows a motor that saturates for most of what that does.
     """
     moved = together(problem, [*members, candidate])
-    own = _measured(problem, moved[-1], _beside(problem, moved, len(members)))
+    own = _measured(problem, moved[-1], all_but(problem, moved, len(members)))
     if own.gain < FAR_MORE * candidate.gain or not _beyond(problem, own, moved[:-1]):
         return None
     return [*moved[:-1], own]
@@ -307,7 +302,7 @@ def _polished(
         changed = False
         for i in range(len(members)):
             others = [m for k, m in enumerate(members) if k != i]
-            beside = _beside(problem, members, i)
+            beside = all_but(problem, members, i)
             now = composed(problem, members, [members[i].hypothesis])
             reached = _measured(problem, members[i], beside)
             before = won.get(members[i].hypothesis)

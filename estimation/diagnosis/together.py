@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.refinement import Member, refine
+from estimation.diagnosis.refinement import Member, all_but, refine
 from estimation.diagnosis.scoring import accept
 
 ROUNDS = 8
@@ -39,7 +39,7 @@ def _along(problem: Problem, members: list[Member], own: Sequence[int]) -> None:
     for _ in range(ROUNDS):
         before = [members[i] for i in own]
         for i in own:
-            beside = accept(problem, tuple(m.group for k, m in enumerate(members) if k != i))
+            beside = all_but(problem, members, i)
             members[i] = refine(problem, members[i].hypothesis, members[i].shape, beside)
         more = _explained(problem, members) - gain
         if more < TOLD:
@@ -47,7 +47,7 @@ def _along(problem: Problem, members: list[Member], own: Sequence[int]) -> None:
         gain += more
         after = [members[i] for i in own]
         for factor in FACTORS:
-            shapes = [_beyond(problem, a, b, factor) for a, b in zip(before, after, strict=True)]
+            shapes = [_further(problem, a, b, factor) for a, b in zip(before, after, strict=True)]
             trial = list(members)
             for i, shape in zip(own, shapes, strict=True):
                 trial[i] = replace(members[i], shape=shape, group=problem.measured(members[i].hypothesis, shape))
@@ -60,7 +60,7 @@ def _explained(problem: Problem, members: Sequence[Member]) -> float:
     return accept(problem, tuple(member.group for member in members)).gain
 
 
-def _beyond(problem: Problem, before: Member, after: Member, factor: float) -> tuple[float, ...]:
+def _further(problem: Problem, before: Member, after: Member, factor: float) -> tuple[float, ...]:
     """Gives the shape that goes on as from one to the other, by a multiple of that, within its bounds."""
     effect, joint = after.hypothesis.effect, after.hypothesis.joint
     shape = []

@@ -84,25 +84,31 @@ def stray_rows(columns: Columns) -> dict[tuple[str, int], NDArray[np.intp]]:
     found: dict[tuple[str, int], NDArray[np.intp]] = {}
     for joint, column in enumerate(columns.q):
         found["q", joint] = spike_rows(column, SHARE_OF_POSITION, noisy=False)
-    for joint, column in enumerate(() if columns.signal is None else columns.signal):
-        lost = dropouts(column, columns.q[joint])
-        peaks = _away_from_reversals(spike_rows(column, SHARE_OF_SIGNAL, noisy=True), columns)
-        found[columns.prefix, joint] = np.union1d(peaks, lost)
+    signals = [] if columns.signal is None else list(columns.signal)
+    peaks = [spike_rows(column, SHARE_OF_SIGNAL, noisy=True) for column in signals]
+    if any(map(len, peaks)):
+        turning = _turning(columns)
+        peaks = [_away(rows, turning) for rows in peaks]
+    for joint, (column, rows) in enumerate(zip(signals, peaks, strict=True)):
+        found[columns.prefix, joint] = np.union1d(rows, dropouts(column, columns.q[joint]))
     return {place: rows for place, rows in found.items() if len(rows)}
 
 
-def _away_from_reversals(rows: NDArray[np.intp], columns: Columns) -> NDArray[np.intp]:
-    """Leaves out rows of torque beside reversals of any joint, where most of them are and chance puts few."""
-    if not len(rows):
-        return rows
+def _turning(columns: Columns) -> NDArray[np.bool_]:
+    """Marks rows (N,) beside those in which any joint turns round, starts or stops."""
     turning = np.zeros(len(columns.q[0]), dtype=bool)
     for q in columns.q:
         # Over some rows, for the noise of an encoder turns no motion round.
         way = np.sign(q[BESIDE:] - q[:-BESIDE])
         turns = np.flatnonzero(way[1:] != way[:-1]) + BESIDE // 2
         turning[np.unique(np.clip(turns[:, None] + np.arange(-BESIDE, BESIDE + 1), 0, len(q) - 1))] = True
+    return turning
+
+
+def _away(rows: NDArray[np.intp], turning: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Leaves out rows of torque beside reversals, where most of them are and chance puts few."""
     beside = turning[rows]
-    return rows[~beside] if beside.mean() > MOST > 2 * turning.mean() else rows
+    return rows[~beside] if len(rows) and beside.mean() > MOST > 2 * turning.mean() else rows
 
 
 def are_accidents(rows: NDArray[np.intp], samples: int) -> bool:

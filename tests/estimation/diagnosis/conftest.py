@@ -15,7 +15,10 @@ from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.regularisation import pull_of
 from estimation.diagnosis.upper import pose_upper
+from robots import load_robot
+from robots.regressor import default_model
 from robots.robot import Robot
+from robots.terms.effects import Situation, situation
 
 
 @pytest.fixture(scope="session")
@@ -37,3 +40,15 @@ def pose_arm(arm: Robot) -> Callable[..., Problem]:
         return pose(recording, baseline, whitening, draws=draws, rng=np.random.default_rng(0), upper=upper)
 
     return build
+
+
+@pytest.fixture(scope="session")
+def swept() -> Situation:
+    """A motion of six joints under gravity, with friction."""
+    robot = load_robot("ur10")
+    t = 0.02 * np.arange(500)
+    rates = np.array([0.9, 1.1, 1.3, 1.7, 2.1, 2.6])
+    q = 0.6 * np.sin(np.outer(t, rates))
+    dq, ddq = 0.6 * rates * np.cos(np.outer(t, rates)), -0.6 * rates**2 * np.sin(np.outer(t, rates))
+    model = default_model(robot)
+    return situation(model, model.nominal, 100.0 + t, q, dq, ddq)

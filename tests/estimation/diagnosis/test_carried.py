@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from estimation.diagnosis.carried import lightened, situation_on, with_body
@@ -15,6 +14,7 @@ from robots.common.errors import InputError
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log
+from tests.estimation.diagnosis.pinocchio_chains import torque_of_mass
 
 MASS, CENTRE = 1.5, np.array([0.02, -0.03, 0.1])
 
@@ -22,21 +22,6 @@ MASS, CENTRE = 1.5, np.array([0.02, -0.03, 0.1])
 def _point(mass: float, centre: np.ndarray) -> np.ndarray:
     inertia = mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     return np.array([mass, *(mass * centre), *inertia[np.triu_indices(3)]])
-
-
-def _hung(robot: Robot, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
-    """Torque (N, n) of a point mass on the flange of a robot without bodies, by pinocchio."""
-    model = pin.Model()
-    parent = 0
-    for joint in robot.chain.joints:
-        placement = pin.SE3(np.asarray(joint.rotation), np.asarray(joint.translation))
-        parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(np.asarray(joint.axis)), placement, joint.name)
-    tip = np.asarray(robot.chain.tip)
-    at = tip[:3, :3] @ CENTRE + tip[:3, 3]
-    model.appendBodyToJoint(parent, pin.Inertia(MASS, at, np.zeros((3, 3))), pin.SE3.Identity())
-    model.gravity.linear = np.asarray(robot.chain.gravity)
-    data = model.createData()
-    return np.array([pin.rnea(model, data, *state) for state in zip(q, dq, ddq, strict=True)])
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +37,7 @@ def test_a_known_payload_is_taken_off_and_felt(arm: Robot, logs: tuple[Log, Log]
     recording = record(arm, logs)
     light = lightened(arm, recording)
     run = recording.runs[1]
-    expected = _hung(arm, recording.q[run], recording.dq[run], recording.ddq[run])
+    expected = torque_of_mass(arm, MASS, CENTRE, recording.q[run], recording.dq[run], recording.ddq[run])
     lost = recording.tau - light.tau
     assert lost[run] == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
     assert not lost[recording.runs[0]].any()
@@ -67,7 +52,7 @@ def test_a_known_payload_is_taken_off_and_felt(arm: Robot, logs: tuple[Log, Log]
     pull = with_it.sensitivity("gravity")[run] @ np.asarray(arm.chain.gravity)
     alone = without.sensitivity("gravity")[run] @ np.asarray(arm.chain.gravity)
     still = np.zeros_like(recording.q[run])
-    hanging = _hung(arm, recording.q[run], still, still)
+    hanging = torque_of_mass(arm, MASS, CENTRE, recording.q[run], still, still)
     assert pull - alone == pytest.approx(hanging, abs=1e-9 * np.abs(hanging).max())
     assert with_body(model, parameters, np.zeros(10)) == pytest.approx(parameters)
 

@@ -9,32 +9,19 @@ from estimation.diagnosis.extension import find_effect
 from estimation.diagnosis.fading import FEWEST, Fading
 from estimation.diagnosis.patterns import is_of_time
 from robots import load_robot
-from robots.regressor import default_model
 from robots.robot import Robot
-from robots.terms.effects import Situation, situation
+from robots.terms.effects import Situation
 
 
-@pytest.fixture(scope="module")
-def state() -> Situation:
-    """A motion of six joints under gravity, with friction."""
-    robot = load_robot("ur10")
-    t = 0.02 * np.arange(500)
-    rates = np.array([0.9, 1.1, 1.3, 1.7, 2.1, 2.6])
-    q = 0.6 * np.sin(np.outer(t, rates))
-    dq, ddq = 0.6 * rates * np.cos(np.outer(t, rates)), -0.6 * rates**2 * np.sin(np.outer(t, rates))
-    model = default_model(robot)
-    return situation(model, model.nominal, 100.0 + t, q, dq, ddq)
-
-
-def test_a_slow_gain_of_all_joints_is_within_its_columns(state: Situation) -> None:
+def test_a_slow_gain_of_all_joints_is_within_its_columns(swept: Situation) -> None:
     """A gain that goes up and down again is told to a tenth of what it changes, by the same values on all joints."""
-    x = (state.t - state.t[0]) / np.ptp(state.t)
+    x = (swept.t - swept.t[0]) / np.ptp(swept.t)
     gain = 0.05 * np.exp(-(((x - 0.4) / 0.3) ** 2))
-    extra = state.torque * gain[:, None]
-    X = np.concatenate([Fading().columns(state, None), state.torque[:, :, None]], axis=2)
+    extra = swept.torque * gain[:, None]
+    X = np.concatenate([Fading().columns(swept, None), swept.torque[:, :, None]], axis=2)
     rows, target = X.reshape(-1, X.shape[2]), extra.ravel()
     values = np.linalg.lstsq(rows, target, rcond=None)[0]
-    size = np.ptp(gain) * np.abs(state.torque).max()
+    size = np.ptp(gain) * np.abs(swept.torque).max()
     np.testing.assert_allclose(rows @ values, target, atol=0.1 * size)
     told = Fading().describe(None, values[:-1])
     assert float(told.split("differs by ")[1].split(" %")[0]) == pytest.approx(100 * np.ptp(gain), rel=0.1)

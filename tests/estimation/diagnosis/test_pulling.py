@@ -14,6 +14,7 @@ from robots import load_robot
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.terms.effects import Situation, situation
+from tests.estimation.diagnosis.pinocchio_chains import chain_of
 
 PLACE = np.array([0.03, -0.02, 0.12])
 
@@ -40,10 +41,7 @@ def state(robot: Robot) -> Situation:
 
 def _kinematics(robot: Robot, state: Situation) -> tuple[np.ndarray, np.ndarray]:
     """The flange's places (N, 3) and Jacobians (N, 3, n) by a pinocchio model of the same chain."""
-    model, parent = pin.Model(), 0
-    for joint in robot.chain.joints:
-        placement = pin.SE3(np.asarray(joint.rotation), np.asarray(joint.translation))
-        parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(np.asarray(joint.axis)), placement, joint.name)
+    model, parent = chain_of(robot)
     frame = model.addFrame(pin.Frame("flange", parent, pin.SE3(np.eye(3), PLACE), pin.FrameType.OP_FRAME))
     data = model.createData()
     places, jacobians = [], []

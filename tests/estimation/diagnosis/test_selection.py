@@ -17,6 +17,10 @@ Members = list[SimpleNamespace]
 MOST_SCANS = 40
 
 
+def _all_but(problem: object, members: Members, i: int) -> tuple[object, ...]:
+    return tuple(m.group for k, m in enumerate(members) if k != i)
+
+
 def _searching(
     monkeypatch: pytest.MonkeyPatch, polished: Callable[[Members], Members], *, showing: Sequence[Hypothesis]
 ) -> list[set[Hypothesis]]:
@@ -37,6 +41,7 @@ def _searching(
 
     replace("_seen", lambda *args: ([], []))
     replace("accept", lambda problem, groups: groups)
+    replace("all_but", _all_but)
     replace("scan", scan)
     replace("contenders", lambda problem, result, members: result.outcomes)
     replace(
@@ -124,6 +129,7 @@ def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
         return SimpleNamespace(outcomes=[])
 
     monkeypatch.setattr(selection, "accept", lambda problem, groups: groups)
+    monkeypatch.setattr(selection, "all_but", _all_but)
     monkeypatch.setattr(selection, "composed", lambda problem, members, hypotheses: problem)
     monkeypatch.setattr(selection, "refine", lambda problem, h, shape, beside: member(h, gains[h]))
     monkeypatch.setattr(selection, "_measured", lambda problem, m, beside: member(m.hypothesis, gains[m.hypothesis]))
@@ -153,6 +159,7 @@ def test_what_the_torque_shows_by_itself_has_no_rivals(monkeypatch: pytest.Monke
         return SimpleNamespace(hypothesis=hypothesis, group=hypothesis, shape=(), gain=5.0, bic=lambda rows: -7.0)
 
     monkeypatch.setattr(selection, "accept", lambda problem, groups: groups)
+    monkeypatch.setattr(selection, "all_but", _all_but)
     monkeypatch.setattr(selection, "_measured", lambda problem, m, beside: m)
     monkeypatch.setattr(selection, "scan", lambda *args, **options: SimpleNamespace(outcomes=[]))
     monkeypatch.setattr(selection, "contenders", lambda *args: [SimpleNamespace(hypothesis=B)])

@@ -17,6 +17,7 @@ from robots.regressor import default_model
 from robots.robot import Robot
 from robots.terms.effects import Situation, situation
 from robots.terms.effects.situation import joined
+from tests.estimation.diagnosis.pinocchio_chains import chain_of
 
 PERIOD = 0.004
 RATES = np.array([0.9, 1.1, 1.3, 1.7, 2.1, 2.6])  # [rad/s]
@@ -64,10 +65,7 @@ def robot() -> Robot:
 @pytest.fixture(scope="module")
 def flange(robot: Robot) -> Flange:
     """The same in pinocchio."""
-    model, parent = pin.Model(), 0
-    for joint in robot.chain.joints:
-        placement = pin.SE3(np.asarray(joint.rotation), np.asarray(joint.translation))
-        parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(np.asarray(joint.axis)), placement, joint.name)
+    model, parent = chain_of(robot)
     tip = pin.SE3(np.asarray(robot.chain.tip)[:3, :3], np.asarray(robot.chain.tip)[:3, 3])
     frame = model.addFrame(pin.Frame("flange", parent, tip, pin.FrameType.OP_FRAME))
     return Flange(model, model.createData(), frame)
