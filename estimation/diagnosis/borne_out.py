@@ -9,9 +9,10 @@ from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.free_functions import SURE
 from estimation.diagnosis.patterns import PREFIX, is_of_time, swings_by_itself
 from estimation.diagnosis.refinement import Member
-from estimation.diagnosis.selection import LEAST, Found
+from estimation.diagnosis.selection import Found
 from estimation.diagnosis.unseen import Measured
 from estimation.diagnosis.verdict import CLOSE, Judgement
+from estimation.diagnosis.worthwhile import LEAST
 from robots.terms.effects import Effect
 
 LEFT = 0.2  # share of an effect's gain that stretches left out must show

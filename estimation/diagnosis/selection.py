@@ -8,24 +8,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
 from estimation.diagnosis.composed import composed
 from estimation.diagnosis.contenders import NEAR, contenders
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.quiet_logs import profile_gain
 from estimation.diagnosis.refinement import Member, all_but, refine
 from estimation.diagnosis.scan import Entry, Outcome, Scan, measure, scan
 from estimation.diagnosis.scoring import Accepted, accept, score
-from estimation.diagnosis.shocks import beside_a_shock
 from estimation.diagnosis.together import together
+from estimation.diagnosis.worthwhile import LEAST, beyond, is_sure, lasts, worth_it
 from robots.common.parallel import available_cores
 
 # A member whose gain is within this share of what it was when it won over its rivals wins over them still.
 SAME = 0.02
 MOST = 4  # effects at once
-# What is reported must be worth its parameters by so much (Schwarz): strong evidence, beside a small p-value.
-LEAST = 10.0
 # But for a single effect whose p-value is below this share of the false-alarm chance: it must be worth them at all.
 SURE = 0.2
 FAR_MORE = 1.5  # times the gain
@@ -102,11 +98,11 @@ def select(
         chance = {member.hypothesis: chances.get(member.hypothesis, 1.0) for member in refined}
         able = [m for m in refined if chance[m.hypothesis] <= false_alarm and m.hypothesis not in spurned]
         alone = SURE * false_alarm if not members else 0.0
-        best = [m for m in able if _worth_it(problem, m, members) or _sure(problem, m, chance[m.hypothesis], alone)]
-        best = [m for m in best if not m.hypothesis.effect.passing or _lasts(problem, m, accepted)]
+        best = [m for m in able if worth_it(problem, m, members) or is_sure(problem, m, chance[m.hypothesis], alone)]
+        best = [m for m in best if not m.hypothesis.effect.passing or lasts(problem, m, accepted)]
         if not best:
             break
-        if not _beyond(problem, best[0], members):
+        if not beyond(problem, best[0], members):
             if (formed := _formed_anew(problem, best[0], members)) is None:
                 break
             *members, best[0] = formed
@@ -137,8 +133,8 @@ def select(
         f
         for f in found
         if f.member.hypothesis in seen
-        or _worth_it(problem, f.member, others)
-        or _sure(problem, f.member, f.p_value, alone)
+        or worth_it(problem, f.member, others)
+        or is_sure(problem, f.member, f.p_value, alone)
     ]
     order = sorted(kept, key=lambda f: -f.member.gain)
     last = result if members else first
@@ -210,52 +206,6 @@ def _best(
     return list(best.values())
 
 
-def _worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
-    worth = candidate.bic(problem.rows) - candidate.doubt if members else candidate.worth(problem.rows)
-    if worth <= LEAST and not members and len(problem.recording.runs) > 1:
-        worth += profile_gain(problem, candidate) - candidate.gain
-    return worth > LEAST
-
-
-def _sure(problem: Problem, candidate: Member, p_value: float, chance: float) -> bool:
-    """Whether an effect has a p-value below a chance, and is worth its parameters at all."""
-    return p_value < chance and candidate.bic(problem.rows) - candidate.doubt > 0
-
-
-def _lasts(problem: Problem, candidate: Member, accepted: Accepted) -> bool:
-    """Whether what acts for a moment is more than one shock of the noise."""
-    return beside_a_shock(problem, candidate, accepted).worth(problem.rows) > LEAST
-
-
-def _beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
-    """Whether a candidate is worth it by the joints alone on which it is more than what others may leave.
-
-    What the torque as logged shows by itself, such as flat tops, no other formula leaves. Nor does one leave the same
-    coefficient on joints that must agree on it: those on which another effect explains more must do no more than that.
-    """
-    hypothesis = candidate.hypothesis
-    flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
-    if flags is not None and flags.any():
-        return True
-    if hypothesis.effect.alike:
-        return not members or _agreed(problem, candidate, members)
-    robot = problem.situation.robot
-    able = [
-        j
-        for j in candidate.group.joints
-        if candidate.gain_on([j])
-        >= max(
-            (
-                m.hypothesis.effect.leaves(robot, j, m.shape) * m.gain_on([j]) * candidate.share_beside(m, j)
-                for m in members
-            ),
-            default=0.0,
-        )
-    ]
-    lost = candidate.gain - candidate.gain_on(able)
-    return not members or candidate.bic(problem.rows) - lost > LEAST
-
-
 def _formed_anew(problem: Problem, candidate: Member, members: Sequence[Member]) -> list[Member] | None:
     """Gives members and a candidate refined together, if beside it they take forms that leave it far more; or None.
 
@@ -263,25 +213,9 @@ def _formed_anew(problem: Problem, candidate: Member, members: Sequence[Member])
     """
     moved = together(problem, [*members, candidate])
     own = _measured(problem, moved[-1], all_but(problem, moved, len(members)))
-    if own.gain < FAR_MORE * candidate.gain or not _beyond(problem, own, moved[:-1]):
+    if own.gain < FAR_MORE * candidate.gain or not beyond(problem, own, moved[:-1]):
         return None
     return [*moved[:-1], own]
-
-
-def _agreed(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
-    """Whether joints on which no effect of theirs explains more tell a common coefficient by themselves."""
-    beside = accept(problem, tuple(m.group for m in members))
-    gram, cross, sure = joint_by_joint(problem, candidate.hypothesis, candidate.shape, beside)
-    gram, cross = sure * gram, sure * cross
-    others = [
-        max((m.gain_on([j]) for m in members if m.hypothesis.joint == j + 1), default=0.0)
-        for j in candidate.group.joints
-    ]
-    told = (gram > 0) & (cross**2 >= gram * others)
-    if not told.any():
-        return False
-    gram, cross = gram[told], cross[told]
-    return agreed_gain(gram, cross) - candidate.degrees * float(np.log(problem.rows * len(gram))) > LEAST
 
 
 def _polished(

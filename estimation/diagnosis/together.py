@@ -36,13 +36,14 @@ def together(problem: Problem, members: Sequence[Member]) -> list[Member]:
 def _along(problem: Problem, members: list[Member], own: Sequence[int]) -> None:
     """Moves some of the members, in place."""
     gain = _explained(problem, members)
-    for _ in range(ROUNDS):
+    for left in reversed(range(ROUNDS)):
         before = [members[i] for i in own]
         for i in own:
             beside = all_but(problem, members, i)
             members[i] = refine(problem, members[i].hypothesis, members[i].shape, beside)
         more = _explained(problem, members) - gain
-        if more < TOLD:
+        # The last word is a refinement's: it says which shapes are free.
+        if more < TOLD or not left:
             break
         gain += more
         after = [members[i] for i in own]

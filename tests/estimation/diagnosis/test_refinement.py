@@ -8,13 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from estimation.diagnosis import refinement, selection
+from estimation.diagnosis import refinement, worthwhile
 from estimation.diagnosis.contenders import contenders
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Group
 from estimation.diagnosis.refinement import RARE, Member
 from estimation.diagnosis.scan import Outcome
-from estimation.diagnosis.selection import _beyond, _worth_it
+from estimation.diagnosis.worthwhile import beyond, worth_it
 from robots.terms.effects import EFFECTS, Shape
 from robots.terms.effects.stribeck import Stribeck
 
@@ -96,8 +96,8 @@ def test_what_errors_of_the_motion_may_make_of_a_gain_says_nothing_of_its_being_
     assert doubted.worth(ROWS) == pytest.approx(delay.worth(ROWS) - GAIN + 40.0)
     problem = SimpleNamespace(rows=ROWS, recording=SimpleNamespace(runs=(slice(0, ROWS),)))
     for others in ([], [_member("spring", 1, _boxes()[:1])]):
-        assert _worth_it(problem, delay, others)  # type: ignore[arg-type]
-        assert not _worth_it(problem, replace(doubted, degrees=4), others)  # type: ignore[arg-type]
+        assert worth_it(problem, delay, others)  # type: ignore[arg-type]
+        assert not worth_it(problem, replace(doubted, degrees=4), others)  # type: ignore[arg-type]
 
 
 def test_a_contact_that_cannot_win_is_not_searched() -> None:
@@ -134,14 +134,14 @@ def test_what_a_log_shows_by_itself_is_no_leftover() -> None:
     small = _member("current_clipping", 1, ((flat - tau)[:, :1],))
     other = _member("stribeck", 1, ((flat - tau)[:, :1],))
 
-    def beyond(candidate: Member, measured: np.ndarray) -> bool:
+    def counts(candidate: Member, measured: np.ndarray) -> bool:
         situation = SimpleNamespace(runs=(slice(0, ROWS),), robot=None, measured=None)
         problem = SimpleNamespace(situation=situation, recording=SimpleNamespace(tau=measured), rows=ROWS)
-        return _beyond(problem, replace(candidate, gain=200.0), [large])  # type: ignore[arg-type]
+        return beyond(problem, replace(candidate, gain=200.0), [large])  # type: ignore[arg-type]
 
-    assert beyond(small, flat)
-    assert not beyond(small, tau)
-    assert not beyond(other, flat)
+    assert counts(small, flat)
+    assert not counts(small, tau)
+    assert not counts(other, flat)
 
 
 @pytest.mark.parametrize(
@@ -162,11 +162,11 @@ def test_what_all_joints_share_is_told_by_those_without_a_stronger_effect(
     delay = replace(_member("time_delay", None, (column, column)), gain=sum(gains))
     ripple = replace(_member("torque_ripple", 1, (column,)), gain=other)
     gram = np.array([1e4, 1e4])
-    monkeypatch.setattr(selection, "accept", lambda problem, groups: None)
-    monkeypatch.setattr(selection, "joint_by_joint", lambda *_: (gram, np.sqrt(np.array(gains) * gram), np.ones(2)))
+    monkeypatch.setattr(worthwhile, "accept", lambda problem, groups: None)
+    monkeypatch.setattr(worthwhile, "joint_by_joint", lambda *_: (gram, np.sqrt(np.array(gains) * gram), np.ones(2)))
     situation = SimpleNamespace(runs=(slice(0, ROWS),), robot=None)
     problem = SimpleNamespace(situation=situation, recording=SimpleNamespace(tau=column), rows=ROWS)
-    assert _beyond(problem, delay, [ripple]) is counts  # type: ignore[arg-type]
+    assert beyond(problem, delay, [ripple]) is counts  # type: ignore[arg-type]
 
 
 class _Summits(Stribeck):

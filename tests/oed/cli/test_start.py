@@ -49,3 +49,10 @@ def test_help_is_quick() -> None:
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     # Time of the processor, not of the wall: other tests may be running.
     assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 0.5
+
+
+def test_it_runs_as_a_module() -> None:
+    """`python -m oed` is `oed`, its exit code for bad input too."""
+    done = subprocess.run([sys.executable, "-m", "oed", "predict"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "oed predict" in done.stderr

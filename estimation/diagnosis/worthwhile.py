@@ -1,0 +1,80 @@
+"""Whether an effect is worth its parameters beside others, by what no other effect may leave of itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.quiet_logs import profile_gain
+from estimation.diagnosis.refinement import Member
+from estimation.diagnosis.scoring import Accepted, accept
+from estimation.diagnosis.shocks import beside_a_shock
+
+# What is reported must be worth its parameters by so much (Schwarz): strong evidence, beside a small p-value.
+LEAST = 10.0
+
+
+def worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
+    """Whether a candidate is worth its parameters beside members; the first one may have another size in each log."""
+    worth = candidate.bic(problem.rows) - candidate.doubt if members else candidate.worth(problem.rows)
+    if worth <= LEAST and not members and len(problem.recording.runs) > 1:
+        worth += profile_gain(problem, candidate) - candidate.gain
+    return worth > LEAST
+
+
+def is_sure(problem: Problem, candidate: Member, p_value: float, chance: float) -> bool:
+    """Whether an effect has a p-value below a chance, and is worth its parameters at all."""
+    return p_value < chance and candidate.bic(problem.rows) - candidate.doubt > 0
+
+
+def lasts(problem: Problem, candidate: Member, accepted: Accepted) -> bool:
+    """Whether what acts for a moment is more than one shock of the noise."""
+    return beside_a_shock(problem, candidate, accepted).worth(problem.rows) > LEAST
+
+
+def beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
+    """Whether a candidate is worth it by the joints alone on which it is more than what others may leave.
+
+    What the torque as logged shows by itself, such as flat tops, no other formula leaves. Nor does one leave the same
+    coefficient on joints that must agree on it: those on which another effect explains more must do no more than that.
+    """
+    hypothesis = candidate.hypothesis
+    flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
+    if flags is not None and flags.any():
+        return True
+    if hypothesis.effect.alike:
+        return not members or _agreed(problem, candidate, members)
+    robot = problem.situation.robot
+    able = [
+        j
+        for j in candidate.group.joints
+        if candidate.gain_on([j])
+        >= max(
+            (
+                m.hypothesis.effect.leaves(robot, j, m.shape) * m.gain_on([j]) * candidate.share_beside(m, j)
+                for m in members
+            ),
+            default=0.0,
+        )
+    ]
+    lost = candidate.gain - candidate.gain_on(able)
+    return not members or candidate.bic(problem.rows) - lost > LEAST
+
+
+def _agreed(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
+    """Whether joints on which no effect of theirs explains more tell a common coefficient by themselves."""
+    beside = accept(problem, tuple(m.group for m in members))
+    gram, cross, sure = joint_by_joint(problem, candidate.hypothesis, candidate.shape, beside)
+    gram, cross = sure * gram, sure * cross
+    others = [
+        max((m.gain_on([j]) for m in members if m.hypothesis.joint == j + 1), default=0.0)
+        for j in candidate.group.joints
+    ]
+    told = (gram > 0) & (cross**2 >= gram * others)
+    if not told.any():
+        return False
+    gram, cross = gram[told], cross[told]
+    return agreed_gain(gram, cross) - candidate.degrees * float(np.log(problem.rows * len(gram))) > LEAST

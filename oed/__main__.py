@@ -1,0 +1,5 @@
+"""Runs ``python -m oed``."""
+
+from oed.cli import main
+
+main()
