@@ -36,6 +36,9 @@ FARTHEST = 0.1
 LEAST, MOST = 1 / 8, 8.0
 """Shares of the gap that the time of its crossing tells: the time, whose cube that is, is true to a factor of two."""
 
+HOVERS = 0.05
+"""Share of its root mean square that a load must get beyond zero to have changed sides."""
+
 INEXACT = 0.05
 """Share by which a play errs besides: no link flies quite freely, nor does it stop at once on the other flank."""
 SMALLEST = 5e-7
@@ -144,17 +147,18 @@ class Backlash(Effect):
             t = situation.t[run]
             inside = (times >= t[0]) & (times <= t[-1])
             start, jump, duration = times[inside], 2 * ways[inside], durations[inside]
-            first, last = np.searchsorted(t, (start, start + duration))
+            begins, last = np.searchsorted(t, (start, start + duration))
             # The rows of all crossings, one after the other; they may overlap.
-            count = last - first
+            count = last - begins
             of = np.repeat(np.arange(len(start)), count)
-            rows = np.arange(len(of)) + np.repeat(first - np.cumsum(count) + count, count)
+            rows = np.arange(len(of)) + np.repeat(begins - np.cumsum(count) + count, count)
             s = (t[rows] - start[of]) / duration[of]
             per, rises = jump[of] / duration[of], np.bincount(last, jump, len(t) + 1)[: len(t)]
             curve[run] = np.bincount(rows, per / duration[of] * (60 * s - 180 * s**2 + 120 * s**3), len(t))
             rate[run] = np.bincount(rows, per * (30 * s**2 - 60 * s**3 + 30 * s**4), len(t))
             crossed = np.bincount(rows, jump[of] * (10 * s**3 - 15 * s**4 + 6 * s**5), len(t))
-            side[run] = np.sign(load[run.start]) + np.cumsum(rises) + crossed
+            first = -ways[inside][0] if inside.any() else np.sign(np.sum(load[run]))
+            side[run] = first + np.cumsum(rises) + crossed
         return windup(situation, joint, side, rate, curve, rotor)[:, :, None]
 
     def describe(
@@ -188,15 +192,23 @@ def _size(situation: Situation, joint: int) -> float:
 
 
 def _crossings(situation: Situation, joint: int, at: float, rotor: float) -> tuple[Array, Array, Array]:
-    """Finds where the load passes a value: times [s], the new side, and its rate over the link's inertia [rad/s3]."""
+    """Finds where the load passes a value: times [s], the new side, and its rate over the link's inertia [rad/s3].
+
+    It must get as far as `HOVERS` beyond before it comes back: a load that hovers about zero, as that of a horizontal
+    axis at even speed, has no sides, and what makes it cross is what is not known of the motion.
+    """
     load = load_beside(situation, joint, rotor) - at
     inertia = np.maximum(link_inertia(situation, joint, rotor)[:, joint - 1], 1e-12)
-    small = 1e-4 * float(np.abs(load).max(initial=0.0))
+    beyond = HOVERS * float(np.sqrt(np.mean(load**2))) if len(load) else 0.0
     found = []
     for run in situation.runs:
         part = load[run]
-        # A load that only grazes zero, as a vertical axis' at rest, has no sides.
-        found.append(run.start + np.flatnonzero((part[:-1] * part[1:] < 0) & (np.abs(np.diff(part)) > small)))
+        sure = np.flatnonzero(np.abs(part) > beyond)
+        last = sure[:-1][part[sure[:-1]] * part[sure[1:]] < 0]
+        # Of the rows between two sides the load changes its sign for good in the last that is not yet the new one's.
+        changes = np.flatnonzero(part[:-1] * part[1:] <= 0)
+        after = sure[np.searchsorted(sure, last, side="right")]
+        found.append(run.start + changes[np.searchsorted(changes, after, side="left") - 1])
     i = np.concatenate(found) if found else np.zeros(0, dtype=np.intp)
     step = situation.t[i + 1] - situation.t[i]
     change = load[i + 1] - load[i]
