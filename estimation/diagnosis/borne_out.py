@@ -170,12 +170,13 @@ def _idle(
     """Whether a name that hardly stands out brings nothing on unseen data that it should be seen in.
 
     One that stands out of the noise, and hardly beside another, may move base parameters to where they err there, and
-    be true: then those data speak for it.
+    be true: then those data speak for it, or it surely brings something after all.
     """
-    if beyond(member.hypothesis.effect) or seen.gains[i].nrmse_after < seen.gains[i].nrmse_before:
+    gain = seen.gains[i]
+    if beyond(member.hypothesis.effect):
         return False
-    slight = worth(member) < min(SLIGHT * strongest, PLAIN) and seen.speaks[i] < LEFT
-    return slight or worth(member) <= LEAST
+    slight = worth(member) < min(SLIGHT * strongest, PLAIN) and seen.speaks[i] < LEFT and gain.ci95[0] <= 0
+    return slight or (worth(member) <= LEAST and gain.nrmse_after >= gain.nrmse_before)
 
 
 def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bool]) -> bool:

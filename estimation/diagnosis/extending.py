@@ -14,7 +14,7 @@ from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.regularisation import held, row_weight
 from estimation.diagnosis.scoring import accept
-from estimation.diagnosis.shape_errors import hidden_moments, inexact, shape_errors, with_value
+from estimation.diagnosis.shape_errors import between_logs, hidden_moments, inexact, shape_errors, with_value
 from estimation.diagnosis.shrinkage import pull_on
 from estimation.identification import NEGLIGIBLE, RELATIVE
 from estimation.model import Model
@@ -53,17 +53,20 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
     base = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
     blocks, slices, deviations = [base], [], []
     at = base.shape[2]
+    told: list[Member] = []
     for i, member in enumerate(members):
         X = dense(problem, member.hypothesis, member.shape)
         rest = [m for k, m in enumerate(members) if k != i]
         steps = shape_errors(problem, member, accept(problem, tuple(m.group for m in rest)))
+        member = between_logs(problem, member, rest)
         steps = hidden_moments(problem, member, rest, steps)
+        told.append(member)
         slopes = [_slope(problem, member, k, abs(step)) for k, step in enumerate(steps)]
         blocks += [X, *slopes]
         slices.append((at, X.shape[2], len(member.shape)))
         deviations.append(steps)
         at += X.shape[2] + len(member.shape)
-    columns = np.concatenate(blocks, axis=2)
+    members, columns = told, np.concatenate(blocks, axis=2)
     fast, kicks = np.zeros((2, columns.shape[2]), dtype=bool)
     for member, (start, size, shapes) in zip(members, slices, strict=True):
         rows, effect = slice(start, start + size + shapes), member.hypothesis.effect

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -175,9 +176,7 @@ def _along_ridge(problem: Problem, member: Member, k: int, others: Accepted, ste
 
 
 def hidden_moments(problem: Problem, member: Member, others: Sequence[Member], errors: Sequence[float]) -> list[float]:
-    """Widens errors of moments of change, and of how long it lasts from there, beside rows that show none.
-
-    Those are rows in which a drive is at its limit, whose torque is all that, and in which the joints stand.
+    """Widens errors of moments of change, and of how long it lasts from there, beside times that show none.
 
     Args:
         problem: the data.
@@ -186,24 +185,52 @@ def hidden_moments(problem: Problem, member: Member, others: Sequence[Member], e
         errors: by the profiles.
     """
     result, shapes = list(errors), member.hypothesis.effect.shapes
-    moments = [k for k, s in enumerate(shapes) if s.unit == "s" and s.lower == -np.inf]
-    if not moments:
-        return result
-    robot, t = problem.situation.robot, problem.recording.t
-    joints = member.hypothesis.effect.acts_on(robot, member.hypothesis.joint)
+    lasts = [i for i, s in enumerate(shapes) if s.name == "duration"]
+    for k in _moments(member):
+        for start, stop in _hidden(problem, member, others, member.shape[k]):
+            far = max(member.shape[k] - start, stop - member.shape[k])
+            for i in (k, *lasts):
+                result[i] = max(result[i], float(far) / 1.96)
+    return result
+
+
+def between_logs(problem: Problem, member: Member, others: Sequence[Member]) -> Member:
+    """Puts a change that may as well have come between two logs in the middle of where it may have come."""
+    moments, t = _moments(member), problem.recording.t
+    ends = [(t[start - 1], t[start]) for start in problem.recording.starts[1:]]
+    if len(moments) != 1 or any(s.name == "duration" for s in member.hypothesis.effect.shapes):
+        return member
+    for start, stop in _hidden(problem, member, others, member.shape[moments[0]]):
+        if any(start <= last and first <= stop for last, first in ends):
+            return replace(member, shape=with_value(member.shape, moments[0], float(start + stop) / 2))
+    return member
+
+
+def _moments(member: Member) -> list[int]:
+    return [k for k, s in enumerate(member.hypothesis.effect.shapes) if s.moment]
+
+
+def _hidden(problem: Problem, member: Member, others: Sequence[Member], moment: float) -> list[tuple[float, float]]:
+    """Lists the times [s] about a moment between which nothing shows it.
+
+    A drive is at its limit, and its torque is all that; the joints stand; or no log was running.
+    """
+    t, joints = problem.recording.t, member.hypothesis.effect.acts_on(problem.situation.robot, member.hypothesis.joint)
     blind = [np.asarray(problem.recording.unsure[:, list(joints)].all(axis=1))]
     for other in others:
         if other.hypothesis.effect.last and set(other.group.joints) & set(joints):
             lost = [np.abs(X).max(axis=1) for X in problem.columns_of(other.hypothesis, other.shape)[1]]
             blind.append(np.asarray(np.any([loss > CUT * loss.max() for loss in lost], axis=0)))
-    for start, stop in (span for rows in blind for span in spans(rows) if t[span[1] - 1] - t[span[0]] > BORDER):
-        for k in moments:
-            if t[start] - BORDER <= member.shape[k] <= t[stop - 1] + BORDER:
-                far = max(member.shape[k] - t[start], t[stop - 1] - member.shape[k])
-                lasts = [i for i, s in enumerate(shapes) if s.name == "duration"]
-                for i in (k, *lasts):
-                    result[i] = max(result[i], float(far) / 1.96)
-    return result
+    found = [(float(t[start]), float(t[stop - 1])) for rows in blind for start, stop in spans(rows)]
+    found += [(float(t[start - 1]), float(t[start])) for start in problem.recording.starts[1:]]
+    merged: list[tuple[float, float]] = []
+    for start, stop in sorted(found):
+        # A joint that waits for the log's end, and one that waits in the next: between them nothing shows either.
+        if merged and start <= merged[-1][1] + problem.recording.step:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], stop))
+        else:
+            merged.append((start, stop))
+    return [(a, b) for a, b in merged if b - a > BORDER and a - BORDER <= moment <= b + BORDER]
 
 
 def inexact(problem: Problem, member: Member, coefficients: Array) -> Array:

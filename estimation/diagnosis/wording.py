@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -51,13 +52,14 @@ def word_finding(
     units = {}
     if joint is not None:
         units = {"force": force_unit(robot, joint - 1), "length": length_unit(robot, joint - 1)}
-    sentence = hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units)
+    parameters = _parameters(robot, member, fitted, i, known)
+    sentence = _when(hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units), parameters)
     pattern = hypothesis.name if hypothesis.name.startswith(PREFIX) else ""
     rivals = [] if found is None else [(rival.hypothesis, worse) for rival, worse in found.rivals]
     return Finding(
         effect="unexplained" if pattern else hypothesis.name,
         joint=joint,
-        parameters=_parameters(robot, member, fitted, i, known),
+        parameters=parameters,
         p_value=p_value,
         delta_bic=member.worth(problem.rows),
         gain=gain,
@@ -70,6 +72,15 @@ def word_finding(
         coordinate=hypothesis.effect.coordinate(problem.sees(hypothesis.effect), joint, member.shape)[0],
         pattern=pattern,
     )
+
+
+def _when(sentence: str, parameters: Sequence[Parameter]) -> str:
+    """Says between which times a change came where it is not known better."""
+    for own in parameters:
+        if own.name == "change_time" and not own.determined and np.isfinite(own.ci95).all():
+            between = f"between t = {own.ci95[0]:.1f} and {own.ci95[1]:.1f} s"
+            sentence = sentence.replace(f"at t = {own.value:.2f} s", between)
+    return sentence
 
 
 def no_part(finding: Finding) -> Finding:

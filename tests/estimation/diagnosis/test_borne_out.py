@@ -335,7 +335,8 @@ def test_a_faint_name_needs_unseen_data_that_speak_for_it(shown: Shown, stays: b
         (0.9, Shown(-0.003, 0.002, 1.001), True),
         (1.1, Shown(-0.003, 0.002, 1.001), False),
         (1.1, Shown(-0.003, 0.002, 1.001, speaks=LEFT), True),
-        (1.1, Shown(-0.002, 0.003, 0.999), True),
+        (1.1, Shown(-0.002, 0.003, 0.999), False),
+        (1.1, Shown(0.001, 0.003, 0.999), True),
     ],
 )
 def test_a_name_that_is_slight_beside_another_needs_unseen_data_that_speak_for_it(

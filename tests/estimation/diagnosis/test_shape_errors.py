@@ -12,7 +12,7 @@ from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import refine
 from estimation.diagnosis.scoring import accept, score
-from estimation.diagnosis.shape_errors import CUT, hidden_moments, shape_errors
+from estimation.diagnosis.shape_errors import CUT, between_logs, hidden_moments, shape_errors
 from estimation.diagnosis.states import record
 from robots.common.stretches import spans
 from robots.robot import Robot
@@ -120,3 +120,27 @@ def test_a_moment_while_the_arm_stands_may_be_anywhere_there(
     assert rest == [0.03, 0.0]
     before = replace(push, shape=(begins - 0.2, 1.0, 0.5, 0.0))
     assert hidden_moments(problem, before, [], [0.01, 0.02, 0.03, 0.0]) == [0.01, 0.02, 0.03, 0.0]
+
+
+def test_a_change_between_two_logs_may_have_come_at_any_time_there(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
+) -> None:
+    """From the last row that shows it has not come to the first that shows it has, rests at either end included."""
+    first = arm_log(torque_noise=0.02)
+    recording = record(arm, [first, replace(first, t=first.t + 500.0)])
+    border = recording.starts[1]
+    stands = recording.unsure.copy()
+    stands[border : border + 100] = True
+    problem = pose_arm(replace(recording, unsure=stands))
+    ends, begins = float(recording.t[border - 1]), float(recording.t[border + 99])
+    step = refine(problem, Hypothesis(EFFECTS["friction_step"], 1), (begins,), accept(problem, ()))
+    for moment in (begins + 0.01, ends - 0.01):
+        middle = between_logs(problem, replace(step, shape=(moment,)), [])
+        assert middle.shape[0] == pytest.approx((ends + begins) / 2, abs=0.02)
+        (error,) = hidden_moments(problem, middle, [], [0.01])
+        assert 1.96 * error == pytest.approx((begins - ends) / 2, abs=0.02)
+    before = replace(step, shape=(ends - 1.0,))
+    assert between_logs(problem, before, []) is before
+    # A push has its own beginning and end.
+    push = refine(problem, Hypothesis(EFFECTS["external_contact"], None), (begins, 1.0, 0.5, 0.0), accept(problem, ()))
+    assert between_logs(problem, push, []) is push

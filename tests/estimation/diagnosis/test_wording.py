@@ -13,7 +13,7 @@ from estimation.diagnosis.extension import Extension
 from estimation.diagnosis.findings import Finding, Gain, Parameter
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.refinement import Member
-from estimation.diagnosis.wording import _parameters, _roughly, no_part
+from estimation.diagnosis.wording import _parameters, _roughly, _when, no_part
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
 
@@ -103,3 +103,15 @@ def test_what_warms_up_gains_no_friction(arm: Robot, effect: str) -> None:
         EFFECTS[effect].believable(arm, 1, np.array(falls), shape) for falls in ((3.0, 1.0), (-1.0, 2.0), (-3.3, -1.6))
     ]
     assert believed == [True, True, False]
+
+
+def test_a_change_is_told_at_its_time_or_between_two() -> None:
+    """As well as the interval says."""
+    sentence = "The payload grew by 0.2 kg at t = 210.37 s."
+    sure = Parameter(
+        name="change_time", value=210.37, unit="s", standard_error=0.01, ci95=(210.3, 210.4), determined=True
+    )
+    assert _when(sentence, [sure]) == sentence
+    rough = replace(sure, ci95=(59.72, 361.04), determined=False)
+    assert _when(sentence, [rough]) == "The payload grew by 0.2 kg between t = 59.7 and 361.0 s."
+    assert _when(sentence, [replace(rough, ci95=(-np.inf, np.inf))]) == sentence
