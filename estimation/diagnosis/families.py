@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,9 @@ from scipy.signal import lfilter
 
 from estimation.diagnosis.fading import of_logs, waves
 from estimation.diagnosis.resonance import resonance
+from robots.common.stretches import spans
 from robots.terms.effects import Situation
+from robots.terms.effects.states import bristle
 
 Array = NDArray[np.float64]
 
@@ -19,6 +22,11 @@ HARMONICS = (1, 2, 3, 4)
 # Of what remembers velocity, of a sensor that creeps, and of a supply that sags [s].
 MEMORIES, CREEPS, SUPPLIES = (0.1, 0.3, 1.0, 3.0), (1.0, 3.0, 10.0, 30.0), (0.03, 0.15, 0.7)
 KNOTS, AGEING = 8, 3
+# Changes of torque, as shares of its largest, within which a hysteresis turns round.
+STRAINS = (0.05, 0.2, 0.6)
+# A joint stands that is slower than this share of its RMS speed for so long [s]. What it feels when it goes changes
+# evenly between some times [s] from then on, and ends with the last.
+STANDS, RESTS, SINCE = 0.02, 0.1, (0.0, 0.1, 0.2, 0.3, 0.5, 0.8)
 
 
 @dataclass(frozen=True)
@@ -131,6 +139,12 @@ def _creep(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Ar
     return _followers(s, s.torque[:, joint - 1], CREEPS)
 
 
+def _hysteresis(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    torque = _torque_of(s, joint) / shape[0]
+    rate = np.concatenate([np.gradient(torque[run], s.period) if run.stop - run.start > 1 else [0.0] for run in s.runs])
+    return np.column_stack([bristle(s.t, torque, rate, s.runs, length) for length in STRAINS])
+
+
 def _supply(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     power = np.sum(s.torque * s.dq, axis=1)
     power = _followers(s, power / max(float(np.abs(power).max(initial=0.0)), 1e-300), SUPPLIES)
@@ -155,6 +169,19 @@ def _ageing(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> A
     q = s.q[:, joint - 1]
     slow = waves(of_logs(s), AGEING)
     return np.hstack([slow * wave[:, None] for wave in (np.cos(q), np.sin(q))])
+
+
+def _start(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    v = np.abs(s.dq[:, joint - 1])
+    still = v < STANDS * float(np.sqrt(np.mean(v**2)))
+    columns = np.zeros((len(s), len(SINCE) - 1))
+    for run in s.runs:
+        t, own = s.t[run], columns[run]
+        goes = [stop for start, stop in spans(still[run]) if (stop - start) * s.period >= RESTS and stop < len(t)]
+        for start, stop in pairwise([*goes, len(t)]):
+            since = t[start:stop] - t[start]
+            own[start:stop] = np.column_stack([np.interp(since, SINCE, peak) for peak in np.eye(len(SINCE))[:-1]])
+    return columns
 
 
 def _ringing(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
@@ -209,9 +236,13 @@ FAMILIES: dict[str, Family] = {
     ),
     "memory": Family(_memory, 4, "remembers the velocity of the joint for a while"),
     "creep": Family(_creep, 4, "remembers the torque of the joint for a while"),
+    "hysteresis": Family(
+        _hysteresis, len(STRAINS), "differs as its torque grows and as it falls", _torque_of, "N m or N"
+    ),
     "supply": Family(_supply, 6, "depends on its own torque and the power that all joints draw together"),
     "time": Family(_time, KNOTS, "changes slowly with time"),
     "ageing": Family(_ageing, 2 * AGEING, "depends on its own position, and changes slowly with time"),
+    "start": Family(_start, len(SINCE) - 1, "is another for a while after the joint has stood"),
     "ringing": Family(_ringing, 4, "rings at {point} Hz after the motion"),
     "vibration": Family(_vibration, 8, "vibrates at {point} Hz whatever the motion"),
     "sway": Family(_sway, 2, "swings to and fro at {point} Hz whatever the motion"),

@@ -13,6 +13,7 @@ from estimation.diagnosis.families import FAMILIES
 from estimation.diagnosis.leaning import Leaning
 from estimation.diagnosis.pulling import Pulling
 from estimation.diagnosis.spotting import Spot
+from estimation.diagnosis.stopping import Stop
 from estimation.diagnosis.swinging import Swinging
 from robots.robot import Robot
 from robots.terms.effects import Coefficient, Effect, JointEffect, Shape, Situation
@@ -29,7 +30,8 @@ SWINGS = 5.0
 SWAYING = ("vibration", "sway")
 # What acts on all joints at once.
 WHOLE: tuple[Effect, ...] = (Swinging(), Pulling(), Leaning(), Fading(), Draining())
-SPOTS = (Spot(), Spot(odd=True))
+# What is at a place of a joint's range.
+PLACES: tuple[Effect, ...] = (Spot(), Spot(odd=True), Stop(), Stop(below=True))
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,7 @@ class Pattern(JointEffect):
 
 def build_pattern(text: str) -> Effect | None:
     """Reads the name of a pattern; None for anything else."""
-    for known in (*SPOTS, *WHOLE):
+    for known in (*PLACES, *WHOLE):
         if text == known.name:
             return known
     parts = text.removeprefix(PREFIX).split(":")
@@ -182,8 +184,15 @@ def all_patterns(robot: Robot) -> tuple[Effect, ...]:
     """Lists the patterns to look for on every joint, and on the robot as a whole."""
     joints = range(1, robot.n + 1)
     own = [Pattern("speed"), Pattern("speed", odd=True), Pattern("load"), Pattern("load", odd=True)]
-    own += [Pattern("torque"), Pattern("acceleration"), Pattern("memory"), Pattern("creep"), Pattern("supply")]
-    own += [Pattern("time"), Pattern("time", odd=True), Pattern("ageing")]
+    own += [
+        Pattern("torque"),
+        Pattern("acceleration"),
+        Pattern("memory"),
+        Pattern("creep"),
+        Pattern("hysteresis"),
+        Pattern("supply"),
+    ]
+    own += [Pattern("time"), Pattern("time", odd=True), Pattern("ageing"), Pattern("start", odd=True)]
     own += [Pattern("ringing"), Pattern("vibration"), Pattern("sway"), Pattern("sway", odd=True), Pattern("turns")]
     each = [Pattern("angle", k, odd) for k in joints for odd in (False, True)]
     each += [Pattern("angles", k) for k in joints] if robot.n > 1 else []
@@ -191,7 +200,7 @@ def all_patterns(robot: Robot) -> tuple[Effect, ...]:
     each += [Pattern("push", k) for k in joints] if robot.n > 1 else []
     each += [Pattern("drag", k) for k in joints]
     each += [Pattern("posture", k) for k in joints] if robot.n > 1 else []
-    return (*own, *SPOTS, *each, *WHOLE)
+    return (*own, *PLACES, *each, *WHOLE)
 
 
 def is_of_time(effect: object) -> bool:

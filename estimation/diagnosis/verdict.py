@@ -15,6 +15,7 @@ from estimation.diagnosis.scan import Entry
 from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.selection import Found, Selection
 from estimation.diagnosis.spotting import Spot
+from estimation.diagnosis.stopping import Stop
 
 # Named effects that explain less than this share of what stands out of the noise, or of what free functions do in their
 # place, do not explain it; nor do those that fit worse than one of those and explain less than the second share of it.
@@ -169,12 +170,15 @@ def _holds(
     as_many = len(free) >= len(own) and gain - degrees > AS_MUCH * sum(map(worth, free))
     if len(own) > 1 and not as_many and not _thriftier(problem, own, others, free, LEAST):
         return False
-    if len(own) == 1 and own[0].hypothesis.effect.waves:
-        # Waves over a joint's range are no more than one place of it where that explains nearly as much with less.
-        spots = [entry for entry in here if isinstance(entry.hypothesis.effect, Spot)]
-        free, _ = free_functions(problem, spots, others, false_alarm, rng)
-        if free and free[0].degrees < degrees and worth(free[0]) > NEARLY * (gain - degrees):
-            return False
+    if len(own) == 1:
+        # Waves over a joint's range, or a spring, are no more than one place of it where that explains nearly as much
+        # with less, or more.
+        spots, stops = ([e for e in here if isinstance(e.hypothesis.effect, kind)] for kind in (Spot, Stop))
+        enough = NEARLY * (gain - degrees) if own[0].hypothesis.effect.waves else np.inf
+        for entries, least in ((spots, enough), (stops, gain - degrees + LEAST)):
+            free, _ = free_functions(problem, entries, others, false_alarm, rng) if np.isfinite(least) else ([], [])
+            if free and free[0].degrees < degrees and worth(free[0]) > least:
+                return False
     if any(member.hypothesis.effect.passing for member in own):
         # What comes and goes follows nearly any torque: functions of the motion that do so with less refute it.
         moving = [entry for entry in here if not is_of_time(entry.hypothesis.effect)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -61,6 +62,20 @@ def _leak(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
     return 3 * size * np.exp(-t / 10.0) * np.cos(np.asarray(motion.q)[:, 1])
 
 
+def _buffer(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
+    q = np.asarray(motion.q)[:, 1]
+    return 6 * size * np.maximum(q - np.quantile(q, 0.8), 0.0) / np.ptp(q)
+
+
+def _lag_of_gauge(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
+    """A gauge that keeps what it showed until the torque has changed by a width: Prandtl's play."""
+    width, shown, inside = 0.4 * tau[:, 1].std(), [], float(tau[0, 1])
+    for value in tau[:, 1]:
+        inside = min(max(inside, value - width), value + width)
+        shown.append((inside - value) / width)
+    return size * np.array(shown)
+
+
 @pytest.mark.parametrize(
     ("stranger", "share", "pattern"),
     [
@@ -73,6 +88,8 @@ def _leak(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
         (_sag, 0.1, "pattern:supply:0:even"),
         (_push, 0.1, "pattern:push:1:even"),
         (_leak, 0.2, "pattern:ageing:0:even"),
+        (_buffer, 0.2, "pattern:stop:0:above"),
+        (_lag_of_gauge, 0.1, "pattern:hysteresis:0:even"),
     ],
 )
 def test_a_stranger_is_told_by_what_it_depends_on(
@@ -100,6 +117,9 @@ def test_a_stranger_is_told_by_what_it_depends_on(
         assert values["centre"] == pytest.approx(0.2, abs=0.02)
         assert values["width"] == pytest.approx(0.05, rel=0.3)
         assert values["peak"] == pytest.approx(size, rel=0.3)
+    if "stop" in pattern:
+        place = {parameter.name: parameter.value for parameter in result.findings[0].parameters}["place"]
+        assert place == pytest.approx(np.quantile(np.asarray(motion.q)[:, 1], 0.8), abs=0.05)
     if "sway" in pattern:
         values = {parameter.name: parameter.value for parameter in result.findings[0].parameters}
         assert values["frequency"] == pytest.approx(1.13 if "odd" in pattern else 0.27, abs=0.01)
@@ -118,3 +138,23 @@ def test_a_line_is_proposed_at_its_top(
         residual[:, 0] += np.sin(2 * np.pi * frequency * recording.t + 0.4)
         ((first,), *_) = vibration.propose(problem.situation, 1, residual, 4)
         assert abs(first - frequency) < 0.02 / recording.duration
+
+
+def test_what_a_joint_feels_when_it_goes_is_told(arm: Robot, arm_plant: Callable) -> None:
+    """A brake that opens late drags in the first quarter of a second of each move, against it."""
+    step, moves = 0.004, 16
+    rise = np.concatenate([np.zeros(150), 0.5 - 0.5 * np.cos(np.pi * np.arange(350) / 350), np.ones(100)])
+    way = np.concatenate([[0.0], np.cumsum(np.tile([1.0, -0.6, -1.0, 0.6], moves // 4))])
+    turn = np.concatenate([a + (b - a) * rise for a, b in pairwise(way)])
+    t = step * np.arange(len(turn))
+    q = np.column_stack([0.8 * np.roll(turn, 300), turn])
+    q[:300, 0] = 0.0
+    dq = np.gradient(q, step, axis=0)
+    motion = Motion(t=t, q=q, dq=dq, ddq=np.gradient(dq, step, axis=0))
+    log = simulate(arm_plant(torque_noise=0.02), motion, seed=0)
+    since = np.tile(np.arange(600) - 150, moves) * step
+    drag = 0.2 * np.sqrt(np.mean(log.tau[:, 1] ** 2)) * np.sign(dq[:, 1]) * ((since >= 0) & (since < 0.25))
+    result = diagnose(arm, replace(log, tau=log.tau + np.column_stack([np.zeros(len(t)), drag])))
+    assert result.verdict == "unexplained"
+    assert (result.findings[0].joint, result.findings[0].pattern) == (2, "pattern:start:0:odd")
+    assert result.findings[0].gain.ci95[0] > 0
