@@ -25,6 +25,8 @@ OPEN = 3.84
 CHANGED = 7.35
 # It is followed each way in growing steps, until so many in a row drop by twice as much.
 FIRST, GROWING, MANY, LOST = 1.5, 1.3, 24, 3
+# What lies between the last of them and the next is halved so often.
+HALVINGS = 4
 # A choice is made where another explains less by so much: strong evidence.
 CHOSEN = 10.0
 # Of two shapes one is followed in steps that grow by this, so often at most, the other refitted in so many evaluations.
@@ -113,15 +115,22 @@ def _reach(drop: Callable[[float], float], value: float, step: float, bounds: tu
     """
     farthest = 0.0
     for way in (-1, 1):
-        lost = 0
+        lost, inside, outside = 0, 0.0, np.inf
         for distance in step * FIRST * GROWING ** np.arange(MANY):
             x = value + way * distance
             if lost == LOST or not bounds[0] <= x <= bounds[1]:
                 break
             lower = drop(x)
             lost = lost + 1 if lower > 2 * CHANGED else 0
-            # Where it is lost between two points is not known: half way.
-            farthest = max(farthest, distance * (1 + GROWING) / 2) if lower < CHANGED else farthest
+            if lower < CHANGED:
+                inside, outside = distance, np.inf
+            else:
+                outside = min(outside, distance)
+        # Between the last point where it may be and the next one: a moment in a rest may be anywhere to its end.
+        for _ in range(HALVINGS if inside and np.isfinite(outside) else 0):
+            middle = (inside + outside) / 2
+            inside, outside = (middle, outside) if drop(value + way * middle) < CHANGED else (inside, middle)
+        farthest = max(farthest, inside)
     return float(farthest)
 
 

@@ -12,7 +12,7 @@ from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import refine
 from estimation.diagnosis.scoring import accept, score
-from estimation.diagnosis.shape_errors import CUT, between_logs, hidden_moments, shape_errors
+from estimation.diagnosis.shape_errors import CUT, _reach, between_logs, hidden_moments, shape_errors
 from estimation.diagnosis.states import record
 from robots.common.stretches import spans
 from robots.robot import Robot
@@ -144,3 +144,12 @@ def test_a_change_between_two_logs_may_have_come_at_any_time_there(
     # A push has its own beginning and end.
     push = refine(problem, Hypothesis(EFFECTS["external_contact"], None), (begins, 1.0, 0.5, 0.0), accept(problem, ()))
     assert between_logs(problem, push, []) is push
+
+
+@pytest.mark.parametrize("edge", [0.9, 3.17, 11.0])
+def test_a_moment_may_be_as_far_as_the_likelihood_drops_at_once(edge: float) -> None:
+    """As at the end of a rest: the last place of it is found to a hundredth, on either side."""
+    for way in (-1, 1):
+        told = _reach(lambda x, way=way: 30.0 if way * x > edge or way * x < -0.3 else 3.0, 0.0, 0.2, (-50.0, 50.0))
+        assert told == pytest.approx(edge, rel=0.02)
+    assert _reach(lambda x: 30.0, 0.0, 0.2, (-50.0, 50.0)) == 0.0
