@@ -152,12 +152,15 @@ def _supply(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> A
 
 
 def _followers(s: Situation, source: Array, memories: tuple[float, ...]) -> Array:
-    """What follows a source (N,) with some time constants [s], (N, k), each log anew."""
+    """What follows a source (N,) with some time constants [s], (N, k), each log anew, from its mean there.
+
+    From zero it would settle for as long, as a drift does that begins with the log.
+    """
     columns = np.zeros((len(s), len(memories)))
     for k, memory in enumerate(memories):
         keep = float(np.exp(-s.period / memory))
         for run in s.runs:
-            columns[run, k] = lfilter([1 - keep], [1.0, -keep], source[run])
+            columns[run, k] = lfilter([1 - keep], [1.0, -keep], source[run], zi=[keep * source[run].mean()])[0]
     return columns
 
 

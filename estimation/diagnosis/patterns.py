@@ -208,6 +208,11 @@ def is_of_time(effect: object) -> bool:
     return isinstance(effect, (Fading, Draining)) or (isinstance(effect, Pattern) and effect.kind in ("time", "ageing"))
 
 
+def is_plain(effect: object) -> bool:
+    """Whether a pattern's few functions resemble a cause that is no other: a name that explains less is none."""
+    return isinstance(effect, Stop) or (isinstance(effect, Pattern) and effect.kind == "ageing")
+
+
 def swings_by_itself(effect: object) -> bool:
     """Whether a pattern goes to and fro in time, not with the motion: where in its swing it is elsewhere is open."""
     return isinstance(effect, Pattern) and effect.kind in SWAYING

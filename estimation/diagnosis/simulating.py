@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from estimation.diagnosis.carried import situation_on, with_body
+from estimation.diagnosis.patterns import PREFIX
 from estimation.diagnosis.recording import Recording, cut
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.simulation import Curves, Simulation
@@ -154,8 +155,9 @@ class _Effects:
     def __init__(self, plant: Plant, whole: Recording, rows: slice, cutoff: float) -> None:
         self.plant, self.part = plant, cut(whole, rows)
         count = range(len(plant.members))
-        # What depends on the past needs all of it; the rest this stretch alone.
-        late = [i for i in count if plant.members[i].hypothesis.effect.depends_on == "time"]
+        # What depends on the past, as a free function may, needs all of it; the rest this stretch alone.
+        effects = [member.hypothesis.effect for member in plant.members]
+        late = [i for i in count if effects[i].depends_on == "time" or effects[i].name.startswith(PREFIX)]
         self.near = [i for i in count if i not in late]
         self.late = late
         zero = np.zeros_like(self.part.q)

@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.diagnosis.free_functions import LEAST, criterion, free_functions, worth
-from estimation.diagnosis.patterns import is_of_time
+from estimation.diagnosis.patterns import is_of_time, is_plain
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scan import Entry
 from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.selection import Found, Selection
 from estimation.diagnosis.spotting import Spot
-from estimation.diagnosis.stopping import Stop
 
 # Named effects that explain less than this share of what stands out of the noise, or of what free functions do in their
 # place, do not explain it; nor do those that fit worse than one of those and explain less than the second share of it.
@@ -171,14 +170,17 @@ def _holds(
     if len(own) > 1 and not as_many and not _thriftier(problem, own, others, free, LEAST):
         return False
     if len(own) == 1:
-        # Waves over a joint's range, or a spring, are no more than one place of it where that explains nearly as much
-        # with less, or more.
-        spots, stops = ([e for e in here if isinstance(e.hypothesis.effect, kind)] for kind in (Spot, Stop))
-        enough = NEARLY * (gain - degrees) if own[0].hypothesis.effect.waves else np.inf
-        for entries, least in ((spots, enough), (stops, gain - degrees + LEAST)):
-            free, _ = free_functions(problem, entries, others, false_alarm, rng) if np.isfinite(least) else ([], [])
-            if free and free[0].degrees < degrees and worth(free[0]) > least:
-                return False
+        # Waves over a joint's range are no more than one place of it where that explains nearly as much with less.
+        waves = own[0].hypothesis.effect.waves
+        spots = [entry for entry in here if waves and isinstance(entry.hypothesis.effect, Spot)]
+        free, _ = free_functions(problem, spots, others, false_alarm, rng)
+        if free and free[0].degrees < degrees and worth(free[0]) > NEARLY * (gain - degrees):
+            return False
+        # Nor is anything what another place, or a position that counts less and less, explains more of, and better.
+        plain = [entry for entry in here if is_plain(entry.hypothesis.effect)]
+        free, _ = free_functions(problem, plain, others, false_alarm, rng)
+        if free and worth(free[0]) > gain - degrees + LEAST and not _thriftier(problem, own, others, free[:1]):
+            return False
     if any(member.hypothesis.effect.passing for member in own):
         # What comes and goes follows nearly any torque: functions of the motion that do so with less refute it.
         moving = [entry for entry in here if not is_of_time(entry.hypothesis.effect)]

@@ -22,6 +22,8 @@ from robots.terms.effects.base import Coefficient, Shape
 # A parameter that an effect is not linear in is determined where its interval reaches no farther than this share of it;
 # a moment, so many seconds.
 WITHIN, MOMENT = 0.2, 0.2
+# Share of an effect's largest coefficient that is none.
+NOTHING = 1e-6
 
 
 def word_finding(
@@ -54,6 +56,8 @@ def word_finding(
         units = {"force": force_unit(robot, joint - 1), "length": length_unit(robot, joint - 1)}
     parameters = _parameters(robot, member, fitted, i, known)
     sentence = _when(hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units), parameters)
+    if hypothesis.effect.vague and not known[: len(extension.coefficients)].any():
+        sentence = hypothesis.effect.vague.format(joint=joint)
     pattern = hypothesis.name if hypothesis.name.startswith(PREFIX) else ""
     rivals = [] if found is None else [(rival.hypothesis, worse) for rival, worse in found.rivals]
     return Finding(
@@ -111,11 +115,12 @@ def _parameters(
     ]
     values = [*extension.coefficients.tolist(), *extension.shape]
     errors = np.sqrt(np.maximum(np.diag(extension.covariance), 0.0))
+    largest = NOTHING * float(np.abs(extension.coefficients).max(initial=0.0))
     result = []
     for own, value, error, sure in zip(described, values, errors, known, strict=True):
         if not own.name or (isinstance(own, Shape) and own.is_left(value)):
             continue
-        if isinstance(own, Coefficient) and value == 0.0 and not np.isfinite(error):
+        if isinstance(own, Coefficient) and abs(value) <= largest and not np.isfinite(error):
             # A column that is none in these logs, such as a knot of a short drift.
             continue
         interval = (value - 1.96 * error, value + 1.96 * error)

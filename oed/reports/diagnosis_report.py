@@ -68,7 +68,8 @@ def _verdict(view: DiagnosisView) -> str:
     if view.verdict == "ambiguous":
         return f"Something is found, but not which of several causes. The likeliest: {first}{more}"
     if view.verdict == "unexplained":
-        helps = any(finding.interval[0] > 0 for finding in view.findings)
+        # A free function names no cause, however much it brings.
+        helps = any(finding.interval[0] > 0 and finding.named for finding in view.findings)
         part = "A part of the error is explained, another is not." if helps else _STANDS_OUT
         return f"{part} {first}{more}"
     return f"{first}{more}"
@@ -136,7 +137,8 @@ def _torque(view: DiagnosisView) -> Section:
     table = Table(
         headings=("joint", "base model [%]", "extended model [%]", "less error [%]"),
         rows=tuple(rows),
-        caption="Error of the simulated torque over the torque's RMS, on data that the fit has not seen.",
+        caption="Error of the simulated torque over the torque's RMS, on data that the fit has not seen. Rows in which "
+        "a joint stands or turns round do not count for it: its friction may have any value there.",
     )
     return Section(
         title="Measured and simulated torque",
@@ -188,7 +190,8 @@ def _finding(view: DiagnosisView, index: int) -> Section:
             Table(
                 headings=("instead of it", "worse by, in BIC"),
                 rows=tuple((title, round(margin, 1)) for title, margin in finding.rivals),
-                caption=f"Below {CLOSE:g} the rival remains possible.",
+                caption=f"{'Below' if finding.rivals[0][1] < CLOSE else 'No nearer than'} {CLOSE:g}: "
+                f"{'the rival remains possible' if finding.rivals[0][1] < CLOSE else 'no rival remains possible'}.",
             )
         )
     picture = cause_picture(
@@ -226,7 +229,7 @@ def _next(view: DiagnosisView) -> Section:
     if not view.next_kind:
         rare = [title for finding in view.findings for title, worse in finding.rivals if worse < CLOSE]
         text = _UNLESS.format(", ".join(rare)) if view.verdict == "named" and rare else _NO_EXPERIMENT[view.verdict]
-        return Section(title="Next step", paragraphs=(text,))
+        return Section(title="Next step", paragraphs=(f"{text}{_rough(view)}",))
     paragraphs = [f"Make {view.next_kind}: {view.next_why}." if view.next_why else f"Make {view.next_kind}."]
     rows: Sequence[tuple[Cell, ...]] = tuple(
         (kind, round(100 * chance), round(duration)) for kind, chance, duration in view.next_ranking
@@ -248,6 +251,18 @@ def _next(view: DiagnosisView) -> Section:
             "run instead."
         )
     return Section(title="Next step", paragraphs=tuple(paragraphs), tables=(*tables, *_runs(view)))
+
+
+def _rough(view: DiagnosisView) -> str:
+    """Says which values of what is named a longer log could tell."""
+    rough = [
+        f"{', '.join(name.replace('_', ' ') for name in finding.rough)} of {finding.title}"
+        for finding in view.findings
+        if finding.rough
+    ]
+    if view.verdict != "named" or not rough:
+        return ""
+    return f" Not well determined yet: {'; '.join(rough)}. More of such logs would tell them better."
 
 
 def _runs(view: DiagnosisView) -> tuple[Table, ...]:

@@ -40,6 +40,8 @@ class FindingView:
         of: what before and after are the error of.
         unit: of the residuals where they are no torques.
         elsewhere: joints on which before and after are, where those are not its own; begins with a space, or is empty.
+        named: whether it is an effect of the catalogue.
+        rough: names of the parameters that are not well determined.
     """
 
     title: str
@@ -60,6 +62,8 @@ class FindingView:
     of: str = "torque"
     unit: str = ""
     elsewhere: str = ""
+    named: bool = True
+    rough: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -206,6 +210,8 @@ def _finding(finding: Finding, trace: Trace, coordinate: Array) -> FindingView:
         residual_before=trace.before[:, joint - 1],
         residual_after=trace.after[:, joint - 1],
         elsewhere=finding.elsewhere,
+        named=finding.effect != "unexplained",
+        rough=tuple(p.name for p in finding.parameters if not p.determined),
     )
 
 

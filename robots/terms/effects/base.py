@@ -123,6 +123,7 @@ class Effect(ABC):
         blurs: whether it lets friction turn round later or over some time: how sharp its sign is shows beside it only.
         waves: whether it goes up and down over the joint's range, as a spot of it does once.
         last: whether it acts on all of the torque, that of other effects too (`Situation.beyond`).
+        vague: what is said of it where the logs determine none of its coefficients; nothing by default.
         shapes: the parameters that the columns are not linear in.
         rivals: effects that resemble it, the closest first.
         experiments: kinds of experiment that separate it from them, the best first.
@@ -141,6 +142,7 @@ class Effect(ABC):
     blurs: ClassVar[bool] = False
     waves: ClassVar[bool] = False
     last: ClassVar[bool] = False
+    vague: ClassVar[str] = ""
     shapes: ClassVar[tuple[Shape, ...]] = ()
     rivals: ClassVar[tuple[str, ...]] = ()
     experiments: ClassVar[tuple[str, ...]] = ()

@@ -56,8 +56,11 @@ class FrictionStep(JointEffect):
         length: str = "rad",
     ) -> str:
         """Says what the values mean."""
-        change = "rose" if coefficients[0] + coefficients[1] > 0 else "fell"
+        coulomb, viscous = coefficients[:2]
+        change = "changed" if coulomb * viscous < 0 else "rose" if coulomb + viscous > 0 else "fell"
+        if change == "fell":
+            coulomb, viscous = -coulomb, -viscous
         return (
-            f"The friction of joint {joint} {change} at t = {shape[0]:.2f} s: Coulomb by {coefficients[0]:.3g} "
-            f"{force}, viscous by {coefficients[1]:.3g} {force} s/{length}."
+            f"The friction of joint {joint} {change} at t = {shape[0]:.2f} s: Coulomb by {coulomb:.3g} {force}, "
+            f"viscous by {viscous:.3g} {force} s/{length}."
         )

@@ -89,8 +89,9 @@ class LoadDependentFriction(StaticJointEffect):
             "" if not shape or shape[0] == ALIKE else f" Driven back by its load it loses {shape[0]:.2g} times as much."
         )
         return (
-            f"The friction of joint {joint} grows with its load: {100 * coefficients[0]:.3g} % of it in Coulomb "
-            f"friction, and {100 * coefficients[1]:.3g} % per {length}/s.{back}"
+            f"The friction of joint {joint} {'grows' if coefficients[0] >= 0 else 'falls'} with its load: by "
+            f"{100 * abs(coefficients[0]):.3g} % of it in Coulomb friction, and "
+            f"{100 * coefficients[1] * (1 if coefficients[0] >= 0 else -1):.3g} % per {length}/s.{back}"
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

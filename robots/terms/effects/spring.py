@@ -40,6 +40,10 @@ class Spring(StaticJointEffect):
 
     name: ClassVar[str] = "spring"
     title: ClassVar[str] = "a spring or cable on the joint"
+    vague: ClassVar[str] = (
+        "A spring or cable acts on joint {joint}; how stiff it is where, these logs do not tell: gravity resembles "
+        "much of it."
+    )
     shapes: ClassVar[tuple[Shape, ...]] = (LEVER, CENTRE)
     rivals: ClassVar[tuple[str, ...]] = ("base_tilt", "torque_ripple", "asymmetric_friction", "encoder_offset")
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "second_base_pose", "payload")
