@@ -23,8 +23,25 @@ BINS = 1000
 """Of the joint's range, by which all spots are ranked at once."""
 
 
+class Placed(JointEffect):
+    """What is at a place of a joint's range."""
+
+    def coordinate(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the position."""
+        assert joint is not None
+        return f"position of joint {joint} [rad or m]", situation.q[:, joint - 1]
+
+    @staticmethod
+    def reach(situation: Situation, joint: int | None) -> tuple[float, float]:
+        """Gives where a joint's range begins, and its extent; zero for one that hardly moves."""
+        assert joint is not None
+        q = situation.q[:, joint - 1]
+        reach = float(np.ptp(q)) if len(q) else 0.0
+        return (float(q.min()), reach) if reach > 1e-3 else (0.0, 0.0)
+
+
 @dataclass(frozen=True)
-class Spot(JointEffect):
+class Spot(Placed):
     """tau = c exp(-((q - centre) / width)^2 / 2), times the direction of motion where it rubs.
 
     Attributes:
@@ -55,8 +72,7 @@ class Spot(JointEffect):
 
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
         """Lists spots all over the joint's range."""
-        assert joint is not None
-        low, reach = _range(situation, joint)
+        low, reach = self.reach(situation, joint)
         if not reach:
             return ()
         return tuple(
@@ -67,8 +83,7 @@ class Spot(JointEffect):
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
         """Keeps the spot within the joint's range."""
-        assert joint is not None
-        low, reach = _range(situation, joint)
+        low, reach = self.reach(situation, joint)
         return (low, low + reach), (NARROWEST * reach, WIDEST * reach)
 
     def propose(
@@ -79,7 +94,7 @@ class Spot(JointEffect):
         grid = self.grid(situation, joint)
         if len(grid) <= count:
             return grid
-        low, reach = _range(situation, joint)
+        low, reach = self.reach(situation, joint)
         own = residual[:, joint - 1]
         q = (situation.q[:, joint - 1] - low) / reach
         turned = own * situation.sign[:, joint - 1] if self.odd else own
@@ -115,15 +130,3 @@ class Spot(JointEffect):
             f"The residual torque of joint {joint} is that of a spot at {shape[0]:.3g} {length}, {2 * shape[1]:.2g} "
             f"{length} wide, with {coefficients[0]:.2g} {force} of {what}."
         )
-
-    def coordinate(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the position."""
-        assert joint is not None
-        return f"position of joint {joint} [rad or m]", situation.q[:, joint - 1]
-
-
-def _range(situation: Situation, joint: int) -> tuple[float, float]:
-    """Gives where a joint's range begins, and its extent; zero for one that hardly moves."""
-    q = situation.q[:, joint - 1]
-    reach = float(np.ptp(q)) if len(q) else 0.0
-    return (float(q.min()), reach) if reach > 1e-3 else (0.0, 0.0)

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.spotting import Placed
 from robots.robot import Robot
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects import Coefficient, JointEffect, Shape, Situation
+from robots.terms.effects import Coefficient, Shape, Situation
 
 Array = NDArray[np.float64]
 
@@ -20,7 +21,7 @@ RANGE = (0.02, 0.98)
 
 
 @dataclass(frozen=True)
-class Stop(JointEffect):
+class Stop(Placed):
     """tau = (k + d dq) x beyond a place c, x = (q - c) there; or short of it, x = (c - q).
 
     What is met gives way in proportion (k), and takes energy by how deep it is (d), as a buffer of rubber does.
@@ -51,12 +52,12 @@ class Stop(JointEffect):
 
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
         """Lists places all over the joint's range; none for one that hardly moves."""
-        low, reach = self._range(situation, joint)
-        return tuple((low + reach * share,) for share in PLACES) if reach > 1e-3 else ()
+        low, reach = self.reach(situation, joint)
+        return tuple((low + reach * share,) for share in PLACES) if reach else ()
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
         """Keeps the place within the joint's range."""
-        low, reach = self._range(situation, joint)
+        low, reach = self.reach(situation, joint)
         return ((low + RANGE[0] * reach, low + RANGE[1] * reach),)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
@@ -79,14 +80,3 @@ class Stop(JointEffect):
             f"{length} and changes by {coefficients[0]:.3g} {force}/{length} from there: as if a buffer, a stop, or a "
             f"hose that goes taut were met."
         )
-
-    def coordinate(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the position."""
-        assert joint is not None
-        return f"position of joint {joint} [rad or m]", situation.q[:, joint - 1]
-
-    @staticmethod
-    def _range(situation: Situation, joint: int | None) -> tuple[float, float]:
-        assert joint is not None
-        q = situation.q[:, joint - 1]
-        return (float(q.min()), float(np.ptp(q))) if len(q) else (0.0, 0.0)
