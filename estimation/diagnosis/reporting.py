@@ -21,6 +21,7 @@ from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.notes import faster_joints, notes_of, worse_joints
 from estimation.diagnosis.patterns import all_patterns
+from estimation.diagnosis.predicting import smoothed_best
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import cut
 from estimation.diagnosis.refinement import Member
@@ -121,7 +122,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         excess=told.excess,
         limits=told.limits,
         next_experiment=_next(problem, founds) if verdict == "ambiguous" else None,
-        model=replace(fitted.model, extensions=(*fitted.model.extensions, *added)),
+        model=smoothed_best(replace(fitted.model, extensions=(*fitted.model.extensions, *added)), problem, told.logs),
         how_unseen=unseen.how,
         notes=(
             *told.notes,
