@@ -144,7 +144,7 @@ def _limit(
         fitted = min((sum(known[k] is None for k in free) for known in assumed), default=len(free))
         penalty = (len(roots[at]) + fitted) * float(np.log(problem.rows * len(entry.groups[at].joints)))
         needed = detectable_energy(len(roots[at]), tries, false_alarm=false_alarm, penalty=penalty)
-        sure = _sure(problem, hypothesis, entry.shapes[at]) if hypothesis.effect.alike else 1.0
+        sure = _sure(problem, hypothesis, entry.shapes[at]) if hypothesis.effect.lags else 1.0
         return float(size_per_energy(mixtures[at], entry.groups[at].gram) * np.sqrt(needed / sure))
 
     sizes = {at: size(at) for at in showing}

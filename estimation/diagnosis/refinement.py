@@ -177,7 +177,7 @@ def refine(
             shape = tuple(own if value is None else value for value, own in zip(known, refined.shape, strict=True))
             evaluate(shape, sum(known[k] is None for k in loose))
     found = best[0]
-    if hypothesis.effect.alike:
+    if hypothesis.effect.lags:
         return _agreed(problem, found, accepted)
     return replace(found, scatter=_borne_out(problem, found, accepted)) if hypothesis.effect.kicks else found
 

@@ -23,6 +23,7 @@ class CurrentLag(JointEffect):
     name: ClassVar[str] = "current_lag"
     title: ClassVar[str] = "torque of one joint that is logged late (filter)"
     rare: ClassVar[bool] = True
+    lags: ClassVar[bool] = True
     blurs: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (replace(SHIFT, lower=0.0, grid=tuple(s for s in SHIFT.grid if s > 0)),)
     rivals: ClassVar[tuple[str, ...]] = ("time_delay", "presliding_hysteresis", "joint_elasticity")

@@ -37,6 +37,7 @@ class TimeDelay(Effect):
     title: ClassVar[str] = "torque that is logged later than position"
     whole_robot: ClassVar[bool] = True
     alike: ClassVar[bool] = True
+    lags: ClassVar[bool] = True
     blurs: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (SHIFT,)
     rivals: ClassVar[tuple[str, ...]] = ("current_lag", "presliding_hysteresis", "joint_elasticity")

@@ -128,3 +128,23 @@ def test_an_interval_is_no_narrower_than_the_profile(recording: Recording, posed
     found = refine(problem, STEP, (TRUE + 0.3,), nothing)
     covariance = fit_extended(problem, [found], {}).model.extensions[0].covariance
     assert np.sqrt(covariance[2, 2]) >= 0.999 * errors.shape_errors(problem, found, nothing)[0]
+
+
+@pytest.mark.parametrize("moment", [0.0, 3e-3])
+def test_a_lag_of_one_joint_is_told_no_better_than_its_reversals(
+    recording: Recording, posed: Callable, moment: float
+) -> None:
+    """However many of them: of a lag d whose moments are known to m, no more than (d / m)^2 is evidence."""
+    lag, joint = 6e-3, 2
+    plain = posed(np.zeros_like(recording.tau))
+    problem = posed(lag * lateness(plain.situation, lag) * [0.0, 1.0])
+    everywhere, both = np.ones(recording.q.shape, dtype=bool), np.ones(2, dtype=bool)
+    known = replace(problem.recording, clear=everywhere, trusted=both, moments=np.full(2, moment))
+    found = refine(
+        replace(problem, recording=known), Hypothesis(EFFECTS["current_lag"], joint), (lag,), accept(problem, ())
+    )
+    assert found.gain > 60
+    own = score(problem, found.group, accept(problem, ()))
+    gram, cross = float(own.gram[0, 0]), float(own.cross[0])
+    assert found.doubt == pytest.approx(cross**2 / gram * (1 - 1 / (1 + moment**2 * gram)), rel=0.01, abs=1e-9)
+    assert (found.worth(problem.rows) > 10) is (moment == 0)
