@@ -190,8 +190,7 @@ def _finding(view: DiagnosisView, index: int) -> Section:
             Table(
                 headings=("instead of it", "worse by, in BIC"),
                 rows=tuple((title, round(margin, 1)) for title, margin in finding.rivals),
-                caption=f"{'Below' if finding.rivals[0][1] < CLOSE else 'No nearer than'} {CLOSE:g}: "
-                f"{'the rival remains possible' if finding.rivals[0][1] < CLOSE else 'no rival remains possible'}.",
+                caption=f"Below {CLOSE:g} a rival remains possible{'' if finding.rivals[0][1] < CLOSE else ': none is'}.",
             )
         )
     picture = cause_picture(
