@@ -190,7 +190,8 @@ def _finding(view: DiagnosisView, index: int) -> Section:
             Table(
                 headings=("instead of it", "worse by, in BIC"),
                 rows=tuple((title, round(margin, 1)) for title, margin in finding.rivals),
-                caption=f"Below {CLOSE:g} a rival remains possible{'' if finding.rivals[0][1] < CLOSE else ': none is'}.",
+                caption=f"Below {CLOSE:g} a rival remains possible"
+                f"{'' if finding.rivals[0][1] < CLOSE else ': none does'}.",
             )
         )
     picture = cause_picture(
