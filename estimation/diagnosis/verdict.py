@@ -173,7 +173,7 @@ def _holds(
         # Waves over a joint's range are no more than one place of it where that explains nearly as much with less.
         waves = own[0].hypothesis.effect.waves
         spots = [entry for entry in here if waves and isinstance(entry.hypothesis.effect, Spot)]
-        free, _ = free_functions(problem, spots, others, false_alarm, rng)
+        free = free_functions(problem, spots, others, false_alarm, rng)[0] if spots else []
         if free and free[0].degrees < degrees and worth(free[0]) > NEARLY * (gain - degrees):
             return False
         # Nor is anything what another place, or a position that counts less and less, explains more of, and better.
