@@ -55,12 +55,12 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
     at = base.shape[2]
     told: list[Member] = []
     for i, member in enumerate(members):
-        X = dense(problem, member.hypothesis, member.shape)
         rest = [m for k, m in enumerate(members) if k != i]
         steps = shape_errors(problem, member, accept(problem, tuple(m.group for m in rest)))
         member = between_logs(problem, member, rest)
         steps = hidden_moments(problem, member, rest, steps)
         told.append(member)
+        X = dense(problem, member.hypothesis, member.shape)
         slopes = [_slope(problem, member, k, abs(step)) for k, step in enumerate(steps)]
         blocks += [X, *slopes]
         slices.append((at, X.shape[2], len(member.shape)))

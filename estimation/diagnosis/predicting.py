@@ -33,10 +33,13 @@ def smoothed_best(model: Model, problem: Problem, logs: Sequence[Log]) -> Model:
     log = max(logs, key=lambda log: float(log.t[-1] - log.t[0]))
     middle = 0.5 * float(log.t[0] + log.t[-1])
     part = log.rows(slice(*np.searchsorted(log.t, (middle - 0.5 * STRETCH, middle + 0.5 * STRETCH)).tolist()))
-    errors = {}
-    for cutoff in np.geomspace(low, high, POINTS if high > low else 1):
-        stated = replace(model, provenance={**model.provenance, "cutoff_hz": float(cutoff)})
-        spread = predict(stated, part).relative_spread
-        told = spread[np.isfinite(spread) & (spread > 0)]
-        errors[float(np.mean(np.log(told))) if len(told) else 0.0] = stated
-    return errors[min(errors)]
+    tried = np.geomspace(low, high, POINTS if high > low else 1)
+    stated = [replace(model, provenance={**model.provenance, "cutoff_hz": float(cutoff)}) for cutoff in tried]
+    return min(stated, key=lambda one: _misfit(one, part))
+
+
+def _misfit(model: Model, log: Log) -> float:
+    """Mean over the joints of the logarithm of a prediction's error over the torque's spread."""
+    spread = predict(model, log).relative_spread
+    told = spread[np.isfinite(spread) & (spread > 0)]
+    return float(np.mean(np.log(told))) if len(told) else 0.0

@@ -193,8 +193,7 @@ def hidden_moments(problem: Problem, member: Member, others: Sequence[Member], e
         others: what else was found.
         errors: by the profiles.
     """
-    result, shapes = list(errors), member.hypothesis.effect.shapes
-    lasts = [i for i, s in enumerate(shapes) if s.name == "duration"]
+    result, lasts = list(errors), _durations(member)
     for k in _moments(member):
         for start, stop in _hidden(problem, member, others, member.shape[k]):
             far = max(member.shape[k] - start, stop - member.shape[k])
@@ -205,18 +204,27 @@ def hidden_moments(problem: Problem, member: Member, others: Sequence[Member], e
 
 def between_logs(problem: Problem, member: Member, others: Sequence[Member]) -> Member:
     """Puts a change that may as well have come between two logs in the middle of where it may have come."""
-    moments, t = _moments(member), problem.recording.t
-    ends = [(t[start - 1], t[start]) for start in problem.recording.starts[1:]]
-    if len(moments) != 1 or any(s.name == "duration" for s in member.hypothesis.effect.shapes):
+    moments = _moments(member)
+    if len(moments) != 1 or _durations(member):
         return member
     for start, stop in _hidden(problem, member, others, member.shape[moments[0]]):
-        if any(start <= last and first <= stop for last, first in ends):
+        if any(start <= last and first <= stop for last, first in _pauses(problem)):
             return replace(member, shape=with_value(member.shape, moments[0], float(start + stop) / 2))
     return member
 
 
 def _moments(member: Member) -> list[int]:
     return [k for k, s in enumerate(member.hypothesis.effect.shapes) if s.moment]
+
+
+def _durations(member: Member) -> list[int]:
+    return [k for k, s in enumerate(member.hypothesis.effect.shapes) if s.name == "duration"]
+
+
+def _pauses(problem: Problem) -> list[tuple[float, float]]:
+    """Lists the times [s] between which no log was running."""
+    t = problem.recording.t
+    return [(float(t[start - 1]), float(t[start])) for start in problem.recording.starts[1:]]
 
 
 def _hidden(problem: Problem, member: Member, others: Sequence[Member], moment: float) -> list[tuple[float, float]]:
@@ -231,7 +239,7 @@ def _hidden(problem: Problem, member: Member, others: Sequence[Member], moment: 
             lost = [np.abs(X).max(axis=1) for X in problem.columns_of(other.hypothesis, other.shape)[1]]
             blind.append(np.asarray(np.any([loss > CUT * loss.max() for loss in lost], axis=0)))
     found = [(float(t[start]), float(t[stop - 1])) for rows in blind for start, stop in spans(rows)]
-    found += [(float(t[start - 1]), float(t[start])) for start in problem.recording.starts[1:]]
+    found += _pauses(problem)
     merged: list[tuple[float, float]] = []
     for start, stop in sorted(found):
         # A joint that waits for the log's end, and one that waits in the next: between them nothing shows either.

@@ -14,7 +14,7 @@ from robots.terms.effects import Coefficient, Shape, Situation
 
 Array = NDArray[np.float64]
 
-PLACES = tuple(float(share) for share in np.arange(0.05, 0.96, 0.075))
+SCANNED = tuple(float(share) for share in np.arange(0.05, 0.96, 0.075))
 """Places of a scan, as shares of the joint's range."""
 RANGE = (0.02, 0.98)
 """Shares of it between which one is: what is met before it, or after it, is all or nothing of the data."""
@@ -53,7 +53,7 @@ class Stop(Placed):
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
         """Lists places all over the joint's range; none for one that hardly moves."""
         low, reach = self.reach(situation, joint)
-        return tuple((low + reach * share,) for share in PLACES) if reach else ()
+        return tuple((low + reach * share,) for share in SCANNED) if reach else ()
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
         """Keeps the place within the joint's range."""

@@ -88,10 +88,12 @@ class LoadDependentFriction(StaticJointEffect):
         back = (
             "" if not shape or shape[0] == ALIKE else f" Driven back by its load it loses {shape[0]:.2g} times as much."
         )
+        change, (coulomb, viscous) = "grows", 100 * coefficients[:2]
+        if coulomb < 0:
+            change, coulomb, viscous = "falls", -coulomb, -viscous
         return (
-            f"The friction of joint {joint} {'grows' if coefficients[0] >= 0 else 'falls'} with its load: by "
-            f"{100 * abs(coefficients[0]):.3g} % of it in Coulomb friction, and "
-            f"{100 * coefficients[1] * (1 if coefficients[0] >= 0 else -1):.3g} % per {length}/s.{back}"
+            f"The friction of joint {joint} {change} with its load: by {coulomb:.3g} % of it in Coulomb friction, and "
+            f"{viscous:.3g} % per {length}/s.{back}"
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
