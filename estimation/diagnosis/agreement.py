@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,21 +15,45 @@ Array = NDArray[np.float64]
 
 # Share of a coefficient that all joints have alike by which each may differ: so far its formula is true.
 ROUGH = 0.25
+# Share of what other effects explain on a joint by which their formulas may be wrong there.
+ASIDE = 0.05
 
 
-def joint_by_joint(
-    problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...], accepted: Accepted
-) -> tuple[Array, Array, Array]:
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What each of the joints on which an effect of one column acts tells of its coefficient.
+
+    Attributes:
+        gram: squares of the column (m,).
+        cross: its products with the residual (m,).
+        sure: share (m,) of what they tell that errors of the motion leave.
+        apart: variance (m,) of a joint's own coefficient that the formulas of other effects there may make.
+    """
+
+    gram: Array
+    cross: Array
+    sure: Array
+    apart: Array
+
+    def some(self, joints: NDArray[np.bool_]) -> Told:
+        """Gives what some of the joints (m,) tell."""
+        return Told(self.gram[joints], self.cross[joints], self.sure[joints], self.apart[joints])
+
+    def gain(self, *, surely: bool = False) -> float:
+        """What one coefficient of all joints explains, over their Birge ratio; of what is sure of that, where asked."""
+        share = self.sure if surely else 1.0
+        return agreed_gain(share * self.gram, share * self.cross, self.apart)
+
+
+def joint_by_joint(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...], accepted: Accepted) -> Told:
     """Measures an effect of one column, a torque per time, on each of its joints, beside others.
 
     A log with reversals tells a delay by them, as often as they come; but when a joint turns round is known only as
     well as its velocity is there, and kicks make that late at each of them alike.
-
-    Returns:
-        Squares of the column (m,), its products with the residual, and the share of what they tell that is sure.
     """
     joints, columns = problem.columns_of(hypothesis, shape)
     gram, cross, sure = np.zeros(len(joints)), np.zeros(len(joints)), np.ones(len(joints))
+    explained = _explained(accepted, problem.n)
     for k, (j, X) in enumerate(zip(joints, columns, strict=True)):
         group = problem.group((j,), (X,), effect=hypothesis.effect)
         own = score(problem, group, accepted)
@@ -37,10 +63,21 @@ def joint_by_joint(
             told = np.maximum(score(problem, problem.split(group, np.ones(1), beside), accepted).gram.sum(axis=1), 0.0)
             if told.sum() > 0:
                 sure[k] = (told[0] / (1.0 + late**2 * told[0]) + told[1]) / told.sum()
-    return gram, cross, sure
+    apart = ASIDE**2 * explained[list(joints)] / np.where(gram > 0, gram, np.inf)
+    return Told(gram, cross, sure, apart)
 
 
-def agreed_gain(gram: Array, cross: Array) -> float:
+def _explained(accepted: Accepted, joints: int) -> Array:
+    """Squares (n,) of what accepted groups are on each joint together."""
+    white: list[Array | float] = [0.0] * joints
+    coefficients = np.split(accepted.root.T @ accepted.cross, np.cumsum([group.size for group in accepted.groups])[:-1])
+    for group, own in zip(accepted.groups, coefficients, strict=False):
+        for j, columns in zip(group.joints, group.columns, strict=True):
+            white[j] = white[j] + columns @ own
+    return np.array([np.sum(np.square(one)) for one in white])
+
+
+def agreed_gain(gram: Array, cross: Array, apart: Array | None = None) -> float:
     """What one coefficient of all joints explains, over their Birge ratio.
 
     One joint may be at odds with the rest, where something else is left on it: it then counts for nothing.
@@ -48,15 +85,20 @@ def agreed_gain(gram: Array, cross: Array) -> float:
     Args:
         gram: squares of each joint's column (m,), one or more, of noise one.
         cross: each one's product with the residual (m,).
+        apart: variance (m,) by which a joint's own coefficient may be another for other effects' sake; none by default.
     """
     if len(gram) == 1:
         return float(cross[0] ** 2 / gram[0])
     everyone = np.ones((1, len(gram)), dtype=bool)
     sets = np.vstack([everyone, ~np.eye(len(gram), dtype=bool)]) if len(gram) > 2 else everyone
-    return max(_over_scatter(gram[chosen], cross[chosen]) for chosen in sets)
+    # Formulas may be as good as told, too: joints that agree are not asked to be apart.
+    errors = [np.zeros(len(gram)), *([] if apart is None else [apart])]
+    return max(_over_scatter(gram[chosen], cross[chosen], own[chosen]) for chosen in sets for own in errors)
 
 
-def _over_scatter(gram: Array, cross: Array) -> float:
-    mean = cross.sum() / gram.sum()
-    squares = np.sum((cross / gram - mean) ** 2 / (1.0 / gram + (ROUGH * mean) ** 2))
-    return max(float(cross.sum() ** 2 / gram.sum() / max(1.0, squares / (len(gram) - 1))), 1e-300)
+def _over_scatter(gram: Array, cross: Array, apart: Array) -> float:
+    own, variance = cross / gram, 1.0 / gram + apart
+    mean = np.sum(own / variance) / np.sum(1.0 / variance)
+    squares = np.sum((own - mean) ** 2 / (variance + (ROUGH * mean) ** 2))
+    explained = mean * (2.0 * cross.sum() - mean * gram.sum())
+    return max(float(explained / max(1.0, squares / (len(gram) - 1))), 1e-300)

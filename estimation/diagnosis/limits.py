@@ -172,8 +172,8 @@ def _limit(
 
 def _sure(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> float:
     """Gives the share of an effect's energy that counts, where joints tell it by reversals."""
-    gram, _, sure = joint_by_joint(problem, hypothesis, shape, accept(problem, ()))
-    return float(np.sum(sure * gram) / np.sum(gram)) if gram.any() else 1.0
+    told = joint_by_joint(problem, hypothesis, shape, accept(problem, ()))
+    return float(np.sum(told.sure * told.gram) / np.sum(told.gram)) if told.gram.any() else 1.0
 
 
 def _toughest(

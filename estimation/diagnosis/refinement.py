@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
+from estimation.diagnosis.agreement import joint_by_joint
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Group, Problem
 from estimation.diagnosis.scoring import Accepted, accept, score
@@ -184,14 +184,13 @@ def refine(
 
 def _agreed(problem: Problem, member: Member, accepted: Accepted) -> Member:
     """Says how much less its gain counts where joints differ in what they share (Birge 1932), or tell by reversals."""
-    gram, cross, sure = joint_by_joint(problem, member.hypothesis, member.shape, accepted)
-    told = gram > 0
-    if not told.any():
+    told = joint_by_joint(problem, member.hypothesis, member.shape, accepted)
+    if not (acts := told.gram > 0).any():
         return member
-    gram, cross, sure = gram[told], cross[told], sure[told]
-    agreed = agreed_gain(gram, cross)
-    scatter = max(1.0, float(cross.sum() ** 2 / gram.sum()) / agreed)
-    return replace(member, scatter=scatter, doubt=max(0.0, agreed - agreed_gain(sure * gram, sure * cross)))
+    told = told.some(acts)
+    agreed = told.gain()
+    scatter = max(1.0, float(told.cross.sum() ** 2 / told.gram.sum()) / agreed)
+    return replace(member, scatter=scatter, doubt=max(0.0, agreed - told.gain(surely=True)))
 
 
 def _borne_out(problem: Problem, member: Member, accepted: Accepted) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
+from estimation.diagnosis.agreement import joint_by_joint
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.quiet_logs import profile_gain
 from estimation.diagnosis.refinement import Member
@@ -67,14 +67,12 @@ def beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bo
 def _agreed(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
     """Whether joints on which no effect of theirs explains more tell a common coefficient by themselves."""
     beside = accept(problem, tuple(m.group for m in members))
-    gram, cross, sure = joint_by_joint(problem, candidate.hypothesis, candidate.shape, beside)
-    gram, cross = sure * gram, sure * cross
+    told = joint_by_joint(problem, candidate.hypothesis, candidate.shape, beside)
     others = [
         max((m.gain_on([j]) for m in members if m.hypothesis.joint == j + 1), default=0.0)
         for j in candidate.group.joints
     ]
-    told = (gram > 0) & (cross**2 >= gram * others)
-    if not told.any():
+    told = told.some((told.gram > 0) & (told.sure * told.cross**2 >= told.gram * others))
+    if not len(told.gram):
         return False
-    gram, cross = gram[told], cross[told]
-    return agreed_gain(gram, cross) - candidate.degrees * float(np.log(problem.rows * len(gram))) > LEAST
+    return told.gain(surely=True) - candidate.degrees * float(np.log(problem.rows * len(told.gram))) > LEAST

@@ -11,12 +11,15 @@ from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.planned import planned_problem
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.scoring import accept
+from estimation.diagnosis.scoring import Accepted, accept
 from robots.loading import load_robot
 from robots.plants import Sensors
 from robots.regressor import default_model
 from robots.signals import Motion
 from robots.terms.effects import EFFECTS
+
+# Positions, velocities and accelerations of a wave, per unit of its rate.
+_WAVES = ((0, np.sin), (1, np.cos), (2, lambda phase: -np.sin(phase)))
 
 
 def _shared(*coefficients: float, error: float = 0.01) -> tuple[float, float]:
@@ -63,8 +66,8 @@ def test_reversals_tell_a_delay_no_better_than_their_moments_are_known() -> None
         trusted = np.arange(6) < 4
         known = replace(problem.recording, clear=clear, trusted=trusted, moments=np.full(6, moment))
         seen: Problem = replace(problem, recording=known)
-        gram, _, sure = joint_by_joint(seen, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accept(seen, ()))
-        return gram, sure
+        told = joint_by_joint(seen, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accept(seen, ()))
+        return told.gram, told.sure
 
     everywhere, nowhere = np.ones(motion.q.shape, dtype=bool), np.zeros(motion.q.shape, dtype=bool)
     gram, sure = measured(everywhere, 1e-4)
@@ -74,3 +77,32 @@ def test_reversals_tell_a_delay_no_better_than_their_moments_are_known() -> None
     np.testing.assert_array_equal(sure[4:], 1.0)
     np.testing.assert_allclose(measured(nowhere, 1e-4)[1], 1.0)
     np.testing.assert_array_equal(measured(everywhere, 0.0)[1], 1.0)
+
+
+def test_a_joint_whose_other_effects_formula_may_hide_it_need_not_agree() -> None:
+    """A gear that gives way by forty times the delay, and is 5 % off, leaves its joints any delay of its own."""
+    gram, own = np.array([1e4, 1e4, 2e3, 1e3]), np.array([2.0, 2.0, 0.1, -0.6])
+    cross, apart = gram * own, np.array([0.0, 0.0, 2.0, 2.0]) ** 2
+    whole = float(cross.sum() ** 2 / gram.sum())
+    assert agreed_gain(gram, cross, apart) > 0.9 * whole
+    assert agreed_gain(gram, cross) < 0.3 * whole
+    # What such joints alone tell is no delay either.
+    alone = gram * np.array([0.0, 0.0, 1.0, 1.0])
+    assert agreed_gain(gram, alone, apart) < 0.02 * float(alone.sum() ** 2 / gram.sum())
+
+
+def test_what_other_effects_explain_on_a_joint_makes_its_own_coefficient_doubtful() -> None:
+    """Five hundredths of the torque of effects accepted there, over the size of the column."""
+    robot = load_robot("ur10")
+    t = 0.004 * np.arange(3000)
+    motion = Motion(t, *(np.outer(f(2.0 * t), 2.0**k * np.linspace(0.4, 1.0, 6)) for k, f in _WAVES))
+    model = default_model(replace(robot, friction=np.full((6, 4), 3.0)), velocity_scale=2e-3)
+    problem = planned_problem(model, model.nominal, [motion], noise=Sensors(torque_noise=0.025))
+    friction = problem.measured(Hypothesis(EFFECTS["stribeck"], 2), (0.3, 1.0))
+    root = 1.0 / np.sqrt(friction.gram)
+    accepted = Accepted((friction,), root, np.array([100.0]), np.zeros((1, 0)))
+    told = joint_by_joint(problem, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accepted)
+    np.testing.assert_array_equal(told.apart[[0, 2, 3, 4, 5]], 0.0)
+    coefficients = root.T @ accepted.cross
+    torque = friction.columns[0].astype(float) @ coefficients
+    assert told.apart[1] == pytest.approx((0.05**2) * float(torque @ torque) / told.gram[1], rel=1e-4)

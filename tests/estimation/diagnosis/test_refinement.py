@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis import refinement, worthwhile
+from estimation.diagnosis.agreement import Told
 from estimation.diagnosis.contenders import contenders
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Group
@@ -162,8 +163,9 @@ def test_what_all_joints_share_is_told_by_those_without_a_stronger_effect(
     delay = replace(_member("time_delay", None, (column, column)), gain=sum(gains))
     ripple = replace(_member("torque_ripple", 1, (column,)), gain=other)
     gram = np.array([1e4, 1e4])
+    told = Told(gram, np.sqrt(np.array(gains) * gram), np.ones(2), np.zeros(2))
     monkeypatch.setattr(worthwhile, "accept", lambda problem, groups: None)
-    monkeypatch.setattr(worthwhile, "joint_by_joint", lambda *_: (gram, np.sqrt(np.array(gains) * gram), np.ones(2)))
+    monkeypatch.setattr(worthwhile, "joint_by_joint", lambda *_: told)
     situation = SimpleNamespace(runs=(slice(0, ROWS),), robot=None)
     problem = SimpleNamespace(situation=situation, recording=SimpleNamespace(tau=column), rows=ROWS)
     assert beyond(problem, delay, [ripple]) is counts  # type: ignore[arg-type]
