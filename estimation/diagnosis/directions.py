@@ -33,6 +33,9 @@ BESIDE, SPREAD, NO_KICK = 3, 0.25, 0.02
 LARGER = 3.0
 # Up to such a frequency [Hz] a position loop undoes what kicks do to a joint, which has then most of it about there.
 LOOP = 25.0
+# A position's noise beside reversals and elsewhere is as good as drawn anew after so many rows: a slow joint stays on
+# a count of its encoder for some. It is compared where there are so many rows of each.
+ANEW, FEWEST = 5, 200
 # The slowest reversals have the most rows in which friction turns round: their moments count, and are known worst.
 SLOWEST = 0.1
 # A joint slower than this share of its RMS speed for so long [s] creeps: its friction may have any value.
@@ -76,7 +79,14 @@ class Directions:
 
 
 def directions(
-    dq: Array, ddq: Array, cutoffs: Array, floor: Array, ends: Array, step: float, sampled: bool
+    dq: Array,
+    ddq: Array,
+    cutoffs: Array,
+    floor: Array,
+    ends: Array,
+    step: float,
+    sampled: bool,
+    rest: Array | None = None,
 ) -> Directions:
     """Tells in which rows (N, n) of a log the direction of a joint's motion is known.
 
@@ -92,6 +102,7 @@ def directions(
         ends: power density (n,) of the positions at the cut-offs.
         step: sample period [s].
         sampled: whether torque was measured at these rows, not between them.
+        rest: what the positions (N, n) as logged have besides; None where that is not known at these rows.
     """
     unsure, clear = np.zeros(dq.shape, dtype=bool), np.zeros(dq.shape, dtype=bool)
     jolts, moments = np.zeros(dq.shape[1]), np.zeros(dq.shape[1])
@@ -109,8 +120,9 @@ def directions(
         change = np.abs(a) * step
         # A kick that does not stand out of the noise where it is looked for is still there; a joint at rest has none.
         usual = float(np.sqrt(np.average(error**2, weights=np.where(turned, change, 0.0) + 1e-300)))
-        # It may be as large as the noise hides where it has most power.
-        usual = max(usual, KICK * largest / (2 * np.pi * cutoff) * (LOOP / cutoff) ** 2)
+        # It may be as large as the noise hides where it has most power, and as what is seen beside the reversals.
+        hidden = KICK * largest / (2 * np.pi * cutoff) * (LOOP / cutoff) ** 2
+        usual = max(usual, hidden if rest is None else min(hidden, _shaken(rest[:, j], turned, step)))
         jolts[j] = 2 * np.pi * max(cutoff, LOOP) * usual
         error = CLEAR * np.maximum(error, usual)
         least = np.maximum(error, np.maximum(ALIKE * change, SURELY * sharpest(v)))
@@ -121,6 +133,21 @@ def directions(
             if (stop - start) * step > CREEPING:
                 unsure[start:stop, j], clear[start:stop, j] = True, False
     return Directions(unsure, unsure & clear, jolts, moments)
+
+
+def _shaken(rest: Array, turned: Flags, step: float) -> float:
+    """Bounds what kicks do to a joint's velocity at its reversals by what its position (N,) has there besides.
+
+    They move it by as much as that is larger than elsewhere, or would not be told to be; a position loop undoes them
+    with its bandwidth, and what they last for is known by that.
+    """
+    reach = round(1.0 / (LOOP * step))
+    near, around = (maximum_filter1d(turned.astype(np.int8), 2 * k * reach + 1) > 0 for k in (1, 2))
+    if min(int(near.sum()), int((~around).sum())) < FEWEST:
+        return np.inf
+    usual, here = float(np.mean(rest[~around] ** 2)), float(np.mean(rest[near] ** 2))
+    error = 2.0 * np.sqrt(2.0 * ANEW / int(near.sum())) * max(usual, here)
+    return float(2 * np.pi * LOOP * np.sqrt(max(here - usual, 0.0) + error))
 
 
 def sharpest(dq: Array) -> float:

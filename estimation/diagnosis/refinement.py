@@ -11,6 +11,7 @@ from scipy.optimize import minimize
 
 from estimation.diagnosis.agreement import joint_by_joint
 from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.late_reversals import owed_to_moments
 from estimation.diagnosis.problem import Group, Problem
 from estimation.diagnosis.scoring import Accepted, accept, score
 
@@ -179,6 +180,9 @@ def refine(
     found = best[0]
     if hypothesis.effect.lags:
         return _agreed(problem, found, accepted)
+    if hypothesis.effect.turns and hypothesis.joint is not None:
+        owed = owed_to_moments(problem, hypothesis.joint, found.group, found.gain, accepted)
+        return replace(found, doubt=owed)
     return replace(found, scatter=_borne_out(problem, found, accepted)) if hypothesis.effect.kicks else found
 
 

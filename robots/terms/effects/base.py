@@ -118,6 +118,7 @@ class Effect(ABC):
         passing: whether it belongs to the logs it is found in, and may be gone or different in others.
         alike: whether it has one coefficient, that all joints share: each joint tells it, and they must agree.
         lags: whether its one coefficient is a time: reversals tell that no better than their own moments are known.
+        turns: whether it acts where a joint turns round: an error in the moment of that resembles it.
         kicks: whether it acts by changes of acceleration: they are largest, and least known, where a joint turns round.
         fast: whether its torque owes nothing to accelerations: it is looked for above the frequencies of those, too.
         unmoved: whether the arm's motion answers to it, and not it to the motion: no base model is fitted to that.
@@ -138,6 +139,7 @@ class Effect(ABC):
     passing: ClassVar[bool] = False
     alike: ClassVar[bool] = False
     lags: ClassVar[bool] = False
+    turns: ClassVar[bool] = False
     kicks: ClassVar[bool] = False
     fast: ClassVar[bool] = False
     unmoved: ClassVar[bool] = False

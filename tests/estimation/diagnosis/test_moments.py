@@ -20,6 +20,7 @@ from estimation.diagnosis.states import record
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import EFFECTS
+from robots.terms.effects.states import bristle
 from robots.terms.effects.time_delay import lateness
 
 STEP = Hypothesis(EFFECTS["friction_step"], 2)
@@ -148,3 +149,25 @@ def test_a_lag_of_one_joint_is_told_no_better_than_its_reversals(
     gram, cross = float(own.gram[0, 0]), float(own.cross[0])
     assert found.doubt == pytest.approx(cross**2 / gram * (1 - 1 / (1 + moment**2 * gram)), rel=0.01, abs=1e-9)
     assert (found.worth(problem.rows) > 10) is (moment == 0)
+
+
+def test_friction_that_turns_round_over_microns_is_told_no_better_than_the_moments(
+    recording: Recording, pose_arm: Callable[..., Problem]
+) -> None:
+    """Late by some milliseconds at each reversal: all of it is sure where moments are, and less where not."""
+    q, dq = recording.q[:, 1], recording.dq[:, 1]
+    z = bristle(recording.t, q, dq, recording.runs, 1e-4)
+    extra = np.zeros_like(recording.tau)
+    extra[:, 1] = 3.0 * (z - np.sign(dq))
+    everywhere = np.ones(recording.q.shape, dtype=bool)
+    problem = pose_arm(replace(recording.trusting(everywhere[0]), tau=recording.tau + extra))
+    doubts = []
+    for moment in (1e-6, 3e-4, 1e-3, 3e-3):
+        known = replace(problem.recording, clear=everywhere, trusted=everywhere[0], moments=np.full(2, moment))
+        seen: Problem = replace(problem, recording=known)
+        member = refine(seen, Hypothesis(EFFECTS["presliding_hysteresis"], 2), (2e-4,), accept(seen, ()))
+        assert member.gain > 100.0
+        doubts.append(member.doubt / member.gain)
+    assert doubts[0] < 0.01
+    assert doubts == sorted(doubts)
+    assert doubts[-1] > 0.2
