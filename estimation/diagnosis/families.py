@@ -21,7 +21,10 @@ Array = NDArray[np.float64]
 HARMONICS = (1, 2, 3, 4)
 # Of what remembers velocity, of a sensor that creeps, and of a supply that sags [s].
 MEMORIES, CREEPS, SUPPLIES = (0.1, 0.3, 1.0, 3.0), (1.0, 3.0, 10.0, 30.0), (0.03, 0.15, 0.7)
+# Of grease that thins as it is worked [s].
+WORKED = (0.5, 2.0, 8.0)
 KNOTS, AGEING = 8, 3
+WHIRLING = 6  # joints at most beside the two
 # Changes of torque, as shares of its largest, within which a hysteresis turns round.
 STRAINS = (0.05, 0.2, 0.6)
 # A joint stands that is slower than this share of its RMS speed for so long [s]. What it feels when it goes changes
@@ -76,6 +79,13 @@ def _push(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Arr
         return np.zeros((len(s), 3))
     q, a = s.q[:, joint - 1], s.ddq[:, other - 1]
     return np.column_stack([a, a * np.cos(q), a * np.sin(q)])
+
+
+def _whirl(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    columns = np.zeros((len(s), WHIRLING))
+    further = [k for k in range(s.q.shape[1]) if k + 1 not in (joint, other)][:WHIRLING] if other != joint else []
+    columns[:, : len(further)] = s.dq[:, other - 1, None] * s.dq[:, further]
+    return columns
 
 
 def _drag(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
@@ -133,6 +143,12 @@ def _acceleration(s: Situation, joint: int, other: int, shape: tuple[float, ...]
 
 def _memory(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     return _followers(s, s.dq[:, joint - 1], MEMORIES)
+
+
+def _worked(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    speed = np.abs(s.dq[:, joint - 1]) / shape[0]
+    before = _followers(s, speed, WORKED)
+    return np.hstack([before, before * speed[:, None]])
 
 
 def _creep(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
@@ -225,6 +241,7 @@ FAMILIES: dict[str, Family] = {
     "angles": Family(_angles, 16, "depends on its own position and that of {who} together"),
     "motion": Family(_motion, 5, "depends on the velocity of {who}"),
     "push": Family(_push, 3, "depends on the acceleration of {who}"),
+    "whirl": Family(_whirl, WHIRLING, "depends on the velocity of {who} times those of further joints"),
     "drag": Family(_drag, 8, "depends on its own position and the velocity of {who} together"),
     "posture": Family(_posture, 8, "depends on its own velocity and the position of {who} together"),
     "speed": Family(_speed, 6, "depends on the speed of the joint", _speed_of, "rad/s or m/s"),
@@ -238,6 +255,9 @@ FAMILIES: dict[str, Family] = {
         "rad/s2 or m/s2",
     ),
     "memory": Family(_memory, 4, "remembers the velocity of the joint for a while"),
+    "worked": Family(
+        _worked, 2 * len(WORKED), "depends on how fast the joint has moved before", _speed_of, "rad/s or m/s"
+    ),
     "creep": Family(_creep, 4, "remembers the torque of the joint for a while"),
     "hysteresis": Family(
         _hysteresis, len(STRAINS), "differs as its torque grows and as it falls", _torque_of, "N m or N"

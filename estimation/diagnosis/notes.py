@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 # Error on unseen data that is worth a word: so many times that of the fit and more than this share of the torque, or
 # more than the second share, whatever the fit's.
-STRANGE, FAR, ODD = 3.0, 0.05, 0.2
+STRANGE, FAR, ODD = 1.5, 0.035, 0.2
 # Unseen speeds beyond the fitted ones by this factor are worth one, too.
 FASTER = 1.3
 # So is a joint on which the extended model errs by so many times what the base model does, and so much more.
@@ -79,7 +79,7 @@ def notes_of(
         # What is no part of the model says so itself.
         if finding.gain.ci95[0] <= 0 and finding not in apart:
             where = f"{finding.effect} of joint {finding.joint}" if finding.joint else finding.effect
-            notes.append(f"The gain of {where} on unseen data is not sure: its interval begins below zero.")
+            notes.append((_UNSURE if finding.gain.ci95[1] >= 0 else _AGAINST).format(where))
     part = [finding for finding in findings if finding not in apart]
     open_ = sorted({finding.joint for finding in part if finding.effect == "unexplained" and finding.joint})
     if open_:
@@ -92,6 +92,13 @@ def notes_of(
     sprung = {finding.joint for finding in findings if finding.effect == "spring"}
     notes += [text for joint, text in hidden_springs(problem, false_alarm) if joint not in sprung]
     return tuple(notes)
+
+
+_UNSURE = "The gain of {} on unseen data is not sure: its interval begins below zero."
+_AGAINST = (
+    "The unseen data speak against {}: with it the model predicts them worse. What is in the logs of the fit is not so "
+    "there, or has another cause."
+)
 
 
 def _strange(problem: Problem, after: Array) -> dict[int, str]:

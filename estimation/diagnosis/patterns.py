@@ -11,10 +11,12 @@ from estimation.diagnosis.draining import Draining
 from estimation.diagnosis.fading import Fading
 from estimation.diagnosis.families import FAMILIES
 from estimation.diagnosis.leaning import Leaning
+from estimation.diagnosis.parting import Parting
 from estimation.diagnosis.pulling import Pulling
 from estimation.diagnosis.spotting import Spot
 from estimation.diagnosis.stopping import Stop
 from estimation.diagnosis.swinging import Swinging
+from estimation.diagnosis.switching import Switch
 from robots.robot import Robot
 from robots.terms.effects import Coefficient, Effect, JointEffect, Shape, Situation
 
@@ -29,9 +31,9 @@ SLOWEST, RUBBING = 0.6, 2.0
 SWINGS = 5.0
 SWAYING = ("vibration", "sway")
 # What acts on all joints at once.
-WHOLE: tuple[Effect, ...] = (Swinging(), Pulling(), Leaning(), Fading(), Draining())
-# What is at a place of a joint's range.
-PLACES: tuple[Effect, ...] = (Spot(), Spot(odd=True), Stop(), Stop(below=True))
+WHOLE: tuple[Effect, ...] = (Swinging(), Pulling(), Leaning(), Fading(), Draining(), Parting())
+# What is at a place of a joint's range, or comes at a moment.
+SINGLE: tuple[Effect, ...] = (Spot(), Spot(odd=True), Stop(), Stop(below=True), Switch())
 
 
 @dataclass(frozen=True)
@@ -171,7 +173,7 @@ class Pattern(JointEffect):
 
 def build_pattern(text: str) -> Effect | None:
     """Reads the name of a pattern; None for anything else."""
-    for known in (*PLACES, *WHOLE):
+    for known in (*SINGLE, *WHOLE):
         if text == known.name:
             return known
     parts = text.removeprefix(PREFIX).split(":")
@@ -188,6 +190,7 @@ def all_patterns(robot: Robot) -> tuple[Effect, ...]:
         Pattern("torque"),
         Pattern("acceleration"),
         Pattern("memory"),
+        Pattern("worked", odd=True),
         Pattern("creep"),
         Pattern("hysteresis"),
         Pattern("supply"),
@@ -198,19 +201,22 @@ def all_patterns(robot: Robot) -> tuple[Effect, ...]:
     each += [Pattern("angles", k) for k in joints] if robot.n > 1 else []
     each += [Pattern("motion", k, odd) for k in joints for odd in (False, True)] if robot.n > 1 else []
     each += [Pattern("push", k) for k in joints] if robot.n > 1 else []
+    each += [Pattern("whirl", k) for k in joints] if robot.n > 2 else []
     each += [Pattern("drag", k) for k in joints]
     each += [Pattern("posture", k) for k in joints] if robot.n > 1 else []
-    return (*own, *PLACES, *each, *WHOLE)
+    return (*own, *SINGLE, *each, *WHOLE)
 
 
 def is_of_time(effect: object) -> bool:
     """Whether a pattern's function goes by time: of the motion it knows what it acts on, or the direction."""
-    return isinstance(effect, (Fading, Draining)) or (isinstance(effect, Pattern) and effect.kind in ("time", "ageing"))
+    return isinstance(effect, (Fading, Draining, Parting, Switch)) or (
+        isinstance(effect, Pattern) and effect.kind in ("time", "ageing")
+    )
 
 
 def is_plain(effect: object) -> bool:
     """Whether a pattern's few functions resemble a cause that is no other: a name that explains less is none."""
-    return isinstance(effect, Stop) or (isinstance(effect, Pattern) and effect.kind == "ageing")
+    return isinstance(effect, (Stop, Switch)) or (isinstance(effect, Pattern) and effect.kind == "ageing")
 
 
 def swings_by_itself(effect: object) -> bool:

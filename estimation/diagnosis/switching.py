@@ -1,0 +1,58 @@
+"""Torque of one joint that is logged by another share from one moment on: another amplifier, sensor or range."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.robot import Robot
+from robots.terms.effects import Coefficient, JointEffect, Shape, Situation
+from robots.terms.effects.states import change_times
+
+Array = NDArray[np.float64]
+
+
+class Switch(JointEffect):
+    """tau = e tau_j from the time t_c on.
+
+    What heat makes of a motor's constant comes little by little, and is `torque_constant_heat`.
+    """
+
+    name: ClassVar[str] = "pattern:switch:0:even"
+    title: ClassVar[str] = "torque of a joint that changes by a share of itself at one moment"
+    depends_on: ClassVar[Literal["state", "time"]] = "time"
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("change_time", "s", -np.inf, np.inf, "linear", inexact=0.02),)
+
+    def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
+        """Describes the share by which the torque changes."""
+        return (Coefficient("share", "1"),)
+
+    def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
+        """Lists times through the data, and the pauses between logs."""
+        return tuple((time,) for time in change_times(situation))
+
+    def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
+        """Keeps the change within the data."""
+        return ((float(situation.t[0]), float(situation.t[-1])),)
+
+    def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the base model's torque after the change."""
+        return np.where(situation.t >= shape[0], situation.torque[:, joint - 1], 0.0)[:, None]
+
+    def describe(
+        self,
+        joint: int | None,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what is seen."""
+        which = "more" if coefficients[0] > 0 else "less"
+        return (
+            f"The torque of joint {joint} is logged {100 * abs(coefficients[0]):.2g} % {which} from t = {shape[0]:.2f} "
+            "s on than before: another amplifier or sensor, or another of its ranges, does that."
+        )
