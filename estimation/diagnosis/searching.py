@@ -80,23 +80,17 @@ def search(
             give_back()
             if blurred:
                 baseline = build_baseline(base, replace(recording, tau=settled.without_effects(tau)))
-        upper = None
+        rng = np.random.default_rng(seed)
+        posed = pose(
+            recording, baseline, whitening, draws=DRAWS, rng=rng, extra=settled.extra, followed=settled.followed
+        )
         if any(effect.fast for effect in effects):
             wide = estimate_whitening(recording, settled.residual, fitted, inertia, WIDER, spared)
-            remainder = tau - baseline.regressor @ settled.values
-            upper = pose_upper(recording, baseline, remainder, settled.residual, whitening.bands, wide)
-        rng = np.random.default_rng(seed)
+            # What is left by the base model as it is fitted alone: beside effects it may be far from that.
+            upper = pose_upper(recording, baseline, posed.remainder, settled.residual, whitening.bands, wide)
+            posed = replace(posed, upper=upper)
         last = _searched(
-            pose(
-                recording,
-                baseline,
-                whitening,
-                draws=DRAWS,
-                rng=rng,
-                extra=settled.extra,
-                upper=upper,
-                followed=settled.followed,
-            ),
+            posed,
             hypotheses,
             false_alarm,
             rng,
