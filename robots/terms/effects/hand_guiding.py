@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Windows in a log in which a hand is looked for, as shares of it, and the shortest [s]: what is briefer is a contact.
+NO_WEIGHT = 1e-9
+SHARES, SHORTEST = (1 / 2, 1 / 4, 1 / 8, 1 / 16), 2.0
+
 
 class HandGuiding(Effect):
     """tau_j = w(t) (a_j sign(dq_j) + b_j dq_j - s_j tau_M,j - g_j tau_G,j), w one during a log.
@@ -51,10 +55,27 @@ class HandGuiding(Effect):
         return tuple(result)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists the logs, where there are several: a hand on all of them is what the base model was fitted to."""
-        if len(situation.starts) < 2:
-            return ()
-        return tuple((float(situation.t[run.start]), float(situation.t[run.stop - 1])) for run in situation.runs)
+        """Lists the logs, where there are several, and windows in each; one hand on all of them is the base model's."""
+        several = len(situation.starts) > 1
+        logs = [(float(situation.t[run.start]), float(situation.t[run.stop - 1])) for run in situation.runs]
+        inside = [window for log in logs for window in _windows(*log)]
+        return (*(logs if several else ()), *inside)
+
+    def propose(
+        self, situation: Situation, joint: Place, residual: Array, count: int = 8
+    ) -> tuple[tuple[float, ...], ...]:
+        """Ranks windows by how much more is left in them than in most of their length, on all joints."""
+        grid = self.grid(situation, joint)
+        if len(grid) <= count:
+            return grid
+        sums = np.concatenate([np.zeros((1, residual.shape[1])), np.cumsum(residual**2, axis=0)])
+        starts, ends = np.array(grid).T
+        first, last = np.searchsorted(situation.t, starts), np.searchsorted(situation.t, ends, side="right")
+        rows = np.maximum(last - first, 1)[:, None]
+        powers = (sums[last] - sums[first]) / rows
+        usual = np.maximum(np.median(powers, axis=0), 1e-300)
+        scores = np.sum((powers / usual - 1.0) * np.sqrt(rows), axis=1)
+        return tuple(grid[i] for i in np.argsort(-scores)[:count])
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Keeps start and end within the data."""
@@ -67,6 +88,8 @@ class HandGuiding(Effect):
         during = (situation.t >= shape[0]) & (situation.t <= shape[1])
         weight = np.einsum("njk,nk->nj", situation.sensitivity("gravity")[during], situation.gravity[during])
         moving = situation.rigid[during] - weight
+        # An axis along gravity carries no weight, but for rounding.
+        weight[:, np.abs(weight).max(axis=0, initial=0.0) < NO_WEIGHT * np.abs(moving).max(initial=1e-300)] = 0.0
         X = np.zeros((len(situation), n, n, 4))
         for j in range(n):
             X[during, j, j, 0] = situation.sign[during, j]
@@ -89,3 +112,13 @@ class HandGuiding(Effect):
             f"An external force moved the robot from t = {shape[0]:.2f} s to {shape[1]:.2f} s, as a hand does: the "
             f"drives carried its weight, not its friction and inertia."
         )
+
+
+def _windows(start: float, end: float) -> list[tuple[float, float]]:
+    """Lists windows in a log, each length from half of it down, every quarter of that from the one before."""
+    result = []
+    for share in SHARES:
+        length = share * (end - start)
+        if length >= SHORTEST:
+            result += [(t, t + length) for t in np.arange(start, end - length + 1e-9, length / 4).tolist()]
+    return result
