@@ -78,7 +78,8 @@ def notes_of(
             )
         # What is no part of the model says so itself.
         if finding.gain.ci95[0] <= 0 and finding not in apart:
-            where = f"{finding.effect} of joint {finding.joint}" if finding.joint else finding.effect
+            what = "what is unexplained" if finding.effect == "unexplained" else finding.effect
+            where = f"{what} of joint {finding.joint}" if finding.joint else what
             notes.append((_UNSURE if finding.gain.ci95[1] >= 0 else _AGAINST).format(where))
     part = [finding for finding in findings if finding not in apart]
     open_ = sorted({finding.joint for finding in part if finding.effect == "unexplained" and finding.joint})

@@ -216,7 +216,7 @@ def is_of_time(effect: object) -> bool:
 
 def is_plain(effect: object) -> bool:
     """Whether a pattern's few functions resemble a cause that is no other: a name that explains less is none."""
-    return isinstance(effect, (Stop, Switch)) or (isinstance(effect, Pattern) and effect.kind == "ageing")
+    return isinstance(effect, (Stop, Switch, Draining)) or (isinstance(effect, Pattern) and effect.kind == "ageing")
 
 
 def swings_by_itself(effect: object) -> bool:

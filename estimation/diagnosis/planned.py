@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from scipy.linalg import solve_toeplitz
 
 from estimation.diagnosis.band import Band
 from estimation.diagnosis.baseline import build_baseline
+from estimation.diagnosis.directions import SHARP, SURELY, sharpest
 from estimation.diagnosis.gaps import no_gaps
 from estimation.diagnosis.hypotheses import all_hypotheses
 from estimation.diagnosis.limits import Limit, find_limits
@@ -30,6 +32,8 @@ Array = NDArray[np.float64]
 
 ORDER = 12
 """Of the prediction filter of noise that is a sum of white and first-order noise, which has no finite one."""
+ROUGH = 0.3
+"""Coulomb friction that a plan has at least, over the torque's standard deviation."""
 
 
 def planned_limits(
@@ -82,18 +86,29 @@ def planned_problem(
         step=step,
         cycles=(None,) * len(motions),
         cutoff=0.5 / step,
-        unsure=np.zeros(joined.q.shape, dtype=bool),
+        unsure=_at_reversals(joined.dq, starts),
         clear=np.zeros(joined.q.shape, dtype=bool),
         jolts=np.zeros(joined.q.shape[1]),
         floor=np.zeros(joined.q.shape[1]),
         names=tuple(f"motion {i}" for i in range(1, len(motions) + 1)),
     )
     whitening = expected_whitening(recording, noise, level)
-    baseline = build_baseline(find_base_parameters(model), recording, whitening.scale)
+    # How sharp a sign is shows where there is friction, of which a description may say nothing.
+    rough = recording.tau + ROUGH * recording.tau.std(axis=0) * np.tanh(joined.dq / SHARP)
+    baseline = build_baseline(find_base_parameters(model), replace(recording, tau=rough), whitening.scale)
     # The parameters are known: the motion's own torque gives them back, and nothing is to hold them elsewhere.
     size = baseline.base.size + baseline.nuisance.shape[2]
     free = Pull(np.zeros((size, size)), np.zeros(size))
     return pose(recording, baseline, whitening, draws=0, rng=np.random.default_rng(0), pull=free)
+
+
+def _at_reversals(dq: Array, starts: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Marks rows (N, n) beside reversals, and those too slow for a sign: a log may not know the direction there."""
+    turned = np.zeros(dq.shape, dtype=bool)
+    turned[1:] = dq[1:] * dq[:-1] < 0
+    turned[list(starts)] = False
+    beside = turned | np.roll(turned, -1, axis=0)
+    return beside | (np.abs(dq) < SURELY * np.array([sharpest(column) for column in dq.T]))
 
 
 def expected_whitening(recording: Recording, noise: Sensors, level: Array | None = None) -> Whitening:

@@ -96,6 +96,8 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         )
         for i, member in enumerate(members)
     )
+    order = sorted(range(len(findings)), key=lambda i: -findings[i].delta_bic)
+    findings = tuple(findings[i] for i in order)
     if spoiling:
         fit = fit_extended(problem, [*members, *(member for member, _, _ in spoiling)], {})
         findings += tuple(
@@ -132,7 +134,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
             *held.notes,
             *lost,
         ),
-        trace=_trace(unseen, seen.coordinates, twisted),
+        trace=_trace(unseen, [seen.coordinates[i] for i in order], twisted),
         simulation=simulation,
     )
 

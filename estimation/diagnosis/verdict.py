@@ -10,7 +10,7 @@ import numpy as np
 from estimation.diagnosis.free_functions import LEAST, criterion, free_functions, worth
 from estimation.diagnosis.patterns import is_of_time, is_plain
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.refinement import Member, refine
+from estimation.diagnosis.refinement import RARE, Member, refine
 from estimation.diagnosis.scan import Entry
 from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.selection import Found, Selection
@@ -236,7 +236,11 @@ def _holds_alone(
         return True
     others = [member for member in named if member is not own]
     free, _ = free_functions(problem, patterns, others, false_alarm, rng)
-    return not _beaten(problem, own.gain, own.degrees, free)
+    if _beaten(problem, own.gain, own.degrees, free):
+        return False
+    plain = [entry for entry in patterns if is_plain(entry.hypothesis.effect) and entry.hypothesis.joint is None]
+    free = free_functions(problem, plain, others, false_alarm, rng)[0] if plain else []
+    return not free or worth(free[0]) <= own.gain - own.degrees + LEAST
 
 
 def _holds_together(
@@ -302,5 +306,5 @@ def _thriftier(
 
 
 def is_open(found: Found) -> bool:
-    """Whether an effect has rivals that fit about as well; one that robots seldom have does not count alone."""
-    return any(worse < CLOSE and not rival.hypothesis.effect.rare for rival, worse in found.rivals)
+    """Whether an effect has rivals that fit about as well; one that robots seldom have must do so by the data alone."""
+    return any(worse < (RARE if rival.hypothesis.effect.rare else CLOSE) for rival, worse in found.rivals)

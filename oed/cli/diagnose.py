@@ -121,7 +121,8 @@ def _limits(
     from robots.signals import Motion
 
     with ResultFolder(out, force, names=["limits.json", "report.html"]) as folder:
-        torque_model = default_model(robot, velocity_scale=1e-3)
+        # As a diagnosis fits it by default.
+        torque_model = default_model(robot, friction="polynomial", velocity_scale=1e-3)
         parameters = np.asarray(torque_model.nominal)
         beyond: list[str] = []
         if model is not None:
@@ -132,6 +133,8 @@ def _limits(
             parameters = np.zeros(torque_model.size)
             parameters[list(known.columns)] = known.values
             beyond = [e.effect if e.joint is None else f"{e.effect} of joint {e.joint}" for e in known.extensions]
+        smooth = [] if model is not None else [j for j, f in enumerate(np.asarray(robot.friction), 1) if not f.any()]
+        notes = [_SMOOTH.format(", ".join(map(str, smooth)))] if smooth else []
         motions: list[Motion] = []
         for path in trajectories:
             motion = read_trajectory(path)[0]
@@ -145,6 +148,7 @@ def _limits(
             "robot": robot.name,
             "limits": [limit.to_dict() for limit in found],
             "extensions_not_counted": beyond,
+            "notes": notes,
         }
         write_atomic(folder.path("limits.json"), codec.dumps(data, indent=2, allow_nan=False) + "\n")
         save_limits_report(found, robot.title or robot.name, folder)
@@ -160,9 +164,16 @@ def _limits(
         f"{_percent(limit.at_worst):>10} {_percent(limit.attributable):>11}   {limit.toughest or ''}".rstrip()
         for limit in found
     ]
+    summary += [f"  {note}" for note in notes]
     if beyond:
         summary.append(f"  limits beside the base model; the model's extensions are not counted: {', '.join(beyond)}")
     return "\n".join(summary), data
+
+
+_SMOOTH = (
+    "The description says nothing of the friction of joints {}: shares are of a torque without it, and limits may be "
+    "far too small. Give the model of an identified robot (--model)."
+)
 
 
 def _percent(share: float) -> str:

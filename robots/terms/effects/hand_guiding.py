@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Windows in a log in which a hand is looked for, as shares of it, and the shortest [s]: what is briefer is a contact.
+# Of the torque, what is less than this is rounding.
 NO_WEIGHT = 1e-9
+# Who moves the arm takes over this share of what its motion needs at least: less is no hand.
+MOST = 0.5
+# Windows in a log in which a hand is looked for, as shares of it, and the shortest [s]: what is briefer is a contact.
 SHARES, SHORTEST = (1 / 2, 1 / 4, 1 / 8, 1 / 16), 2.0
 
 
@@ -49,7 +52,7 @@ class HandGuiding(Effect):
             result += [
                 Coefficient(f"coulomb_by_hand_{j + 1}", force),
                 Coefficient(f"viscous_by_hand_{j + 1}", f"{force} s/{length}"),
-                Coefficient(f"inertia_by_hand_{j + 1}", "1", lower=0.0),
+                Coefficient(f"inertia_by_hand_{j + 1}", "1", lower=MOST),
                 Coefficient(f"weight_by_hand_{j + 1}", "1"),
             ]
         return tuple(result)

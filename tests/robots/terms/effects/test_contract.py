@@ -56,7 +56,7 @@ def effect(request):
 def _points(effect, now):
     """The last joint that shows an effect, with three of its shapes: the first, the middle, the last."""
     shown = [(joint, grid) for joint in effect.joints(now.robot) if (grid := effect.grid(now, joint))]
-    assert shown or effect.name == "hand_guiding"  # which shows between logs only
+    assert shown
     for joint, grid in shown[-1:]:
         for point in dict.fromkeys((grid[0], grid[len(grid) // 2], grid[-1])):
             yield joint, point

@@ -218,9 +218,36 @@ def test_a_hand_takes_what_motion_needs(seen, twin):
     np.testing.assert_allclose(taken[700:], expected, atol=1e-9 * np.abs(now.rigid).max())
 
 
-def test_a_hand_on_the_only_log_shows_nowhere(seen):
-    """Where there is one log, a hand that guides the robot all through it is what the model was fitted to."""
-    assert EFFECTS["hand_guiding"].grid(seen(), None) == ()
+def test_a_hand_on_all_of_the_only_log_shows_nowhere(seen):
+    """Where there is one log, a hand on all of it is what the model was fitted to: windows within it are tried."""
+    now = seen()
+    windows = EFFECTS["hand_guiding"].grid(now, None)
+    duration = now.t[-1] - now.t[0]
+    assert windows
+    assert all(now.t[0] <= start < end <= now.t[-1] + 1e-9 for start, end in windows)
+    assert max(end - start for start, end in windows) < 0.6 * duration
+
+
+def test_the_window_with_most_left_in_it_is_proposed(seen):
+    """A residual that is five times as large for a fifth of the log, on all joints."""
+    now = seen(times=0.02 * np.arange(3000))
+    rng = np.random.default_rng(3)
+    during = (now.t > 21.0) & (now.t < 33.0)
+    left = rng.normal(size=now.q.shape) * np.where(during, 5.0, 1.0)[:, None]
+    guiding = EFFECTS["hand_guiding"]
+    proposed = guiding.propose(now, None, left, 6)
+    assert len(guiding.grid(now, None)) > 60 > len(proposed)
+    start, end = proposed[0]
+    assert min(end, 33.0) - max(start, 21.0) > 0.5 * (max(end, 33.0) - min(start, 21.0))
+
+
+def test_an_axis_along_gravity_carries_no_weight(seen):
+    """What rounding leaves of it is no column: a share of it would be any number."""
+    now = seen(times=0.02 * np.arange(1000))
+    X = EFFECTS["hand_guiding"].columns(now, None, (now.t[0], now.t[-1]))
+    weight = np.einsum("njk,nk->nj", now.sensitivity("gravity"), now.gravity)
+    for j in range(now.robot.n):
+        assert X[:, j, 4 * j + 3].any() == (np.abs(weight[:, j]).max() > 1e-6)
 
 
 @pytest.mark.parametrize("swing", [0.0, 0.5])
