@@ -60,9 +60,9 @@ def limits_section(limits: Sequence[Limit], *, folded: bool = False) -> Section:
             headings=("effect", *(f"joint {joint}" for joint in joints)),
             rows=tuple(rows),
             caption="Smallest size that would be found with 95 % chance / that would also be told from its rivals, in "
-            "per cent of the joint's torque RMS. In brackets, where it is much more: from what size on it would be "
-            "found whatever its speed, time constant or travel. A dash: cannot act there; hidden: no size shows in "
-            "this motion.",
+            "per cent of the joint's torque RMS, of an effect of usual shape: half of the speeds, time constants or "
+            "travels that are tried show sooner. In brackets, where it is much more: from what size on it would be "
+            "found whatever those are. A dash: cannot act there; hidden: no size shows in this motion.",
             align=("left", *("right" for _ in joints)),
         )
     ]

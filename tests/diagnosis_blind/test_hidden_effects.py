@@ -139,7 +139,10 @@ def test_two_effects_are_both_found_by_the_command(hide: Hide, tmp_path: Path, m
     with pytest.raises(SystemExit) as ended:
         main()
     assert not ended.value.code
-    assert complaints(truth_of(case), json.loads((tmp_path / "said" / "diagnosis.json").read_text())) == []
+    said = json.loads((tmp_path / "said" / "diagnosis.json").read_text())
+    assert complaints(truth_of(case), said) == []
+    strength = [finding["delta_bic"] for finding in said["findings"]]
+    assert strength == sorted(strength, reverse=True)
 
 
 @pytest.mark.skipif(not ALL, reason="takes minutes more; set ALL_HIDDEN=1")

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis import verdict
+from estimation.diagnosis.draining import Draining
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.patterns import Pattern
 from estimation.diagnosis.problem import Group
-from estimation.diagnosis.refinement import Member
+from estimation.diagnosis.refinement import RARE, Member
 from estimation.diagnosis.selection import Found
 from estimation.diagnosis.spotting import Spot
 from robots.robot import Robot
@@ -297,3 +298,37 @@ def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
     assert (given is not None) is kept
     if given is not None:
         assert given.member.shape == (near(0.004)[0][1],)
+
+
+@pytest.mark.parametrize(
+    ("rival", "worse", "stays_open"),
+    [
+        ("spring", verdict.CLOSE - 1.0, True),
+        ("spring", verdict.CLOSE + 1.0, False),
+        ("load_heat", RARE - 1.0, True),  # as rare as it is, the data speak for it as much
+        ("load_heat", RARE + 1.0, False),
+    ],
+)
+def test_a_rare_rival_leaves_a_name_open_where_the_data_alone_speak_for_it(
+    rival: str, worse: float, stays_open: bool
+) -> None:
+    """Its BIC is that much worse beforehand."""
+    other = _member(rival, 1, 100.0, 2)
+    assert verdict.is_open(Found(_member("thermal_friction", 1, 110.0, 2), 1e-9, ((other, worse),))) is stays_open
+
+
+@pytest.mark.parametrize(("gain", "holds"), [(526.0, False), (480.0, True)])
+def test_a_tank_that_empties_is_no_step(gain: float, holds: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step of 468 and five parameters, where a body that changes slowly explains clearly more with twelve."""
+    step = _member("payload_change", None, 468.0, 5)
+    drains = replace(_member("spring", None, gain, 12), hypothesis=Hypothesis(Draining(), None))
+    entry = SimpleNamespace(hypothesis=drains.hypothesis)
+
+    def free(problem: object, patterns: list[Any], *rest: object) -> tuple[list[Member], list[float]]:
+        return ([drains], [1e-30]) if patterns else ([], [])
+
+    monkeypatch.setattr(verdict, "free_functions", free)
+    problem = SimpleNamespace(rows=ROWS)
+    found = Found(step, 1e-9, ())
+    held = verdict._holds_alone(problem, found, [step], [entry], 0.01, np.random.default_rng(0))  # type: ignore[arg-type,list-item]
+    assert held is holds
