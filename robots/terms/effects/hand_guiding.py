@@ -21,6 +21,8 @@ NO_WEIGHT = 1e-9
 MOST = 0.5
 # Windows in a log in which a hand is looked for, as shares of it, and the shortest [s]: what is briefer is a contact.
 SHARES, SHORTEST = (1 / 2, 1 / 4, 1 / 8, 1 / 16), 2.0
+# Windows that are proposed: each has four columns a joint.
+PROPOSED = 3
 
 
 class HandGuiding(Effect):
@@ -68,7 +70,7 @@ class HandGuiding(Effect):
         self, situation: Situation, joint: Place, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
         """Ranks windows by how much more is left in them than in most of their length, on all joints."""
-        grid = self.grid(situation, joint)
+        grid, count = self.grid(situation, joint), min(count, PROPOSED)
         if len(grid) <= count:
             return grid
         sums = np.concatenate([np.zeros((1, residual.shape[1])), np.cumsum(residual**2, axis=0)])
