@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.fading import FEWEST, of_logs, waves
+from estimation.diagnosis.fading import OverTime, of_logs, waves
 from robots.robot import Robot
-from robots.terms.effects import Coefficient, Effect, Situation
+from robots.terms.effects import Coefficient, Situation
 
 Array = NDArray[np.float64]
 
@@ -17,7 +17,7 @@ KNOTS = 3
 _PARTS = (("mass", "kg"), ("moment_x", "kg m"), ("moment_y", "kg m"), ("moment_z", "kg m"))
 
 
-class Draining(Effect):
+class Draining(OverTime):
     """Y_tool (m, m c) g(t), g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
 
     A body that comes or goes at once is `payload_change`.
@@ -25,16 +25,10 @@ class Draining(Effect):
 
     name: ClassVar[str] = "pattern:draining:0:even"
     title: ClassVar[str] = "a body at the flange that changes slowly with time"
-    whole_robot: ClassVar[bool] = True
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes mass and first moments of each half wave."""
         return tuple(Coefficient(f"{part}_{k}", unit) for k in range(1, KNOTS + 1) for part, unit in _PARTS)
-
-    def joints(self, robot: Robot) -> tuple[int | None, ...]:
-        """Names the whole robot where it has joints enough for their torques to be one body's."""
-        return (None,) if robot.n >= FEWEST else ()
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of a unit body times each wave (N, n, 4 KNOTS)."""

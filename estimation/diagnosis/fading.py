@@ -16,7 +16,18 @@ KNOTS = 5
 FEWEST = 3  # joints
 
 
-class Fading(Effect):
+class OverTime(Effect):
+    """What all joints share and changes slowly with time."""
+
+    whole_robot: ClassVar[bool] = True
+    depends_on: ClassVar[Literal["state", "time"]] = "time"
+
+    def joints(self, robot: Robot) -> tuple[int | None, ...]:
+        """Names the whole robot where it has joints enough for something to be one of all of them."""
+        return (None,) if robot.n >= FEWEST else ()
+
+
+class Fading(OverTime):
     """tau_j g(t) on every joint j, g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
 
     What heat makes of a motor's constant differs from joint to joint, and is `torque_constant_heat`.
@@ -24,16 +35,10 @@ class Fading(Effect):
 
     name: ClassVar[str] = "pattern:fading:0:even"
     title: ClassVar[str] = "torque of all joints that changes by the same share with time"
-    whole_robot: ClassVar[bool] = True
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the shares of the half waves."""
         return tuple(Coefficient(f"share_{k}", "1") for k in range(1, KNOTS + 1))
-
-    def joints(self, robot: Robot) -> tuple[int | None, ...]:
-        """Names the whole robot where it has joints enough for a share to be one of all of them."""
-        return (None,) if robot.n >= FEWEST else ()
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the base model's torque times each wave (N, n, KNOTS)."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.fading import FEWEST, of_logs, waves
+from estimation.diagnosis.fading import OverTime, of_logs, waves
 from robots.robot import Robot
-from robots.terms.effects import Coefficient, Effect, Situation
+from robots.terms.effects import Coefficient, Situation
 from robots.terms.effects.time_delay import lateness
 
 Array = NDArray[np.float64]
@@ -19,7 +19,7 @@ KNOTS = 3
 OVER = 1e-3
 
 
-class Parting(Effect):
+class Parting(OverTime):
     """-g(t) dtau_j / dt on every joint j, g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
 
     A delay that stays is `time_delay`.
@@ -27,16 +27,10 @@ class Parting(Effect):
 
     name: ClassVar[str] = "pattern:parting:0:even"
     title: ClassVar[str] = "torque that is logged later than position by more or less as time goes on"
-    whole_robot: ClassVar[bool] = True
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the delays of the half waves."""
         return tuple(Coefficient(f"delay_{k}", "s") for k in range(1, KNOTS + 1))
-
-    def joints(self, robot: Robot) -> tuple[int | None, ...]:
-        """Names the whole robot where it has joints enough for a delay to be one of all of them."""
-        return (None,) if robot.n >= FEWEST else ()
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the change of torque per delay times each wave (N, n, KNOTS)."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.draining import Draining
-from estimation.diagnosis.fading import Fading
+from estimation.diagnosis.fading import Fading, OverTime
 from estimation.diagnosis.families import FAMILIES
 from estimation.diagnosis.leaning import Leaning
 from estimation.diagnosis.parting import Parting
@@ -209,9 +209,7 @@ def all_patterns(robot: Robot) -> tuple[Effect, ...]:
 
 def is_of_time(effect: object) -> bool:
     """Whether a pattern's function goes by time: of the motion it knows what it acts on, or the direction."""
-    return isinstance(effect, (Fading, Draining, Parting, Switch)) or (
-        isinstance(effect, Pattern) and effect.kind in ("time", "ageing")
-    )
+    return isinstance(effect, (OverTime, Switch)) or (isinstance(effect, Pattern) and effect.kind in ("time", "ageing"))
 
 
 def is_plain(effect: object) -> bool:

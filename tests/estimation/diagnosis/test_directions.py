@@ -63,6 +63,12 @@ def _beside(log: Log, arm: Robot) -> float:
     return float(np.median([sum(lengths) for lengths in found]))
 
 
+def _beside_reversals(v: Array) -> NDArray[np.intp]:
+    """Rows from two before to three after each change of a velocity's (N,) sign."""
+    turns = np.flatnonzero(v[1:] * v[:-1] < 0)
+    return np.unique(np.clip(turns[:, None] + np.arange(-2, 4), 0, len(v) - 1))
+
+
 def test_few_rows_are_lost(arm: Robot, fourier_motion: Callable) -> None:
     """Of a coarse encoder all rows beside a reversal, of which there are few."""
     motion = fourier_motion(arm, duration=20.0)
@@ -99,8 +105,7 @@ def test_rows_that_count_beside_a_reversal_have_a_velocity_that_is_known(
         recording = _trusting(arm, _counted(motion, q, counts))
         first = int(np.argmin(np.abs(motion.t - recording.t[0])))
         true = dq[first : first + len(recording), 0]
-        turns = np.flatnonzero(true[1:] * true[:-1] < 0)
-        near = np.unique(np.clip(turns[:, None] + np.arange(-2, 4), 0, len(true) - 1))
+        near = _beside_reversals(true)
         counted = near[~recording.unsure[near, 0]]
         error = np.abs(recording.dq[counted, 0] - true[counted])
         change = np.abs(recording.ddq[counted, 0]) * STEP
@@ -199,8 +204,7 @@ def test_positions_beside_reversals_tell_how_well_those_are_known(
         assert 0.0 < recording.moments[0] < 3e-4
     first = int(np.argmin(np.abs(motion.t - recording.t[0])))
     true = dq[first : first + len(recording), 0]
-    turns = np.flatnonzero(true[1:] * true[:-1] < 0)
-    near = np.unique(np.clip(turns[:, None] + np.arange(-2, 4), 0, len(true) - 1))
+    near = _beside_reversals(true)
     counted = near[~recording.unsure[near, 0]]
     error = np.abs(recording.dq[counted, 0] - true[counted])
     allowed = np.maximum(np.abs(true[counted]) / 8, ALIKE * np.abs(recording.ddq[counted, 0]) * STEP)
