@@ -7,15 +7,18 @@ so do the gravity terms that each leaves to the base model. The robot's descript
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from estimation.diagnosis.extending import dense
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.refinement import Member, refine
+from estimation.diagnosis.refinement import Member, all_but, refine
 from estimation.diagnosis.regularisation import explained, row_weight
 from estimation.diagnosis.scoring import accept
+from estimation.diagnosis.selection import Found
 from estimation.diagnosis.shrinkage import pull_on
+from estimation.diagnosis.worthwhile import LEAST
 from estimation.pulls import Pull
 
 # Forms whose fits differ by less than this, twice a log-likelihood, are alike to the log.
@@ -30,6 +33,24 @@ def alike_forms(problem: Problem, members: Sequence[Member], i: int) -> list[Mem
     forms = [refine(problem, own.hypothesis, shape, beside, effort=0) for shape in shapes if shape != own.shape]
     forms = [form for form in forms if form.gain > own.gain - ALIKE]
     return sorted(forms, key=_evidence(problem, others), reverse=True) if forms else []
+
+
+def completed(problem: Problem, founds: Sequence[Found]) -> tuple[Found, ...]:
+    """Gives what was found with all that its effect has once it is there, where it is worth that.
+
+    A search pays for each coefficient, and goes without those that are hardly told; values without them are told as
+    surer than they are, and off by what those would have been.
+    """
+    members = [found.member for found in founds]
+    whole = []
+    for i, found in enumerate(founds):
+        own = found.member
+        shape = own.hypothesis.effect.complete(problem.situation, own.hypothesis.joint, own.shape)
+        if shape != own.shape:
+            form = refine(problem, own.hypothesis, shape, all_but(problem, members, i), effort=0)
+            found = replace(found, member=form) if form.worth(problem.rows) > LEAST else found
+        whole.append(found)
+    return tuple(whole)
 
 
 def _evidence(problem: Problem, others: Sequence[Member]) -> Callable[[Member], float]:

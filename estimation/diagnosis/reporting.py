@@ -13,7 +13,7 @@ from estimation.diagnosis.borne_out import bear_out
 from estimation.diagnosis.carried import situation_on, unloaded
 from estimation.diagnosis.diagnosis import Diagnosis, Trace
 from estimation.diagnosis.extending import fit_extended
-from estimation.diagnosis.forms import alike_forms
+from estimation.diagnosis.forms import alike_forms, completed
 from estimation.diagnosis.free_functions import strongest_pattern
 from estimation.diagnosis.gain import Unseen
 from estimation.diagnosis.hypotheses import all_hypotheses
@@ -62,7 +62,8 @@ class Told:
 
 def assemble(robot: Robot, told: Told) -> Diagnosis:
     """Fits the extended model, measures it on unseen data, and puts the findings into words."""
-    problem, judgement = told.problem, told.judgement
+    problem = told.problem
+    judgement = replace(told.judgement, kept=completed(problem, told.judgement.kept))
     held = bear_out(
         judgement,
         lambda members: measure_unseen(robot, problem, members, told.held_out, told.seed + 3),

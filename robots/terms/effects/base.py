@@ -273,6 +273,10 @@ class Effect(ABC):
         """
         return self.grid(situation, joint)
 
+    def complete(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[float, ...]:
+        """Gives the shape with all that the effect has where it is there; a search may go without some of that."""
+        return shape
+
     def gate(self, situation: Situation, joint: Place, measured: Array) -> NDArray[np.bool_] | None:
         """Flags the samples (N, n) that this effect makes useless as torque measurements; None for no such effect.
 

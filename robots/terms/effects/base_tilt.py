@@ -50,6 +50,11 @@ class BaseTilt(Effect):
         alike = upright(situation.robot) and bool(np.all(situation.gravity == level))
         return ((0.0,), (1.0,)) if alike else ((0.0,),)
 
+    def complete(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[float, ...]:
+        """Gives the first axis' own moments, if they may be there: angles would take what they are."""
+        ((free,), *_) = reversed(self.likely(situation, joint, shape, np.zeros(0)))
+        return shape if free is None else (free,)
+
     def joints(self, robot: Robot) -> tuple[Place, ...]:
         """Names the whole robot, if there is gravity."""
         return (None,) if np.any(robot.chain.gravity) else ()

@@ -11,15 +11,20 @@ import pytest
 from estimation.diagnosis.baseline import base_parameters, build_baseline
 from estimation.diagnosis.extending import fit_extended
 from estimation.diagnosis.extension import extension_torque
-from estimation.diagnosis.forms import ALIKE, alike_forms
+from estimation.diagnosis.forms import ALIKE, alike_forms, completed
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.planned import planned_problem
+from estimation.diagnosis.problem import Group, Problem
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.refinement import refine
-from estimation.diagnosis.scoring import accept
+from estimation.diagnosis.scoring import Accepted, accept
+from estimation.diagnosis.selection import Found
 from estimation.diagnosis.states import record
+from robots.loading import load_robot
+from robots.plants import Sensors
+from robots.regressor import default_model
 from robots.robot import Robot
-from robots.signals import Log
+from robots.signals import Log, Motion
 from robots.terms.effects import EFFECTS
 
 SPRING = Hypothesis(EFFECTS["spring"], 1)
@@ -84,3 +89,54 @@ def test_a_form_that_fits_worse_is_not_listed(
     assert alike_forms(problem, [plain], 0) == []
     stribeck = refine(problem, Hypothesis(EFFECTS["stribeck"], 1), (0.1, 1.0), accept(problem, ()), effort=0)
     assert alike_forms(problem, [stribeck], 0) == []
+
+
+def test_a_tilt_is_told_beside_the_first_axis_own_moments() -> None:
+    """Moments that a search went without bend the angles: with them free, the angles are within 3 standard errors.
+
+    The chance that one of two is not is 1 in 180.
+    """
+    robot, rng = load_robot("ur10"), np.random.default_rng(8)
+    t = 0.004 * np.arange(5000)
+    rates = np.array([0.7, 1.1, 1.3, 1.7, 2.1, 2.6])
+    q, dq, ddq = (0.6 * rates**k * f(np.outer(t, rates)) for k, f in enumerate((np.sin, np.cos, lambda x: -np.sin(x))))
+    model = default_model(replace(robot, friction=np.full((6, 4), 3.0)), velocity_scale=2e-3)
+    problem = planned_problem(model, model.nominal, [Motion(t, q, dq, ddq)], noise=Sensors(torque_noise=0.025))
+    tilt = Hypothesis(EFFECTS["base_tilt"], None)
+    truth = np.array([0.012, -0.008, 1.5, 2.0])
+    whole = problem.measured(tilt, (1.0,))
+    # The residual's product with any columns, of this tilt and of noise one.
+    drawn = np.linalg.cholesky(whole.gram + 1e-9 * np.diag(np.diag(whole.gram))) @ rng.normal(size=4)
+    alone = problem.measured(tilt, (0.0,))
+    seen = {(1.0,): replace(whole, cross=whole.gram @ truth + drawn)}
+    seen[0.0,] = replace(alone, cross=problem.product(alone, whole) @ truth + np.array([*drawn[:2], 0.0, 0.0]))
+    posed = _Measured(problem, seen)
+    plain = refine(posed, tilt, (0.0,), _nothing(), effort=0)  # type: ignore[arg-type]
+    (told,) = completed(posed, [Found(plain, 1e-9, ())])  # type: ignore[arg-type]
+    assert (plain.shape, told.member.shape) == ((0.0,), (1.0,))
+    errors = np.sqrt(np.diag(np.linalg.pinv(whole.gram)))[:2]
+    assert np.all(np.abs(told.member.coefficients[:2] - truth[:2]) < 3 * errors)
+    assert np.any(np.abs(plain.coefficients[:2] - truth[:2]) > 3 * errors)
+    # What is hardly there is not worth two more coefficients.
+    faint = {shape: replace(group, cross=0.02 * group.cross) for shape, group in seen.items()}
+    posed = _Measured(problem, faint)
+    plain = refine(posed, tilt, (0.0,), _nothing(), effort=0)  # type: ignore[arg-type]
+    assert completed(posed, [Found(plain, 1e-9, ())])[0].member is plain  # type: ignore[arg-type]
+
+
+def _nothing() -> Accepted:
+    return Accepted((), np.zeros((0, 0)), np.zeros(0), np.zeros((0, 0)))
+
+
+class _Measured:
+    """A problem whose groups are known."""
+
+    def __init__(self, problem: Problem, seen: dict[tuple[float, ...], Group]) -> None:
+        self.problem, self.seen = problem, seen
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.problem, name)
+
+    def measured(self, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Group:
+        """Gives the group of a shape."""
+        return self.seen[shape]
