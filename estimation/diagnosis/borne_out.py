@@ -200,4 +200,6 @@ def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bo
     idle = effect.name.startswith(PREFIX) and seen.gains[i].ci95[1] < 0
     # By less of its gain than this a base model that errs there, too, makes them speak against a cause.
     against = seen.worse[i] and seen.speaks[i] < -AGAINST
-    return (against and not stored) or idle or seen.rises[i] > HARM
+    # Base parameters that it moves may err elsewhere by more than it is, whatever those rows say of it.
+    risen = seen.rises[i] > HARM and seen.speaks[i] < LEFT
+    return (against and not stored) or idle or risen

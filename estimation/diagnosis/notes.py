@@ -97,8 +97,8 @@ def notes_of(
 
 _UNSURE = "The gain of {} on unseen data is not sure: its interval begins below zero."
 _AGAINST = (
-    "The unseen data speak against {}: with it the model predicts them worse. What is in the logs of the fit is not so "
-    "there, or has another cause."
+    "With {} the model predicts the unseen data worse: what is in the logs of the fit is not so there, has another "
+    "cause, or moves base parameters that those logs hardly tell."
 )
 
 
