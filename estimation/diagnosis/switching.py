@@ -13,6 +13,9 @@ from robots.terms.effects.states import change_times
 
 Array = NDArray[np.float64]
 
+# Larger changes are no amplifier's or sensor's: another drive, or none.
+MOST = 0.5
+
 
 class Switch(JointEffect):
     """tau = e tau_j from the time t_c on.
@@ -27,7 +30,7 @@ class Switch(JointEffect):
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the share by which the torque changes."""
-        return (Coefficient("share", "1"),)
+        return (Coefficient("share", "1", -MOST, MOST),)
 
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
         """Lists times through the data, and the pauses between logs."""
