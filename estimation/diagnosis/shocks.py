@@ -20,6 +20,8 @@ BETWEEN = 9
 # The largest shocks elsewhere tell the noise's tail: this share of all, so many at least and at most. Where as many as
 # this are likely as large, it may be one.
 TAIL, FEWEST, MOST, LIKELY = 0.02, 5, 20, 0.01
+# However unlikely by those, it is a shock of one joint where that leaves less than this share: a push acts on several.
+GLITCH = 0.1
 
 
 def beside_a_shock(problem: Problem, member: Member, accepted: Accepted) -> Member:
@@ -40,14 +42,15 @@ def beside_a_shock(problem: Problem, member: Member, accepted: Accepted) -> Memb
     best, place = (int(k) for k in np.unravel_index(int(np.argmax(within)), within.shape))
     reach = max(len(_bump(problem, j, 0.0)) for j in joints)
     elsewhere = np.where(maximum_filter1d(acts, reach)[:, None], 0.0, sizes[BETWEEN // 2])
-    if _chance(problem, elsewhere, joints, float(sizes[best, place].max())) < LIKELY:
-        return member
-    beside = accept(problem, (*accepted.groups, _shock(problem, joints, place, float(offsets[best]))))
+    offset, largest = float(offsets[best]), int(np.argmax(sizes[best, place]))
+    likely = _chance(problem, elsewhere, joints, float(sizes[best, place].max())) >= LIKELY
+    struck = joints if likely else joints[largest : largest + 1]
+    beside = accept(problem, (*accepted.groups, _shock(problem, struck, place, offset)))
     situation = problem.sees(member.hypothesis.effect)
     gain, _ = score(problem, member.group, beside).bounded(
         *member.hypothesis.coefficient_bounds(situation.robot, member.shape)
     )
-    return replace(member, gain=gain)
+    return replace(member, gain=gain) if likely or gain < GLITCH * member.gain else member
 
 
 def _left(problem: Problem, accepted: Accepted) -> Array:

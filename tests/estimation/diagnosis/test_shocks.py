@@ -17,7 +17,7 @@ from robots.robot import Robot
 from robots.signals import Log
 
 # The noise's memory from sample to sample, and its standard deviation [N m].
-MEMORY, NOISE = 0.97, np.array([0.1, 0.05])
+MEMORY, SHORT, NOISE = 0.97, 0.85, np.array([0.1, 0.05])
 # Encoders as coarse as this [rad] leave a band of some hertz, in which a shock is a bump of several rows.
 COARSE = 1e-4
 # A push of the elbow: its moment, duration [s] and peak [N m].
@@ -58,3 +58,14 @@ def test_a_shock_is_found_where_it_is_and_as_large_as_it_is(rows: int) -> None:
     assert sizes.shape == (rows, 1)
     assert np.argmax(sizes) == 11
     assert sizes.max() == pytest.approx(7.0, rel=0.02)
+
+
+def test_a_shock_of_one_joint_is_a_glitch_however_unlikely(arm: Robot, arm_log: Callable[..., Log]) -> None:
+    """A single innovation of eighty standard errors in normal noise, of which nothing else in the log comes near."""
+    log = arm_log()
+    innovations = np.random.default_rng(7).standard_normal(log.tau.shape)
+    innovations[round(MOMENT / 0.004), 1] += 80.0
+    noise = lfilter([np.sqrt(1 - SHORT**2)], [1, -SHORT], innovations, axis=0) * NOISE
+    log = replace(log, tau=log.tau + noise)
+    result = diagnose(arm, log, candidates=("external_contact", "stribeck"), friction="coulomb-viscous", check=False)
+    assert result.findings == ()
