@@ -54,8 +54,8 @@ class Switch(JointEffect):
         length: str = "rad",
     ) -> str:
         """Says what is seen."""
-        which = "more" if coefficients[0] > 0 else "less"
+        change = f"{100 * abs(coefficients[0]):.2g} % {'more' if coefficients[0] > 0 else 'less'}"
         return (
-            f"The torque of joint {joint} is logged {100 * abs(coefficients[0]):.2g} % {which} from t = {shape[0]:.2f} "
-            "s on than before: another amplifier or sensor, or another of its ranges, does that."
+            f"The residual torque of joint {joint} is that of a torque logged {change} from t = {shape[0]:.2f} s on "
+            "than before: another amplifier or sensor, or another of its ranges, does that."
         )

@@ -9,6 +9,7 @@ from estimation.diagnosis.draining import Draining
 from estimation.diagnosis.extension import Extension, extension_torque, find_effect, read_extension
 from estimation.diagnosis.fading import Fading
 from estimation.diagnosis.leaning import Leaning
+from estimation.diagnosis.parting import Parting
 from estimation.diagnosis.patterns import all_patterns, build_pattern
 from estimation.diagnosis.pulling import Pulling
 from estimation.diagnosis.swinging import Swinging
@@ -30,7 +31,7 @@ def state(arm: Robot) -> Situation:
 
 def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(arm: Robot, state: Situation) -> None:
     """A pattern in a model file is the pattern that was found; all its values are finite."""
-    *own, swinging, pulling, leaning, fading, draining = all_patterns(arm)
+    *own, swinging, pulling, leaning, fading, draining, parting = all_patterns(arm)
     for pattern in own:
         assert build_pattern(pattern.name) == pattern
         for shape in pattern.grid(state, 1)[:2]:
@@ -54,6 +55,7 @@ def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(
         assert effect.columns(state, None).shape == (300, 2, len(effect.parameters(arm, None)))
     assert type(build_pattern(fading.name)) is type(fading) is Fading
     assert type(build_pattern(draining.name)) is type(draining) is Draining
+    assert type(build_pattern(parting.name)) is type(parting) is Parting
     for whole in (swinging, pulling, leaning):
         text = whole.describe(None, np.zeros(12), whole.grid(state, None)[0])
         assert text.startswith("The residual torque of all joints")
