@@ -53,7 +53,7 @@ def joint_by_joint(problem: Problem, hypothesis: Hypothesis, shape: tuple[float,
     """
     joints, columns = problem.columns_of(hypothesis, shape)
     gram, cross, sure = np.zeros(len(joints)), np.zeros(len(joints)), np.ones(len(joints))
-    explained = _explained(accepted, problem.n)
+    explained = np.sum(accepted.torque(problem.white) ** 2, axis=0)
     for k, (j, X) in enumerate(zip(joints, columns, strict=True)):
         group = problem.group((j,), (X,), effect=hypothesis.effect)
         own = score(problem, group, accepted)
@@ -65,16 +65,6 @@ def joint_by_joint(problem: Problem, hypothesis: Hypothesis, shape: tuple[float,
                 sure[k] = (told[0] / (1.0 + late**2 * told[0]) + told[1]) / told.sum()
     apart = ASIDE**2 * explained[list(joints)] / np.where(gram > 0, gram, np.inf)
     return Told(gram, cross, sure, apart)
-
-
-def _explained(accepted: Accepted, joints: int) -> Array:
-    """Squares (n,) of what accepted groups are on each joint together."""
-    white: list[Array | float] = [0.0] * joints
-    coefficients = np.split(accepted.root.T @ accepted.cross, np.cumsum([group.size for group in accepted.groups])[:-1])
-    for group, own in zip(accepted.groups, coefficients, strict=False):
-        for j, columns in zip(group.joints, group.columns, strict=True):
-            white[j] = white[j] + columns @ own
-    return np.array([np.sum(np.square(one)) for one in white])
 
 
 def agreed_gain(gram: Array, cross: Array, apart: Array | None = None) -> float:

@@ -79,14 +79,7 @@ class Directions:
 
 
 def directions(
-    dq: Array,
-    ddq: Array,
-    cutoffs: Array,
-    floor: Array,
-    ends: Array,
-    step: float,
-    sampled: bool,
-    rest: Array | None = None,
+    dq: Array, ddq: Array, cutoffs: Array, floor: Array, ends: Array, step: float, rest: Array | None
 ) -> Directions:
     """Tells in which rows (N, n) of a log the direction of a joint's motion is known.
 
@@ -101,9 +94,10 @@ def directions(
         floor: power density (n,) of the encoders' noise.
         ends: power density (n,) of the positions at the cut-offs.
         step: sample period [s].
-        sampled: whether torque was measured at these rows, not between them.
-        rest: what the positions (N, n) as logged have besides; None where that is not known at these rows.
+        rest: what the positions (N, n) as logged have besides; None where positions and torque were measured between
+            these rows.
     """
+    sampled = rest is not None
     unsure, clear = np.zeros(dq.shape, dtype=bool), np.zeros(dq.shape, dtype=bool)
     jolts, moments = np.zeros(dq.shape[1]), np.zeros(dq.shape[1])
     for j, cutoff in enumerate(np.maximum(cutoffs, 1e-3)):

@@ -37,6 +37,15 @@ class Accepted:
         """Squared residual that the groups explain together."""
         return float(self.cross @ self.cross)
 
+    def torque(self, white: Array) -> Array:
+        """Gives the groups' torque together, as large as explains most, at white rows (N, n) like these."""
+        total, coefficients = np.zeros_like(white), self.root.T @ self.cross
+        for group in self.groups:
+            own, coefficients = coefficients[: group.size], coefficients[group.size :]
+            for j, part in zip(group.joints, group.columns, strict=True):
+                total[:, j] += part @ own
+        return total
+
 
 def accept(problem: Problem, groups: tuple[Group, ...]) -> Accepted:
     """Joins groups into one set of orthonormal columns."""

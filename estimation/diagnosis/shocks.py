@@ -30,12 +30,12 @@ def beside_a_shock(problem: Problem, member: Member, accepted: Accepted) -> Memb
     Noise with memory comes of innovations; a single one that is far out (an innovational outlier, Fox 1972) makes a
     bump that decays as the noise does, and in a band of low frequencies a bump of white rows. Where tails are heavy one
     of many thousands is as large as any push; but to be taken for one the noise would need two that meet. Where nothing
-    else in the log comes near, it is no shock.
+    else in the log comes near, it is a shock only of one joint that it explains nearly wholly.
     """
     joints, stride = member.group.joints, problem.whitening.stride
     torques = [np.abs(part @ member.coefficients) for part in member.group.columns]
     acts = np.max([torque > ACTS * torque.max(initial=0.0) for torque in torques], axis=0)
-    left = _left(problem, accepted)
+    left = problem.white - accepted.torque(problem.white)
     offsets = np.linspace(-0.5, 0.5, BETWEEN) * stride
     sizes = np.array([_sizes(problem, left, joints, float(offset)) for offset in offsets])  # (offsets, N, joints)
     within = np.where(acts, (sizes**2).sum(axis=2), -np.inf)
@@ -51,17 +51,6 @@ def beside_a_shock(problem: Problem, member: Member, accepted: Accepted) -> Memb
         *member.hypothesis.coefficient_bounds(situation.robot, member.shape)
     )
     return replace(member, gain=gain) if likely or gain < GLITCH * member.gain else member
-
-
-def _left(problem: Problem, accepted: Accepted) -> Array:
-    """What accepted groups leave of the white residual (N, n)."""
-    left = problem.white.copy()
-    coefficients = accepted.root.T @ accepted.cross
-    for group in accepted.groups:
-        own, coefficients = coefficients[: group.size], coefficients[group.size :]
-        for j, part in zip(group.joints, group.columns, strict=True):
-            left[:, j] -= part @ own
-    return left
 
 
 def _bump(problem: Problem, joint: int, offset: float) -> Array:

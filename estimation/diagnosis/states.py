@@ -205,7 +205,7 @@ def _part(log: Prepared, step: float, cap: float, spectra: Spectra, found: Seque
     steps = np.array([lattice_step(x) for x in log.log.q.T])
     states[1:] = cruised(states[0], states[1], states[2], steps, step)
     besides = positions[first : first + count] - q[first : first + count] if sampled else None
-    turns = directions(states[1], states[2], cutoffs, floor, np.maximum(ends, floor), step, sampled, besides)
+    turns = directions(states[1], states[2], cutoffs, floor, np.maximum(ends, floor), step, besides)
     turns = turns.spread(_between(log.log.t, t, period))
     cut = slice(None) if moved is not None else _moving(states[1], step)
     q, dq, ddq = (array[cut] for array in states)
