@@ -58,11 +58,15 @@ def joint_by_joint(problem: Problem, hypothesis: Hypothesis, shape: tuple[float,
         group = problem.group((j,), (X,), effect=hypothesis.effect)
         own = score(problem, group, accepted)
         gram[k], cross[k] = float(np.ravel(own.gram)[0]), float(np.ravel(own.cross)[0])
-        late, beside = problem.late(j)
-        if late > 0 and gram[k] > 0:
-            told = np.maximum(score(problem, problem.split(group, np.ones(1), beside), accepted).gram.sum(axis=1), 0.0)
+        late = problem.late(j)
+        if late.any() and gram[k] > 0:
+            told = score(problem, problem.split(group, np.ones(1), late > 0), accepted).gram.sum(axis=1)
+            told = np.maximum(told, 0.0)
             if told.sum() > 0:
-                sure[k] = (told[0] / (1.0 + late**2 * told[0]) + told[1]) / told.sum()
+                # What each of them has of the column's squares weighs its moment.
+                squares = np.where(late > 0, group.columns[0][:, 0], 0.0) ** 2
+                usual = np.sum(squares * late**2) / max(float(np.sum(squares)), 1e-300)
+                sure[k] = (told[0] / (1.0 + usual * told[0]) + told[1]) / told.sum()
     apart = ASIDE**2 * explained[list(joints)] / np.where(gram > 0, gram, np.inf)
     return Told(gram, cross, sure, apart)
 

@@ -36,8 +36,6 @@ LOOP = 25.0
 # A position's noise beside reversals and elsewhere is as good as drawn anew after so many rows: a slow joint stays on
 # a count of its encoder for some. It is compared where there are so many rows of each.
 ANEW, FEWEST = 5, 200
-# The slowest reversals have the most rows in which friction turns round: their moments count, and are known worst.
-SLOWEST = 0.1
 # A joint slower than this share of its RMS speed for so long [s] creeps: its friction may have any value.
 CREEP, CREEPING = 0.03, 0.15
 
@@ -50,17 +48,17 @@ class Directions:
         unsure: rows (N, n) in which a joint's direction is not known, or not to be relied on beside its reversals.
         clear: those of them (N, n) in which the velocity tells it.
         jolts: error of the accelerations (n,) beside reversals [rad/s2 or m/s2].
-        moments: error of the moments (n,) of reversals [s]: kicks make the velocity change its sign late.
+        late: how late joints may turn round (N, n) [s] by their velocities' error, where rows beside reversals count.
     """
 
     unsure: Flags
     clear: Flags
     jolts: Array
-    moments: Array
+    late: Array
 
     def rows(self, kept: slice) -> Directions:
         """Gives what is known of some rows."""
-        return replace(self, unsure=self.unsure[kept], clear=self.clear[kept])
+        return replace(self, unsure=self.unsure[kept], clear=self.clear[kept], late=self.late[kept])
 
     def spread(self, between: NDArray[np.intp]) -> Directions:
         """Takes no row as sure whose torque comes of two samples between which a joint may have turned round.
@@ -99,7 +97,7 @@ def directions(
     """
     sampled = rest is not None
     unsure, clear = np.zeros(dq.shape, dtype=bool), np.zeros(dq.shape, dtype=bool)
-    jolts, moments = np.zeros(dq.shape[1]), np.zeros(dq.shape[1])
+    jolts, late = np.zeros(dq.shape[1]), np.zeros(dq.shape)
     for j, cutoff in enumerate(np.maximum(cutoffs, 1e-3)):
         v, a = dq[:, j], ddq[:, j]
         speed = float(np.sqrt(np.mean(v**2)))
@@ -122,11 +120,12 @@ def directions(
         least = np.maximum(error, np.maximum(ALIKE * change, SURELY * sharpest(v)))
         clear[:, j] = sampled & (error < change) & (np.abs(v) > least)
         if (turned & (error < change)).any():
-            moments[j] = usual / float(np.quantile(np.abs(a[turned & (error < change)]), SLOWEST))
+            # Reversals at which it is more do not count.
+            late[:, j] = np.minimum(usual / np.maximum(np.abs(a), 1e-300), step / CLEAR)
         for start, stop in spans(np.abs(v) < CREEP * speed):
             if (stop - start) * step > CREEPING:
                 unsure[start:stop, j], clear[start:stop, j] = True, False
-    return Directions(unsure, unsure & clear, jolts, moments)
+    return Directions(unsure, unsure & clear, jolts, late)
 
 
 def _shaken(rest: Array, turned: Flags, step: float) -> float:

@@ -13,18 +13,19 @@ from robots.terms.effects import EFFECTS
 def owed_to_moments(problem: Problem, joint: int, group: Group, gain: float, accepted: Accepted) -> float:
     """Gives the part of a gain that is gone where the reversals of a joint (from 1) may all be late by their error.
 
-    Friction that turns round over a short way is late for that, at each reversal by about as much. What the moments'
-    error allows is fitted beside it, with that error as its prior.
+    Friction that turns round over a short way is late for that. What the moments' error allows is fitted beside it,
+    with that error as its prior.
     """
-    late, beside = problem.late(joint - 1)
-    if late <= 0 or not beside.any():
+    late = problem.late(joint - 1)
+    if not late.any():
         return 0.0
-    shifted = problem.measured(Hypothesis(EFFECTS["current_lag"], joint), (late,))
-    torque = np.where(beside, shifted.columns[0][:, 0].astype(float), 0.0)
+    usual = float(np.sqrt(np.mean(late[late > 0] ** 2)))
+    shifted = problem.measured(Hypothesis(EFFECTS["current_lag"], joint), (usual,))
+    torque = np.where(late > 0, shifted.columns[0][:, 0].astype(float), 0.0)
     moved = problem.white_group((joint - 1,), (torque[:, None],))
     own, other = score(problem, group, accepted), score(problem, moved, accepted)
     between = problem.product(group, moved) - own.onto.T @ other.onto
-    allowed = other.gram + late**-2.0
+    allowed = other.gram + usual**-2.0
     gram = own.gram - between @ between.T / allowed
     cross = own.cross - (between * other.cross / allowed)[:, 0]
     # Directions that the error of the moments explains wholly tell nothing.

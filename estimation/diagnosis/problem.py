@@ -251,13 +251,16 @@ class Problem:
         """Marks white rows (N,) in which no joint has turned round, come to rest or left it, nor is about to."""
         return self.recording.calm(self.whitening.stride)
 
-    def late(self, joint: int) -> tuple[float, NDArray[np.bool_]]:
-        """How well the moments of a joint's reversals are known [s], and its white rows (N,) that count beside them."""
+    def late(self, joint: int) -> Array:
+        """How late a joint may turn round [s] by what is not known of its velocity, in white rows (N,).
+
+        Zero in rows that are not beside reversals, and where those do not count.
+        """
         recording, stride = self.recording, self.whitening.stride
-        if recording.moments is None or recording.trusted is None or not recording.trusted[joint]:
-            return 0.0, np.zeros(self.rows, dtype=bool)
-        beside = ~recording.away(recording.clear[:, joint, None])[:, 0]
-        return float(recording.moments[joint]), np.concatenate([beside[run][::stride] for run in recording.runs])
+        if recording.late is None or recording.trusted is None or not recording.trusted[joint]:
+            return np.zeros(self.rows)
+        late = np.where(recording.away(recording.clear[:, joint, None])[:, 0], 0.0, recording.late[:, joint])
+        return np.concatenate([late[run][::stride] for run in recording.runs])
 
     def _known(self, joints: tuple[int, ...], columns: Sequence[Array]) -> Array:
         """Energy (k,) of whitened columns (N, k) of some joints that is not from beside rows of unknown direction."""

@@ -38,7 +38,7 @@ class Recording:
         clear: those of them (N, n) in which the velocity tells the direction, if kicks at reversals do not show.
         jolts: error of each joint's acceleration (n,) beside its reversals [rad/s2 or m/s2].
         names: of the logs.
-        moments: how well it is known when each joint turns round (n,) [s]; None where motion is known exactly.
+        late: how late joints may turn round (N, n) [s] by their velocities' error; None where motion is known exactly.
         payloads: per log a known body at the flange (10,), in its frame; empty where no log has one.
         fields: per log gravity (3,) in the base frame [m/s2], None as the robot is described; empty where all are so.
         trusted: joints (n,) whose clear rows count, and are `unsure` no more; None before that is known.
@@ -58,7 +58,7 @@ class Recording:
     clear: NDArray[np.bool_]
     jolts: Array
     names: tuple[str, ...]
-    moments: Array | None = None
+    late: Array | None = None
     payloads: tuple[Array, ...] = ()
     fields: tuple[Array | None, ...] = ()
     trusted: NDArray[np.bool_] | None = None
@@ -135,6 +135,7 @@ def cut(whole: Recording, rows: slice) -> Recording:
         tau=whole.tau[rows],
         unsure=whole.unsure[rows],
         clear=whole.clear[rows],
+        late=None if whole.late is None else whole.late[rows],
         cycles=(None,) * len(begins),
         names=whole.names[logs],
         payloads=whole.payloads[logs],
@@ -158,6 +159,7 @@ def following(first: Recording, second: Recording) -> Recording:
         tau=both("tau"),
         unsure=both("unsure").astype(bool),
         clear=both("clear").astype(bool),
+        late=None if first.late is None or second.late is None else both("late"),
         starts=starts,
         cycles=(*first.cycles, *second.cycles),
         names=(*first.names, *second.names),

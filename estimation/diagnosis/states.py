@@ -113,7 +113,7 @@ def record(
         unsure=np.concatenate([part[7].unsure for part in parts]),
         clear=np.concatenate([part[7].clear for part in parts]),
         jolts=np.max([part[7].jolts for part in parts], axis=0),
-        moments=np.max([part[7].moments for part in parts], axis=0),
+        late=np.concatenate([part[7].late for part in parts]),
         names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
         payloads=_payloads(prepared),
         fields=_fields(prepared),
@@ -135,7 +135,7 @@ def _standing(parts: Sequence[_Part], held: NDArray[np.bool_]) -> list[_Part]:
             unsure=turns.unsure | stands,
             clear=turns.clear & ~stands,
             jolts=np.where(stands, 0.0, turns.jolts),
-            moments=np.where(stands, 0.0, turns.moments),
+            late=np.where(stands, 0.0, turns.late),
         )
         result.append((t, q, dq, ddq, tau, cycle, cutoff, still, floor))
     return result

@@ -64,7 +64,7 @@ def test_reversals_tell_a_delay_no_better_than_their_moments_are_known() -> None
 
     def measured(clear: np.ndarray, moment: float) -> tuple[np.ndarray, np.ndarray]:
         trusted = np.arange(6) < 4
-        known = replace(problem.recording, clear=clear, trusted=trusted, moments=np.full(6, moment))
+        known = replace(problem.recording, clear=clear, trusted=trusted, late=np.full(motion.q.shape, moment))
         seen: Problem = replace(problem, recording=known)
         told = joint_by_joint(seen, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accept(seen, ()))
         return told.gram, told.sure

@@ -140,7 +140,7 @@ def test_a_lag_of_one_joint_is_told_no_better_than_its_reversals(
     plain = posed(np.zeros_like(recording.tau))
     problem = posed(lag * lateness(plain.situation, lag) * [0.0, 1.0])
     everywhere, both = np.ones(recording.q.shape, dtype=bool), np.ones(2, dtype=bool)
-    known = replace(problem.recording, clear=everywhere, trusted=both, moments=np.full(2, moment))
+    known = replace(problem.recording, clear=everywhere, trusted=both, late=np.full(recording.q.shape, moment))
     found = refine(
         replace(problem, recording=known), Hypothesis(EFFECTS["current_lag"], joint), (lag,), accept(problem, ())
     )
@@ -163,7 +163,9 @@ def test_friction_that_turns_round_over_microns_is_told_no_better_than_the_momen
     problem = pose_arm(replace(recording.trusting(everywhere[0]), tau=recording.tau + extra))
     doubts = []
     for moment in (1e-6, 3e-4, 1e-3, 3e-3):
-        known = replace(problem.recording, clear=everywhere, trusted=everywhere[0], moments=np.full(2, moment))
+        known = replace(
+            problem.recording, clear=everywhere, trusted=everywhere[0], late=np.full(recording.q.shape, moment)
+        )
         seen: Problem = replace(problem, recording=known)
         member = refine(seen, Hypothesis(EFFECTS["presliding_hysteresis"], 2), (2e-4,), accept(seen, ()))
         assert member.gain > 100.0
