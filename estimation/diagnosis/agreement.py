@@ -62,11 +62,13 @@ def joint_by_joint(problem: Problem, hypothesis: Hypothesis, shape: tuple[float,
         if late.any() and gram[k] > 0:
             told = score(problem, problem.split(group, np.ones(1), late > 0), accepted).gram.sum(axis=1)
             told = np.maximum(told, 0.0)
+            # What is told by the balance of impulses has its error already.
+            timed = 0.0 if group.timed is None else float(np.sum(group.timed**2))
             if told.sum() > 0:
                 # What each of them has of the column's squares weighs its moment.
                 squares = np.where(late > 0, group.columns[0][:, 0], 0.0) ** 2
                 usual = np.sum(squares * late**2) / max(float(np.sum(squares)), 1e-300)
-                sure[k] = (told[0] / (1.0 + usual * told[0]) + told[1]) / told.sum()
+                sure[k] = (told[0] / (1.0 + usual * told[0]) + told[1] + timed) / (told.sum() + timed)
     apart = ASIDE**2 * explained[list(joints)] / np.where(gram > 0, gram, np.inf)
     return Told(gram, cross, sure, apart)
 

@@ -97,6 +97,13 @@ class _Fit:
         blocks = [dense(problem, member.hypothesis, member.shape) for member in members]
         self.problem = problem
         self.full = np.concatenate([baseline.regressor, baseline.nuisance, *blocks], axis=2)
+        # What reversals tell beside the rows.
+        self.timed = np.zeros((recording.n, self.full.shape[2]))
+        edge = baseline.regressor.shape[2] + baseline.nuisance.shape[2]
+        for member, block in zip(members, blocks, strict=True):
+            if member.group.timed is not None:
+                self.timed[:, edge : edge + block.shape[2]] = member.group.timed
+            edge += block.shape[2]
         self.weights = (counted & ~recording.unsure) / problem.whitening.scales(len(recording))
 
     def values(self, tau: Array, passes: Array | float = 1.0) -> Array:
@@ -106,7 +113,11 @@ class _Fit:
     def moments(self, tau: Array, passes: Array | float = 1.0) -> tuple[Array, Array]:
         """Gives the normal equations (b, b), (b,) of such a fit."""
         flat = (self.full * (self.weights * passes)[:, :, None]).reshape(-1, self.full.shape[2])
-        return flat.T @ flat, flat.T @ (tau * self.weights).reshape(-1)
+        gram, cross = flat.T @ flat, flat.T @ (tau * self.weights).reshape(-1)
+        gram += self.timed.T @ self.timed
+        if self.problem.timing is not None:
+            cross += self.timed.T @ self.problem.timing.residual
+        return gram, cross
 
     def told(self, values: Array) -> Problem:
         """The problem, all of the torque known by these values."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from estimation.diagnosis.groups import Group
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.problem import Group, Problem
+from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.scoring import Accepted, score
 from robots.terms.effects import EFFECTS
 

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.agreement import joint_by_joint
+from estimation.diagnosis.groups import Group
 from estimation.diagnosis.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.power import beside, detectable_energy, resolving_energy, size_per_energy, unit_mixtures
-from estimation.diagnosis.problem import Group, Problem
+from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.scan import Entry
 from estimation.diagnosis.scoring import accept, visible_root
 from robots.terms.effects import EFFECTS

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.baseline import Baseline
+from estimation.diagnosis.groups import Group
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.recording import Recording
+from estimation.diagnosis.reversal_timing import Timing
 from estimation.diagnosis.upper import Upper
 from estimation.diagnosis.whitening import Whitening
 from estimation.pulls import Pull
@@ -25,34 +27,6 @@ Small = NDArray[np.float32]
 # torque, at reversals), must owe this share of what counts to rows that are not beside them.
 COUNTED, KNOWN = 0.02, 0.5
 FAINT = 1e-5
-
-
-@dataclass(frozen=True, eq=False)
-class Group:
-    """A hypothesis at one shape, measured against the data.
-
-    Attributes:
-        joints: those it acts on, from 0.
-        columns: whitened (N, k) of each of the joints.
-        against: <X, Q> (k, b), Q the base model's orthonormal columns.
-        gram: of what the base model leaves of the columns (k, k).
-        raw: squared norms (k,) before that; infinite for columns that are nearly all in rows that do not count.
-        cross: with the residual (k,).
-        above: white columns (N', k) of each of the joints above its band; none for effects that are not `fast`.
-    """
-
-    joints: tuple[int, ...]
-    columns: tuple[Small, ...]
-    against: Array
-    gram: Array
-    raw: Array
-    cross: Array
-    above: tuple[Small, ...] = ()
-
-    @property
-    def size(self) -> int:
-        """The number of columns k."""
-        return len(self.raw)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +49,7 @@ class Problem:
         pull: what holds base parameters that the data leave open, in units of rows over the noise's scale.
         upper: the frequencies above the bands; None where nothing is asked of them.
         whole: what effects depend on that act on all of the torque, as far as that is known; None where none is seen.
+        timing: how late torque is against reversals whose rows do not count; None where that is not known.
         followed: what those depend on that make all of it late, with the other effects found before; None without any.
     """
 
@@ -90,6 +65,7 @@ class Problem:
     remainder: Array
     pull: Pull
     upper: Upper | None = None
+    timing: Timing | None = None
     whole: Situation | None = None
     followed: Situation | None = None
 
@@ -188,6 +164,11 @@ class Problem:
             cross += self.upper.cross(part, j, bare=effect.unmoved)
             apart = part.T.reshape(count, k, -1)
             gram += apart @ apart.transpose(0, 2, 1)
+        timed = self._timed(joints, effect)
+        if timed is not None and self.timing is not None:
+            told = float(np.sum(timed**2))
+            raw, gram = np.where(np.isfinite(raw), raw + told, raw), gram + told
+            cross += float(timed[:, 0] @ self.timing.residual)
         high = [np.asfortranarray(part, dtype=np.float32) for part in above]
         small = [np.asfortranarray(part) for part in white]
         return [
@@ -199,9 +180,16 @@ class Problem:
                 raw=np.asarray(raw[own]),
                 cross=cross[own],
                 above=tuple(part[:, own] for part in high),
+                timed=timed,
             )
             for i, own in enumerate(slice(i * k, (i + 1) * k) for i in range(count))
         ]
+
+    def _timed(self, joints: tuple[int, ...], effect: Effect | None) -> Array | None:
+        """What reversals tell of a lag of all torque (n, 1), by some joints."""
+        if self.timing is None or effect is None or not (effect.lags and effect.whole_robot):
+            return None
+        return np.where(np.isin(np.arange(self.n), joints), 1.0 / self.timing.errors, 0.0)[:, None]
 
     def _whitened(self, columns: Array, joint: int) -> tuple[Small, Small]:
         """Whitens columns (N, k) of a joint: with the rows that do not count, and without."""
@@ -289,6 +277,8 @@ class Problem:
         for at, group in enumerate(groups):
             for part in group.above:
                 null[at] += self._drawn(part)
+            if group.timed is not None:
+                null[at] += group.timed.T @ self._drawn_timing
         return null
 
     def _drawn(self, columns: Small) -> Array:
@@ -300,6 +290,10 @@ class Problem:
         values, vectors = np.linalg.eigh(gram)
         unit = np.random.default_rng(gram.ravel().view(np.uint64)).standard_normal((len(gram), self.nulls[1].shape[1]))
         return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ unit)
+
+    @cached_property
+    def _drawn_timing(self) -> Array:
+        return np.random.default_rng(self.n).standard_normal((self.n, self.nulls[1].shape[1]))
 
     def product(self, first: Group, second: Group) -> Array:
         """Inner products (k1, k2) of what the base model leaves of two groups."""
@@ -313,6 +307,8 @@ class Problem:
             for b, right in zip(second.joints, second.above, strict=False):
                 if a == b:
                     total = total + (left.T @ right).astype(float)
+        if first.timed is not None and second.timed is not None:
+            total = total + first.timed.T @ second.timed
         return total
 
 

@@ -39,6 +39,8 @@ class Recording:
         jolts: error of each joint's acceleration (n,) beside its reversals [rad/s2 or m/s2].
         names: of the logs.
         late: how late joints may turn round (N, n) [s] by their velocities' error; None where motion is known exactly.
+        rest: what positions (N, n) as logged have besides `q`; None where not all were logged at these rows.
+        cutoffs: of each log's joints (logs, n) [Hz], above which positions are taken for noise; None as `rest`.
         payloads: per log a known body at the flange (10,), in its frame; empty where no log has one.
         fields: per log gravity (3,) in the base frame [m/s2], None as the robot is described; empty where all are so.
         trusted: joints (n,) whose clear rows count, and are `unsure` no more; None before that is known.
@@ -59,6 +61,8 @@ class Recording:
     jolts: Array
     names: tuple[str, ...]
     late: Array | None = None
+    rest: Array | None = None
+    cutoffs: Array | None = None
     payloads: tuple[Array, ...] = ()
     fields: tuple[Array | None, ...] = ()
     trusted: NDArray[np.bool_] | None = None
@@ -95,6 +99,11 @@ class Recording:
     def periodic(self) -> bool:
         """Whether every log repeats its motion."""
         return all(cycle is not None for cycle in self.cycles)
+
+    @property
+    def counting(self) -> NDArray[np.bool_]:
+        """Joints (n,) of which rows at reversals count."""
+        return np.zeros(self.n, dtype=bool) if self.trusted is None else self.trusted & self.clear.any(axis=0)
 
     def calm(self, stride: int = 1) -> NDArray[np.bool_]:
         """Marks every `stride`-th row of each log in which no joint turns round, comes to rest, or has just done so."""
@@ -136,6 +145,8 @@ def cut(whole: Recording, rows: slice) -> Recording:
         unsure=whole.unsure[rows],
         clear=whole.clear[rows],
         late=None if whole.late is None else whole.late[rows],
+        rest=None,
+        cutoffs=None,
         cycles=(None,) * len(begins),
         names=whole.names[logs],
         payloads=whole.payloads[logs],
@@ -160,6 +171,8 @@ def following(first: Recording, second: Recording) -> Recording:
         unsure=both("unsure").astype(bool),
         clear=both("clear").astype(bool),
         late=None if first.late is None or second.late is None else both("late"),
+        rest=None,
+        cutoffs=None,
         starts=starts,
         cycles=(*first.cycles, *second.cycles),
         names=(*first.names, *second.names),

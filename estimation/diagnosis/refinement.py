@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from estimation.diagnosis.agreement import joint_by_joint
+from estimation.diagnosis.groups import Group
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.late_reversals import owed_to_moments
-from estimation.diagnosis.problem import Group, Problem
+from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.scoring import Accepted, accept, score
 
 Array = NDArray[np.float64]

@@ -145,9 +145,17 @@ def _is_beyond(told: Told, effect: Effect) -> bool:
 
     Where it is not known when they were recorded, they say nothing of what comes with time.
     """
+    if any(f.member.hypothesis.effect is effect and _is_timed(f.member) for f in told.selection.found):
+        return True
     if not told.held_out:
         return False
     return effect.passing or (not told.dated and effect.depends_on == "time")
+
+
+def _is_timed(member: Member) -> bool:
+    """Whether most of what tells an effect are reversals whose rows count for nothing else."""
+    timed = member.group.timed
+    return timed is not None and 2.0 * float(np.sum(timed**2)) > float(member.group.gram[0, 0])
 
 
 def _unnamed(robot: Robot, told: Told, member: Member, beside: Sequence[Member]) -> tuple[Member, float] | None:

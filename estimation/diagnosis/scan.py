@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from scipy.special import gammaincc, gammaln
 from scipy.stats import gumbel_r
 
+from estimation.diagnosis.groups import Group
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.problem import Group, Problem
+from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.scoring import Accepted, score
 from robots.common.parallel import available_cores
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from estimation.diagnosis.problem import Group, Problem
+from estimation.diagnosis.groups import Group
+from estimation.diagnosis.problem import Problem
 
 Array = NDArray[np.float64]
 

@@ -15,6 +15,7 @@ from estimation.diagnosis.own_functions import is_short, own_functions
 from estimation.diagnosis.posing import moments, pose
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.regularisation import free, held, loosened, pull_of
+from estimation.diagnosis.reversal_timing import reversal_timing
 from estimation.diagnosis.scan import Entry, measure
 from estimation.diagnosis.selection import Selection, select, with_rivals
 from estimation.diagnosis.settling import Settled, calmer, moved, settle
@@ -89,6 +90,9 @@ def search(
             # What is left by the base model as it is fitted alone: beside effects it may be far from that.
             upper = pose_upper(recording, baseline, posed.remainder, settled.residual, whitening.bands, wide)
             posed = replace(posed, upper=upper)
+        timing = reversal_timing(recording, baseline, settled.values, settled.residual)
+        if timing is not None:
+            posed = replace(posed, timing=timing.beside(recording))
         last = _searched(
             posed,
             hypotheses,
@@ -115,7 +119,12 @@ def _relied_on(base: BaseParameters, recording: Recording) -> Recording:
         return recording
     baseline, settled = fit_plain(base, recording)
     inertia = inertia_of(baseline, recording, settled.values)
-    return recording.trusting(quiet_joints(recording, settled.residual, inertia))
+    trusted = quiet_joints(recording, settled.residual, inertia)
+    timing = reversal_timing(recording, baseline, settled.values, settled.residual)
+    if timing is not None and recording.late is not None:
+        # Positions alone bound what a kick may hide; beside torque they may tell that it is more.
+        trusted &= timing.kicks <= np.max(recording.late * np.abs(recording.ddq), axis=0)
+    return recording.trusting(trusted)
 
 
 def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Settled]:

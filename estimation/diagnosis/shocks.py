@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import correlate
 
-from estimation.diagnosis.problem import Group, Problem
+from estimation.diagnosis.groups import Group
+from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import ACTS, Member
 from estimation.diagnosis.scoring import Accepted, accept, score
 

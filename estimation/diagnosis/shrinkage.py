@@ -53,13 +53,19 @@ def shrinkage(result: Score) -> Array:
 def pull_on(problem: Problem, members: Sequence[Member]) -> Pull:
     """Gives the pull on base model, nuisance and the coefficients of members (b + m + k,), in units of plain rows."""
     pull = problem.pull
-    own = []
+    own, targets = [], []
     for i, member in enumerate(members):
         others = accept(problem, tuple(m.group for k, m in enumerate(members) if k != i))
-        own.append(row_weight(problem.whitening) * shrinkage(score(problem, member.group, others)))
+        precision, target = shrinkage(score(problem, member.group, others)), np.zeros(member.group.size)
+        if member.group.timed is not None and problem.timing is not None:
+            timed = np.sum(member.group.timed**2, axis=0)
+            target = member.group.timed.T @ problem.timing.residual / (timed + precision)
+            precision = precision + timed
+        own.append(row_weight(problem.whitening) * precision)
+        targets.append(target)
     added = np.concatenate([np.zeros(0), *own])
     known = len(pull.target)
     precision = np.zeros((known + len(added),) * 2)
     precision[:known, :known] = pull.precision
     precision[range(known, len(precision)), range(known, len(precision))] = added
-    return Pull(precision, np.concatenate([pull.target, np.zeros(len(added))]))
+    return Pull(precision, np.concatenate([pull.target, *targets]))

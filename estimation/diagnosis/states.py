@@ -26,7 +26,7 @@ from robots.robot import Robot
 from robots.signals import Log
 
 Array = NDArray[np.float64]
-_Part = tuple[Array, Array, Array, Array, Array, Cycle | None, float, Directions, Array]
+_Part = tuple[Array, Array, Array, Array, Array, Cycle | None, Array, Directions, Array, Array | None]
 
 # More rows than this only cost time: the logs are then thinned by a whole number, torque low-passed before.
 MOST_ROWS = 40_000
@@ -99,6 +99,7 @@ def record(
             remedy="record a longer log",
         )
     joined = [np.concatenate([part[k] for part in parts]) for k in range(5)]
+    rests = [part[9] for part in parts if part[9] is not None]
     return Recording(
         t=joined[0],
         starts=tuple(int(s) for s in np.cumsum([0, *lengths[:-1]])),
@@ -108,12 +109,14 @@ def record(
         tau=joined[4],
         step=step,
         cycles=tuple(part[5] for part in parts),
-        cutoff=min(part[6] for part in parts),
+        cutoff=min(float(part[6].min()) for part in parts),
         floor=np.max([part[8] for part in parts], axis=0),
         unsure=np.concatenate([part[7].unsure for part in parts]),
         clear=np.concatenate([part[7].clear for part in parts]),
         jolts=np.max([part[7].jolts for part in parts], axis=0),
         late=np.concatenate([part[7].late for part in parts]),
+        rest=np.concatenate(rests) if len(rests) == len(parts) else None,
+        cutoffs=np.array([part[6] for part in parts]) if len(rests) == len(parts) else None,
         names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
         payloads=_payloads(prepared),
         fields=_fields(prepared),
@@ -128,7 +131,7 @@ def _standing(parts: Sequence[_Part], held: NDArray[np.bool_]) -> list[_Part]:
     """
     result = []
     for part, stands in zip(parts, held, strict=True):
-        t, q, dq, ddq, tau, cycle, cutoff, turns, floor = part
+        t, q, dq, ddq, tau, cycle, cutoffs, turns, floor, rest = part
         dq, ddq, floor = (np.where(stands, 0.0, values) for values in (dq, ddq, floor))
         still = replace(
             turns,
@@ -137,7 +140,7 @@ def _standing(parts: Sequence[_Part], held: NDArray[np.bool_]) -> list[_Part]:
             jolts=np.where(stands, 0.0, turns.jolts),
             late=np.where(stands, 0.0, turns.late),
         )
-        result.append((t, q, dq, ddq, tau, cycle, cutoff, still, floor))
+        result.append((t, q, dq, ddq, tau, cycle, cutoffs, still, floor, rest))
     return result
 
 
@@ -209,7 +212,8 @@ def _part(log: Prepared, step: float, cap: float, spectra: Spectra, found: Seque
     turns = turns.spread(_between(log.log.t, t, period))
     cut = slice(None) if moved is not None else _moving(states[1], step)
     q, dq, ddq = (array[cut] for array in states)
-    return t[cut], q, dq, ddq, tau[cut], moved, float(cutoffs.min()), turns.rows(cut), floor
+    rests = None if besides is None else besides[cut]
+    return t[cut], q, dq, ddq, tau[cut], moved, cutoffs, turns.rows(cut), floor, rests
 
 
 def _between(own: Array, t: Array, period: float) -> NDArray[np.intp]:

@@ -12,9 +12,10 @@ from estimation.diagnosis.baseline import base_parameters, build_baseline
 from estimation.diagnosis.extending import fit_extended
 from estimation.diagnosis.extension import extension_torque
 from estimation.diagnosis.forms import ALIKE, alike_forms, completed
+from estimation.diagnosis.groups import Group
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.planned import planned_problem
-from estimation.diagnosis.problem import Group, Problem
+from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.refinement import refine
 from estimation.diagnosis.scoring import Accepted, accept

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from estimation import diagnose, on_one_clock, read_log
+from estimation.diagnosis.groups import Group
 from estimation.diagnosis.noise import estimate_whitening
 from estimation.diagnosis.notes import ODD
-from estimation.diagnosis.problem import Group
 from estimation.diagnosis.quiet_logs import PASSED, profile_gain
 from estimation.diagnosis.states import Recording
 from robots import load_robot

@@ -11,8 +11,8 @@ import pytest
 from estimation.diagnosis import refinement, worthwhile
 from estimation.diagnosis.agreement import Told
 from estimation.diagnosis.contenders import contenders
+from estimation.diagnosis.groups import Group
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.problem import Group
 from estimation.diagnosis.refinement import RARE, Member
 from estimation.diagnosis.scan import Outcome
 from estimation.diagnosis.worthwhile import beyond, worth_it

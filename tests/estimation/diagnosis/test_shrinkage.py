@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from estimation.diagnosis.problem import Group
+from estimation.diagnosis.groups import Group
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.regularisation import held
 from estimation.diagnosis.scoring import Score, visible_root

@@ -11,9 +11,9 @@ import pytest
 
 from estimation.diagnosis import verdict
 from estimation.diagnosis.draining import Draining
+from estimation.diagnosis.groups import Group
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.patterns import Pattern
-from estimation.diagnosis.problem import Group
 from estimation.diagnosis.refinement import RARE, Member
 from estimation.diagnosis.selection import Found
 from estimation.diagnosis.spotting import Spot
