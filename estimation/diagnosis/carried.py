@@ -35,7 +35,7 @@ def lightened(robot: Robot, recording: Recording) -> Recording:
             parameters = with_body(model, np.zeros(model.size), body)
             motion = (recording.q[run], recording.dq[run], recording.ddq[run])
             tau[run] -= model.under(gravity).torque(*motion, parameters)
-    return replace(recording, tau=tau)
+    return replace(recording, tau=tau, finer=None if recording.finer is None else lightened(robot, recording.finer))
 
 
 def regressor_on(base: BaseParameters, recording: Recording) -> Array:
@@ -47,6 +47,15 @@ def regressor_on(base: BaseParameters, recording: Recording) -> Array:
         motion = (recording.q[run], recording.dq[run], recording.ddq[run])
         base.model.under(gravity).regressor(*motion, columns=base.independent, out=Y[run])
     return Y
+
+
+def torque_on(base: BaseParameters, recording: Recording, values: Array) -> Array:
+    """Evaluates the base model's torque (N, n) on a recording with base parameters (b,), each log under its gravity."""
+    parts = []
+    for run, gravity in zip(recording.runs, recording.gravities, strict=True):
+        motion = (recording.q[run], recording.dq[run], recording.ddq[run])
+        parts.append(base.torque(*motion, values, gravity=gravity))
+    return np.concatenate(parts)
 
 
 def situation_on(

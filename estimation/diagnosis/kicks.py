@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.baseline import Baseline
 from estimation.diagnosis.periods import Cycle
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.smoothed_motion import passed
+from robots.base_parameters import BaseParameters
 
 Array = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ class Turns:
     inertia: Array
 
 
-def reversals(recording: Recording, j: int, baseline: Baseline, values: Array) -> Turns | None:
+def reversals(recording: Recording, j: int, base: BaseParameters, values: Array) -> Turns | None:
     """Finds the reversals of a joint (from 0), with base parameters (b,); None where they are too few."""
     at, rates, run, kind = [], [], [], []
     for k, rows in enumerate(recording.runs):
@@ -116,7 +116,7 @@ def reversals(recording: Recording, j: int, baseline: Baseline, values: Array) -
     q = recording.q[np.round(moments[fast]).astype(int)]
     unit, zero = np.zeros_like(q), np.zeros_like(q)
     unit[:, j] = 1.0
-    own = (baseline.base.torque(q, zero, unit, values) - baseline.base.torque(q, zero, zero, values))[:, j]
+    own = (base.torque(q, zero, unit, values) - base.torque(q, zero, zero, values))[:, j]
     usual = float(np.median(own))
     if usual <= 0:
         return None

@@ -41,6 +41,7 @@ class Recording:
         late: how late joints may turn round (N, n) [s] by their velocities' error; None where motion is known exactly.
         rest: what positions (N, n) as logged have besides `q`; None where not all were logged at these rows.
         cutoffs: of each log's joints (logs, n) [Hz], above which positions are taken for noise; None as `rest`.
+        finer: the same logs at the rate of their samples, where this one is thinned; None where those are too many.
         payloads: per log a known body at the flange (10,), in its frame; empty where no log has one.
         fields: per log gravity (3,) in the base frame [m/s2], None as the robot is described; empty where all are so.
         trusted: joints (n,) whose clear rows count, and are `unsure` no more; None before that is known.
@@ -63,6 +64,7 @@ class Recording:
     late: Array | None = None
     rest: Array | None = None
     cutoffs: Array | None = None
+    finer: Recording | None = None
     payloads: tuple[Array, ...] = ()
     fields: tuple[Array | None, ...] = ()
     trusted: NDArray[np.bool_] | None = None
@@ -147,6 +149,7 @@ def cut(whole: Recording, rows: slice) -> Recording:
         late=None if whole.late is None else whole.late[rows],
         rest=None,
         cutoffs=None,
+        finer=None,
         cycles=(None,) * len(begins),
         names=whole.names[logs],
         payloads=whole.payloads[logs],
@@ -173,6 +176,7 @@ def following(first: Recording, second: Recording) -> Recording:
         late=None if first.late is None or second.late is None else both("late"),
         rest=None,
         cutoffs=None,
+        finer=None,
         starts=starts,
         cycles=(*first.cycles, *second.cycles),
         names=(*first.names, *second.names),

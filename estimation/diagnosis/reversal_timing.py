@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.baseline import Baseline
+from estimation.diagnosis.carried import torque_on
 from estimation.diagnosis.kicks import FEWEST, Table, Turns, columns_about, edges_of, moved, reversals
 from estimation.diagnosis.recording import Recording
 
@@ -67,7 +68,9 @@ class Timing:
         return replace(self, errors=errors) if np.isfinite(errors).any() else None
 
 
-def reversal_timing(recording: Recording, baseline: Baseline, values: Array, residual: Array) -> Timing | None:
+def reversal_timing(
+    recording: Recording, baseline: Baseline, values: Array, residual: Array, extra: Array | None = None
+) -> Timing | None:
     """Measures how late torque is against each joint's reversals.
 
     Friction that turns round is late in the torque by as much as the torque is. An encoder tells a reversal of
@@ -81,20 +84,29 @@ def reversal_timing(recording: Recording, baseline: Baseline, values: Array, res
         recording: the data.
         baseline: the base model on it.
         values: its parameters (b,).
-        residual: torque less base model (N, n) [N m or N].
+        residual: torque less base model and effects that are known (N, n) [N m or N].
+        extra: torque of those (N, n); None for none.
 
     Returns:
         The timing; None where no joint tells any.
     """
-    if recording.rest is None or recording.cutoffs is None or recording.late is None:
+    base = baseline.base
+    if recording.finer is not None:
+        own = recording.finer
+        residual = own.tau - torque_on(base, own, values)
+        if extra is not None:
+            residual -= np.column_stack([np.interp(own.t, recording.t, column) for column in extra.T])
+        recording = own
+    if recording.rest is None or recording.cutoffs is None:
         return None
     lags, errors, kicks = np.zeros(recording.n), np.full(recording.n, np.inf), np.zeros(recording.n)
     for j in range(recording.n):
-        own = [i for i, c in enumerate(baseline.base.columns) if c.symbol == "f1" and c.joint == j + 1]
-        turns = reversals(recording, j, baseline, values) if own else None
+        coulomb = [i for i, c in enumerate(base.columns) if c.symbol == "f1" and c.joint == j + 1]
+        turns = reversals(recording, j, base, values) if coulomb else None
         if turns is None:
             continue
-        friction, sign = float(abs(values[own[0]])), baseline.regressor[:, j, own[0]]
+        friction = float(abs(values[coulomb[0]]))
+        sign = torque_on(base, recording, np.eye(base.size)[coulomb[0]])[:, j]
         found = _joint(recording, j, turns, residual[:, j], friction, sign)
         if found is not None:
             lags[j], errors[j], kicks[j] = found

@@ -30,6 +30,8 @@ _Part = tuple[Array, Array, Array, Array, Array, Cycle | None, Array, Directions
 
 # More rows than this only cost time: the logs are then thinned by a whole number, torque low-passed before.
 MOST_ROWS = 40_000
+# Reversals are timed by all rows, where they are no more than this.
+MOST_FINE = 130_000
 FASTEST = 260.0  # [Hz] sampling beyond which no effect of the catalogue gains
 ORDER = 8  # of the low-pass before thinning
 # At its ends a log knows its derivatives less well, for nothing is known beyond: so many periods of the cut-off are
@@ -79,8 +81,11 @@ def record(
                 remedy="shift t by the time at which the log was recorded; where that is not known, --own-clocks or "
                 "estimation.on_one_clock put the logs one after the other",
             )
+    finer = None
     if step is None:
-        step = _step(prepared)
+        own, step = max(log.positions.period for log in prepared), _step(prepared)
+        if step > 1.5 * own and sum(log.log.duration for log in prepared) / own <= MOST_FINE:
+            finer = record(robot, logs, step=own, shortest=shortest, travel=travel)
     spectra = [Spectra.of(log.positions) for log in prepared]
     found = [[of.of_positions(x) for x in log.positions.q.T] for of, log in zip(spectra, prepared, strict=True)]
     highest = np.max([[spectrum.cutoff() for spectrum in own] for own in found], axis=0)
@@ -117,6 +122,7 @@ def record(
         late=np.concatenate([part[7].late for part in parts]),
         rest=np.concatenate(rests) if len(rests) == len(parts) else None,
         cutoffs=np.array([part[6] for part in parts]) if len(rests) == len(parts) else None,
+        finer=finer,
         names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
         payloads=_payloads(prepared),
         fields=_fields(prepared),

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from estimation import diagnose
+from estimation.diagnosis import states
 from estimation.diagnosis.agreement import joint_by_joint
 from estimation.diagnosis.baseline import base_parameters
 from estimation.diagnosis.hypotheses import Hypothesis
@@ -195,3 +196,24 @@ def test_null_logs_meet_reversals_whose_lags_are_noise(pose_arm: Callable[..., P
     hypothesis = Hypothesis(EFFECTS["time_delay"], None)
     before, after = (p.null_cross(p.measured(hypothesis, (1e-3,))) for p in (plain, problem))
     assert np.var(after - before) == pytest.approx(np.sum(errors**-2.0), rel=0.2)
+
+
+def test_reversals_of_a_thinned_log_are_timed_by_all_its_samples(
+    cases: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A low-pass before thinning spreads what turns round; as the samples tell it, it stays where it is."""
+    case, robot, log = cases(1006, True)
+    plain = _timed(robot, log)
+    monkeypatch.setattr(states, "MOST_ROWS", 8000)
+    recording = record(robot, [log])
+    assert recording.finer is not None
+    assert recording.step == pytest.approx(2 * recording.finer.step)
+    thinned = _timed(robot, log)
+    told = np.isfinite(thinned.errors)
+    assert told.sum() >= 3
+    assert np.abs((thinned.lags - case.effects[0].amount) / thinned.errors)[told].max() < 4.0
+    both = told & np.isfinite(plain.errors)
+    # The base model is another, fitted to half of the rows.
+    assert np.all(np.abs(thinned.lags - plain.lags)[both] < plain.errors[both])
+    monkeypatch.setattr(states, "MOST_FINE", 10_000)
+    assert record(robot, [log]).finer is None
