@@ -93,6 +93,7 @@ def search(
         timing = reversal_timing(recording, baseline, settled.values, settled.residual, settled.extra)
         if timing is not None:
             posed = replace(posed, timing=timing.beside(recording))
+        give_back()
         last = _searched(
             posed,
             hypotheses,
