@@ -39,3 +39,8 @@ class Group:
     def size(self) -> int:
         """The number of columns k."""
         return len(self.raw)
+
+    @property
+    def by_reversals(self) -> bool:
+        """Whether most of what tells it are reversals whose rows count neither in a fit nor on unseen data."""
+        return self.timed is not None and 2.0 * float(np.sum(self.timed**2)) > float(self.gram[0, 0])

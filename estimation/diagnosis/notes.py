@@ -35,7 +35,12 @@ _AT_LIMIT = (
 
 
 def notes_of(
-    problem: Problem, false_alarm: float, findings: Sequence[Finding], apart: Sequence[Finding], after: Array
+    problem: Problem,
+    false_alarm: float,
+    findings: Sequence[Finding],
+    apart: Sequence[Finding],
+    after: Array,
+    timed: Sequence[str] = (),
 ) -> tuple[str, ...]:
     """Says what the logs and the findings leave open.
 
@@ -45,6 +50,7 @@ def notes_of(
         findings: all of them.
         apart: those that are no part of the extended model.
         after: error of that model over torque RMS on unseen data (n,).
+        timed: effects that reversals tell whose rows do not count.
     """
     recording = problem.recording
     notes = []
@@ -77,7 +83,9 @@ def notes_of(
                 f"value {parameter.value:.3g} s is one of many that fit."
             )
         # What is no part of the model says so itself.
-        if finding.gain.ci95[0] <= 0 and finding not in apart:
+        if finding.effect in timed:
+            notes.append(_TIMED.format(finding.effect))
+        elif finding.gain.ci95[0] <= 0 and finding not in apart:
             what = "what is unexplained" if finding.effect == "unexplained" else finding.effect
             where = f"{what} of joint {finding.joint}" if finding.joint else what
             notes.append((_UNSURE if finding.gain.ci95[1] >= 0 else _AGAINST).format(where))
@@ -95,6 +103,10 @@ def notes_of(
     return tuple(notes)
 
 
+_TIMED = (
+    "What tells {} are impulses at reversals, whose rows count neither in the fit nor on unseen data: encoders tell too "
+    "little of when the joints turn round. Its gain there says nothing of it."
+)
 _UNSURE = "The gain of {} on unseen data is not sure: its interval begins below zero."
 _AGAINST = (
     "With {} the model predicts the unseen data worse: what is in the logs of the fit is not so there, has another "

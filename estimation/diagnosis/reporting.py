@@ -113,6 +113,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     added = [windup.extension for windup in twisted if windup.extension.joint not in known]
     simulation = simulate_unseen(problem, members, seen, bool(told.held_out)) if members else None
     lost = (_LOST,) if members and simulation is None else ()
+    timed = [member for member in members if member.group.by_reversals]
     # Of a joint that rests in all of them unseen data say nothing: that is no error of zero.
     shown = unseen.counts.any(axis=0)
     before, after = (np.where(shown, unseen.nrmse(model), np.nan) for model in (0, len(unseen.errors) - 1))
@@ -129,7 +130,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         how_unseen=unseen.how,
         notes=(
             *told.notes,
-            *notes_of(problem, told.false_alarm, findings, apart, after),
+            *notes_of(problem, told.false_alarm, findings, apart, after, [m.hypothesis.name for m in timed]),
             *worse_joints(before, after),
             *faster_joints(problem, seen),
             *held.notes,
@@ -145,17 +146,11 @@ def _is_beyond(told: Told, effect: Effect) -> bool:
 
     Where it is not known when they were recorded, they say nothing of what comes with time.
     """
-    if any(f.member.hypothesis.effect is effect and _is_timed(f.member) for f in told.selection.found):
+    if any(f.member.hypothesis.effect is effect and f.member.group.by_reversals for f in told.selection.found):
         return True
     if not told.held_out:
         return False
     return effect.passing or (not told.dated and effect.depends_on == "time")
-
-
-def _is_timed(member: Member) -> bool:
-    """Whether most of what tells an effect are reversals whose rows count for nothing else."""
-    timed = member.group.timed
-    return timed is not None and 2.0 * float(np.sum(timed**2)) > float(member.group.gram[0, 0])
 
 
 def _unnamed(robot: Robot, told: Told, member: Member, beside: Sequence[Member]) -> tuple[Member, float] | None:

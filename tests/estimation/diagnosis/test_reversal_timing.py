@@ -97,6 +97,8 @@ def test_a_delay_is_named_that_only_reversals_tell(cases: Callable) -> None:
     (delay,) = (p for p in finding.parameters if p.name == "delay")
     assert delay.ci95[0] < case.effects[0].amount < delay.ci95[1]
     assert delay.ci95[1] - delay.ci95[0] < 1.5e-3
+    (note,) = (note for note in diagnosis.notes if "time_delay" in note)
+    assert "impulses at reversals" in note
 
 
 def test_positions_that_say_too_little_of_reversals_say_nothing(cases: Callable) -> None:
