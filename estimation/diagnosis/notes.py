@@ -104,8 +104,8 @@ def notes_of(
 
 
 _TIMED = (
-    "What tells {} are impulses at reversals, whose rows count neither in the fit nor on unseen data: encoders tell too "
-    "little of when the joints turn round. Its gain there says nothing of it."
+    "What tells {} are impulses at reversals, whose rows count neither in the fit nor on unseen data: encoders tell "
+    "too little of when the joints turn round. Its gain there says nothing of it."
 )
 _UNSURE = "The gain of {} on unseen data is not sure: its interval begins below zero."
 _AGAINST = (
