@@ -90,7 +90,7 @@ def search(
             # What is left by the base model as it is fitted alone: beside effects it may be far from that.
             upper = pose_upper(recording, baseline, posed.remainder, settled.residual, whitening.bands, wide)
             posed = replace(posed, upper=upper)
-        timing = reversal_timing(recording, baseline, settled.values, settled.residual, settled.extra)
+        timing = reversal_timing(recording, baseline, settled.values, *settled.but_late())
         if timing is not None:
             posed = replace(posed, timing=timing.beside(recording))
         give_back()

@@ -41,6 +41,7 @@ class Settled:
         extra: torque of the effects (N, n) [N m or N]; None without any.
         degrees: parameters of the effects.
         followed: torque (N, n) of those that others among them make late; None without such others.
+        late: torque (N, n) by which all of it is late; None where it is not.
     """
 
     residual: Array
@@ -48,6 +49,13 @@ class Settled:
     extra: Array | None = None
     degrees: int = 0
     followed: Array | None = None
+    late: Array | None = None
+
+    def but_late(self) -> tuple[Array, Array | None]:
+        """What all effects but those leave by which all torque is late, and their torque (N, n); None without any."""
+        if self.extra is None or self.late is None:
+            return self.residual, self.extra
+        return self.residual + self.late, self.extra - self.late
 
     def without_effects(self, tau: Array) -> Array:
         """Takes the torque of the effects off the measured one (N, n)."""
@@ -68,13 +76,16 @@ def settle(problem: Problem, members: Sequence[Member]) -> Settled:
         members = [_again(problem, members, k) if k in cut else member for k, member in enumerate(members)]
     values, left, full = fit(problem, members)
     known = len(problem.pull.target)
-    plain = np.concatenate([np.repeat(not m.hypothesis.effect.blurs, len(m.coefficients)) for m in members])
+    effects = [(m.hypothesis.effect, len(m.coefficients)) for m in members]
+    plain = np.concatenate([np.repeat(not effect.blurs, size) for effect, size in effects])
+    late = np.concatenate([np.repeat(effect.lags and effect.whole_robot, size) for effect, size in effects])
     return Settled(
         residual=left,
         values=values[: problem.baseline.base.size],
         extra=full[:, :, known:] @ values[known:],
         degrees=sum(member.degrees for member in members),
         followed=None if plain.all() else full[:, :, known:] @ (values[known:] * plain),
+        late=full[:, :, known:] @ (values[known:] * late) if late.any() else None,
     )
 
 

@@ -97,6 +97,9 @@ def test_a_delay_is_named_that_only_reversals_tell(cases: Callable) -> None:
     (delay,) = (p for p in finding.parameters if p.name == "delay")
     assert delay.ci95[0] < case.effects[0].amount < delay.ci95[1]
     assert delay.ci95[1] - delay.ci95[0] < 1.5e-3
+    # Beside the delay that was found first it is told as well as alone.
+    timing = _timed(robot, log)
+    assert delay.value == pytest.approx(np.average(timing.lags, weights=timing.errors**-2.0), abs=2e-4)
     (note,) = (note for note in diagnosis.notes if "time_delay" in note)
     assert "impulses at reversals" in note
 
