@@ -100,13 +100,10 @@ def reversals(recording: Recording, j: int, base: BaseParameters, values: Array)
     """Finds the reversals of a joint (from 0), with base parameters (b,); None where they are too few."""
     at, rates, run, kind = [], [], [], []
     for k, rows in enumerate(recording.runs):
-        v = recording.dq[rows, j]
-        before = np.flatnonzero(v[1:] * v[:-1] < 0)
-        rate = v[before + 1] - v[before]
-        moments = before - v[before] / rate
+        moments, rate = _crossings(recording.dq[rows, j])
         at.append(rows.start + moments)
         rates.append(rate)
-        run.append(np.full(len(before), k))
+        run.append(np.full(len(moments), k))
         kind.append(_kinds(moments * recording.step, recording.cycles[k]))
     moments, rate, runs = (np.concatenate(parts) for parts in (at, rates, run))
     kinds = np.unique(np.column_stack([runs, np.concatenate(kind)]), axis=0, return_inverse=True)[1].ravel()
@@ -121,6 +118,13 @@ def reversals(recording: Recording, j: int, base: BaseParameters, values: Array)
     if usual <= 0:
         return None
     return Turns(moments[fast], np.sign(rate[fast]), runs[fast], kinds[fast], np.maximum(own, LEAST * usual))
+
+
+def _crossings(v: Array) -> tuple[Array, Array]:
+    """Gives the moments [rows] at which a velocity (N,) changes its sign, and its changes from row to row there."""
+    before = np.flatnonzero(v[1:] * v[:-1] < 0)
+    rate = v[before + 1] - v[before]
+    return before - v[before] / rate, rate
 
 
 def _kinds(moments: Array, cycle: Cycle | None) -> NDArray[np.intp]:
@@ -168,9 +172,7 @@ def columns_about(
 
 def moved(recording: Recording, turns: Turns, at: Array, dq: Array) -> Array:
     """Moves reversals (R,) to where a velocity (N,) has its own nearest to them, if that is near."""
-    before = np.flatnonzero(dq[1:] * dq[:-1] < 0)
-    rate = dq[before + 1] - dq[before]
-    own = before - dq[before] / rate
+    own, rate = _crossings(dq)
     result = at.copy()
     for way in (-1.0, 1.0):
         same, chosen = own[np.sign(rate) == way], turns.way == way
