@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +45,6 @@ def diagnose(
     check: bool = True,
     seed: int = 0,
     progress: Progress | None = None,
-    executor: Executor | None = None,
 ) -> Diagnosis:
     """Finds what rigid body, friction, rotors and offsets do not explain in a robot's logs.
 
@@ -67,7 +65,6 @@ def diagnose(
             out of their neighbours are filled in, and logs are cut at gaps.
         seed: of the noise that is drawn.
         progress: is told how far it is.
-        executor: not needed so far: the work is in threads.
 
     Returns:
         The diagnosis.

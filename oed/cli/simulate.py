@@ -96,18 +96,20 @@ def simulate(
         else:
             assert trajectory is not None
             motion, metadata = read_trajectory(trajectory, n=given.n if given else None)
-            if given is None and not metadata.get("robot"):
-                raise InputError("the file names no robot", file=trajectory, remedy="give --robot")
-            described = given or robot_from(str(metadata["robot"]), tip, joints, lock)
             target = out or Path("log.csv")
             progress.start("simulating", None)
+            named = str(metadata.get("robot") or "")
+            described = given or (robot_from(named, tip, joints, lock) if named else None)
             if model is not None:
                 from estimation import load_model
                 from estimation.virtual_robot import virtual_robot
 
-                virtual = virtual_robot(load_model(model), described)
-            else:
+                obeyed = load_model(model)
+                virtual, described = virtual_robot(obeyed, described), described or obeyed.robot
+            elif described is not None:
                 virtual = load_plant(plant, described) if plant else nominal_plant(described)
+            else:
+                raise InputError("the file names no robot", file=trajectory, remedy="give --robot")
             log = run(virtual, motion, seed=seed)
             write_log(target, log, force=force)
             data = {"file": str(target), "samples": len(log), "duration": log.duration, "robot": described.name}

@@ -137,7 +137,10 @@ class ExternalContact(Effect):
         when = f"from t = {shape[0]:.2f} s for {shape[1]:.2g} s"
         if on_the_flange(shape):
             pushed = np.linalg.norm(coefficients[:3])
-            return f"Something pushed the flange {when}, with a force of {pushed:.3g} N that stayed the same."
+            return (
+                f"Something pushed the flange {when}, with a force of {pushed:.3g} N that stayed the same (along the "
+                "base's axes; the signs are those of the arm's push against it)."
+            )
         size = np.abs(coefficients)
         most, last = int(np.argmax(size)) + 1, int(np.flatnonzero(size > 0.05 * size.max())[-1]) + 1
         return (

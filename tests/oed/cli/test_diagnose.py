@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from estimation.logs import read_log, write_log
@@ -137,6 +138,19 @@ def test_a_model_takes_the_place_of_a_plant(run, done: Path, logs: Path, experim
     assert both.code == 2
     assert "--model takes the place of --plant" in " ".join(both.err.split())
     assert not (tmp_path / "log.csv").exists()
+
+
+def test_a_model_knows_its_robot(run, done: Path, experiment: Path, tmp_path: Path) -> None:
+    """A motion whose file names no robot is played on the model's own; without a model, a robot is asked for."""
+    bare = tmp_path / "bare.csv"
+    pd.read_csv(experiment / "trajectory.csv", comment="#").to_csv(bare, index=False)
+    line = ("simulate", "--trajectory", bare, "--out", tmp_path / "log.csv")
+    nobody = run(*line)
+    assert nobody.code == 2
+    assert "--robot" in nobody.err
+    played = run(*line, "--model", done / "model.json", "--json")
+    assert played.code == 0, played.err
+    assert played.data["robot"] == load_model(done / "model.json").robot.name
 
 
 @pytest.mark.parametrize(
