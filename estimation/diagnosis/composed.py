@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.carried import situation_on, unloaded
-from estimation.diagnosis.extending import dense
+from estimation.diagnosis.extending import dense, timed
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.own_functions import is_short
 from estimation.diagnosis.problem import Problem
@@ -97,13 +97,8 @@ class _Fit:
         blocks = [dense(problem, member.hypothesis, member.shape) for member in members]
         self.problem = problem
         self.full = np.concatenate([baseline.regressor, baseline.nuisance, *blocks], axis=2)
-        # What reversals tell beside the rows.
-        self.timed = np.zeros((recording.n, self.full.shape[2]))
-        edge = baseline.regressor.shape[2] + baseline.nuisance.shape[2]
-        for member, block in zip(members, blocks, strict=True):
-            if member.group.timed is not None:
-                self.timed[:, edge : edge + block.shape[2]] = member.group.timed
-            edge += block.shape[2]
+        edges = np.cumsum([baseline.regressor.shape[2] + baseline.nuisance.shape[2], *(b.shape[2] for b in blocks)])
+        self.timed = timed(members, edges[:-1].tolist(), (recording.n, self.full.shape[2]))
         self.weights = (counted & ~recording.unsure) / problem.whitening.scales(len(recording))
 
     def values(self, tau: Array, passes: Array | float = 1.0) -> Array:

@@ -86,7 +86,8 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
     # White rows tell what they are, not what coloured ones of their number would.
     pull = Pull(pull.precision / row_weight(white), pull.target)
     values[linear] = held(free.T @ free, free.T @ tau, pull)
-    covariance, unseen = _covariance(np.concatenate([flat, _timed(members, slices, flat.shape[1])]))
+    by_reversals = timed(members, [start for start, *_ in slices], (problem.n, flat.shape[1]))
+    covariance, unseen = _covariance(np.concatenate([flat, by_reversals]))
     lower_upper = [m.hypothesis.coefficient_bounds(problem.situation.robot, m.shape) for m in members]
     extensions, known = [], []
     for member, (start, size, shapes), steps, (lower, upper) in zip(
@@ -151,15 +152,13 @@ def dense(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) ->
     return X
 
 
-def _timed(members: Sequence[Member], slices: Sequence[tuple[int, int, int]], size: int) -> Array:
-    """What reversals tell of members (M, size) beside the rows."""
-    rows = [np.zeros((0, size))]
-    for member, (start, own, _) in zip(members, slices, strict=True):
+def timed(members: Sequence[Member], starts: Sequence[int], shape: tuple[int, int]) -> Array:
+    """What each joint's reversals tell beside the rows (n, p) of members whose columns start at these."""
+    told = np.zeros(shape)
+    for member, start in zip(members, starts, strict=True):
         if member.group.timed is not None:
-            told = np.zeros((len(member.group.timed), size))
-            told[:, start : start + own] = member.group.timed
-            rows.append(told)
-    return np.concatenate(rows)
+            told[:, start : start + member.group.size] = member.group.timed
+    return told
 
 
 def _slope(problem: Problem, member: Member, k: int, step: float) -> Array:

@@ -164,8 +164,9 @@ class Problem:
             cross += self.upper.cross(part, j, bare=effect.unmoved)
             apart = part.T.reshape(count, k, -1)
             gram += apart @ apart.transpose(0, 2, 1)
-        timed = self._timed(joints, effect)
-        if timed is not None and self.timing is not None:
+        timed = None
+        if self.timing is not None and effect is not None and effect.lags and effect.whole_robot:
+            timed = self.timing.column(joints)
             told = float(np.sum(timed**2))
             raw, gram = np.where(np.isfinite(raw), raw + told, raw), gram + told
             cross += float(timed[:, 0] @ self.timing.residual)
@@ -184,12 +185,6 @@ class Problem:
             )
             for i, own in enumerate(slice(i * k, (i + 1) * k) for i in range(count))
         ]
-
-    def _timed(self, joints: tuple[int, ...], effect: Effect | None) -> Array | None:
-        """What reversals tell of a lag of all torque (n, 1), by some joints."""
-        if self.timing is None or effect is None or not (effect.lags and effect.whole_robot):
-            return None
-        return np.where(np.isin(np.arange(self.n), joints), 1.0 / self.timing.errors, 0.0)[:, None]
 
     def _whitened(self, columns: Array, joint: int) -> tuple[Small, Small]:
         """Whitens columns (N, k) of a joint: with the rows that do not count, and without."""
@@ -240,15 +235,8 @@ class Problem:
         return self.recording.calm(self.whitening.stride)
 
     def late(self, joint: int) -> Array:
-        """How late a joint may turn round [s] by what is not known of its velocity, in white rows (N,).
-
-        Zero in rows that are not beside reversals, and where those do not count.
-        """
-        recording, stride = self.recording, self.whitening.stride
-        if recording.late is None or recording.trusted is None or not recording.trusted[joint]:
-            return np.zeros(self.rows)
-        late = np.where(recording.away(recording.clear[:, joint, None])[:, 0], 0.0, recording.late[:, joint])
-        return np.concatenate([late[run][::stride] for run in recording.runs])
+        """How late a joint may turn round [s] by what is not known of its velocity, in white rows (N,)."""
+        return self.recording.late_beside(joint, self.whitening.stride)
 
     def _known(self, joints: tuple[int, ...], columns: Sequence[Array]) -> Array:
         """Energy (k,) of whitened columns (N, k) of some joints that is not from beside rows of unknown direction."""

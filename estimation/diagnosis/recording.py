@@ -119,6 +119,16 @@ class Recording:
         away = self.away(turns)[:, 0]
         return np.concatenate([away[run][::stride] for run in self.runs])
 
+    def late_beside(self, joint: int, stride: int = 1) -> Array:
+        """How late a joint may turn round [s] by what is not known of its velocity, every `stride`-th row of each log.
+
+        Zero in rows that are not beside reversals, and where those do not count.
+        """
+        late = np.zeros(len(self))
+        if self.late is not None and self.trusted is not None and self.trusted[joint]:
+            late = np.where(self.away(self.clear[:, joint, None])[:, 0], 0.0, self.late[:, joint])
+        return np.concatenate([late[run][::stride] for run in self.runs])
+
     def away(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Marks rows of each log farther than `BESIDE` from marked ones, both (N, k)."""
         reach = 2 * round(BESIDE / self.step) + 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,6 +57,10 @@ class Timing:
         """The lags over their errors (n,)."""
         return np.asarray(self.lags / self.errors)
 
+    def column(self, joints: Sequence[int]) -> Array:
+        """What some joints (from 0) tell of a lag of all torque (n, 1), over their errors."""
+        return np.where(np.isin(np.arange(len(self.errors)), joints), 1.0 / self.errors, 0.0)[:, None]
+
     def beside(self, recording: Recording) -> Timing | None:
         """Keeps what is not told by rows at reversals that count, or far better than by those; None for nothing."""
         errors = self.errors.copy()
@@ -100,14 +105,13 @@ def reversal_timing(
     if recording.rest is None or recording.cutoffs is None:
         return None
     lags, errors, kicks = np.zeros(recording.n), np.full(recording.n, np.inf), np.zeros(recording.n)
-    for j in range(recording.n):
-        coulomb = [i for i, c in enumerate(base.columns) if c.symbol == "f1" and c.joint == j + 1]
-        turns = reversals(recording, j, base, values) if coulomb else None
+    coulomb = {column.joint - 1: i for i, column in enumerate(base.columns) if column.symbol == "f1"}
+    signs = torque_on(base, recording, np.isin(np.arange(base.size), list(coulomb.values())).astype(float))
+    for j, i in coulomb.items():
+        turns = reversals(recording, j, base, values)
         if turns is None:
             continue
-        friction = float(abs(values[coulomb[0]]))
-        sign = torque_on(base, recording, np.eye(base.size)[coulomb[0]])[:, j]
-        found = _joint(recording, j, turns, residual[:, j], friction, sign)
+        found = _joint(recording, j, turns, residual[:, j], float(abs(values[i])), signs[:, j])
         if found is not None:
             lags[j], errors[j], kicks[j] = found
     return Timing(lags, errors, kicks)

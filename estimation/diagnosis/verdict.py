@@ -7,24 +7,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.diagnosis.free_functions import LEAST, criterion, free_functions, worth
+from estimation.diagnosis.comparing import ENOUGH, NEARLY, STAYS, beaten, keep, thriftier
+from estimation.diagnosis.free_functions import LEAST, free_functions, worth
 from estimation.diagnosis.patterns import is_of_time, is_plain
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import RARE, Member, refine
 from estimation.diagnosis.scan import Entry
-from estimation.diagnosis.scoring import accept, score
+from estimation.diagnosis.scoring import accept
 from estimation.diagnosis.selection import Found, Selection
 from estimation.diagnosis.spotting import Spot
 
-# Named effects that explain less than this share of what stands out of the noise, or of what free functions do in their
-# place, do not explain it; nor do those that fit worse than one of those and explain less than the second share of it.
-ENOUGH, NEARLY = 0.7, 0.9
 # Several names on a joint that explain this share of what as many free functions do are as good as those.
 AS_MUCH = 0.95
 # Rivals within this of the best BIC stay possible.
 CLOSE = 10.0
-# A name of the whole robot is not owed to a joint where a free function there leaves it this share of its gain.
-STAYS, HALF = 0.75, 0.5
+# Nor is a name borrowed from free functions of which none does this share of what it does.
+HALF = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +99,7 @@ def judge(
         # So may one that acts on its own joint alone, if base parameters have taken another's torque for it.
         for found in (found for found in kept if found not in spread):
             elsewhere = [member for member in members if member.hypothesis.joint != found.member.hypothesis.joint]
-            if not _keep(problem, [found.member], [*_beside(kept, found), *elsewhere]):
+            if not keep(problem, [found.member], [*_beside(kept, found), *elsewhere]):
                 borrowed.append(found)
         if not borrowed:
             return Judgement("unexplained", kept, tuple(members), tuple(p_values), float(share))
@@ -163,11 +161,11 @@ def _holds(
     free, _ = free_functions(problem, here, others, false_alarm, rng)
     if gain - degrees < ENOUGH * max(gain - degrees + rest, sum(map(worth, free))):
         return False
-    if _beaten(problem, gain, degrees, free):
+    if beaten(problem, gain, degrees, free):
         return False
     # Free functions that are as many as the names claim as many causes, and have more freedom to follow each.
     as_many = len(free) >= len(own) and gain - degrees > AS_MUCH * sum(map(worth, free))
-    if len(own) > 1 and not as_many and not _thriftier(problem, own, others, free, LEAST):
+    if len(own) > 1 and not as_many and not thriftier(problem, own, others, free, LEAST):
         return False
     if len(own) == 1:
         # Waves over a joint's range are no more than one place of it where that explains nearly as much with less.
@@ -179,13 +177,13 @@ def _holds(
         # Nor is anything what another place, or a position that counts less and less, explains more of, and better.
         plain = [entry for entry in here if is_plain(entry.hypothesis.effect)]
         free, _ = free_functions(problem, plain, others, false_alarm, rng)
-        if free and worth(free[0]) > gain - degrees + LEAST and not _thriftier(problem, own, others, free[:1]):
+        if free and worth(free[0]) > gain - degrees + LEAST and not thriftier(problem, own, others, free[:1]):
             return False
     if any(member.hypothesis.effect.passing for member in own):
         # What comes and goes follows nearly any torque: functions of the motion that do so with less refute it.
         moving = [entry for entry in here if not is_of_time(entry.hypothesis.effect)]
         free, _ = free_functions(problem, moving, others, false_alarm, rng)
-        if not _thriftier(problem, own, others, free):
+        if not thriftier(problem, own, others, free):
             return False
     whole = [member for member in others if member.hypothesis.joint is None]
     if not whole:
@@ -193,7 +191,7 @@ def _holds(
     # What acts on all joints may have been named for what the name on this one left.
     single = [member for member in others if member.hypothesis.joint is not None]
     free, _ = free_functions(problem, here, single, false_alarm, rng)
-    return _keep(problem, whole, [*single, *free]) or _thriftier(problem, [*own, *whole], single, free)
+    return keep(problem, whole, [*single, *free]) or thriftier(problem, [*own, *whole], single, free)
 
 
 def _fewer(
@@ -236,7 +234,7 @@ def _holds_alone(
         return True
     others = [member for member in named if member is not own]
     free, _ = free_functions(problem, patterns, others, false_alarm, rng)
-    if _beaten(problem, own.gain, own.degrees, free):
+    if beaten(problem, own.gain, own.degrees, free):
         return False
     plain = [entry for entry in patterns if is_plain(entry.hypothesis.effect) and entry.hypothesis.joint is None]
     free = free_functions(problem, plain, others, false_alarm, rng)[0] if plain else []
@@ -249,18 +247,7 @@ def _holds_together(
     """Whether names fit better than one cause of all joints' torque that no name is for, all parameters counted."""
     whole = [entry for entry in patterns if entry.hypothesis.joint is None]
     free, _ = free_functions(problem, whole, [], false_alarm, rng)
-    return _thriftier(problem, named, [], free[:1])
-
-
-def _beaten(problem: Problem, gain: float, degrees: int, free: Sequence[Member]) -> bool:
-    """Whether one free function explains much more than names do, or clearly more and fits better.
-
-    Several of them may be about other things besides, which the names do not claim.
-    """
-    if not free:
-        return False
-    most, own = worth(free[0]), gain - degrees * float(np.log(problem.rows))
-    return gain - degrees < ENOUGH * most or (gain - degrees < NEARLY * most and own < criterion(problem, free[:1]))
+    return thriftier(problem, named, [], free[:1])
 
 
 def _stays(
@@ -280,29 +267,13 @@ def _stays(
     free, _ = free_functions(problem, patterns, others, false_alarm, rng, alone=True)
     own = found.member
     each = [worth(member) / max(worth(own), 1e-300) for member in free]
-    if sum(each) < NEARLY and max(each, default=0.0) < HALF and _thriftier(problem, [own], others, free):
+    if sum(each) < NEARLY and max(each, default=0.0) < HALF and thriftier(problem, [own], others, free):
         return True
-    return _keep(problem, [own], [*others, *free])
+    return keep(problem, [own], [*others, *free])
 
 
 def _beside(kept: Sequence[Found], found: Found) -> list[Member]:
     return [other.member for other in kept if other is not found]
-
-
-def _keep(problem: Problem, names: Sequence[Member], beside: Sequence[Member]) -> bool:
-    """Whether names explain beside other functions most of what they do without them."""
-    accepted = accept(problem, tuple(member.group for member in beside))
-    return all(score(problem, name.group, accepted).gain > STAYS * name.gain for name in names)
-
-
-def _thriftier(
-    problem: Problem, names: Sequence[Member], others: Sequence[Member], free: Sequence[Member], margin: float = 0.0
-) -> bool:
-    """Whether names fit better than free functions in their place, by a margin (Schwarz), all parameters counted."""
-    gain = accept(problem, tuple(m.group for m in (*others, *names))).gain
-    gain -= accept(problem, tuple(m.group for m in others)).gain
-    price = float(np.log(problem.rows))
-    return not free or gain - sum(member.degrees for member in names) * price > criterion(problem, free) + margin
 
 
 def is_open(found: Found) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.diagnosis import verdict
+from estimation.diagnosis import comparing, verdict
 from estimation.diagnosis.draining import Draining
 from estimation.diagnosis.groups import Group
 from estimation.diagnosis.hypotheses import Hypothesis
@@ -23,6 +24,11 @@ from robots.terms.effects.time_delay import near
 
 ROWS = 5000
 PRICE = float(np.log(ROWS))
+
+
+def _accepting(monkeypatch: pytest.MonkeyPatch, accept: Callable[..., Any]) -> None:
+    for module in (comparing, verdict):
+        monkeypatch.setattr(module, "accept", accept)
 
 
 def _member(name: str, joint: int | None, gain: float, degrees: int) -> Member:
@@ -46,12 +52,11 @@ def test_a_name_of_the_whole_robot_may_be_what_a_name_on_a_joint_left(
     gains = {(): 0.0, ("external_contact",): 100.0, ("external_contact", "torque_ripple"): 400.0}
     gains["torque_ripple", "external_contact"] = 400.0
     labels = {id(m.group): m.hypothesis.name for m in (ripple, push)}
-    monkeypatch.setattr(
-        verdict,
-        "accept",
+    _accepting(
+        monkeypatch,
         lambda problem, groups: SimpleNamespace(gain=gains.get(tuple(labels.get(id(g), "free") for g in groups), 0.0)),
     )
-    monkeypatch.setattr(verdict, "score", lambda problem, group, beside: SimpleNamespace(gain=left))
+    monkeypatch.setattr(comparing, "score", lambda problem, group, beside: SimpleNamespace(gain=left))
     found = replace(ripple, gain=free, degrees=8, group=replace(ripple.group))
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments: ([found] if push not in arguments[2] else [], []))
     problem = SimpleNamespace(rows=ROWS)
@@ -75,9 +80,7 @@ def test_waves_are_no_catch_at_one_angle(
     own = _member(name, 1, 300.0, 5)
     catch = replace(_member("spring", 1, spot, degrees), hypothesis=Hypothesis(Spot(), 1))
     gains = {id(own.group): 300.0, id(catch.group): spot}
-    monkeypatch.setattr(
-        verdict, "accept", lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups))
-    )
+    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
     spots = [SimpleNamespace(hypothesis=catch.hypothesis), SimpleNamespace(hypothesis=Hypothesis(Pattern("turns"), 1))]
 
     def patterns(problem: object, entries: list[SimpleNamespace], *rest: object) -> tuple[list[Member], list[float]]:
@@ -106,9 +109,7 @@ def test_a_drift_is_a_free_function_of_time(
     pattern = Hypothesis(Pattern("time" if of_time else "angle"), 2)
     free = replace(_member("spring", 2, 219.0, degrees), hypothesis=pattern)
     gains = {id(drift.group): 220.0, id(free.group): 219.0}
-    monkeypatch.setattr(
-        verdict, "accept", lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups))
-    )
+    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
 
     def patterns(
         problem: object, entries: list[SimpleNamespace], *rest: object, **kind: bool
@@ -140,10 +141,8 @@ def test_a_formula_is_not_named_for_what_is_unexplained_on_joints_that_it_reache
     offset = replace(offset, group=replace(offset.group, joints=joints))
     free = replace(_member("spring", 2, 80.0, 15), hypothesis=Hypothesis(Pattern("angle"), where))
     gains = {id(offset.group): 100.0, id(free.group): 80.0}
-    monkeypatch.setattr(
-        verdict, "accept", lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups))
-    )
-    monkeypatch.setattr(verdict, "score", lambda problem, group, beside: SimpleNamespace(gain=left))
+    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
+    monkeypatch.setattr(comparing, "score", lambda problem, group, beside: SimpleNamespace(gain=left))
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: ([free], [1e-30]))
     monkeypatch.setattr(verdict, "_holds", lambda *arguments: True)
     monkeypatch.setattr(verdict, "_believable", lambda *arguments: True)
@@ -183,9 +182,7 @@ def test_several_names_on_one_joint_must_fit_better_than_one_free_function(monke
     pair = [_member("spring", 1, 200.0, 3), _member("presliding_hysteresis", 1, 109.0, 2)]
     free = replace(_member("spring", 1, 299.0, 4), hypothesis=Hypothesis(Pattern("memory"), 1))
     gains = {id(pair[0].group): 200.0, id(pair[1].group): 109.0, id(free.group): 299.0}
-    monkeypatch.setattr(
-        verdict, "accept", lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups))
-    )
+    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
     problem = SimpleNamespace(rows=ROWS)
 
     def held(functions: list[Member]) -> bool:
@@ -233,8 +230,8 @@ def test_what_does_more_than_free_functions_does_not_borrow_from_them(
         for k, gain in enumerate(gains, start=1)
     ]
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: (free, []))
-    monkeypatch.setattr(verdict, "accept", lambda problem, groups: SimpleNamespace(gain=1000.0 * len(groups)))
-    monkeypatch.setattr(verdict, "score", lambda problem, group, beside: SimpleNamespace(gain=450.0))
+    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=1000.0 * len(groups)))
+    monkeypatch.setattr(comparing, "score", lambda problem, group, beside: SimpleNamespace(gain=450.0))
     found = Found(delay, 1e-9, ())
     problem: Any = SimpleNamespace(rows=ROWS)
     assert verdict._stays(problem, found, (found,), [], 0.01, np.random.default_rng(0)) is stays
@@ -253,7 +250,7 @@ def test_small_names_beside_one_that_holds_are_left_out(monkeypatch: pytest.Monk
         seen.append(tuple(m.hypothesis.label for m in named if m.hypothesis.joint == joint))
         return len(seen[-1]) == 1
 
-    monkeypatch.setattr(verdict, "accept", lambda problem, groups: SimpleNamespace(gain=800.0))
+    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=800.0))
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: ([], []))
     monkeypatch.setattr(verdict, "refine", lambda problem, hypothesis, shape, beside: replace(stribeck, gain=705.0))
     monkeypatch.setattr(verdict, "_holds", holds)
@@ -291,7 +288,7 @@ def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
             torn, shape=shape, gain=worth, coefficients=np.array([shape[0] if believed else near(shape[0])[0][1]])
         )
 
-    monkeypatch.setattr(verdict, "accept", lambda problem, groups: SimpleNamespace(gain=0.0))
+    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=0.0))
     monkeypatch.setattr(verdict, "refine", refined)
     problem: Any = SimpleNamespace(rows=ROWS, sees=lambda effect: None, situation=SimpleNamespace(robot=None))
     given = verdict._buildable(problem, Found(torn, 1e-9, ()), [torn])
