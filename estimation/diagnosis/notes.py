@@ -146,7 +146,8 @@ def faster_joints(problem: Problem, seen: Measured) -> list[str]:
     """Says which joints are faster on unseen data than their friction's polynomial was fitted for."""
     if seen.whole is problem.recording or not any(column.symbol == "f4" for column in problem.baseline.base.columns):
         return []
-    known, there = (np.abs(r.dq).max(axis=0) for r in (problem.recording, cut(seen.whole, slice(seen.first, None))))
+    unseen = cut(seen.whole, slice(seen.first, len(seen.whole)))
+    known, there = (np.abs(recording.dq).max(axis=0) for recording in (problem.recording, unseen))
     ratio = there / np.maximum(known, 1e-9)
     fast = np.flatnonzero(ratio > FASTER)
     names = ", ".join(str(j + 1) for j in fast)

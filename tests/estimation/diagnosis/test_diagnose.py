@@ -181,6 +181,11 @@ def test_unseen_motion_that_is_faster_than_friction_was_fitted_for_is_said(
     assert note.startswith("Joints 1, 2: up to 2.0 times")
     assert told(SIMPLE, unseen) == []
     assert told("polynomial", simulate(plant, replace(motion, t=2 * half + 100.0), seed=2)) == []
+    # One with a gap is two stretches.
+    kept = np.abs(unseen.t - unseen.t.mean()) > 0.5
+    torn = replace(unseen, t=unseen.t[kept], q=unseen.q[kept], tau=unseen.tau[kept])
+    (note,) = told("polynomial", torn)
+    assert note.startswith("Joints 1, 2: up to 2.0 times")
 
 
 def test_a_finding_that_is_no_part_of_the_model_is_shown(stepped: tuple[Diagnosis, Log]) -> None:
