@@ -13,6 +13,8 @@ from estimation.diagnosis.families import FAMILIES
 from estimation.diagnosis.leaning import Leaning
 from estimation.diagnosis.parting import Parting
 from estimation.diagnosis.pulling import Pulling
+from estimation.diagnosis.recurring import Recurring, Spell
+from estimation.diagnosis.shifting import BaseShift, Shift, ZeroShift
 from estimation.diagnosis.spotting import Spot
 from estimation.diagnosis.stopping import Stop
 from estimation.diagnosis.swinging import Swinging
@@ -31,9 +33,18 @@ SLOWEST, RUBBING = 0.6, 2.0
 SWINGS = 5.0
 SWAYING = ("vibration", "sway")
 # What acts on all joints at once.
-WHOLE: tuple[Effect, ...] = (Swinging(), Pulling(), Leaning(), Fading(), Draining(), Parting())
+WHOLE: tuple[Effect, ...] = (
+    Swinging(),
+    Pulling(),
+    Leaning(),
+    Fading(),
+    Draining(),
+    Parting(),
+    BaseShift(),
+    Recurring(),
+)
 # What is at a place of a joint's range, or comes at a moment.
-SINGLE: tuple[Effect, ...] = (Spot(), Spot(odd=True), Stop(), Stop(below=True), Switch())
+SINGLE: tuple[Effect, ...] = (Spot(), Spot(odd=True), Stop(), Stop(below=True), Switch(), ZeroShift(), Spell())
 
 
 @dataclass(frozen=True)
@@ -209,12 +220,16 @@ def all_patterns(robot: Robot) -> tuple[Effect, ...]:
 
 def is_of_time(effect: object) -> bool:
     """Whether a pattern's function goes by time: of the motion it knows what it acts on, or the direction."""
-    return isinstance(effect, (OverTime, Switch)) or (isinstance(effect, Pattern) and effect.kind in ("time", "ageing"))
+    return isinstance(effect, (OverTime, Switch, Shift, Spell)) or (
+        isinstance(effect, Pattern) and effect.kind in ("time", "ageing")
+    )
 
 
 def is_plain(effect: object) -> bool:
     """Whether a pattern's few functions resemble a cause that is no other: a name that explains less is none."""
-    return isinstance(effect, (Stop, Switch, Draining)) or (isinstance(effect, Pattern) and effect.kind == "ageing")
+    return isinstance(effect, (Stop, Switch, Shift, Draining)) or (
+        isinstance(effect, Pattern) and effect.kind == "ageing"
+    )
 
 
 def swings_by_itself(effect: object) -> bool:

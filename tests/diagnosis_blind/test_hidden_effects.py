@@ -81,6 +81,7 @@ STRANGE = (
     Hide(seed=7071, effects=(strangers.Drag,), joint=1, size=0.03),
     Hide(seed=7073, effects=(whole_strangers.LeaningBase,), size=0.02, kind="ur10"),
     Hide(seed=7074, effects=(strangers.DeadZone,), joint=2, size=0.02),
+    Hide(seed=7075, effects=(whole_strangers.SlippedBase,), size=0.015, kind="ur10", periodic=False),
 )
 SWINGING = Hide(seed=7041, effects=(whole_strangers.Slosh,), size=0.01, duration=60.0)
 MORE = (
@@ -91,7 +92,11 @@ MORE = (
     Hide(seed=7006, effects=(friction.PositionDependent,), joint=4),
     Hide(seed=7007, effects=(surroundings.Tilt,), kind="ur10"),
 )
-MORE_STRANGE = (Hide(seed=7072, effects=(whole_strangers.Hose,), size=0.03, kind="ur10"),)
+MORE_STRANGE = (
+    Hide(seed=7072, effects=(whole_strangers.Hose,), size=0.03, kind="ur10"),
+    Hide(seed=7076, effects=(strangers.SlippedZero,), size=0.015, joint=3),
+    Hide(seed=7077, effects=(whole_strangers.Conveyor,), size=0.015, kind="panda"),
+)
 """Cases for a longer run: with ALL_HIDDEN set in the environment."""
 ALL = bool(os.environ.get("ALL_HIDDEN"))
 

@@ -21,11 +21,12 @@ from tests.truth.effects.strangers import (
     Drag,
     DraggingBrake,
     Interpolation,
+    SlippedZero,
     TiredCable,
 )
 from tests.truth.effects.surroundings import Contact, Payload, Tilt
 from tests.truth.effects.transmission import Backlash, Balancer, Cable, Elastic, Ripple, WristCoupling
-from tests.truth.effects.whole_strangers import FloorVibration, Hose, LeaningBase, Slosh
+from tests.truth.effects.whole_strangers import Conveyor, FloorVibration, Hose, LeaningBase, SlippedBase, Slosh
 
 KNOWN: tuple[type[Effect], ...] = (
     Stribeck,
@@ -64,5 +65,8 @@ STRANGERS: tuple[type[Effect], ...] = (
     BeltFriction,
     LeaningBase,
     DeadZone,
+    SlippedBase,
+    SlippedZero,
+    Conveyor,
 )
 __all__ = ["KNOWN", "STRANGERS", "Effect"]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from tests.truth.dynamics import rigid_torque
 from tests.truth.effects.base import Effect, log_uniform
 from tests.truth.machines import Machine
 from tests.truth.ride import Ride
@@ -156,6 +157,32 @@ class DeadZone(Effect):
         own = torque[:, self.j]
         zone = self.amount * np.abs(own[ride.runs[0]]).max()
         return torque + self.on_joint(ride, -np.clip(own, -zone, zone))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlippedZero(Effect):
+    """A joint that from a moment on stands amount [rad or m] further than its encoder says."""
+
+    moment: float = 0.0
+
+    name = "unexplained"
+    largest = 0.5
+
+    @classmethod
+    def joints(cls, machine: Machine) -> tuple[int | None, ...]:
+        return tuple(range(2, machine.n + 1))
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> SlippedZero:
+        return cls(joint=joint, moment=span * rng.uniform(0.2, 0.8))
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        model, q = ride.machine.model, ride.link_q + self.on_joint(ride, np.full(len(ride.t), self.amount))
+        there, told = (rigid_torque(model, x, ride.link_v, ride.link_a) for x in (q, ride.link_q))
+        return (ride.t >= self.moment)[:, None] * (there - told)
+
+    def truths(self) -> dict[str, float]:
+        return {"change_time": self.moment}
 
 
 def _another(machine: Machine, rng: np.random.Generator, joint: int | None) -> int:

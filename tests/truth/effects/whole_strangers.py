@@ -147,6 +147,69 @@ class LeaningBase(Effect):
         return _between(ride, torque, every)
 
 
+@dataclass(frozen=True, kw_only=True)
+class SlippedBase(Effect):
+    """A base that from a moment on stands tilted by amount [rad] about a horizontal axis."""
+
+    moment: float = 0.0
+    heading: float = 0.0
+
+    name = "unexplained"
+    largest = 0.2
+
+    @classmethod
+    def joints(cls, machine: Machine) -> tuple[int | None, ...]:
+        return (None,)
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> SlippedBase:
+        return cls(moment=span * rng.uniform(0.2, 0.8), heading=rng.uniform(0, 2 * np.pi))
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        model, still = ride.machine.model, np.zeros_like(ride.q)
+        turn = pin.exp3(self.amount * np.array([np.cos(self.heading), np.sin(self.heading), 0.0]))
+        field = with_gravity(model, turn @ model.gravity.linear - model.gravity.linear)
+        return (ride.t >= self.moment)[:, None] * rigid_torque(field, ride.link_q, still, still)
+
+    def truths(self) -> dict[str, float]:
+        return {"change_time": self.moment}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conveyor(Effect):
+    """A machine that pushes the tool by amount [N] in each of its cycles, bell-shaped in time."""
+
+    period: float = 4.0
+    phase: float = 0.0
+    seconds: float = 0.06
+    direction: tuple[float, float, float] = (1.0, 0.0, 0.0)
+
+    name = "unexplained"
+    largest = 3000.0
+
+    @classmethod
+    def joints(cls, machine: Machine) -> tuple[int | None, ...]:
+        return (None,)
+
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Conveyor:
+        direction = rng.normal(size=3)
+        return cls(
+            period=log_uniform(rng, 2.0, 9.0),
+            phase=rng.uniform(),
+            seconds=log_uniform(rng, 0.04, 0.3),
+            direction=tuple((direction / np.linalg.norm(direction)).tolist()),
+        )
+
+    def torque(self, ride: Ride) -> np.ndarray:
+        since = (np.mod(ride.t / self.period - self.phase + 0.5, 1.0) - 0.5) * self.period
+        force = self.amount * np.exp(-0.5 * (since / self.seconds) ** 2)[:, None] * np.array(self.direction)
+        return point_force_torque(ride.machine.model, ride.link_q, ride.machine.n, np.zeros(3), force)
+
+    def truths(self) -> dict[str, float]:
+        return {"period": self.period}
+
+
 def _places(machine: Machine, q: np.ndarray, point: np.ndarray) -> np.ndarray:
     data = machine.model.createData()
     places = np.empty((len(q), 3))

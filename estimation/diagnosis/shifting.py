@@ -1,0 +1,104 @@
+"""What moves once and for all while the logs go on: a base that slips on its mount, a joint's zero that jumps."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.robot import Robot
+from robots.terms.base import length_unit
+from robots.terms.effects import Coefficient, Effect, Shape, Situation
+from robots.terms.effects.base_tilt import tilted_torque
+from robots.terms.effects.states import change_times
+
+Array = NDArray[np.float64]
+
+
+class Shift(Effect):
+    """What acts from a time t_c on, and did not before."""
+
+    depends_on: ClassVar[Literal["state", "time"]] = "time"
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("change_time", "s", -np.inf, np.inf, "linear", inexact=0.02),)
+
+    def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
+        """Lists times through the data, and the pauses between logs."""
+        return tuple((time,) for time in change_times(situation))
+
+    def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
+        """Keeps the change within the data."""
+        return ((float(situation.t[0]), float(situation.t[-1])),)
+
+
+def _after(columns: Array, situation: Situation, shape: tuple[float, ...]) -> Array:
+    """Keeps of columns (N, n, k) what is after the change."""
+    return np.where((situation.t >= shape[0])[:, None, None], columns, 0.0)
+
+
+class BaseShift(Shift):
+    """(d rigid/dg) (g x e_k) a_k from t_c on, e_1 and e_2 level: `base_tilt` that begins while the robot moves."""
+
+    name: ClassVar[str] = "pattern:base_shift:0:even"
+    title: ClassVar[str] = "a base that tilts at one moment"
+    whole_robot: ClassVar[bool] = True
+
+    def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
+        """Describes the base's rotations about its two level axes."""
+        return Coefficient("tilt_1", "rad", -0.5, 0.5), Coefficient("tilt_2", "rad", -0.5, 0.5)
+
+    def joints(self, robot: Robot) -> tuple[int | None, ...]:
+        """Names the whole robot, if there is gravity."""
+        return (None,) if np.any(robot.chain.gravity) else ()
+
+    def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the torque of all joints per angle (N, n, 2)."""
+        return _after(tilted_torque(situation), situation, shape)
+
+    def describe(
+        self,
+        joint: int | None,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what is seen."""
+        angle = np.degrees(np.hypot(*coefficients))
+        return (
+            f"The residual torque of all joints is that of a base that tilts by {angle:.2g} deg at t = {shape[0]:.2f} "
+            "s and stays so: its mount gave way."
+        )
+
+
+class ZeroShift(Shift):
+    """(d rigid/dq_j) o from t_c on: `encoder_offset` that begins while the robot moves."""
+
+    name: ClassVar[str] = "pattern:zero_shift:0:even"
+    title: ClassVar[str] = "a joint zero that jumps at one moment"
+
+    def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
+        """Describes the offset."""
+        assert joint is not None
+        return (Coefficient("offset", length_unit(robot, joint - 1), -0.5, 0.5),)
+
+    def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the torque of all joints per offset of one (N, n, 1)."""
+        assert joint is not None
+        return _after(situation.sensitivity("position")[:, :, joint - 1 : joint], situation, shape)
+
+    def describe(
+        self,
+        joint: int | None,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what is seen."""
+        return (
+            f"The residual torque is that of a joint {joint} that stands {coefficients[0]:.2g} {length} further than "
+            f"its encoder says, from t = {shape[0]:.2f} s on: a coupling slipped, or a reference was set anew."
+        )
