@@ -22,6 +22,7 @@ HOLD = 0.1  # of one that lasts
 # as long, and from there, its middle or its end, it is looked for.
 LONGER = (1.0, 2.0, 4.0, 8.0)
 FROM = (0.0, 0.5, 1.0)
+ALONE = 0.05  # share of what a joint feels below which others feel nothing
 WRENCH = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
 
 
@@ -58,6 +59,17 @@ class ExternalContact(Effect):
         else:
             told = [Coefficient(f"peak_on_joint_{j + 1}", force_unit(robot, j)) for j in range(robot.n)]
         return (*told, *(Coefficient("", "") for _ in range(_count(robot.n) - len(told))))
+
+    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+        """Whether joints before the one that feels it most feel it, too.
+
+        A force misses the axes of the first two where it acts across the arm, or along an upright first axis; all
+        before a further one it misses by chance only. What one of those has alone is its own.
+        """
+        size = np.abs(coefficients[: robot.n])
+        most = int(np.argmax(size))
+        alone = not on_the_flange(shape) and most >= 2 and bool((size[:most] < ALONE * size[most]).all())
+        return not alone and super().believable(robot, joint, coefficients, shape)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists durations, each starting every half of it."""

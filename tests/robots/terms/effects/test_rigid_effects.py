@@ -145,6 +145,18 @@ def test_a_push_anywhere_is_felt_by_each_joint(now, twin):
     assert np.sum(left**2) < 0.1 * np.sum(torque**2)
 
 
+def test_a_push_on_a_further_joint_alone_is_none(catalogue_robot) -> None:
+    """A force that only joint 4 feels would miss three axes; across the arm one may well miss all but the first."""
+    push, brief, lasting = EFFECTS["external_contact"], (3.0, 0.4, 0.6, 0.0), (3.0, 0.4, 0.6, 1.0)
+    robot, n = catalogue_robot, catalogue_robot.n
+    alone = np.eye(n)[3] * 5.0 + 0.04
+    assert not push.believable(robot, None, alone, brief)
+    assert push.believable(robot, None, alone + 0.4 * np.eye(n)[1], brief)
+    assert push.believable(robot, None, np.eye(n)[0] * 5.0, brief)
+    assert push.believable(robot, None, np.eye(n)[1] * 5.0, brief)
+    assert push.believable(robot, None, alone, lasting)
+
+
 def test_a_push_that_lasts_is_a_wrench_on_the_flange(now, twin):
     """A force and a moment that stay the same in the base frame, by pinocchio, whatever the arm does meanwhile."""
     pin = pytest.importorskip("pinocchio")
