@@ -148,7 +148,8 @@ def test_a_push_anywhere_is_felt_by_each_joint(now, twin):
 def test_a_push_on_a_further_joint_alone_is_none(catalogue_robot) -> None:
     """A force that only joint 4 feels would miss three axes; across the arm one may well miss all but the first."""
     push, brief, lasting = EFFECTS["external_contact"], (3.0, 0.4, 0.6, 0.0), (3.0, 0.4, 0.6, 1.0)
-    robot, n = catalogue_robot, catalogue_robot.n
+    robot = catalogue_robot("er3a")
+    n = robot.n
     alone = np.eye(n)[3] * 5.0 + 0.04
     assert not push.believable(robot, None, alone, brief)
     assert push.believable(robot, None, alone + 0.4 * np.eye(n)[1], brief)
