@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.daily import Daily
 from estimation.diagnosis.draining import Draining
 from estimation.diagnosis.fading import Fading, OverTime
 from estimation.diagnosis.families import FAMILIES
 from estimation.diagnosis.leaning import Leaning
 from estimation.diagnosis.parting import Parting
 from estimation.diagnosis.pulling import Pulling
-from estimation.diagnosis.recurring import Recurring, Spell
+from estimation.diagnosis.recurring import PAUSED, Recurring, Spell
 from estimation.diagnosis.shifting import BaseShift, Shift, ZeroShift
 from estimation.diagnosis.spotting import Spot
 from estimation.diagnosis.stopping import Stop
@@ -42,6 +43,7 @@ WHOLE: tuple[Effect, ...] = (
     Parting(),
     BaseShift(),
     Recurring(),
+    Daily(),
 )
 # What is at a place of a joint's range, or comes at a moment.
 SINGLE: tuple[Effect, ...] = (Spot(), Spot(odd=True), Stop(), Stop(below=True), Switch(), ZeroShift(), Spell())
@@ -247,4 +249,6 @@ def _top(f: Array, power: Array, near: float) -> float:
 
 
 def _duration(situation: Situation) -> float:
-    return max(float(situation.t[-1] - situation.t[0]), 1.0)
+    """The time from first to last [s]; where logs are days apart what was recorded, for no phase lasts so long."""
+    span, recorded = float(situation.t[-1] - situation.t[0]), len(situation) * situation.period
+    return max(span if span < PAUSED * recorded else recorded, 1.0)

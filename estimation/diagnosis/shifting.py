@@ -16,6 +16,10 @@ from robots.terms.effects.states import change_times
 Array = NDArray[np.float64]
 
 
+CHANGES = 20
+"""Times through the data: what acts on all joints is seen from afar, and costs as many columns."""
+
+
 class Shift(Effect):
     """What acts from a time t_c on, and did not before."""
 
@@ -24,7 +28,7 @@ class Shift(Effect):
 
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
         """Lists times through the data, and the pauses between logs."""
-        return tuple((time,) for time in change_times(situation))
+        return tuple((time,) for time in change_times(situation, CHANGES))
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
         """Keeps the change within the data."""

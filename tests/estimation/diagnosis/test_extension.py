@@ -32,7 +32,7 @@ def state(arm: Robot) -> Situation:
 
 def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(arm: Robot, state: Situation) -> None:
     """A pattern in a model file is the pattern that was found; all its values are finite."""
-    *own, swinging, pulling, leaning, fading, draining, parting, _, _ = all_patterns(arm)
+    *own, swinging, pulling, leaning, fading, draining, parting, _, _, _ = all_patterns(arm)
     for pattern in own:
         if isinstance(pattern, ZeroShift):
             # It acts on several joints.
