@@ -71,10 +71,10 @@ def mended(robot: Robot, log: Log, which: str) -> Mended:
     """
     gate = check_log(robot, log)
     sizes = [f for f in gate.findings if f.name == "unit_of_torque" and f.joint is not None]
-    strange = 2 * len(sizes) > robot.n
+    strange = 2 * len(sizes) >= max(robot.n, 3)
     told = TOLD - {"unit_of_torque"} if strange else TOLD
     replace(gate, findings=tuple(f for f in gate.findings if f.name not in told)).raise_if_refused()
-    notes = [_SIZES.format(which, _range([f.value for f in sizes]))] if strange else []
+    notes = [_SIZES.format(which, len(sizes), robot.n, _range([f.value for f in sizes]))] if strange else []
     notes += [
         f"{which}{_BY_FIT if finding.name in TOLD else ''}: {finding}."
         for finding in gate.findings
@@ -84,8 +84,8 @@ def mended(robot: Robot, log: Log, which: str) -> Mended:
 
 
 _SIZES = (
-    "{}: most joints' torques are {} times those of the robot's description: check unit and gear ratios (a mapping "
-    "states them) before anything else that is said here; they are right if the description is that wrong."
+    "{}: the torques of {} of {} joints are {} times those of the robot's description: check unit and gear ratios (a "
+    "mapping states them) before anything else that is said here; they are right if the description is that wrong."
 )
 
 
