@@ -95,7 +95,7 @@ def test_friction_of_a_while_is_unexplained_with_its_time(arm: Robot, arm_log: C
     during = (log.t > 8.0) & (log.t < 12.0)
     tau = log.tau.copy()
     tau[:, 1] += size * during * np.sign(np.gradient(log.q[:, 1]))
-    found = diagnose(arm, replace(log, tau=tau))
+    found = diagnose(arm, replace(log, tau=tau), candidates=("friction_step", "thermal_friction", "external_contact"))
     assert found.verdict == "unexplained"
     finding = found.findings[0]
     assert finding.joint == 2
