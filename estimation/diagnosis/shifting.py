@@ -16,8 +16,12 @@ from robots.terms.effects.states import change_times
 Array = NDArray[np.float64]
 
 
-CHANGES = 20
-"""Times through the data: what acts on all joints is seen from afar, and costs as many columns."""
+CHANGES = 64
+"""Times through the data; of so many only the likeliest are scanned, for what acts on all joints takes much memory."""
+
+
+LEAST = 0.02
+"""Share of its torque's energy below which a change is taken to have that much."""
 
 
 class Shift(Effect):
@@ -33,6 +37,22 @@ class Shift(Effect):
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
         """Keeps the change within the data."""
         return ((float(situation.t[0]), float(situation.t[-1])),)
+
+    def propose(
+        self, situation: Situation, joint: int | None, residual: Array, count: int = 8
+    ) -> tuple[tuple[float, ...], ...]:
+        """Ranks all times at once, by what the residual has to do with all that is after each, over its own size."""
+        grid = self.grid(situation, joint)
+        if len(grid) <= count:
+            return grid
+        X = self.columns(situation, joint, (-np.inf,))
+        seen = (residual != 0)[:, :, None] * X
+        products = np.einsum("tjk,tj->tk", X, residual)
+        told, size = (np.cumsum(x[::-1], axis=0)[::-1] for x in (products, np.einsum("tjk,tjk->tk", seen, seen)))
+        rows = np.searchsorted(situation.t, np.ravel(grid))
+        # Of the last moments so little is seen that anything fits.
+        scores = np.sum(told[rows] ** 2 / np.maximum(size[rows], LEAST * size[:1] + 1e-300), axis=1)
+        return tuple(grid[i] for i in np.argsort(-scores)[:count])
 
 
 def _after(columns: Array, situation: Situation, shape: tuple[float, ...]) -> Array:
