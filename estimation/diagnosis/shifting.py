@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 
 CHANGES = 64
 """Times through the data; of so many only the likeliest are scanned, for what acts on all joints takes much memory."""
-
-
+APART = 2
+"""Of those times as many beside one that is scanned are not: it is refined."""
 LEAST = 0.02
 """Share of its torque's energy below which a change is taken to have that much."""
 
@@ -52,7 +52,12 @@ class Shift(Effect):
         rows = np.searchsorted(situation.t, np.ravel(grid))
         # Of the last moments so little is seen that anything fits.
         scores = np.sum(told[rows] ** 2 / np.maximum(size[rows], LEAST * size[:1] + 1e-300), axis=1)
-        return tuple(grid[i] for i in np.argsort(-scores)[:count])
+        chosen: list[int] = []
+        while len(chosen) < count and np.isfinite(scores).any():
+            best = int(np.argmax(scores))
+            chosen.append(best)
+            scores[max(best - APART, 0) : best + APART + 1] = -np.inf
+        return tuple(grid[i] for i in chosen)
 
 
 def _after(columns: Array, situation: Situation, shape: tuple[float, ...]) -> Array:
