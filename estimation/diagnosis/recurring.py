@@ -11,12 +11,10 @@ from estimation.diagnosis.fading import OverTime
 from robots.robot import Robot
 from robots.terms.base import force_unit
 from robots.terms.effects import Coefficient, JointEffect, Shape, Situation
-from robots.terms.effects.external_contact import pulse
+from robots.terms.effects.external_contact import HOLD, pulse
 
 Array = NDArray[np.float64]
 
-HOLD = 0.1
-"""Hardness of a pulse that lasts: nearly as strong at its ends as in its middle."""
 SPELLS = (1.5, 3.0, 6.0, 12.0)
 """Durations of a spell [s], no more than the second share of the data: what lasts longer is a change for good."""
 MOST = 0.4
