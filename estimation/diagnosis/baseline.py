@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.carried import regressor_on, situation_on
+from estimation.diagnosis.carried import regressor_on, signs_on, situation_on
 from estimation.diagnosis.directions import SHARP, sharpest
 from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.states import Recording
+from estimation.diagnosis.thinning import thinned
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.regressor import default_model
 from robots.robot import Robot
@@ -90,7 +91,7 @@ def build_baseline(base: BaseParameters, recording: Recording, residual_scale: A
         base = replace(base, model=model)
         for i in signs:
             joint = base.columns[i].joint - 1
-            Y[:, joint, i] = np.tanh(recording.dq[:, joint] / chosen[joint])
+            Y[:, joint, i] = signs_on(recording, joint, np.array([chosen[joint]]))[:, 0]
     return Baseline(base, Y, _nuisance(recording, chosen))
 
 
@@ -103,11 +104,17 @@ def _nuisance(recording: Recording, chosen: tuple[float, ...] | None) -> Array:
         return np.zeros((len(recording), recording.n, 0))
     result = np.zeros((len(recording), recording.n, recording.n))
     for j, v0 in enumerate(chosen):
-        x = recording.dq[:, j] / v0
-        change = x / np.cosh(np.clip(x, -300, 300)) ** 2
+        change = _change(recording, j, v0)
         if np.sum(change[~recording.unsure[:, j]] ** 2) > SHOWN * np.sum(change**2):
             result[:, j, j] = change
     return result
+
+
+def _change(recording: Recording, joint: int, v0: float) -> Array:
+    if recording.finer is not None:
+        return thinned(_change(recording.finer, joint, v0), recording.finer.starts, recording.stride)
+    x = recording.dq[:, joint] / v0
+    return np.asarray(x / np.cosh(np.clip(x, -300, 300)) ** 2)
 
 
 class _Signs:
@@ -138,7 +145,7 @@ class _Signs:
         for a, joint in enumerate(self.joints):
             # A sign acts on its own joint's rows alone.
             own = slice(a * len(SCALES), (a + 1) * len(SCALES))
-            columns = np.tanh(recording.dq[rows, joint, None] / np.array(SCALES)) * self.counts[:, joint, None]
+            columns = signs_on(recording, joint, np.array(SCALES))[rows] * self.counts[:, joint, None]
             gram[own, own] = columns.T @ columns
             cross[own] = columns.T @ self.tau[:, joint]
             against[own] = columns.T @ self.Q[:, joint]
@@ -164,9 +171,9 @@ class _Signs:
         trial = [len(SCALES) * a + SCALES.index(scales[joint]) for a, joint in enumerate(self.joints)]
         values = self._fitted(trial)
         residual = self.tau - self.Q @ (self.along - self.against[trial].T @ values)
-        dq = self.recording.dq[:: self.stride]
         for joint, value in zip(self.joints, values, strict=True):
-            residual[:, joint] -= value * np.tanh(dq[:, joint] / scales[joint]) * self.counts[:, joint]
+            sign = signs_on(self.recording, joint, np.array([scales[joint]]))[:: self.stride, 0]
+            residual[:, joint] -= value * sign * self.counts[:, joint]
         result = np.zeros(self.recording.tau.shape)
         for run in self.recording.runs:
             rows = slice(-(-run.start // self.stride), -(-run.stop // self.stride))

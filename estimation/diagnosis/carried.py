@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.recording import Recording
+from estimation.diagnosis.thinning import thinned
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.terms.effects import Situation
 from robots.terms.effects.sensitivities import moved_body
-from robots.terms.effects.situation import joined, situation
+from robots.terms.effects.situation import Finer, joined, situation, velocity_scale, with_finer
 
 if TYPE_CHECKING:
     from estimation.diagnosis.problem import Problem
@@ -39,7 +40,27 @@ def lightened(robot: Robot, recording: Recording) -> Recording:
 
 
 def regressor_on(base: BaseParameters, recording: Recording) -> Array:
-    """Evaluates the base model's columns (N, n, b) on a recording, each log under its own gravity."""
+    """Evaluates the base model's columns (N, n, b) on a recording, each log under its own gravity.
+
+    Signs are low-passed as the torque was, where logs are thinned.
+    """
+    Y = _regressor(base, recording)
+    scales = np.broadcast_to(velocity_scale(base.model), recording.n)
+    for i, column in enumerate(base.columns):
+        if column.symbol == "f1" and recording.finer is not None:
+            Y[:, column.joint - 1, i] = signs_on(recording, column.joint - 1, scales[[column.joint - 1]])[:, 0]
+    return Y
+
+
+def signs_on(recording: Recording, joint: int, scales: Array) -> Array:
+    """Evaluates a joint's signs (N, k), from 0, as smooth as `scales` (k,) say, 0 for the sharp one."""
+    if recording.finer is not None:
+        return thinned(signs_on(recording.finer, joint, scales), recording.finer.starts, recording.stride)
+    dq = recording.dq[:, joint, None]
+    return np.where(scales > 0, np.tanh(dq / np.where(scales > 0, scales, 1.0)), np.sign(dq))
+
+
+def _regressor(base: BaseParameters, recording: Recording) -> Array:
     if not recording.fields:
         return base.regressor(recording.q, recording.dq, recording.ddq)
     Y = np.empty((len(recording), recording.n, base.size))
@@ -71,6 +92,15 @@ def situation_on(
     """
     full = np.zeros(model.size)
     full[slice(None) if columns is None else list(columns)] = parameters
+    coarse = _situation(recording, model, full)
+    if recording.finer is None:
+        return coarse
+    starts, stride = recording.finer.starts, recording.stride
+    whole = _situation(recording.finer, model, full)
+    return with_finer(coarse, Finer(whole, lambda rows: thinned(rows, starts, stride)))
+
+
+def _situation(recording: Recording, model: TorqueModel, full: Array) -> Situation:
     parts = []
     runs = zip(recording.runs, recording.bodies, recording.gravities, strict=True)
     for _, group in groupby(runs, key=lambda item: (item[1].tobytes(), None if item[2] is None else item[2].tobytes())):

@@ -41,7 +41,7 @@ def composed(problem: Problem, members: Sequence[Member], hypotheses: Sequence[H
     others = [member for member in members if not member.hypothesis.effect.blurs]
     if others and any(hypothesis.effect.blurs for hypothesis in hypotheses):
         beyond = np.sum([dense(problem, m.hypothesis, m.shape) @ m.coefficients for m in others], axis=0)
-        problem = replace(problem, followed=replace(problem.situation, beyond=beyond))
+        problem = replace(problem, followed=problem.situation.beside(beyond))
     useless = np.zeros_like(problem.recording.unsure)
     for hypothesis in hypotheses:
         if hypothesis.effect.last:
@@ -86,7 +86,7 @@ def _lost(problem: Problem, members: Sequence[Member]) -> Array:
 def _with_more(problem: Problem, torque: Array) -> Problem:
     whole = problem.whole
     assert whole is not None
-    return replace(problem, whole=replace(whole, beyond=torque + (whole.beyond if whole.beyond is not None else 0.0)))
+    return replace(problem, whole=whole.beside(torque + (whole.beyond if whole.beyond is not None else 0.0)))
 
 
 class _Fit:
@@ -119,7 +119,7 @@ class _Fit:
         problem, known = self.problem, len(self.problem.pull.target)
         now = problem.baseline.situation(problem.recording, values[: problem.baseline.base.size])
         beyond = self.full[:, :, known:] @ values[known:] if len(values) > known else None
-        return replace(problem, whole=replace(now, beyond=beyond))
+        return replace(problem, whole=now.beside(beyond))
 
 
 def fit(problem: Problem, members: Sequence[Member]) -> tuple[Array, Array, Array]:
@@ -144,13 +144,13 @@ def columns_on(
     late = [k for k, member in enumerate(members) if member.hypothesis.effect.blurs]
     if problem.followed is not None and 0 < len(late) < len(members):
         plain = [columns[k] @ member.coefficients for k, member in enumerate(members) if k not in late]
-        followed = replace(now, beyond=np.sum(plain, axis=0))
+        followed = now.beside(np.sum(plain, axis=0))
         for k in late:
             states[k], columns[k] = followed, _dense(followed, members[k])
     if problem.whole is not None:
         whole = situation_on(recording, model, unloaded(replace(problem, situation=problem.whole)))
         parts = [X @ m.coefficients for X, m in zip(columns, members, strict=True) if not m.hypothesis.effect.last]
-        whole = replace(whole, beyond=np.sum(parts, axis=0) if parts else None)
+        whole = whole.beside(np.sum(parts, axis=0) if parts else None)
         for k, member in enumerate(members):
             if member.hypothesis.effect.last:
                 states[k], columns[k] = whole, _dense(whole, member)

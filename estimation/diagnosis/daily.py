@@ -8,14 +8,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.clocks import PAUSE
 from estimation.diagnosis.fading import OverTime
 from robots.robot import Robot
 from robots.terms.effects import Coefficient, Situation
 
 Array = NDArray[np.float64]
 
-PAUSE = 60.0
-"""[s] between logs from which on they are two sessions."""
 SESSIONS = 6
 """Sessions that are told apart; more of them are bunched, in order."""
 
@@ -75,9 +74,12 @@ class Daily(OverTime):
 
 
 def _sessions(situation: Situation) -> list[slice]:
-    """Gives the rows of each session: logs with no more than a short pause between are one."""
-    t, runs = situation.t, situation.runs
-    begins = [0, *(b.start for a, b in pairwise(runs) if t[b.start] - t[a.stop - 1] > PAUSE)]
+    """Gives the rows of each session: logs with a pause between that is shorter than `PAUSE` are one.
+
+    Logs whose pauses nobody noted may be of several days.
+    """
+    t, runs, least = situation.t, situation.runs, PAUSE - situation.period
+    begins = [0, *(b.start for a, b in pairwise(runs) if t[b.start] - t[a.stop - 1] > least)]
     bunches = np.array_split(np.arange(len(begins)), min(len(begins), SESSIONS))
     starts = [begins[int(bunch[0])] for bunch in bunches]
     return [slice(a, b) for a, b in pairwise((*starts, len(situation)))]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -129,7 +129,7 @@ def extension_torque(extensions: Sequence[Extension], state: Situation) -> Array
     """
     total = np.zeros_like(state.q)
     for stage in range(3):
-        now = replace(state, beyond=total) if stage else state
+        now = state.beside(total) if stage else state
         own = [extension for extension in extensions if _stage(extension.source) == stage]
         total = total + sum((extension.torque(now) for extension in own), start=np.zeros_like(total))
     return total

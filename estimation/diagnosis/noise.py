@@ -200,7 +200,9 @@ def quiet_joints(recording: Recording, residual: Array, inertia: Array) -> NDArr
         residual: torque less model (N, n) [N m or N].
         inertia: torque on each joint per acceleration of each (n, n) [kg m2].
     """
-    noise = np.sqrt(_density([residual[run] for run in recording.runs], recording.step) / (2 * recording.step))
+    density = _density([residual[run] for run in recording.runs], recording.step)
+    # Of the samples themselves, which are as many as a kick lasts for.
+    noise = np.sqrt(density * recording.stride / (2 * recording.step))
     return np.asarray(np.diag(inertia) * recording.jolts < DROWNED * noise)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -90,7 +88,7 @@ def pose(
         remainder=remainder,
         pull=pull,
         upper=upper,
-        followed=None if followed is None else replace(now, beyond=followed),
+        followed=None if followed is None else now.beside(followed),
     )
 
 

@@ -41,7 +41,8 @@ class Recording:
         late: how late joints may turn round (N, n) [s] by their velocities' error; None where motion is known exactly.
         rest: what positions (N, n) as logged have besides `q`; None where not all were logged at these rows.
         cutoffs: of each log's joints (logs, n) [Hz], above which positions are taken for noise; None as `rest`.
-        finer: the same logs at the rate of their samples, where this one is thinned; None where those are too many.
+        finer: the same logs at the rate of their samples, where this one is thinned: each log's first row and every so
+            many; None where those are too many.
         payloads: per log a known body at the flange (10,), in its frame; empty where no log has one.
         fields: per log gravity (3,) in the base frame [m/s2], None as the robot is described; empty where all are so.
         trusted: joints (n,) whose clear rows count, and are `unsure` no more; None before that is known.
@@ -96,6 +97,11 @@ class Recording:
     def duration(self) -> float:
         """Time recorded, without the pauses between logs [s]."""
         return len(self.t) * self.step
+
+    @property
+    def stride(self) -> int:
+        """Rows of the finer recording that became one; 1 without any."""
+        return 1 if self.finer is None else round(self.step / self.finer.step)
 
     @property
     def periodic(self) -> bool:
@@ -159,12 +165,21 @@ def cut(whole: Recording, rows: slice) -> Recording:
         late=None if whole.late is None else whole.late[rows],
         rest=None,
         cutoffs=None,
-        finer=None,
+        finer=None if whole.finer is None else cut(whole.finer, _at_all_samples(whole, rows)),
         cycles=(None,) * len(begins),
         names=whole.names[logs],
         payloads=whole.payloads[logs],
         fields=whole.fields[logs],
     )
+
+
+def _at_all_samples(thinned: Recording, rows: slice) -> slice:
+    """Gives the rows of the finer recording from the first to the last of some."""
+    assert thinned.finer is not None
+    starts, ends = np.array(thinned.starts), np.array([rows.start, rows.stop - 1])
+    own = np.searchsorted(starts, ends, side="right") - 1
+    first, last = np.array(thinned.finer.starts)[own] + thinned.stride * (ends - starts[own])
+    return slice(int(first), int(last) + 1)
 
 
 def following(first: Recording, second: Recording) -> Recording:
@@ -186,7 +201,7 @@ def following(first: Recording, second: Recording) -> Recording:
         late=None if first.late is None or second.late is None else both("late"),
         rest=None,
         cutoffs=None,
-        finer=None,
+        finer=None if first.finer is None or second.finer is None else following(first.finer, second.finer),
         starts=starts,
         cycles=(*first.cycles, *second.cycles),
         names=(*first.names, *second.names),

@@ -16,6 +16,7 @@ from estimation.diagnosis.groups import Group
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.scoring import Accepted, score
+from robots.common.memory import give_back
 from robots.common.parallel import available_cores
 
 Array = NDArray[np.float64]
@@ -26,8 +27,10 @@ LONG = 60
 PROPOSED = 6
 # Mean of the Gumbel distribution: the largest of m independent -log p is log m + this, on average.
 EULER = 0.5772156649015329
+# Hypotheses after which what their evaluation has left of the heap is given back.
+OFTEN = 20
 # Columns that are whitened side by side.
-WIDE = 64
+WIDE = 32
 
 T = TypeVar("T")
 
@@ -114,6 +117,8 @@ def measure(
         nonlocal done
         entry = _entry(problem, hypothesis)
         done += 1
+        if done % OFTEN == 0:
+            give_back()
         advance(done / len(hypotheses))
         return entry
 

@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
 
 from estimation.diagnosis.believable import believable_cutoff
 from estimation.diagnosis.cruising import cruised
@@ -18,10 +17,10 @@ from estimation.diagnosis.periods import Cycle, find_cycle, project
 from estimation.diagnosis.position_spectra import Spectra, Spectrum
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.smoothed_motion import smoothed
+from estimation.diagnosis.thinning import low_passed, thin, under_its_top
 from estimation.gate.resolution import lattice_step
 from estimation.preparation import Prepared, prepare, still_joints
 from robots.common.errors import InputError
-from robots.common.stretches import spans
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -30,16 +29,15 @@ _Part = tuple[Array, Array, Array, Array, Array, Cycle | None, Array, Directions
 
 # More rows than this only cost time: the logs are then thinned by a whole number, torque low-passed before.
 MOST_ROWS = 40_000
-# Reversals are timed by all rows, where they are no more than this.
+# What jumps is evaluated at all rows, where they are no more than this.
 MOST_FINE = 130_000
 FASTEST = 260.0  # [Hz] sampling beyond which no effect of the catalogue gains
-ORDER = 8  # of the low-pass before thinning
 # At its ends a log knows its derivatives less well, for nothing is known beyond: so many periods of the cut-off are
 # lost, and no more than a share of the log.
 LOST, MOST_LOST = 4.0, 0.02
 SHORTEST = 5.0  # [s] of log below which nothing can be told
-# Torque within this share of its largest is at it, three samples in a row.
-FLAT = 1e-6
+# A step is so many whole periods, but for this share of one.
+WHOLE = 1e-3
 # A mean over repetitions is taken where it knows frequencies higher by this factor than a single pass.
 SHARPER = 1.2
 # At the ends of a log, rows in which all joints are slower than this share are left out, up to so long [s].
@@ -81,11 +79,11 @@ def record(
                 remedy="shift t by the time at which the log was recorded; where that is not known, --own-clocks or "
                 "estimation.on_one_clock put the logs one after the other",
             )
-    finer = None
-    if step is None:
-        own, step = max(log.positions.period for log in prepared), _step(prepared)
-        if step > 1.5 * own and sum(log.log.duration for log in prepared) / own <= MOST_FINE:
-            finer = record(robot, logs, step=own, shortest=shortest, travel=travel)
+    own, step = max(log.positions.period for log in prepared), _step(prepared) if step is None else step
+    stride = round(step / own)
+    whole = abs(step - stride * own) < WHOLE * own
+    if stride > 1 and whole and sum(log.log.duration for log in prepared) / own <= MOST_FINE:
+        return thin(record(robot, logs, step=own, shortest=shortest, travel=travel), stride)
     spectra = [Spectra.of(log.positions) for log in prepared]
     found = [[of.of_positions(x) for x in log.positions.q.T] for of, log in zip(spectra, prepared, strict=True)]
     highest = np.max([[spectrum.cutoff() for spectrum in own] for own in found], axis=0)
@@ -122,7 +120,6 @@ def record(
         late=np.concatenate([part[7].late for part in parts]),
         rest=np.concatenate(rests) if len(rests) == len(parts) else None,
         cutoffs=np.array([part[6] for part in parts]) if len(rests) == len(parts) else None,
-        finer=finer,
         names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
         payloads=_payloads(prepared),
         fields=_fields(prepared),
@@ -236,22 +233,8 @@ def _torque(log: Prepared, step: float) -> _Interpolation:
     if step > 1.5 * period:
         even = t[0] + period * np.arange(int((t[-1] - t[0]) / period + 1e-6) + 1)
         tau = np.column_stack([np.interp(even, t, column) for column in tau.T])
-        sections = butter(ORDER, 0.8 * period / step, output="sos")
-        t, tau = even, _under_its_top(tau, sosfiltfilt(sections, tau, axis=0))
+        t, tau = even, under_its_top(tau, low_passed(tau, step / period))
     return _Interpolation(t, tau)
-
-
-def _under_its_top(tau: Array, passed: Array) -> Array:
-    """Keeps the flat tops of torque (N, n) that a filter has passed: a drive at its limit gives no more than that."""
-    result = passed.copy()
-    for own, column in zip(result.T, tau.T, strict=True):
-        most = float(np.abs(column).max(initial=0.0))
-        flat = [slice(a, b) for a, b in spans(np.abs(column) >= (1.0 - FLAT) * most) if b - a >= 3]
-        if flat:
-            np.clip(own, -most, most, out=own)
-        for rows in flat:
-            own[rows] = column[rows]
-    return result
 
 
 class _Interpolation:

@@ -22,7 +22,7 @@ from estimation.diagnosis.whitening import Whitening
 Array = NDArray[np.float64]
 
 # A joint whose band ends within this share of the wider one has nothing above it.
-NEARLY = 0.8
+NEARLY = 0.75
 # Above the bands, the error of the accelerations may have so many times the power of the torque noise: it is part of
 # the noise there.
 WIDER = 50.0

@@ -121,6 +121,8 @@ class Effect(ABC):
         turns: whether it acts where a joint turns round: an error in the moment of that resembles it.
         kicks: whether it acts by changes of acceleration: they are largest, and least known, where a joint turns round.
         fast: whether its torque owes nothing to accelerations: it is looked for above the frequencies of those, too.
+        sharp: whether its torque may turn round or pass within some samples, otherwise than by the sign of a velocity:
+            where logs are thinned, it is evaluated before.
         unmoved: whether the arm's motion answers to it, and not it to the motion: no base model is fitted to that.
         blurs: whether it lets friction turn round later or over some time: how sharp its sign is shows beside it only.
         waves: whether it goes up and down over the joint's range, as a spot of it does once.
@@ -142,6 +144,7 @@ class Effect(ABC):
     turns: ClassVar[bool] = False
     kicks: ClassVar[bool] = False
     fast: ClassVar[bool] = False
+    sharp: ClassVar[bool] = False
     unmoved: ClassVar[bool] = False
     blurs: ClassVar[bool] = False
     waves: ClassVar[bool] = False

@@ -25,6 +25,7 @@ class CurrentLag(JointEffect):
     rare: ClassVar[bool] = True
     lags: ClassVar[bool] = True
     blurs: ClassVar[bool] = True
+    sharp: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (replace(SHIFT, lower=0.0, grid=tuple(s for s in SHIFT.grid if s > 0)),)
     rivals: ClassVar[tuple[str, ...]] = ("time_delay", "presliding_hysteresis", "joint_elasticity")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "micro_reversals")

@@ -27,6 +27,7 @@ class JointCoupling(StaticEffect):
 
     name: ClassVar[str] = "joint_coupling"
     title: ClassVar[str] = "drives that run through each other (coupling)"
+    sharp: ClassVar[bool] = True
     rivals: ClassVar[tuple[str, ...]] = ("torque_crosstalk", "position_dependent_friction", "load_dependent_friction")
     experiments: ClassVar[tuple[str, ...]] = ("single_joint",)
 

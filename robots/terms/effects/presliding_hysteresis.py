@@ -25,6 +25,7 @@ class PreslidingHysteresis(JointEffect):
 
     name: ClassVar[str] = "presliding_hysteresis"
     title: ClassVar[str] = "friction that turns round gradually at reversals (presliding)"
+    sharp: ClassVar[bool] = True
     turns: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("presliding_travel", "rad", 1e-5, 0.2, "log"),)
     rivals: ClassVar[tuple[str, ...]] = ("stribeck", "backlash", "time_delay", "current_lag", "spring")
@@ -43,7 +44,7 @@ class PreslidingHysteresis(JointEffect):
         if reach < 1e-9:
             return ()
         # At a reversal the joint moves by half the acceleration times the squared period from sample to sample.
-        step = 0.5 * float(np.quantile(np.abs(situation.ddq[:, joint - 1]), 0.5)) * situation.period**2
+        step = 0.5 * float(np.quantile(np.abs(situation.ddq[:, joint - 1]), 0.5)) * situation.sampled**2
         lowest, highest = max(2.0 * step, 1e-5), min(0.1 * reach, 0.2)
         if highest <= lowest:
             return ((highest,),)

@@ -42,6 +42,7 @@ class Situation:
             situations that this one joins; `parameters` are the first's, and each has a model of its own gravity.
         measured: torque as logged (N, n) [N m or N]; None where there is no log, and in models that are evaluated.
         beyond: torque of other effects (N, n) [N m or N], for those that act on all of the torque; None for none.
+        finer: the same logs before they were thinned; None where they were not.
     """
 
     model: TorqueModel
@@ -58,6 +59,7 @@ class Situation:
     parts: tuple[Situation, ...] = ()
     measured: Array | None = None
     beyond: Array | None = None
+    finer: Finer | None = None
     _cache: dict[object, Any] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
@@ -80,9 +82,24 @@ class Situation:
         return float(np.median(steps)) if len(steps) else 0.0
 
     @property
+    def sampled(self) -> float:
+        """The median sample period of the logs before they were thinned [s]."""
+        return self.period if self.finer is None else self.finer.situation.period
+
+    @property
     def whole(self) -> Array:
         """All of the torque that is known (N, n) [N m or N]: the base model's, and that of other effects."""
         return self.torque if self.beyond is None else self.torque + self.beyond
+
+    def beside(self, torque: Array | None) -> Situation:
+        """The same with torque of other effects (N, n) [N m or N]; None for none."""
+        if self.finer is None or torque is None:
+            return replace(self, beyond=torque)
+        other = self.finer.situation
+        spread = np.empty_like(other.q)
+        for own, run in zip(other.runs, self.runs, strict=True):
+            spread[own] = np.column_stack([np.interp(other.t[own], self.t[run], x) for x in torque[run].T])
+        return replace(self, beyond=torque, finer=replace(self.finer, situation=other.beside(spread)))
 
     @cached_property
     def gravity(self) -> Array:
@@ -93,7 +110,9 @@ class Situation:
 
     @cached_property
     def sign(self) -> Array:
-        """The sign of the velocities as the base model takes it (N, n)."""
+        """The sign of the velocities as the base model takes it (N, n), low-passed where logs are thinned."""
+        if self.finer is not None:
+            return self.finer.thinned(self.finer.situation.sign)
         v0 = np.broadcast_to(self.velocity_scale, self.dq.shape)
         return np.where(v0 > 0, np.tanh(self.dq / np.where(v0 > 0, v0, 1.0)), np.sign(self.dq))
 
@@ -159,6 +178,25 @@ class Situation:
         return cast(Kept, self._cache[key])
 
 
+@dataclass(frozen=True, eq=False)
+class Finer:
+    """Logs before they were thinned: what jumps between samples is evaluated there, and goes their torque's way.
+
+    Attributes:
+        situation: what the robot did, at all samples.
+        thinned: low-passes rows (N, ...) of those as the torque was, and thins them.
+    """
+
+    situation: Situation
+    thinned: Callable[[Array], Array]
+
+
+def with_finer(coarse: Situation, finer: Finer) -> Situation:
+    """Gives a situation of thinned logs whose friction is that of all samples, low-passed as their torque."""
+    friction = finer.thinned(finer.situation.friction)
+    return replace(coarse, friction=friction, torque=coarse.torque - coarse.friction + friction, finer=finer, _cache={})
+
+
 def situation(
     model: TorqueModel,
     parameters: ArrayLike,
@@ -214,7 +252,7 @@ def situation(
         rigid=rigid,
         friction=parts["friction"],
         torque=rigid + parts["friction"] + parts["other"],
-        velocity_scale=_velocity_scale(model),
+        velocity_scale=velocity_scale(model),
     )
 
 
@@ -258,6 +296,7 @@ def rotor_inertias(model: TorqueModel, parameters: Array) -> Array:
     return result
 
 
-def _velocity_scale(model: TorqueModel) -> Array:
+def velocity_scale(model: TorqueModel) -> Array:
+    """Gives v0 (n,) of a model's sign, tanh(dq / v0); 0 for the sharp sign."""
     scales = [term.velocity_scale for term in model.terms if hasattr(term, "velocity_scale")]
     return np.broadcast_to(np.asarray(scales[0] if scales else 0.0, dtype=float), (model.robot.n,)).copy()

@@ -39,6 +39,7 @@ class TimeDelay(Effect):
     alike: ClassVar[bool] = True
     lags: ClassVar[bool] = True
     blurs: ClassVar[bool] = True
+    sharp: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (SHIFT,)
     rivals: ClassVar[tuple[str, ...]] = ("current_lag", "presliding_hysteresis", "joint_elasticity")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "micro_reversals")

@@ -14,7 +14,8 @@ from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import refine
 from estimation.diagnosis.scoring import accept
-from estimation.diagnosis.states import _under_its_top, record
+from estimation.diagnosis.states import record
+from estimation.diagnosis.thinning import under_its_top
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import EFFECTS
@@ -109,7 +110,7 @@ def test_flat_tops_stay_flat_where_a_log_is_thinned() -> None:
     t = 0.004 * np.arange(2000)
     tau = np.column_stack([np.clip(np.sin(3 * t), -0.8, 0.8), np.sin(5 * t)])
     passed = tau + 0.01 * np.sin(200 * t)[:, None]
-    kept = _under_its_top(tau, passed)
+    kept = under_its_top(tau, passed)
     top = np.abs(tau[:, 0]) == 0.8
     np.testing.assert_array_equal(kept[top, 0], tau[top, 0])
     assert np.abs(kept[:, 0]).max() == 0.8

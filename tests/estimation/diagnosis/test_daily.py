@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from estimation import diagnose
+from estimation.clocks import on_one_clock
 from estimation.diagnosis.daily import SESSIONS, Daily
 from estimation.diagnosis.extension import find_effect
 from estimation.diagnosis.patterns import Pattern, is_of_time
@@ -40,6 +41,16 @@ def test_each_session_has_shares_of_its_own(swept: Situation) -> None:
     assert Daily().grid(joined([swept, _later(swept, 30.0)]), None) == ()
     many = joined([_later(swept, k * DAY) for k in range(9)])
     assert Daily().columns(many, None).any(axis=(0, 1)).sum() == (SESSIONS - 1) * n
+
+
+def test_logs_whose_pauses_nobody_noted_may_be_of_several_days(swept: Situation) -> None:
+    """Logs that each began its clock anew are two sessions, whatever their times round to."""
+    rng = np.random.default_rng(0)
+    for start in rng.uniform(0.0, 1e4, 50):
+        log = Log(t=swept.t + start, q=swept.q, tau=swept.q)
+        first, second = on_one_clock([log, log])
+        pair = joined([replace(swept, t=np.asarray(part.t), _cache={}) for part in (first, second)])
+        assert Daily().grid(pair, None) == ((),)
 
 
 def test_colder_gears_on_the_second_day_are_told_once(arm: Robot, arm_log: Callable[..., Log]) -> None:

@@ -218,7 +218,7 @@ def test_reversals_of_a_thinned_log_are_timed_by_all_its_samples(
     assert told.sum() >= 3
     assert np.abs((thinned.lags - case.effects[0].amount) / thinned.errors)[told].max() < 4.0
     both = told & np.isfinite(plain.errors)
-    # The base model is another, fitted to half of the rows.
-    assert np.all(np.abs(thinned.lags - plain.lags)[both] < plain.errors[both])
+    # The base model is another, fitted to half of the rows: how sharp its signs are is another chance of the noise.
+    assert np.all(np.abs(thinned.lags - plain.lags)[both] < np.hypot(plain.errors, thinned.errors)[both])
     monkeypatch.setattr(states, "MOST_FINE", 10_000)
     assert record(robot, [log]).finer is None
