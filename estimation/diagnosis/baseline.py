@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from estimation.diagnosis.carried import regressor_on, signs_on, situation_on
 from estimation.diagnosis.directions import SHARP, sharpest
 from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.states import Recording
-from estimation.diagnosis.thinning import thinned
+from estimation.diagnosis.thinning import at_all_samples
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.regressor import default_model
 from robots.robot import Robot
@@ -104,15 +105,13 @@ def _nuisance(recording: Recording, chosen: tuple[float, ...] | None) -> Array:
         return np.zeros((len(recording), recording.n, 0))
     result = np.zeros((len(recording), recording.n, recording.n))
     for j, v0 in enumerate(chosen):
-        change = _change(recording, j, v0)
+        change = at_all_samples(recording, partial(_change, joint=j, v0=v0))
         if np.sum(change[~recording.unsure[:, j]] ** 2) > SHOWN * np.sum(change**2):
             result[:, j, j] = change
     return result
 
 
 def _change(recording: Recording, joint: int, v0: float) -> Array:
-    if recording.finer is not None:
-        return thinned(_change(recording.finer, joint, v0), recording.finer.starts, recording.stride)
     x = recording.dq[:, joint] / v0
     return np.asarray(x / np.cosh(np.clip(x, -300, 300)) ** 2)
 

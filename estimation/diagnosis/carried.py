@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.recording import Recording
-from estimation.diagnosis.thinning import thinned
+from estimation.diagnosis.thinning import at_all_samples, thinned
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError
 from robots.regressor import TorqueModel, default_model
@@ -54,10 +54,12 @@ def regressor_on(base: BaseParameters, recording: Recording) -> Array:
 
 def signs_on(recording: Recording, joint: int, scales: Array) -> Array:
     """Evaluates a joint's signs (N, k), from 0, as smooth as `scales` (k,) say, 0 for the sharp one."""
-    if recording.finer is not None:
-        return thinned(signs_on(recording.finer, joint, scales), recording.finer.starts, recording.stride)
-    dq = recording.dq[:, joint, None]
-    return np.where(scales > 0, np.tanh(dq / np.where(scales > 0, scales, 1.0)), np.sign(dq))
+
+    def evaluate(samples: Recording) -> Array:
+        dq = samples.dq[:, joint, None]
+        return np.where(scales > 0, np.tanh(dq / np.where(scales > 0, scales, 1.0)), np.sign(dq))
+
+    return at_all_samples(recording, evaluate)
 
 
 def _regressor(base: BaseParameters, recording: Recording) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -60,6 +60,13 @@ def thin(finer: Recording, stride: int) -> Recording:
         cutoffs=None,
         finer=finer,
     )
+
+
+def at_all_samples(recording: Recording, evaluate: Callable[[Recording], Array]) -> Array:
+    """Evaluates rows (N, ...) on a recording: of one that is thinned, on all samples, and thinned as its torque was."""
+    if recording.finer is None:
+        return evaluate(recording)
+    return thinned(evaluate(recording.finer), recording.finer.starts, recording.stride)
 
 
 def low_passed(series: Array, ratio: float, kept: int = 1) -> Array:
