@@ -71,6 +71,13 @@ class Unseen:
         )
         return 1.0 if before - after <= WORTH * before else (unseen[0] - unseen[1]) / (before - after)
 
+    def growing(self) -> Array:
+        """By how much the extended model errs more on unseen rows (n,) than where it has seen them; never by less."""
+        if self.fitted is None:
+            return np.ones(self.measured.shape[1])
+        unseen, seen = (self._rms(errors[-1]) for errors in (self.errors, self.fitted))
+        return np.maximum(np.divide(unseen, seen, out=np.ones_like(unseen), where=seen > 0), 1.0)
+
     def astray(self, joint: int) -> bool:
         """Whether the extended model errs on unseen rows of a joint, from 0, far more than where it has seen them."""
         if self.fitted is None:

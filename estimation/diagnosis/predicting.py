@@ -1,4 +1,4 @@
-"""How an extended model's motion is smoothed when it predicts another log: as it predicts its own logs best."""
+"""What an extended model needs to predict other logs: how their motion is smoothed, and how far it may be off."""
 
 from __future__ import annotations
 
@@ -6,12 +6,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from estimation.diagnosis.gain import PARTS, Unseen
 from estimation.diagnosis.problem import Problem
 from estimation.model import Model
 from estimation.prediction import predict
 from robots.signals import Log
 
+Array = NDArray[np.float64]
+
+# Share of the errors that the band holds.
+BAND = 0.95
 # Of the longest log, this long a stretch in the middle [s] tells it, at so many cut-offs.
 STRETCH, POINTS = 30.0, 5
 
@@ -43,3 +49,39 @@ def _misfit(model: Model, log: Log) -> float:
     spread = predict(model, log).relative_spread
     told = spread[np.isfinite(spread) & (spread > 0)]
     return float(np.mean(np.log(told))) if len(told) else 0.0
+
+
+def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen: Unseen) -> Model:
+    """States the half-widths of a band that holds 95 % of the model's errors on data that its fit has not seen.
+
+    Args:
+        model: whose provenance gets them (n,) [N m or N], and the share of each part of the held-out logs that the band
+            of the other parts holds (n,); None of a joint without any.
+        logs: those of the fit, with torque.
+        held_out: others. Without any, errors on the logs of the fit count as many times as much as errors grew on parts
+            of them that fits had not seen.
+        unseen: the errors on those.
+    """
+    if held_out:
+        errors = [np.abs(part) for log in held_out for part in np.array_split(_errors(model, log), PARTS)]
+        shares = [np.mean(error <= _quantile(errors[:k] + errors[k + 1 :]), axis=0) for k, error in enumerate(errors)]
+        covered = np.average(shares, axis=0, weights=[len(error) for error in errors])
+    else:
+        errors = [np.abs(_errors(model, log)) * unseen.growing() for log in logs]
+        covered = np.full(model.robot.n, np.nan)
+    stated = {"band95": _known(_quantile(errors)), "band95_coverage": _known(covered)}
+    return replace(model, provenance={**model.provenance, **stated})
+
+
+def _errors(model: Model, log: Log) -> Array:
+    prediction = predict(model, log)
+    assert prediction.measured is not None
+    return prediction.measured - prediction.predicted
+
+
+def _quantile(errors: Sequence[Array]) -> Array:
+    return np.asarray(np.quantile(np.concatenate(errors), BAND, axis=0))
+
+
+def _known(values: Array) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]

@@ -21,7 +21,7 @@ from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.notes import faster_joints, notes_of, worse_joints
 from estimation.diagnosis.patterns import all_patterns
-from estimation.diagnosis.predicting import smoothed_best
+from estimation.diagnosis.predicting import smoothed_best, with_band
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import cut
 from estimation.diagnosis.refinement import Member
@@ -114,6 +114,8 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     simulation = simulate_unseen(problem, members, seen, bool(told.held_out)) if members else None
     lost = (_LOST,) if members and simulation is None else ()
     timed = [member for member in members if member.group.by_reversals]
+    whole = replace(fitted.model, extensions=(*fitted.model.extensions, *added))
+    model = with_band(smoothed_best(whole, problem, told.logs), told.logs, told.held_out, unseen)
     # Of a joint that rests in all of them unseen data say nothing: that is no error of zero.
     shown = unseen.counts.any(axis=0)
     before, after = (np.where(shown, unseen.nrmse(model), np.nan) for model in (0, len(unseen.errors) - 1))
@@ -126,7 +128,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         excess=told.excess,
         limits=told.limits,
         next_experiment=_next(problem, founds) if verdict == "ambiguous" else None,
-        model=smoothed_best(replace(fitted.model, extensions=(*fitted.model.extensions, *added)), problem, told.logs),
+        model=model,
         how_unseen=unseen.how,
         notes=(
             *told.notes,
