@@ -14,7 +14,7 @@ from estimation.diagnosis.families import FAMILIES
 from estimation.diagnosis.leaning import Leaning
 from estimation.diagnosis.parting import Parting
 from estimation.diagnosis.pulling import Pulling
-from estimation.diagnosis.recurring import PAUSED, Recurring, Spell
+from estimation.diagnosis.recurring import Recurring, Spell, lie_apart
 from estimation.diagnosis.shifting import BaseShift, Shift, ZeroShift
 from estimation.diagnosis.spotting import Spot
 from estimation.diagnosis.stopping import Stop
@@ -251,4 +251,4 @@ def _top(f: Array, power: Array, near: float) -> float:
 def _duration(situation: Situation) -> float:
     """The time from first to last [s]; where logs are days apart what was recorded, for no phase lasts so long."""
     span, recorded = float(situation.t[-1] - situation.t[0]), len(situation) * situation.period
-    return max(span if span < PAUSED * recorded else recorded, 1.0)
+    return max(recorded if lie_apart(situation) else span, 1.0)

@@ -12,6 +12,7 @@ from robots.robot import Robot
 from robots.terms.base import force_unit
 from robots.terms.effects import Coefficient, JointEffect, Shape, Situation
 from robots.terms.effects.external_contact import HOLD, pulse
+from robots.terms.effects.states import spells
 
 Array = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ TIMES = 5.0
 """So often it must come in the data; that and the least time it lasts [s] bound the periods."""
 BRIEFEST, SHORTEST = 0.15, 1.5
 PAUSED = 2.0
-"""Over logs with pauses that are longer than they are no machine keeps its time."""
+"""Logs that are so many times as long from first to last as what was recorded lie apart."""
 BIN = 0.05
 """[s] over which forces are summed before they are folded."""
 LIKE_MOTION, HIGHEST = 0.9, 5.0
@@ -50,13 +51,7 @@ class Spell(JointEffect):
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
         """Lists durations, each starting every half of it."""
         longest = self.bounds(situation, joint)[1][1]
-        return tuple(
-            (float(start), duration)
-            for duration in SPELLS
-            if duration <= longest
-            for run in situation.runs
-            for start in np.arange(situation.t[run.start], situation.t[run.stop - 1] - duration / 2, duration / 2)
-        )
+        return spells(situation, [duration for duration in SPELLS if duration <= longest])
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
         """Keeps the spell within the data, and a spell."""
@@ -162,7 +157,7 @@ class Recurring(OverTime):
     def _periods(self, situation: Situation, share: float) -> tuple[float, ...]:
         def find() -> tuple[float, ...]:
             duration = max(float(situation.t[-1] - situation.t[0]), 1.0)
-            if duration > PAUSED * len(situation) * situation.period:
+            if lie_apart(situation):
                 return ()
             shortest, longest = max(SHORTEST, BRIEFEST / share), duration / TIMES
             # From one to the next the last push moves by as much as it lasts.
@@ -193,6 +188,11 @@ class Recurring(OverTime):
             f"flange that comes every {shape[0]:.3g} s for {shape[2]:.2g} s, whatever the motion: another machine does "
             "that."
         )
+
+
+def lie_apart(situation: Situation) -> bool:
+    """Whether logs have longer pauses between them than they are: over those nothing keeps its time."""
+    return float(situation.t[-1] - situation.t[0]) > PAUSED * len(situation) * situation.period
 
 
 def _middle(situation: Situation) -> float:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.robot import Robot
 from robots.terms.base import length_unit
-from robots.terms.effects import Coefficient, Effect, Shape, Situation
+from robots.terms.effects import Coefficient, Situation
 from robots.terms.effects.base_tilt import tilted_torque
-from robots.terms.effects.states import change_times
+from robots.terms.effects.sudden import Sudden
 
 Array = NDArray[np.float64]
 
@@ -24,19 +24,10 @@ LEAST = 0.02
 """Share of its torque's energy below which a change is taken to have that much."""
 
 
-class Shift(Effect):
-    """What acts from a time t_c on, and did not before."""
+class Shift(Sudden):
+    """What acts on all joints from a time t_c on, and did not before."""
 
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("change_time", "s", -np.inf, np.inf, "linear", inexact=0.02),)
-
-    def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
-        """Lists times through the data, and the pauses between logs."""
-        return tuple((time,) for time in change_times(situation, CHANGES))
-
-    def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
-        """Keeps the change within the data."""
-        return ((float(situation.t[0]), float(situation.t[-1])),)
+    moments: ClassVar[int] = CHANGES
 
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.robot import Robot
-from robots.terms.effects import Coefficient, JointEffect, Shape, Situation
-from robots.terms.effects.states import change_times
+from robots.terms.effects import Coefficient, JointEffect, Situation
+from robots.terms.effects.sudden import Sudden
 
 Array = NDArray[np.float64]
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 MOST = 0.5
 
 
-class Switch(JointEffect):
+class Switch(Sudden, JointEffect):
     """tau = e tau_j from the time t_c on.
 
     What heat makes of a motor's constant comes little by little, and is `torque_constant_heat`.
@@ -25,20 +25,10 @@ class Switch(JointEffect):
 
     name: ClassVar[str] = "pattern:switch:0:even"
     title: ClassVar[str] = "torque of a joint that changes by a share of itself at one moment"
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("change_time", "s", -np.inf, np.inf, "linear", inexact=0.02),)
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the share by which the torque changes."""
         return (Coefficient("share", "1", -MOST, MOST),)
-
-    def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
-        """Lists times through the data, and the pauses between logs."""
-        return tuple((time,) for time in change_times(situation))
-
-    def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
-        """Keeps the change within the data."""
-        return ((float(situation.t[0]), float(situation.t[-1])),)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the base model's torque after the change."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from robots.terms.base import force_unit
 from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effects.states import spells
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -73,12 +74,7 @@ class ExternalContact(Effect):
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists durations, each starting every half of it."""
-        return tuple(
-            (float(start), duration, BETWEEN, 0.0)
-            for duration in self.shapes[1].grid
-            for run in situation.runs
-            for start in np.arange(situation.t[run.start], situation.t[run.stop - 1] - duration / 2, duration / 2)
-        )
+        return tuple((*spell, BETWEEN, 0.0) for spell in spells(situation, self.shapes[1].grid))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Keeps the contact within the data."""

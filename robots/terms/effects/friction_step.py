@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
-from robots.terms.effects.states import change_times
+from robots.terms.effects.base import Coefficient, JointEffect, Place, Situation
+from robots.terms.effects.sudden import Sudden
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -17,13 +17,11 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class FrictionStep(JointEffect):
+class FrictionStep(Sudden, JointEffect):
     """tau = (a sign(dq) + b dq) from the time t_c on."""
 
     name: ClassVar[str] = "friction_step"
     title: ClassVar[str] = "friction that changed at one moment"
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("change_time", "s", -np.inf, np.inf, "linear", inexact=0.02),)
     rivals: ClassVar[tuple[str, ...]] = ("thermal_friction", "load_heat", "payload_change", "external_contact")
     experiments: ClassVar[tuple[str, ...]] = ("pause", "repeat")
 
@@ -32,14 +30,6 @@ class FrictionStep(JointEffect):
         assert joint is not None
         force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
         return Coefficient("coulomb_step", force), Coefficient("viscous_step", f"{force} s/{length}")
-
-    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists times through the data, and the pauses between logs."""
-        return tuple((time,) for time in change_times(situation))
-
-    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the change within the data."""
-        return ((float(situation.t[0]), float(situation.t[-1])),)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates sign(dq) and dq after the change."""

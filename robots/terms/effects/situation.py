@@ -92,7 +92,9 @@ class Situation:
         return self.torque if self.beyond is None else self.torque + self.beyond
 
     def beside(self, torque: Array | None) -> Situation:
-        """The same with torque of other effects (N, n) [N m or N]; None for none."""
+        """The same with torque of other effects (N, n), or as much at all times (n,) [N m or N]; None for none."""
+        if torque is not None:
+            torque = np.broadcast_to(torque, self.q.shape)
         if self.finer is None or torque is None:
             return replace(self, beyond=torque)
         other = self.finer.situation

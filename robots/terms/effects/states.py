@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
@@ -104,6 +106,16 @@ def change_times(situation: Situation, count: int = CHANGES) -> tuple[float, ...
     inside = {int(N * (k + 0.5) / count) for k in range(count)} if 4 * count < N else set()
     between = set(situation.starts[1:]) if len(situation.starts) <= 2 * count else set()
     return tuple(float(situation.t[i]) for i in sorted(inside | between) if 0 < i < N)
+
+
+def spells(situation: Situation, durations: Sequence[float]) -> tuple[tuple[float, float], ...]:
+    """Gives spells of some lengths [s] within the logs: the start of each [s], every half of its length, and that."""
+    return tuple(
+        (float(start), duration)
+        for duration in durations
+        for run in situation.runs
+        for start in np.arange(situation.t[run.start], situation.t[run.stop - 1] - duration / 2, duration / 2)
+    )
 
 
 def moving_speed(situation: Situation, joint: int) -> tuple[float, float]:

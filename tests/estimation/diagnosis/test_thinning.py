@@ -106,6 +106,7 @@ def test_torque_of_other_effects_is_known_at_all_samples(arm: Robot, thin_log: R
     inner = slice(20, -20)
     np.testing.assert_allclose((late - plain)[inner], -10.0 * np.cos(2.0 * thin_log.t)[inner], atol=0.05)
     assert now.beside(None).beyond is None
+    np.testing.assert_array_equal(now.beside(np.array([1.0, -2.0])).whole, now.torque + np.array([1.0, -2.0]))
 
 
 def test_rows_at_reversals_fit_where_signs_are_those_of_all_samples(arm: Robot, thin_log: Recording) -> None:
@@ -141,3 +142,17 @@ def test_presliding_of_a_thinned_log_is_found(
     tau[first : first + len(whole)] += torque
     found = diagnose(arm, [replace(log, tau=tau)], candidates=("presliding_hysteresis", "stribeck"))
     assert [(f.effect, f.joint) for f in found.findings] == [("presliding_hysteresis", 2)]
+
+
+def test_torque_that_is_cut_off_in_a_thinned_log_is_found(
+    arm: Robot, arm_log: Callable[..., Log], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With its limit: the flat tops stay flat when the torque is low-passed."""
+    log = arm_log(torque_noise=0.02)
+    monkeypatch.setattr(states, "MOST_ROWS", int(0.6 * len(log.t)))
+    most = float(np.quantile(np.abs(log.tau[:, 0]), 0.95))
+    tau = log.tau.copy()
+    np.clip(tau[:, 0], -most, most, out=tau[:, 0])
+    (finding,) = diagnose(arm, [replace(log, tau=tau)]).findings
+    assert (finding.effect, finding.joint) == ("current_clipping", 1)
+    assert next(p.value for p in finding.parameters if p.unit == "N m") == pytest.approx(most, rel=0.02)
