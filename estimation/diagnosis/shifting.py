@@ -11,6 +11,7 @@ from robots.robot import Robot
 from robots.terms.base import length_unit
 from robots.terms.effects import Coefficient, Situation
 from robots.terms.effects.base_tilt import tilted_torque
+from robots.terms.effects.states import best_apart
 from robots.terms.effects.sudden import Sudden
 
 Array = NDArray[np.float64]
@@ -43,12 +44,7 @@ class Shift(Sudden):
         rows = np.searchsorted(situation.t, np.ravel(grid))
         # Of the last moments so little is seen that anything fits.
         scores = np.sum(told[rows] ** 2 / np.maximum(size[rows], LEAST * size[:1] + 1e-300), axis=1)
-        chosen: list[int] = []
-        while len(chosen) < count and np.isfinite(scores).any():
-            best = int(np.argmax(scores))
-            chosen.append(best)
-            scores[max(best - APART, 0) : best + APART + 1] = -np.inf
-        return tuple(grid[i] for i in chosen)
+        return tuple(grid[i] for i in best_apart(scores, count, APART))
 
 
 def _after(columns: Array, situation: Situation, shape: tuple[float, ...]) -> Array:

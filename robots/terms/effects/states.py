@@ -108,6 +108,17 @@ def change_times(situation: Situation, count: int = CHANGES) -> tuple[float, ...
     return tuple(float(situation.t[i]) for i in sorted(inside | between) if 0 < i < N)
 
 
+def best_apart(scores: Array, count: int, apart: int) -> list[int]:
+    """Picks the places of the highest scores (K,), the best first, more than `apart` places from each other."""
+    left = np.where(np.isnan(scores), -np.inf, scores)
+    chosen: list[int] = []
+    while len(chosen) < count and np.isfinite(left).any():
+        best = int(np.argmax(left))
+        chosen.append(best)
+        left[max(best - apart, 0) : best + apart + 1] = -np.inf
+    return chosen
+
+
 def spells(situation: Situation, durations: Sequence[float]) -> tuple[tuple[float, float], ...]:
     """Gives spells of some lengths [s] within the logs: the start of each [s], every half of its length, and that."""
     return tuple(

@@ -11,6 +11,7 @@ from scipy.ndimage import median_filter
 
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effects.base import Coefficient, Place, Shape, Situation
+from robots.terms.effects.states import best_apart
 from robots.terms.effects.static import Instant, StaticJointEffect
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ LARGEST = 1600
 """Orders on the grid at most: more than a joint tells over a turn and a half."""
 ABOUT = 201
 """Points of the spectrum, four a resolution, that tell how much is usual about an order."""
+APART = 2
+"""Orders of the grid, two a resolution, beside one that is scanned: they are the same line."""
 
 
 class TorqueRipple(StaticJointEffect):
@@ -75,8 +78,7 @@ class TorqueRipple(StaticJointEffect):
         low = self._lowest(situation, joint)
         count = int(min(max((top - low) / spacing, 0), LARGEST))  # a known gear's orders may lie beyond
         orders = set((low + spacing * np.arange(count + 1)).tolist())
-        ratio = abs(float(situation.robot.gear_ratio[joint - 1]))
-        orders |= {h * ratio for h in (1, 2, 4) if ratio > 1 and low <= h * ratio <= top}
+        orders |= {order for order in _of_gear(situation.robot, joint) if low <= order <= top}
         # Whole orders are the likely ones: the nearest point of the grid moves to each.
         whole = {float(h) for h in range(3, 13) if low <= h <= top}
         return tuple(
@@ -100,18 +102,20 @@ class TorqueRipple(StaticJointEffect):
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Lists whole orders up to 12, and those of a known gear, within the resolution of an order; none is late.
+        """Lists whole orders up to 12 within the resolution of an order, and those of a known gear; none is late.
 
-        Each by the load and by the motor's torque.
+        Each by the load and by the motor's torque. A motion that repeats, sampled, may not tell a gear's order from
+        others far away: it is the likelier.
         """
         assert joint is not None
         spacing = self._resolution(situation, joint)[0]
-        ratio = abs(float(situation.robot.gear_ratio[joint - 1]))
-        built = {float(round(shape[0]))} if shape[0] < 12.5 else set()
-        built |= {h * ratio for h in (1, 2, 4) if ratio > 1}
         low, high = self.bounds(situation, joint)[0]
-        near = [order for order in sorted(built) if abs(order - shape[0]) <= spacing and low <= order <= high]
+        whole = [float(round(shape[0]))] if shape[0] < 12.5 else []
+        built = [order for order in dict.fromkeys((*whole, *_of_gear(situation.robot, joint))) if low <= order <= high]
+        near = [order for order in built if abs(order - shape[0]) <= spacing]
+        far = [order for order in built if order not in near and order not in whole]
         forms = [(None, None), (None, 0.0), *((order, late) for order in near for late in (None, 0.0))]
+        forms += [(order, 0.0) for order in far]
         return tuple((*form, share) for share in self.shapes[2].choices for form in forms)
 
     def _resolution(self, situation: Situation, joint: int) -> tuple[float, float]:
@@ -128,14 +132,18 @@ class TorqueRipple(StaticJointEffect):
     def propose(
         self, situation: Situation, joint: Place, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks all orders at once, by the residual's spectrum over the angle over that of their surroundings."""
+        """Ranks all orders at once, by the residual's spectrum over the angle over that of their surroundings.
+
+        Beside one that is listed no other is, but for those of a known gear, which are listed besides.
+        """
         assert joint is not None
         grid = self.grid(situation, joint)
         if len(grid) <= count:
             return grid
         orders = np.array([order for order, *_ in grid])
         power = angle_spectrum(situation.q[:, joint - 1], residual[:, joint - 1], orders, level=True)
-        return tuple(grid[i] for i in np.argsort(-power)[:count])
+        known = np.flatnonzero(np.isin(orders, _of_gear(situation.robot, joint)))
+        return tuple(grid[i] for i in dict.fromkeys([*best_apart(power, count, APART), *known.tolist()]))
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds cos(h p) and sin(h p), by themselves and times the load or the motor's torque."""
@@ -163,6 +171,12 @@ class TorqueRipple(StaticJointEffect):
         assert joint is not None
         period = 2 * np.pi / shape[0]
         return f"position of joint {joint} within 1/{shape[0]:.4g} turn [rad]", situation.q[:, joint - 1] % period
+
+
+def _of_gear(robot: Robot, joint: int) -> tuple[float, ...]:
+    """Gives the orders of once, twice and four times per motor turn; none without a known gear."""
+    ratio = abs(float(robot.gear_ratio[joint - 1]))
+    return tuple(h * ratio for h in (1, 2, 4)) if ratio > 1 else ()
 
 
 def _highest(situation: Situation, joint: int) -> float:

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from robots.terms.effects import EFFECTS
 from robots.terms.effects.situation import situation
-from robots.terms.effects.states import bristle, change_times
+from robots.terms.effects.states import best_apart, bristle, change_times
 from robots.terms.effects.thermal_friction import SLOWER, heat
 
 
@@ -270,3 +270,10 @@ def test_heat_has_forms_of_all_time_constants_that_a_log_may_show(seen, name):
     told = list(dict.fromkeys(shape[0] for shape in effect.forms(now, 2)))
     assert told == [value for value in effect.shapes[0].grid if value <= 450.0]
     assert len(told) > 1
+
+
+def test_the_best_places_are_apart():
+    """The best first; neighbours of one that is chosen are not, nor what has no score."""
+    scores = np.array([1.0, 9.0, 10.0, 8.0, 7.0, np.nan, 3.0])
+    assert best_apart(scores, 3, 1) == [2, 4, 6]
+    assert best_apart(scores, 9, 0) == [2, 1, 3, 4, 6, 0]

@@ -82,16 +82,35 @@ def test_a_joint_that_does_not_move_has_no_order(seen):
 
 
 def test_orders_of_a_known_gear_and_whole_ones_are_likely(random_robot, seen):
-    """Near an order that was found, those that a machine is built with are offered, and others are not."""
+    """Near an order that was found, whole ones are offered; those of the gear wherever it is, late only near it."""
     robot = replace(random_robot(3, 4), gear_ratio=np.full(4, 30.5))
     now = seen(robot=robot)
     joint = 1 + int(np.argmax(np.ptp(now.q, axis=0)))
     resolution = np.pi / np.ptp(now.q[:, joint - 1])
-    waves = np.ones(4)
-    for away, known in ((0.5, [(61.0, None), (61.0, 0.0)]), (1.5, [])):
+    low, high = RIPPLE.bounds(now, joint)[0]
+    gear = [order for order in (30.5, 61.0, 122.0) if low <= order <= high]
+    assert 61.0 in gear
+    waves, plain = np.ones(4), [(None, None), (None, 0.0)]
+    for away, near in ((0.5, [61.0]), (1.5, [])):
+        forms = [*plain, *((order, late) for order in near for late in (None, 0.0))]
+        forms += [(order, 0.0) for order in gear if order not in near]
         found = RIPPLE.likely(now, joint, (61.0 + away * resolution, 0.001, 0.0), waves)
-        assert found == tuple((*form, share) for share in (0.0, 1.0) for form in [(None, None), (None, 0.0), *known])
-    assert all(order is None for order, *_ in RIPPLE.likely(now, joint, (45.3, 0.001, 0.0), waves))
+        assert found == tuple((*form, share) for share in (0.0, 1.0) for form in forms)
+    assert {order for order, *_ in RIPPLE.likely(now, joint, (45.3, 0.001, 0.0), waves)} == {None, *gear}
+
+
+def test_a_gear_s_order_is_scanned_whatever_else_ripples(random_robot, seen):
+    """Beside louder lines that take all places; and of one line, no neighbour takes another place."""
+    robot = replace(random_robot(3, 4), gear_ratio=np.full(4, 30.5))
+    now = seen(robot=robot)
+    joint = 1 + int(np.argmax(np.ptp(now.q, axis=0)))
+    q = now.q[:, joint - 1]
+    residual = np.random.default_rng(1).normal(size=now.q.shape)
+    residual[:, joint - 1] += sum(np.cos(order * q) for order in (45.0, 80.0, 100.0))
+    found = [order for order, *_ in RIPPLE.propose(now, joint, residual, 3)]
+    assert {30.5, 61.0} <= set(found)
+    for line in (45.0, 80.0, 100.0):
+        assert min(abs(order - line) for order in found[:3]) <= np.pi / np.ptp(q)
 
 
 def test_a_late_ripple_is_the_one_before(seen):
