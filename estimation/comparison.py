@@ -215,14 +215,14 @@ class Comparison:
         errors = [np.abs(error) for part in rows for error in self._errors(part, trial.scales, values)]
         # Of joints that stand in a block its errors are not known.
         told = np.array([~np.isnan(error[0]) for error in errors])
-        levels = np.array([_quantile(error) for error in errors])
-        whole = _quantile(np.concatenate(errors))
+        levels = np.array([band_of(error) for error in errors])
+        whole = band_of(np.concatenate(errors))
         if len(errors) == 1:
             return whole, np.full(len(whole), np.nan)
         shares, count = np.zeros((2, len(whole)))
         for k, error in enumerate(errors):
             if len(errors) <= FEW:
-                level = _quantile(np.concatenate(errors[:k] + errors[k + 1 :]))
+                level = band_of(np.concatenate(errors[:k] + errors[k + 1 :]))
             else:
                 others = np.delete(told, k, 0)
                 known = np.where(others, np.delete(levels, k, 0), 0.0).sum(axis=0)
@@ -286,8 +286,8 @@ class Comparison:
         return description_pull(self.base, np.sqrt(total.square / count), level)
 
 
-def _quantile(errors: Array) -> Array:
-    """The `BAND` of each joint's errors (N, n) that are known; NaN where none is."""
+def band_of(errors: Array) -> Array:
+    """Gives the half-widths (n,) that hold `BAND` of each joint's errors (N, n) that are known; NaN where none is."""
     if not np.isnan(errors).any():
         return np.asarray(np.quantile(errors, BAND, axis=0))
     known = (column[~np.isnan(column)] for column in errors.T)

@@ -45,10 +45,13 @@ def regressor_on(base: BaseParameters, recording: Recording) -> Array:
     Signs are low-passed as the torque was, where logs are thinned.
     """
     Y = _regressor(base, recording)
-    scales = np.broadcast_to(velocity_scale(base.model), recording.n)
+    if recording.finer is None:
+        return Y
+    scales = velocity_scale(base.model)
     for i, column in enumerate(base.columns):
-        if column.symbol == "f1" and recording.finer is not None:
-            Y[:, column.joint - 1, i] = signs_on(recording, column.joint - 1, scales[[column.joint - 1]])[:, 0]
+        if column.symbol == "f1":
+            joint = column.joint - 1
+            Y[:, joint, i] = signs_on(recording, joint, scales[[joint]])[:, 0]
     return Y
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.comparison import band_of
 from estimation.diagnosis.gain import PARTS, Unseen
 from estimation.diagnosis.problem import Problem
 from estimation.model import Model
@@ -16,8 +17,6 @@ from robots.signals import Log
 
 Array = NDArray[np.float64]
 
-# Share of the errors that the band holds.
-BAND = 0.95
 # Of the longest log, this long a stretch in the middle [s] tells it, at so many cut-offs.
 STRETCH, POINTS = 30.0, 5
 
@@ -64,12 +63,15 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
     """
     if held_out:
         errors = [np.abs(part) for log in held_out for part in np.array_split(_errors(model, log), PARTS)]
-        shares = [np.mean(error <= _quantile(errors[:k] + errors[k + 1 :]), axis=0) for k, error in enumerate(errors)]
+        shares = [
+            np.mean(error <= band_of(np.concatenate(errors[:k] + errors[k + 1 :])), axis=0)
+            for k, error in enumerate(errors)
+        ]
         covered = np.average(shares, axis=0, weights=[len(error) for error in errors])
     else:
         errors = [np.abs(_errors(model, log)) * unseen.growing() for log in logs]
         covered = np.full(model.robot.n, np.nan)
-    stated = {"band95": _known(_quantile(errors)), "band95_coverage": _known(covered)}
+    stated = {"band95": _known(band_of(np.concatenate(errors))), "band95_coverage": _known(covered)}
     return replace(model, provenance={**model.provenance, **stated})
 
 
@@ -77,10 +79,6 @@ def _errors(model: Model, log: Log) -> Array:
     prediction = predict(model, log)
     assert prediction.measured is not None
     return prediction.measured - prediction.predicted
-
-
-def _quantile(errors: Sequence[Array]) -> Array:
-    return np.asarray(np.quantile(np.concatenate(errors), BAND, axis=0))
 
 
 def _known(values: Array) -> list[float | None]:
