@@ -92,26 +92,32 @@ def lateness(situation: Situation, shift: float) -> Array:
     Of a small shift, and of a robot that hardly turns round, this is -dtau/dt. The torque is the base model's, and that
     of other effects where the situation has it: what breaks loose at low speed is logged late, too.
     """
+    step = shift if abs(shift) > SMALL else SMALL
 
     def evaluate() -> Array:
-        step = shift if abs(shift) > SMALL else SMALL
         smooth = situation.torque - situation.friction
         before, dq = np.empty_like(smooth), np.empty_like(smooth)
         for run, (torque, velocity) in zip(
             situation.runs, situation.cached("before", lambda: _past(situation, smooth)), strict=True
         ):
-            t = situation.t[run]
-            past = np.clip(t - step, t[0], t[-1])
+            past = _before(situation.t[run], step)
             before[run], dq[run] = torque(past), velocity(past)
-            if situation.beyond is not None:
-                # It may jump between two samples.
-                beyond = make_interp_spline(t, situation.beyond[run], min(1, run.stop - run.start - 1))
-                before[run] += beyond(past) - situation.beyond[run]
         return (before - smooth + situation.friction_at(dq) - situation.friction) / step
 
     # Joints share the points of the grid; those of a search are as many as they are brief.
-    known = ("lateness", shift, situation.beyond is None)
-    return situation.cached(known, evaluate) if shift in SHIFT.grid else evaluate()
+    own = situation.cached(("lateness", shift), evaluate) if shift in SHIFT.grid else evaluate()
+    if situation.beyond is None:
+        return own
+    others = np.empty_like(own)
+    for run in situation.runs:
+        t, torque = situation.t[run], situation.beyond[run]
+        # It may jump between two samples.
+        others[run] = make_interp_spline(t, torque, min(1, len(t) - 1))(_before(t, step)) - torque
+    return own + others / step
+
+
+def _before(t: Array, step: float) -> Array:
+    return np.clip(t - step, t[0], t[-1])
 
 
 def _past(situation: Situation, smooth: Array) -> list[tuple[Callable[[Array], Array], Callable[[Array], Array]]]:

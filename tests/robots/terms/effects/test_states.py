@@ -220,6 +220,21 @@ def test_a_joint_at_rest_is_not_late(seen):
 
 
 @pytest.mark.parametrize("name", ["time_delay", "current_lag"])
+@pytest.mark.parametrize("shift", [1e-3, 1.5e-3])
+def test_what_is_late_beside_other_effects_is_theirs(seen, name, shift):
+    """A situation beside one torque and then beside another gives the second's columns, on the grid and off it."""
+    now, random = seen(3, seed=4), np.random.default_rng(4)
+    first, second = random.normal(size=(2, *now.q.shape)).cumsum(axis=1)
+    effect, joint = EFFECTS[name], None if name == "time_delay" else 1
+    alone = effect.columns(now, joint, (shift,))
+    effect.columns(now.beside(first), joint, (shift,))
+    beside = effect.columns(now.beside(second), joint, (shift,))
+    before = np.interp(now.t - shift, now.t, second[:, 0])
+    expected = alone[:, 0, 0] + (before - second[:, 0]) / shift
+    np.testing.assert_allclose(beside[:, 0, 0], expected, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", ["time_delay", "current_lag"])
 @pytest.mark.parametrize("shift", [-0.008, 0.0, 0.0002, 0.004])
 def test_a_delay_is_near_that_of_the_reversals(name, shift, random_robot):
     """A quotient over 8 ms is no rate: it measures a delay of 2 ms by the torque's second derivative as well."""
