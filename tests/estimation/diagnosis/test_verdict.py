@@ -94,6 +94,28 @@ def test_waves_are_no_catch_at_one_angle(
 
 
 @pytest.mark.parametrize(
+    ("free", "elsewhere", "holds"),
+    [
+        (78.0, 1.0, True),  # no more is seen of the tilt than of the drift, and it fits little better
+        (78.0, 12.0, False),  # it is seen on another joint, too
+        (92.0, 1.0, False),  # it fits far better
+    ],
+)
+def test_a_cause_of_all_joints_is_told_by_more_than_the_joint_of_a_name(
+    free: float, elsewhere: float, holds: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A drift of the first joint, of a gain of 80 and four parameters, or a base that tilts, of three."""
+    drift = _member("torque_sensor_drift", 1, 80.0, 4)
+    columns = tuple(np.sqrt(x / ROWS) * np.ones((ROWS, 1), np.float32) for x in (free - elsewhere, elsewhere))
+    tilt = replace(_member("base_tilt", None, free, 3), group=replace(drift.group, joints=(0, 1), columns=columns))
+    gains = {id(drift.group): 80.0, id(tilt.group): free}
+    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
+    monkeypatch.setattr(verdict, "free_functions", lambda *arguments: ([tilt], []))
+    problem = SimpleNamespace(rows=ROWS)
+    assert verdict._holds_together(problem, [drift], [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
     ("degrees", "of_time", "holds"),
     [
         (3, False, False),  # a function of the motion explains as much with three parameters as the drift with 16
