@@ -23,13 +23,16 @@ class HeatEffect(JointEffect):
 
     depends_on: ClassVar[Literal["state", "time"]] = "time"
     falls: ClassVar[bool] = False
-    """Whether its coefficients are falls of friction: what warms up loses some of it, none gains both kinds."""
+    """Whether its coefficients are falls of friction, Coulomb and viscous: what warms up loses some of it.
+
+    Where oil gets thinner slow motion may rub more (Bittencourt and Gunnarsson 2012), but not all motion does.
+    """
 
     def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Tells what follows its source within seconds from heat, and what grows from what heat makes fall."""
         slow = not shape or shape[0] > LEAST * self.shapes[0].lower
-        rises = self.falls and bool((np.asarray(coefficients) < 0).all())
-        return slow and not rises and super().believable(robot, joint, coefficients)
+        warmer = self.falls and rises(robot, joint, coefficients)
+        return slow and not warmer and super().believable(robot, joint, coefficients)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists time constants up to three times the data's duration: all slower ones look like the slowest."""
@@ -41,3 +44,11 @@ class HeatEffect(JointEffect):
     def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists time constants: a log that is short beside them fits each as well, but what a pause leaves differs."""
         return self.grid(situation, joint)
+
+
+def rises(robot: Robot, joint: Place, coefficients: Array) -> bool:
+    """Whether friction of these falls, Coulomb and viscous (2,), is higher when warm, however fast the joint goes."""
+    assert joint is not None
+    coulomb, viscous = (float(value) for value in coefficients)
+    fastest = float(robot.limits.velocity[joint - 1])
+    return coulomb < 0 and (viscous <= 0 or (np.isfinite(fastest) and coulomb + viscous * fastest < 0))
