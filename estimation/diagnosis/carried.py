@@ -16,8 +16,9 @@ from robots.common.errors import InputError
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.terms.effects import Situation
+from robots.terms.effects.of_model import velocity_scale
 from robots.terms.effects.sensitivities import moved_body
-from robots.terms.effects.situation import Finer, joined, situation, velocity_scale, with_finer
+from robots.terms.effects.situation import Finer, joined, situation, with_finer
 
 if TYPE_CHECKING:
     from estimation.diagnosis.problem import Problem

@@ -251,12 +251,8 @@ class Problem:
         """Marks rows (N, n) away from those of unknown direction."""
         return self.recording.away(self.recording.unsure)
 
-    def null_cross(self, group: Group) -> Array:
-        """Products (k, draws) of a group with noise that the base model was fitted to."""
-        return self.null_crosses([group])[0]
-
     def null_crosses(self, groups: Sequence[Group]) -> Array:
-        """Does what `null_cross` does for groups of one size on the same joints: (count, k, draws)."""
+        """Products (count, k, draws) of groups of one size on the same joints with noise that has a fit of its own."""
         noise, projected = self.nulls
         total = -(np.concatenate([group.against for group in groups]) @ projected)
         for a, j in enumerate(groups[0].joints):

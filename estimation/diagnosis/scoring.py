@@ -57,7 +57,7 @@ def accept(problem: Problem, groups: tuple[Group, ...]) -> Accepted:
     raw = np.concatenate([group.raw for group in groups])
     root = visible_root(gram, raw)
     cross = np.concatenate([group.cross for group in groups])
-    nulls = np.concatenate([problem.null_cross(group) for group in groups])
+    nulls = np.concatenate([problem.null_crosses([group])[0] for group in groups])
     return Accepted(groups, root, root @ cross, root @ nulls)
 
 

@@ -199,7 +199,7 @@ def test_null_logs_meet_reversals_whose_lags_are_noise(pose_arm: Callable[..., P
     errors = np.array([5e-4, 1e-3])
     problem = replace(plain, timing=Timing(np.zeros(2), errors, np.zeros(2)))
     hypothesis = Hypothesis(EFFECTS["time_delay"], None)
-    before, after = (p.null_cross(p.measured(hypothesis, (1e-3,))) for p in (plain, problem))
+    before, after = (p.null_crosses([p.measured(hypothesis, (1e-3,))])[0] for p in (plain, problem))
     assert np.var(after - before) == pytest.approx(np.sum(errors**-2.0), rel=0.2)
 
 
