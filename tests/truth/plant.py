@@ -89,20 +89,18 @@ def measure(ride: Ride, effects: Sequence[Effect]) -> tuple[np.ndarray, tuple[np
     An effect's part is what it adds to the torque that the base model asks for the logged motion.
     """
     machine, ride.parts = ride.machine, []
-    parted = []
+    shares, apart = [], np.zeros_like(ride.q)
     for effect in effects:
-        before = (ride.q, ride.link_q)
-        effect.part(ride)
-        parted.append(ride.q is not before[0] or ride.link_q is not before[1])
-    if any(parted):
-        ride.rigid = rigid_torque(machine.model, ride.q, ride.v, ride.a)
+        before = apart
+        if parts_links(effect):
+            effect.part(ride)
+            ride.rigid = rigid_torque(machine.model, ride.q, ride.v, ride.a)
+            apart = rigid_torque(machine.model, ride.link_q, ride.link_v, ride.link_a) - ride.rigid
+        shares.append(apart - before)
     torque = ride.base_torque()
-    for effect, has_parted in zip(effects, parted, strict=True):
-        extra = np.zeros_like(torque)
-        if has_parted:
-            extra = rigid_torque(machine.model, ride.link_q, ride.link_v, ride.link_a) - ride.rigid
+    for effect, share in zip(effects, shares, strict=True):
         own = effect.torque(ride)
-        ride.parts.append(extra if own is None else extra + own)
+        ride.parts.append(share if own is None else share + own)
         torque = torque + ride.parts[-1]
     errors = tuple(np.zeros_like(ride.q) for _ in range(3))
     for index, effect in enumerate(effects):

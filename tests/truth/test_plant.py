@@ -18,7 +18,7 @@ from tests.truth.effects import KNOWN, STRANGERS
 from tests.truth.effects.friction import LuGre, Stribeck, _bristles
 from tests.truth.effects.strangers import CrossWave
 from tests.truth.effects.surroundings import Payload
-from tests.truth.effects.transmission import Elastic
+from tests.truth.effects.transmission import Backlash, Elastic
 from tests.truth.machines import KINDS, draw_machine
 from tests.truth.oracle import ask_oracle
 from tests.truth.plant import measure, open_loop
@@ -147,6 +147,18 @@ def test_elastic_gear_obeys_both_inertias() -> None:
     twist = np.abs(ride.link_q[:, 5] - ride.q[:, 5]).max()
     # Linear interpolation of the motor's motion excites the undamped spring by a part of the twist.
     assert np.abs(solved.y[0] - ride.link_q[rows, 5][::50]).max() < 0.03 * twist
+
+
+def test_two_effects_that_part_links_act_once() -> None:
+    """A gear with play and a spring: the motor gives what its link takes, and what each brings adds up to that."""
+    machine = draw_machine("heavy", np.random.default_rng(9))
+    reference = draw_periodic(machine, np.random.default_rng(10))
+    both = [Elastic(joint=4, amount=1e-5), Backlash(joint=4, amount=1e-3)]
+    ride = open_loop(machine, [reference], both, step=0.004)
+    needed = rigid_torque(machine.model, *_link(ride)) - rigid_torque(machine.model, ride.q, ride.v, ride.a)
+    np.testing.assert_allclose(sum(ride.parts), needed, atol=1e-9 * np.abs(needed).max())
+    spring = open_loop(machine, [reference], both[:1], step=0.004).parts[0]
+    np.testing.assert_allclose(ride.parts[0], spring, atol=1e-9 * np.abs(needed).max())
 
 
 def _link(ride: object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
