@@ -33,6 +33,8 @@ ACTS = 0.02
 # large, and by so many squared standard errors; at so much of twice the log of the odds that there is none elsewhere it
 # is none: one that is there has this in 2 % of logs at most.
 FORMULA, AGREES, ABSENT = 0.35, 2.0, 4.0
+# Friction that would turn round over a shorter way than any, by this factor, turns round at once: late, if anything.
+NO_WAY = 1.05
 # Twice the log of the odds against an effect that robots seldom have.
 RARE = 6.0
 
@@ -182,6 +184,8 @@ def refine(
     if hypothesis.effect.lags:
         return _agreed(problem, found, accepted)
     if hypothesis.effect.turns and hypothesis.joint is not None:
+        if found.shape[0] < NO_WAY * bounds[0][0]:
+            return replace(found, scatter=np.inf)
         owed = owed_to_moments(problem, hypothesis.joint, found.group, found.gain, accepted)
         return replace(found, doubt=owed)
     return replace(found, scatter=_borne_out(problem, found, accepted)) if hypothesis.effect.kicks else found

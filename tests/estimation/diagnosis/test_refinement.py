@@ -247,3 +247,28 @@ def test_what_an_effect_is_whole_without_is_a_parameter_only_where_it_pays(
     member = refinement.refine(problem, Hypothesis(_More(), 1), (0.08, 0.0), None)  # type: ignore[arg-type]
     assert member.shape == (pytest.approx(place, rel=0.05), pytest.approx(more, abs=0.05))
     assert member.degrees == degrees
+
+
+@pytest.mark.parametrize(("best", "worth"), [(1e-6, False), (4e-5, True)])
+def test_friction_that_turns_round_over_no_way_is_no_presliding(
+    best: float, worth: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A gain of 300 that is largest below the shortest travel is what a delay would bring: it counts for nothing."""
+
+    def score(problem: object, shape: tuple[float, ...], accepted: object) -> SimpleNamespace:
+        gain = 300 - 10 * np.log(shape[0] / best) ** 2
+        return SimpleNamespace(bounded=lambda *_: (float(gain), np.ones(1)), degrees=1, visible=1.0)
+
+    monkeypatch.setattr(refinement, "score", score)
+    monkeypatch.setattr(refinement, "owed_to_moments", lambda *_: 0.0)
+    monkeypatch.setattr(Hypothesis, "coefficient_bounds", lambda *_: ((0.0, np.inf),))
+
+    class _Shape(tuple):  # type: ignore[type-arg]
+        joints = (0,)
+
+    situation = SimpleNamespace(robot=None)
+    problem = SimpleNamespace(sees=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
+    presliding = Hypothesis(EFFECTS["presliding_hysteresis"], 1)
+    member = refinement.refine(problem, presliding, (1e-4,), None)  # type: ignore[arg-type]
+    assert (member.bic(ROWS) > 100.0) is worth
+    assert (member.worth(ROWS) > 100.0) is worth
