@@ -110,6 +110,8 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         own[open_, open_] = np.inf
         coefficients = np.clip(values[start : start + size], lower, upper)
         own[range(len(own)), range(len(own))] += inexact(problem, member, coefficients) ** 2
+        for i, k, apart in member.hypothesis.effect.ties(coefficients):
+            own = _narrowed(own, size + k, float(np.hypot(np.sqrt(own[i, i]), apart)))
         errors = np.sqrt(np.maximum(np.diag(own), 0.0))
         determined = np.concatenate(
             [
@@ -171,6 +173,18 @@ def _slope(problem: Problem, member: Member, k: int, step: float) -> Array:
         return np.zeros((len(problem.recording), problem.n, 1))
     above, below = (dense(problem, member.hypothesis, with_value(member.shape, k, x)) for x in (up, down))
     return ((above - below) @ member.coefficients * (h / (up - down)))[:, :, None]
+
+
+def _narrowed(covariance: Array, k: int, error: float) -> Array:
+    """Takes the standard error of one parameter of a covariance to be no more than it may be."""
+    if not np.isfinite(covariance[k, k]):
+        result = covariance.copy()
+        result[k] = result[:, k] = 0.0
+        result[k, k] = error**2
+        return result
+    scale = np.ones(len(covariance))
+    scale[k] = min(1.0, error / max(float(np.sqrt(covariance[k, k])), 1e-300))
+    return np.asarray(covariance * scale[:, None] * scale)
 
 
 def _covariance(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:

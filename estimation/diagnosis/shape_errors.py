@@ -263,7 +263,9 @@ def inexact(problem: Problem, member: Member, coefficients: Array) -> Array:
 
 
 def _gain(problem: Problem, member: Member, shape: tuple[float, ...], others: Accepted) -> float:
-    return score(problem, problem.measured(member.hypothesis, shape), others).gain
+    """What is explained at a shape, by coefficients that go with it: a delay's are near that of its reversals."""
+    result = score(problem, problem.measured(member.hypothesis, shape), others)
+    return result.bounded(*member.hypothesis.coefficient_bounds(problem.situation.robot, shape))[0]
 
 
 def with_value(shape: tuple[float, ...], k: int, value: float) -> tuple[float, ...]:

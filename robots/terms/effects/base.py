@@ -84,6 +84,10 @@ class Effect(ABC):
         """Gives the range of each coefficient at some shape values: as described, where shapes do not narrow it."""
         return tuple((coefficient.lower, coefficient.upper) for coefficient in self.parameters(robot, joint))
 
+    def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
+        """Lists coefficients and shapes that are one quantity told twice, and what they may differ by (deviation)."""
+        return ()
+
     def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Whether a machine may have these values, of a shape where that is given.
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
-from robots.terms.effects.time_delay import INEXACT, SHIFT, SHORTEST, SMALL, as_late, lateness, near, torn
+from robots.terms.effects.time_delay import INEXACT, SHIFT, SHORTEST, SMALL, as_late, lateness, near, slack, torn
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -38,6 +38,10 @@ class CurrentLag(JointEffect):
         """Keeps the lag near that of the reversals, and positive."""
         ((low, high),) = near(shape[0])
         return ((max(low, 0.0), max(high, SMALL)),)
+
+    def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
+        """Ties its reversals to all else."""
+        return ((0, 0, slack(coefficients)),)
 
     def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Whether a machine may have these values: reversals and all else must tell one lag."""

@@ -52,6 +52,10 @@ class TimeDelay(Effect):
         """Keeps the delay near that of the reversals, of which the torque's own is a difference quotient."""
         return near(shape[0])
 
+    def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
+        """Ties its reversals to all else."""
+        return ((0, 0, slack(coefficients)),)
+
     def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Whether a machine may have these values: reversals and all else must tell one delay."""
         return super().believable(robot, joint, coefficients, shape) and not torn(coefficients, shape)
@@ -144,6 +148,11 @@ def near(shift: float) -> tuple[tuple[float, float], ...]:
     """
     low, high = sorted((shift / APART, shift * APART))
     return ((low - SMALL, high + SMALL),)
+
+
+def slack(coefficients: Array) -> float:
+    """Gives by how much a delay (1,) [s] and that of its reversals may differ: what `near` allows is 95 %."""
+    return 0.5 * (APART - 1.0 / APART) / 1.96 * float(abs(coefficients[0]))
 
 
 def torn(coefficients: Array, shape: tuple[float, ...]) -> bool:

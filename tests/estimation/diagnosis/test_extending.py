@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.diagnosis.extending import _covariance, dense, fit_extended
+from estimation.diagnosis.extending import _covariance, _narrowed, dense, fit_extended
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import Recording
@@ -93,3 +93,26 @@ def test_a_column_that_is_hardly_one_is_left_open() -> None:
     assert covariance[:2, :2] == pytest.approx(np.linalg.inv(matrix[:, :2].T @ matrix[:, :2]))
     assert np.isfinite(covariance).all()
     assert lost.tolist() == [False, False, True]
+
+
+@pytest.mark.parametrize("variance", [4.0, 0.01, np.inf])
+def test_what_is_one_quantity_told_twice_is_known_as_well_as_the_other(variance: float) -> None:
+    """The error of the second falls to what it may be, none rises, and the covariance stays one."""
+    covariance = np.array([[0.25, 0.1 if np.isinf(variance) else 0.4 * np.sqrt(variance)], [0.0, variance]])
+    covariance[1, 0] = covariance[0, 1]
+    narrowed = _narrowed(covariance, 1, 0.3)
+    assert narrowed[0, 0] == 0.25
+    assert narrowed[1, 1] == pytest.approx(min(variance, 0.09))
+    assert np.linalg.eigvalsh(narrowed).min() > 0
+    if np.isfinite(variance):
+        correlations = [c[0, 1] / np.sqrt(c[0, 0] * c[1, 1]) for c in (covariance, narrowed)]
+        assert correlations[1] == pytest.approx(correlations[0])
+
+
+@pytest.mark.parametrize("name", ["time_delay", "current_lag"])
+def test_a_delay_and_its_reversals_differ_by_what_a_factor_allows(name: str) -> None:
+    """A factor of 1.6 either way of 2 ms, 1.25 to 3.2 ms, is an interval of 95 %."""
+    ((coefficient, shape, apart),) = EFFECTS[name].ties(np.array([2e-3]))
+    assert (coefficient, shape) == (0, 0)
+    assert apart == pytest.approx((3.2e-3 - 1.25e-3) / 2 / 1.96)
+    assert EFFECTS["stribeck"].ties(np.array([1.0])) == ()
