@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
-from robots.terms.effects.time_delay import INEXACT, SHIFT, SHORTEST, SMALL, as_late, lateness, near, slack, torn
+from robots.terms.effects.time_delay import INEXACT, SHIFT, SHORTEST, SMALL, Late, lateness, near
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -17,15 +17,12 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class CurrentLag(JointEffect):
+class CurrentLag(Late, JointEffect):
     """tau_j(t - d) - tau_j(t): as a delay, but of one joint: its current's filter."""
 
     name: ClassVar[str] = "current_lag"
     title: ClassVar[str] = "torque of one joint that is logged late (filter)"
     rare: ClassVar[bool] = True
-    lags: ClassVar[bool] = True
-    blurs: ClassVar[bool] = True
-    sharp: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (replace(SHIFT, lower=0.0, grid=tuple(s for s in SHIFT.grid if s > 0)),)
     rivals: ClassVar[tuple[str, ...]] = ("time_delay", "presliding_hysteresis", "joint_elasticity")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "micro_reversals")
@@ -39,23 +36,9 @@ class CurrentLag(JointEffect):
         ((low, high),) = near(shape[0])
         return ((max(low, 0.0), max(high, SMALL)),)
 
-    def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
-        """Ties its reversals to all else."""
-        return ((0, 0, slack(coefficients)),)
-
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
-        """Whether a machine may have these values: reversals and all else must tell one lag."""
-        return super().believable(robot, joint, coefficients, shape) and not torn(coefficients, shape)
-
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the change of the joint's torque per delay."""
         return lateness(situation, shape[0])[:, joint - 1 : joint]
-
-    def likely(
-        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
-    ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the reversals that are as late as all else."""
-        return as_late(coefficients)
 
     def describe(
         self,

@@ -25,7 +25,31 @@ INEXACT = 0.05
 SHIFT = Shape("reversals_late", "s", -0.02, 0.02, "linear", (-0.003, -0.001, -0.0002, 0.0002, 0.001, 0.003, 0.008))
 
 
-class TimeDelay(Effect):
+class Late(Effect):
+    """Torque that is logged late: reversals, its shape, and all else, its coefficient, tell one delay."""
+
+    lags: ClassVar[bool] = True
+    blurs: ClassVar[bool] = True
+    sharp: ClassVar[bool] = True
+
+    def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
+        """Ties reversals to all else: what `near` allows is 95 %."""
+        return ((0, 0, 0.5 * (APART - 1.0 / APART) / 1.96 * float(abs(coefficients[0]))),)
+
+    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+        """Whether a machine may have these values: it does not stand where its reversals' lets it come no closer."""
+        ends = [end for shift in shape for end in near(shift)[0]]
+        torn = any(bool(np.isclose(coefficients[0], end, rtol=1e-6, atol=0.0)) for end in ends)
+        return super().believable(robot, joint, coefficients, shape) and not torn
+
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float | None, ...], ...]:
+        """Gives the reversals that are as late as all else."""
+        return ((float(np.clip(coefficients[0], SHIFT.lower, SHIFT.upper)),),)
+
+
+class TimeDelay(Late):
     """tau(t - d) - tau(t): the logged torque lags the logged position by d, on all joints alike.
 
     It is d times a difference quotient over d', which the base model's torque and velocities of a moment before say:
@@ -37,9 +61,6 @@ class TimeDelay(Effect):
     title: ClassVar[str] = "torque that is logged later than position"
     whole_robot: ClassVar[bool] = True
     alike: ClassVar[bool] = True
-    lags: ClassVar[bool] = True
-    blurs: ClassVar[bool] = True
-    sharp: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (SHIFT,)
     rivals: ClassVar[tuple[str, ...]] = ("current_lag", "presliding_hysteresis", "joint_elasticity")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "micro_reversals")
@@ -52,23 +73,9 @@ class TimeDelay(Effect):
         """Keeps the delay near that of the reversals, of which the torque's own is a difference quotient."""
         return near(shape[0])
 
-    def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
-        """Ties its reversals to all else."""
-        return ((0, 0, slack(coefficients)),)
-
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
-        """Whether a machine may have these values: reversals and all else must tell one delay."""
-        return super().believable(robot, joint, coefficients, shape) and not torn(coefficients, shape)
-
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the change of torque per delay."""
         return lateness(situation, shape[0])[:, :, None]
-
-    def likely(
-        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
-    ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the reversals that are as late as all else."""
-        return as_late(coefficients)
 
     def describe(
         self,
@@ -148,18 +155,3 @@ def near(shift: float) -> tuple[tuple[float, float], ...]:
     """
     low, high = sorted((shift / APART, shift * APART))
     return ((low - SMALL, high + SMALL),)
-
-
-def slack(coefficients: Array) -> float:
-    """Gives by how much a delay (1,) [s] and that of its reversals may differ: what `near` allows is 95 %."""
-    return 0.5 * (APART - 1.0 / APART) / 1.96 * float(abs(coefficients[0]))
-
-
-def torn(coefficients: Array, shape: tuple[float, ...]) -> bool:
-    """Whether a delay (1,) [s] stands where its reversals' lets it come no closer to what all else says."""
-    return any(bool(np.isclose(coefficients[0], end, rtol=1e-6, atol=0.0)) for shift in shape for end in near(shift)[0])
-
-
-def as_late(coefficients: Array) -> tuple[tuple[float, ...], ...]:
-    """Gives the shape that a delay (1,) [s] has where reversals are no exception."""
-    return ((float(np.clip(coefficients[0], SHIFT.lower, SHIFT.upper)),),)
