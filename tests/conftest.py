@@ -30,3 +30,12 @@ def data() -> Callable[[str], Path]:
         return folder
 
     return find
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave out what would take the tests beyond ten minutes, unless it is asked for."""
+    if os.environ.get("LONGER"):
+        return
+    for item in items:
+        if item.get_closest_marker("longer"):
+            item.add_marker(pytest.mark.skip(reason="takes minutes more; set LONGER=1"))

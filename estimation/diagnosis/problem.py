@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.baseline import Baseline
 from estimation.diagnosis.groups import Group
-from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.hypotheses import Hypothesis, acting
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.reversal_timing import Timing
 from estimation.diagnosis.upper import Upper
@@ -188,14 +188,14 @@ class Problem:
 
     def _whitened(self, columns: Array, joint: int) -> tuple[Small, Small]:
         """Whitens columns (N, k) of a joint: with the rows that do not count, and without."""
-        acting = np.asarray(columns.any(axis=0))
-        if acting.all():
+        acts = acting(columns)
+        if acts.all():
             whole = self.whitening.filtered(columns, joint, single=True)
             return whole, self.whitening.counted(whole, joint)
         # A push has a column for each joint, zero on all others.
-        whole, white = (np.zeros((self.rows, len(acting)), np.float32, order="F") for _ in range(2))
-        if acting.any():
-            whole[:, acting], white[:, acting] = self._whitened(columns[:, acting], joint)
+        whole, white = (np.zeros((self.rows, len(acts)), np.float32, order="F") for _ in range(2))
+        if acts.any():
+            whole[:, acts], white[:, acts] = self._whitened(columns[:, acts], joint)
         return whole, white
 
     @cached_property

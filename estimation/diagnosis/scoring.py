@@ -106,9 +106,12 @@ class Score:
         if np.all((c >= lower) & (c <= upper)):
             return self.gain, c
         # min |A c - y|^2 with A'A the Gram matrix in its visible directions.
-        A = np.linalg.pinv(self.root.T)
         y = self.root @ self.cross
-        c = np.asarray(lsq_linear(A, y, bounds=(lower, upper), method="bvls").x)
+        if len(c) == 1:  # most effects have one column, and a scan thousands of those
+            A, c = 1.0 / self.root, np.asarray(np.clip(c, lower, upper))
+        else:
+            A = np.asarray(np.linalg.pinv(self.root.T))
+            c = np.asarray(lsq_linear(A, y, bounds=(lower, upper), method="bvls").x)
         return max(float(y @ y - np.sum((A @ c - y) ** 2)), 0.0), c
 
 
@@ -125,6 +128,8 @@ def score(problem: Problem, group: Group, accepted: Accepted) -> Score:
 
 def visible_root(gram: Array, raw: Array) -> Array:
     """Gives R (k', k) with R gram R' the identity on the directions that show beside what was projected out."""
+    if len(raw) == 1:
+        return gram**-0.5 if gram[0, 0] > VISIBLE * max(raw[0], 1e-300) else np.zeros((0, 1))
     scale = np.sqrt(np.maximum(raw, 1e-300))
     values, vectors = np.linalg.eigh(gram / scale[:, None] / scale)
     kept = values > VISIBLE

@@ -80,14 +80,14 @@ def _lag_of_gauge(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
     ("stranger", "share", "pattern"),
     [
         (_catch, 0.2, "pattern:spot:0:even"),
-        (_grind, 0.2, "pattern:spot:0:odd"),
+        pytest.param(_grind, 0.2, "pattern:spot:0:odd", marks=pytest.mark.longer),
         (_swing, 0.1, "pattern:sway:0:even"),
-        (_rub, 0.1, "pattern:sway:0:odd"),
+        pytest.param(_rub, 0.1, "pattern:sway:0:odd", marks=pytest.mark.longer),
         (_bend, 0.2, "pattern:acceleration:0:even"),
         (_creep, 0.1, "pattern:creep:0:even"),
-        (_sag, 0.1, "pattern:supply:0:even"),
-        (_push, 0.1, "pattern:push:1:even"),
-        (_leak, 0.2, "pattern:ageing:0:even"),
+        pytest.param(_sag, 0.1, "pattern:supply:0:even", marks=pytest.mark.longer),
+        pytest.param(_push, 0.1, "pattern:push:1:even", marks=pytest.mark.longer),
+        pytest.param(_leak, 0.2, "pattern:ageing:0:even", marks=pytest.mark.longer),
         (_buffer, 0.2, "pattern:stop:0:above"),
         (_lag_of_gauge, 0.1, "pattern:hysteresis:0:even"),
     ],
@@ -140,6 +140,7 @@ def test_a_line_is_proposed_at_its_top(
         assert abs(first - frequency) < 0.02 / recording.duration
 
 
+@pytest.mark.longer
 def test_what_a_joint_feels_when_it_goes_is_told(arm: Robot, arm_plant: Callable) -> None:
     """A brake that opens late drags in the first quarter of a second of each move, against it."""
     step, moves = 0.004, 16

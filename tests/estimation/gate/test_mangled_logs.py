@@ -1,4 +1,4 @@
-"""Two hundred mangled logs; the benchmark of the same name runs ten thousand."""
+"""A hundred mangled logs; the benchmark of the same name runs ten thousand."""
 
 from pathlib import Path
 
@@ -14,8 +14,8 @@ def test_mangled_logs_end_in_a_message_or_a_right_result(monkeypatch):
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     import mangled_logs
 
-    cases = list(mangled_logs.run(200, seed=7))
+    cases = list(mangled_logs.run(100, seed=7))
     assert [case for case in cases if case.result in ("silent", "traceback")] == []
     # The ways to spoil a log still let some through and stop some: neither side of the test is empty.
-    assert sum(case.result == "right" for case in cases) > 30
-    assert sum(case.result == "message" for case in cases) > 60
+    assert sum(case.result == "right" for case in cases) > 15
+    assert sum(case.result == "message" for case in cases) > 30

@@ -62,14 +62,16 @@ def test_bad_options_are_named(four_duties: Callable[[int], list[ThermalRun]]) -
 
 
 def test_the_warm_up_of_a_real_arm(data: Callable) -> None:
-    """All six joints of a UR3 warm up within 0.05 degC RMS of the model, and are predicted within 0.5 degC.
+    """A UR3's joints warm up within 0.05 degC RMS of the model, and are predicted within 0.5 degC.
+
+    Every second one; `benchmarks/thermal.py` fits all six.
 
     One heat capacity is heated by a constant part and one that goes with the squared current; the last third of 48
     minutes is predicted from the first two, with the currents but no temperature.
     """
     table = pd.read_parquet(data("ur3_cobotops_thermal") / "morning_coldstart.parquet")
     t = table["t"].to_numpy() - table["t"].iloc[0]
-    for joint in range(1, 7):
+    for joint in (1, 3, 5):
         square = (table[f"i{joint}"].interpolate(limit_direction="both") ** 2).to_numpy()
         power = np.convolve(np.pad(square, 30, mode="edge"), np.ones(61) / 61.0, mode="valid")
         run = ThermalRun(
