@@ -1,4 +1,4 @@
-"""Specification of the band that accelerations are known in well enough not to bias what is fitted to them."""
+"""Specification of the band: what it passes, up to where accelerations bias no fit, and where their kicks drown."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve, firwin
 
-from estimation.diagnosis.band import BIAS, unbiased
+from estimation.diagnosis.band import BIAS, Band, unbiased
+from estimation.diagnosis.noise import estimate_whitening, quiet_joints
 from estimation.diagnosis.recording import Recording, cut
+from tests.estimation.diagnosis.noisy_logs import STEP, noise_of, recording_of
 
-STEP, ROWS = 0.004, 250_000
+ROWS = 250_000
 COUNT, NOISE = 2 * np.pi / 2**14, 0.3
 
 
@@ -105,3 +107,54 @@ def test_rows_at_rest_are_told_apart(counted: tuple[Recording, np.ndarray, np.nd
     whole = unbiased(recording, np.eye(1), noise)
     rested = unbiased(longer, np.eye(1), np.concatenate([noise, still]), np.array([0.5]))
     assert rested == pytest.approx(whole, abs=0.3)
+
+
+def test_the_band_passes_slow_signals_and_stops_fast_ones() -> None:
+    """Below three quarters of the cut-off a signal comes through unchanged, above 1.1 times it is gone."""
+    whitening = estimate_whitening(recording_of(), noise_of(10_000), 0, np.eye(2))
+    band = whitening.bands[0]
+    t = STEP * np.arange(10_000)
+    for frequency, factor in ((0.7 * band.cutoff, 1.0), (1.15 * band.cutoff, 0.0)):
+        wave = np.sin(2 * np.pi * frequency * t)
+        passed = band.passed(wave)[50:-50]
+        # The Kaiser window of shape 6 leaves ripples of 63 dB.
+        assert np.abs(passed - factor * wave[:: band.stride][50:-50]).max() < 2e-3
+
+
+def test_filtering_columns_together_is_filtering_each() -> None:
+    """Columns of very different size, and of zeros, come out as convolution written out has them."""
+    rng = np.random.default_rng(0)
+    band = estimate_whitening(recording_of(), noise_of(10_000), 0, np.eye(2)).bands[0]
+    columns = rng.standard_normal((1000, 5)) * [1.0, 1e9, 0.0, 1e-9, 1.0]
+    after = np.array([1.0, -0.5, 0.2])
+    together = band.passed(columns, after)
+    half = len(band.taps) // 2
+    for column, result in zip(columns.T, together.T, strict=True):
+        full = np.convolve(column, band.taps)
+        # The first rows feel what the filter puts before the log.
+        lead = full[half % band.stride :: band.stride]
+        first = half // band.stride
+        expected = np.convolve(lead, after)[first : first + len(result)]
+        assert result == pytest.approx(expected, abs=1e-12 * max(np.abs(column).max(), 1e-300))
+        assert result == pytest.approx(band.passed(column, after), abs=1e-12 * np.abs(column).max())
+    assert not together[:, 2].any()
+    # A number so small that one over it is none: the cube of a joint's position that stands at zero.
+    tiny = band.passed(np.stack([columns[:, 0], np.full(1000, 7e-314)], axis=1), single=True)
+    assert tiny[:, 0] == pytest.approx(band.passed(columns[:, 0]), abs=1e-5)
+    assert not tiny[:, 1].any()
+
+
+def test_a_band_without_filter_only_thins() -> None:
+    """Without taps every stride-th row is kept as it is."""
+    series = np.arange(10.0)
+    assert Band(np.zeros(0), 2, 1.0).passed(series) == pytest.approx(series[::2])
+
+
+def test_kicks_drown_where_their_torque_is_below_the_noise() -> None:
+    """Torque per acceleration times the accelerations' error, over a sample's noise: 0.9 drowns, 1.1 does not."""
+    residual = np.random.default_rng(0).standard_normal((10_000, 2)) * [3.0, 0.5]
+    slow = 100.0 * np.sin(0.5 * STEP * np.arange(10_000))[:, None]
+    recording = replace(recording_of(), jolts=np.array([0.9 * 3.0 / 20.0, 1.1 * 0.5 / 2.0]))
+    # 10 000 samples tell the noise to 1 %.
+    assert quiet_joints(recording, residual + slow, np.diag([20.0, 2.0])).tolist() == [True, False]
+    assert quiet_joints(recording, 2.0 * residual + slow, np.diag([20.0, 2.0])).tolist() == [True, True]

@@ -2,158 +2,71 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from types import SimpleNamespace
+from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from estimation.diagnosis.borne_out import AGAINST, HARM, LEFT, PLAIN, SLIGHT, BorneOut, bear_out
-from estimation.diagnosis.findings import Gain
-from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.patterns import build_pattern
-from estimation.diagnosis.refinement import Member
+from estimation.diagnosis.borne_out import AGAINST, HARM, LEFT, PLAIN, SLIGHT
 from estimation.diagnosis.selection import Found
-from estimation.diagnosis.verdict import CLOSE, Judgement
-from robots.terms.effects import EFFECTS
-from robots.terms.effects.base import Effect
-
-
-@dataclass(frozen=True)
-class Shown:
-    """What unseen data say of a member: its gain's interval, its rise, shares kept and spoken for, its joint astray."""
-
-    low: float = 0.001
-    high: float = 0.003
-    rise: float = 0.95
-    kept: float = 1.0
-    speaks: float = 0.0
-    astray: bool = False
-
-
-HELPS, IDLE, HARMS = Shown(), Shown(-0.001, 0.002, 1.0), Shown(-0.004, -0.001, 1.02, speaks=-0.5)
-
-
-@dataclass
-class Bench:
-    """Stands for the measurement: what each label shows, also beside certain others, and what it was asked."""
-
-    shows: dict[str, Shown]
-    beside: dict[tuple[str, str], Shown] = field(default_factory=dict)
-    asked: list[tuple[str, ...]] = field(default_factory=list)
-
-    def __call__(self, members: Sequence[Member]) -> SimpleNamespace:
-        labels = tuple(_label(member) for member in members)
-        self.asked.append(labels)
-        shown = [
-            next((self.beside[label, other] for other in labels if (label, other) in self.beside), self.shows[label])
-            for label in labels
-        ]
-        lost = {m.hypothesis.joint - 1 for m, s in zip(members, shown, strict=True) if m.hypothesis.joint and s.astray}
-        return SimpleNamespace(
-            unseen=SimpleNamespace(astray=lambda joint: joint in lost),
-            gains=tuple(
-                Gain(nrmse_before=0.03, nrmse_after=0.03 - (s.low + s.high) / 2, ci95=(s.low, s.high)) for s in shown
-            ),
-            rises=tuple(s.rise for s in shown),
-            worse=tuple(s.high < 0 for s in shown),
-            kept=tuple(s.kept for s in shown),
-            speaks=tuple(s.speaks for s in shown),
-        )
-
-
-def _label(member: Member) -> str:
-    return member.hypothesis.label + (f" {member.shape}" if member.shape else "")
-
-
-def _member(name: str, joint: int | None) -> Member:
-    effect = EFFECTS.get(name) or build_pattern(name)
-    assert effect is not None
-    return Member(Hypothesis(effect, joint), (), None, 100.0, np.zeros(1), 1, 1.0)  # type: ignore[arg-type]
-
-
-SPRING, STRIBECK = _member("spring", 2), _member("stribeck", 2)
-PRESLIDING, TILT, PUSH = (
-    _member("presliding_hysteresis", 2),
-    _member("base_tilt", None),
-    _member("external_contact", None),
+from estimation.diagnosis.verdict import CLOSE
+from tests.estimation.diagnosis.borne_out_bench import (
+    FREE,
+    HARMS,
+    HELPS,
+    IDLE,
+    LABELS,
+    PRESLIDING,
+    PUSH,
+    SPRING,
+    STRIBECK,
+    SWING,
+    TILT,
+    Shown,
+    bench_with,
+    borne,
+    label_of,
+    member_of,
 )
-FREE, SWING = _member("pattern:load:0:even", 3), _member("pattern:swinging:0:even", None)
-LABELS = {m.hypothesis.name: m.hypothesis.label for m in (SPRING, STRIBECK, PRESLIDING, TILT, PUSH, FREE, SWING)}
-
-
-def _bench(**shows: Shown) -> Bench:
-    """Members by the names of their effects; what is not listed helps."""
-    return Bench(
-        {label: shows.get(name.split(":")[1] if ":" in name else name, HELPS) for name, label in LABELS.items()}
-    )
-
-
-def _borne(
-    bench: Bench,
-    *founds: Found,
-    free: Sequence[Member] = (),
-    p_values: Sequence[float] = (),
-    held_out: bool = True,
-    forms: Sequence[Member] = (),
-    faint: Sequence[Member] = (),
-    worths: Mapping[Member, float] | None = None,
-    unnamed: tuple[Member, float] | None = None,
-) -> BorneOut:
-    judgement = Judgement("named", founds, tuple(free), tuple(p_values), 1.0)
-
-    def beyond(effect: Effect) -> bool:
-        return held_out and effect.passing
-
-    return bear_out(
-        judgement,
-        bench,  # type: ignore[arg-type]
-        beyond,
-        lambda members, i: forms if members[i] is SPRING else (),
-        lambda member: (worths or {}).get(member, 1.0 if member in faint else 100.0),
-        lambda member, beside: None if member in beside else unnamed,
-    )
 
 
 @pytest.mark.parametrize(("rise", "stays"), [(HARM - 0.03, True), (HARM + 0.01, False)])
 def test_heat_before_the_unseen_data_is_not_held_against_a_cause(rise: float, stays: bool) -> None:
     """What a pause left of the heat is not known: sure errors leave a thermal cause alone unless they are large."""
-    warm = _member("thermal_friction", 2)
-    bench = _bench()
+    warm = member_of("thermal_friction", 2)
+    bench = bench_with()
     bench.shows[warm.hypothesis.label] = Shown(-0.004, -0.001, rise)
-    assert (_borne(bench, Found(warm, 1e-9, ())).members == (warm,)) is stays
+    assert (borne(bench, Found(warm, 1e-9, ())).members == (warm,)) is stays
 
 
 def test_another_form_of_a_cause_goes_before_a_rival() -> None:
     """A polynomial that errs beyond the angles seen gives way to the first lever that does not; its name stays."""
     rival, levers = (PRESLIDING, 2.0), [replace(SPRING, shape=(0.35, centre)) for centre in (0.0, 1.0, 2.0)]
-    bench = _bench(spring=HARMS)
-    bench.shows |= {_label(levers[0]): HARMS, _label(levers[1]): HELPS, _label(levers[2]): HELPS}
-    result = _borne(bench, Found(SPRING, 1e-9, (rival,)), forms=levers)
+    bench = bench_with(spring=HARMS)
+    bench.shows |= {label_of(levers[0]): HARMS, label_of(levers[1]): HELPS, label_of(levers[2]): HELPS}
+    result = borne(bench, Found(SPRING, 1e-9, (rival,)), forms=levers)
     assert result.founds[0].member is result.members[0] is levers[1]
     assert (result.founds[0].p_value, result.founds[0].rivals, result.notes) == (1e-9, (rival,), ())
-    bench.shows |= {_label(lever): HARMS for lever in levers}
-    assert _borne(bench, Found(SPRING, 1e-9, (rival,)), forms=levers).members[0] is PRESLIDING
+    bench.shows |= {label_of(lever): HARMS for lever in levers}
+    assert borne(bench, Found(SPRING, 1e-9, (rival,)), forms=levers).members[0] is PRESLIDING
 
 
 def test_a_form_that_does_no_harm_goes_after_a_rival_that_helps() -> None:
     """Heat of another time constant that neither helps nor harms keeps a name that would be lost, no rival's place."""
     rival, levers = (PRESLIDING, 2.0), [replace(SPRING, shape=(0.35, centre)) for centre in (0.0, 1.0)]
-    bench = _bench(spring=HARMS, presliding_hysteresis=HARMS)
-    bench.shows |= {_label(levers[0]): HARMS, _label(levers[1]): IDLE}
-    result = _borne(bench, Found(SPRING, 1e-9, (rival,)), forms=levers)
+    bench = bench_with(spring=HARMS, presliding_hysteresis=HARMS)
+    bench.shows |= {label_of(levers[0]): HARMS, label_of(levers[1]): IDLE}
+    result = borne(bench, Found(SPRING, 1e-9, (rival,)), forms=levers)
     assert result.members == (levers[1],)
     assert result.notes == ()
-    bench.shows[_label(PRESLIDING)] = HELPS
-    assert _borne(bench, Found(SPRING, 1e-9, (rival,)), forms=levers).members == (PRESLIDING,)
+    bench.shows[label_of(PRESLIDING)] = HELPS
+    assert borne(bench, Found(SPRING, 1e-9, (rival,)), forms=levers).members == (PRESLIDING,)
 
 
 def test_what_helps_stays_as_it_was_found() -> None:
     """Names and free functions that unseen data bear out, or do not speak against, are kept in order."""
     founds = (Found(SPRING, 1e-9, ((TILT, 3.0),)), Found(STRIBECK, 1e-5, ()))
-    bench = _bench(stribeck=IDLE)
-    result = _borne(bench, *founds, free=[FREE], p_values=[1e-4])
+    bench = bench_with(stribeck=IDLE)
+    result = borne(bench, *founds, free=[FREE], p_values=[1e-4])
     assert result.founds == founds
     assert result.members == (SPRING, STRIBECK, FREE)
     assert result.p_values == (1e-9, 1e-5, 1e-4)
@@ -164,7 +77,7 @@ def test_what_helps_stays_as_it_was_found() -> None:
 
 def test_a_name_that_surely_harms_is_left_out_with_a_note() -> None:
     """Without a rival only the others stay, measured anew without it."""
-    result = _borne(_bench(spring=HARMS), Found(SPRING, 1e-9, ()), Found(STRIBECK, 1e-5, ()))
+    result = borne(bench_with(spring=HARMS), Found(SPRING, 1e-9, ()), Found(STRIBECK, 1e-5, ()))
     assert result.members == (STRIBECK,)
     assert [found.member for found in result.founds] == [STRIBECK]
     assert result.p_values == (1e-5,)
@@ -192,11 +105,11 @@ def test_a_faint_free_function_that_unseen_data_deny_is_noise(
 
     Nor where in its swing what swings by itself is then; but such a function finds its frequency in any noise.
     """
-    free = _member(f"pattern:{kind}:0:even", 3)
-    bench = _bench()
+    free = member_of(f"pattern:{kind}:0:even", 3)
+    bench = bench_with()
     bench.shows[free.hypothesis.label] = HARMS
     founds = (Found(STRIBECK, 1e-5, ()),) if named else ()
-    result = _borne(bench, *founds, free=[free], p_values=[p_value])
+    result = borne(bench, *founds, free=[free], p_values=[p_value])
     assert [member for member, *_ in result.spoiling] == ([free] if told else [])
     assert not result.refuted
     assert len(result.notes) == 1
@@ -205,10 +118,10 @@ def test_a_faint_free_function_that_unseen_data_deny_is_noise(
 @pytest.mark.parametrize("shown", [HELPS, HARMS])
 def test_what_a_refuted_name_was_for_is_told_as_unexplained(shown: Shown) -> None:
     """A free function takes its place: in the model where unseen data bear it out, else beside it."""
-    free = _member("pattern:load:0:odd", 2)
-    bench = _bench(spring=HARMS)
+    free = member_of("pattern:load:0:odd", 2)
+    bench = bench_with(spring=HARMS)
     bench.shows[free.hypothesis.label] = shown
-    result = _borne(bench, Found(SPRING, 1e-9, ()), Found(STRIBECK, 1e-5, ()), unnamed=(free, 1e-7))
+    result = borne(bench, Found(SPRING, 1e-9, ()), Found(STRIBECK, 1e-5, ()), unnamed=(free, 1e-7))
     assert [found.member for found in result.founds] == [STRIBECK]
     assert result.members == ((STRIBECK, free) if shown is HELPS else (STRIBECK,))
     assert result.p_values == ((1e-5, 1e-7) if shown is HELPS else (1e-5,))
@@ -231,24 +144,24 @@ def test_what_a_refuted_name_was_for_is_told_as_unexplained(shown: Shown) -> Non
 )
 def test_reasons_to_leave_a_name_out(shown: Shown, stays: bool) -> None:
     """Errors a twentieth larger, less than a fifth of the gain kept, a joint that goes astray."""
-    result = _borne(_bench(spring=shown), Found(SPRING, 1e-9, ()), held_out=False)
+    result = borne(bench_with(spring=shown), Found(SPRING, 1e-9, ()), held_out=False)
     assert bool(result.members) is stays
     assert bool(result.notes) is not stays
 
 
 def test_what_comes_and_goes_need_not_last_on_other_stretches() -> None:
     """A contact or a step has most of its energy in few stretches: what is kept of it there says nothing."""
-    step = _member("friction_step", 2)
-    bench = _bench()
+    step = member_of("friction_step", 2)
+    bench = bench_with()
     bench.shows[step.hypothesis.label] = Shown(kept=0.0)
-    assert _borne(bench, Found(step, 1e-9, ()), held_out=False).members == (step,)
+    assert borne(bench, Found(step, 1e-9, ()), held_out=False).members == (step,)
 
 
 def test_a_close_rival_that_helps_takes_the_place() -> None:
     """It keeps place and p-value, and the rivals after it, counted from it; the note names both."""
     rivals = ((STRIBECK, 2.0), (TILT, 5.0), (PRESLIDING, CLOSE + 1.0))
-    bench = _bench(spring=HARMS, stribeck=HARMS)
-    result = _borne(bench, Found(SPRING, 1e-9, rivals), free=[FREE], p_values=[1e-4])
+    bench = bench_with(spring=HARMS, stribeck=HARMS)
+    result = borne(bench, Found(SPRING, 1e-9, rivals), free=[FREE], p_values=[1e-4])
     assert result.members == (TILT, FREE)
     assert result.p_values == (1e-9, 1e-4)
     (found,) = result.founds
@@ -256,7 +169,7 @@ def test_a_close_rival_that_helps_takes_the_place() -> None:
     (note,) = result.notes
     assert "spring of joint 2" in note
     assert "base_tilt" in note
-    first = _borne(_bench(spring=HARMS), Found(SPRING, 1e-9, rivals)).founds[0]
+    first = borne(bench_with(spring=HARMS), Found(SPRING, 1e-9, rivals)).founds[0]
     assert first.member is STRIBECK
     assert first.rivals == ((TILT, 3.0),)
 
@@ -264,7 +177,7 @@ def test_a_close_rival_that_helps_takes_the_place() -> None:
 @pytest.mark.parametrize("shown", [HARMS, IDLE, Shown(kept=0.1), Shown(rise=1.1)])
 def test_a_rival_that_is_not_borne_out_takes_no_place(shown: Shown) -> None:
     """One that harms too, or that may as well not help, is no better name."""
-    result = _borne(_bench(spring=HARMS, stribeck=shown), Found(SPRING, 1e-9, ((STRIBECK, 1.0),)), held_out=False)
+    result = borne(bench_with(spring=HARMS, stribeck=shown), Found(SPRING, 1e-9, ((STRIBECK, 1.0),)), held_out=False)
     assert (result.founds, result.members, result.p_values) == ((), (), ())
     (note,) = result.notes
     assert "left out" in note
@@ -272,16 +185,16 @@ def test_a_rival_that_is_not_borne_out_takes_no_place(shown: Shown) -> None:
 
 def test_a_rival_that_fits_far_worse_takes_no_place() -> None:
     """Were it to help, the data of the fit still speak against it."""
-    bench = _bench(spring=HARMS)
-    assert _borne(bench, Found(SPRING, 1e-9, ((STRIBECK, CLOSE),))).members == ()
+    bench = bench_with(spring=HARMS)
+    assert borne(bench, Found(SPRING, 1e-9, ((STRIBECK, CLOSE),))).members == ()
     assert all(LABELS["stribeck"] not in asked for asked in bench.asked)
 
 
 def test_the_surest_goes_first_and_others_are_measured_anew() -> None:
     """A name that harms only beside another that is no cause stays, once that is gone."""
-    bench = _bench(spring=HARMS)
+    bench = bench_with(spring=HARMS)
     bench.beside[LABELS["stribeck"], LABELS["spring"]] = Shown(-0.002, -0.0005, 1.0)
-    result = _borne(bench, Found(STRIBECK, 1e-9, ()), Found(SPRING, 1e-5, ()))
+    result = borne(bench, Found(STRIBECK, 1e-9, ()), Found(SPRING, 1e-5, ()))
     assert result.members == (STRIBECK,)
     assert len(result.notes) == 1
     assert "spring" in result.notes[0]
@@ -289,8 +202,8 @@ def test_the_surest_goes_first_and_others_are_measured_anew() -> None:
 
 def test_a_free_function_that_errs_is_told_and_no_part_of_the_model() -> None:
     """It is handed on with p-value and gain, for that something is unexplained is as true as before."""
-    bench = _bench(load=HARMS)
-    result = _borne(bench, Found(SPRING, 1e-9, ()), free=[FREE, SWING], p_values=[1e-4, 1e-3])
+    bench = bench_with(load=HARMS)
+    result = borne(bench, Found(SPRING, 1e-9, ()), free=[FREE, SWING], p_values=[1e-4, 1e-3])
     assert result.members == (SPRING, SWING)
     assert result.p_values == (1e-9, 1e-3)
     ((member, p_value, gain),) = result.spoiling
@@ -301,7 +214,7 @@ def test_a_free_function_that_errs_is_told_and_no_part_of_the_model() -> None:
 
 def test_what_errs_on_all_joints_is_told_of_the_whole_robot() -> None:
     """What swings at the flange has no joint to name."""
-    result = _borne(_bench(swinging=HARMS), free=[SWING], p_values=[1e-10])
+    result = borne(bench_with(swinging=HARMS), free=[SWING], p_values=[1e-10])
     assert [member for member, _, _ in result.spoiling] == [SWING]
     assert result.notes[0].startswith("On the robot as a whole something is unexplained")
 
@@ -309,11 +222,11 @@ def test_what_errs_on_all_joints_is_told_of_the_whole_robot() -> None:
 def test_a_passing_effect_is_not_judged_on_other_logs() -> None:
     """A push belongs to the log in which it came: other logs say nothing of it, stretches left out do."""
     found = Found(PUSH, 1e-9, ((STRIBECK, 1.0),))
-    assert _borne(_bench(external_contact=HARMS), found).members == (PUSH,)
-    assert _borne(_bench(external_contact=HARMS), found, held_out=False).members == (STRIBECK,)
+    assert borne(bench_with(external_contact=HARMS), found).members == (PUSH,)
+    assert borne(bench_with(external_contact=HARMS), found, held_out=False).members == (STRIBECK,)
     # For the same reason other logs cannot make it take another's place.
-    bench = _bench(stribeck=HARMS, external_contact=HARMS)
-    assert _borne(bench, Found(STRIBECK, 1e-9, ((PUSH, 1.0),))).members == ()
+    bench = bench_with(stribeck=HARMS, external_contact=HARMS)
+    assert borne(bench, Found(STRIBECK, 1e-9, ((PUSH, 1.0),))).members == ()
 
 
 @pytest.mark.parametrize(("shown", "stays"), [(HELPS, True), (IDLE, True), (HARMS, False)])
@@ -321,12 +234,12 @@ def test_a_faint_name_needs_unseen_data_that_speak_for_it(shown: Shown, stays: b
     """What hardly stood out is noise unless its gain is positive, sure or not; what clearly did is refuted surely."""
     slightly = Shown(-0.003, 0.002, 1.001)
     for said, faint, kept in ((shown, False, stays), (slightly, False, True), (slightly, True, False)):
-        result = _borne(_bench(spring=said), Found(SPRING, 1e-3, ()), faint=[SPRING] if faint else [])
+        result = borne(bench_with(spring=said), Found(SPRING, 1e-3, ()), faint=[SPRING] if faint else [])
         assert (result.members == (SPRING,)) is kept
         assert [member for member, *_ in result.refuted] == ([] if kept or faint else [SPRING])
         assert bool(result.notes) is (not kept)
     # A push is over when the unseen log begins.
-    assert _borne(_bench(external_contact=slightly), Found(PUSH, 1e-3, ()), faint=[PUSH]).members == (PUSH,)
+    assert borne(bench_with(external_contact=slightly), Found(PUSH, 1e-3, ()), faint=[PUSH]).members == (PUSH,)
 
 
 @pytest.mark.parametrize(
@@ -343,22 +256,22 @@ def test_a_name_that_is_slight_beside_another_needs_unseen_data_that_speak_for_i
     strength: float, shown: Shown, stays: bool
 ) -> None:
     """As much as a tenth of it may be what the stronger one's formula leaves: clear of the noise, and no cause."""
-    bench = _bench(stribeck=shown)
+    bench = bench_with(stribeck=shown)
     for own, kept in ((0.9 * PLAIN, stays), (1.1 * PLAIN, True)):
         worths = {SPRING: strength * own / SLIGHT, STRIBECK: own}
-        result = _borne(bench, Found(SPRING, 1e-9, ()), Found(STRIBECK, 1e-9, ()), worths=worths)
+        result = borne(bench, Found(SPRING, 1e-9, ()), Found(STRIBECK, 1e-9, ()), worths=worths)
         assert result.members == ((SPRING, STRIBECK) if kept else (SPRING,))
 
 
 @pytest.mark.parametrize(("speaks", "stays"), [(-0.9 * AGAINST, True), (-1.1 * AGAINST, False)])
 def test_unseen_data_speak_against_a_cause_by_a_share_of_its_gain(speaks: float, stays: bool) -> None:
     """Where the base model errs on them, too, a true cause may bring a little less than nothing there, surely so."""
-    bench = _bench(spring=Shown(-0.004, -0.001, 1.02, speaks=speaks))
-    assert (_borne(bench, Found(SPRING, 1e-9, ())).members == (SPRING,)) is stays
+    bench = bench_with(spring=Shown(-0.004, -0.001, 1.02, speaks=speaks))
+    assert (borne(bench, Found(SPRING, 1e-9, ())).members == (SPRING,)) is stays
 
 
 @pytest.mark.parametrize(("speaks", "stays"), [(0.6, True), (LEFT - 0.1, False), (-0.5, False)])
 def test_a_name_that_unseen_rows_speak_for_stays_whatever_base_parameters_do_there(speaks: float, stays: bool) -> None:
     """An error a sixth larger on faster motion, to which friction's polynomial is carried on, is no word against it."""
-    bench = _bench(spring=Shown(-0.008, -0.0002, 1.17, speaks=speaks))
-    assert bool(_borne(bench, Found(SPRING, 1e-9, ())).founds) is stays
+    bench = bench_with(spring=Shown(-0.008, -0.0002, 1.17, speaks=speaks))
+    assert bool(borne(bench, Found(SPRING, 1e-9, ())).founds) is stays

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -12,28 +11,12 @@ import pytest
 
 from estimation.diagnosis import comparing, verdict
 from estimation.diagnosis.draining import Draining
-from estimation.diagnosis.groups import Group
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.patterns import Pattern
-from estimation.diagnosis.refinement import RARE, Member
+from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found
 from estimation.diagnosis.spotting import Spot
-from robots.robot import Robot
-from robots.terms.effects import EFFECTS
-from robots.terms.effects.time_delay import near
-
-ROWS = 5000
-PRICE = float(np.log(ROWS))
-
-
-def _accepting(monkeypatch: pytest.MonkeyPatch, accept: Callable[..., Any]) -> None:
-    for module in (comparing, verdict):
-        monkeypatch.setattr(module, "accept", accept)
-
-
-def _member(name: str, joint: int | None, gain: float, degrees: int) -> Member:
-    group = Group((0,), (np.ones((ROWS, 1), np.float32),), np.zeros((1, 1)), np.eye(1), np.ones(1), np.ones(1))
-    return replace(Member(Hypothesis(EFFECTS[name], joint), (), group, gain, np.ones(1), degrees, 1.0))
+from tests.estimation.diagnosis.verdict_bench import PRICE, ROWS, accepting, member_of
 
 
 @pytest.mark.parametrize(
@@ -48,11 +31,11 @@ def test_a_name_of_the_whole_robot_may_be_what_a_name_on_a_joint_left(
     free: float, left: float, holds: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A ripple of a gain of 300 and a push of 100 beside it, of 4 and 6 parameters."""
-    ripple, push = _member("torque_ripple", 1, 300.0, 4), _member("external_contact", None, 100.0, 6)
+    ripple, push = member_of("torque_ripple", 1, 300.0, 4), member_of("external_contact", None, 100.0, 6)
     gains = {(): 0.0, ("external_contact",): 100.0, ("external_contact", "torque_ripple"): 400.0}
     gains["torque_ripple", "external_contact"] = 400.0
     labels = {id(m.group): m.hypothesis.name for m in (ripple, push)}
-    _accepting(
+    accepting(
         monkeypatch,
         lambda problem, groups: SimpleNamespace(gain=gains.get(tuple(labels.get(id(g), "free") for g in groups), 0.0)),
     )
@@ -77,15 +60,15 @@ def test_waves_are_no_catch_at_one_angle(
     spot: float, degrees: int, name: str, holds: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A ripple of a gain of 300 and five parameters, beside a spot of the joint's range in its place."""
-    own = _member(name, 1, 300.0, 5)
-    catch = replace(_member("spring", 1, spot, degrees), hypothesis=Hypothesis(Spot(), 1))
+    own = member_of(name, 1, 300.0, 5)
+    catch = replace(member_of("spring", 1, spot, degrees), hypothesis=Hypothesis(Spot(), 1))
     gains = {id(own.group): 300.0, id(catch.group): spot}
-    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
+    accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
     spots = [SimpleNamespace(hypothesis=catch.hypothesis), SimpleNamespace(hypothesis=Hypothesis(Pattern("turns"), 1))]
 
     def patterns(problem: object, entries: list[SimpleNamespace], *rest: object) -> tuple[list[Member], list[float]]:
         # Among all free functions another one comes first: that of most parameters.
-        wide = replace(_member("spring", 1, 250.0, 9), hypothesis=Hypothesis(Pattern("turns"), 1))
+        wide = replace(member_of("spring", 1, 250.0, 9), hypothesis=Hypothesis(Pattern("turns"), 1))
         return [wide if len(entries) > 1 else catch], []
 
     monkeypatch.setattr(verdict, "free_functions", patterns)
@@ -105,11 +88,11 @@ def test_a_cause_of_all_joints_is_told_by_more_than_the_joint_of_a_name(
     free: float, elsewhere: float, holds: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A drift of the first joint, of a gain of 80 and four parameters, or a base that tilts, of three."""
-    drift = _member("torque_sensor_drift", 1, 80.0, 4)
+    drift = member_of("torque_sensor_drift", 1, 80.0, 4)
     columns = tuple(np.sqrt(x / ROWS) * np.ones((ROWS, 1), np.float32) for x in (free - elsewhere, elsewhere))
-    tilt = replace(_member("base_tilt", None, free, 3), group=replace(drift.group, joints=(0, 1), columns=columns))
+    tilt = replace(member_of("base_tilt", None, free, 3), group=replace(drift.group, joints=(0, 1), columns=columns))
     gains = {id(drift.group): 80.0, id(tilt.group): free}
-    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
+    accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments: ([tilt], []))
     problem = SimpleNamespace(rows=ROWS)
     assert verdict._holds_together(problem, [drift], [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
@@ -127,11 +110,11 @@ def test_a_drift_is_a_free_function_of_time(
     degrees: int, of_time: bool, holds: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A zero that wanders over a gain of 220 beside a pattern of 219, of the joint's angle or of time."""
-    drift = _member("torque_sensor_drift", 2, 220.0, 16)
+    drift = member_of("torque_sensor_drift", 2, 220.0, 16)
     pattern = Hypothesis(Pattern("time" if of_time else "angle"), 2)
-    free = replace(_member("spring", 2, 219.0, degrees), hypothesis=pattern)
+    free = replace(member_of("spring", 2, 219.0, degrees), hypothesis=pattern)
     gains = {id(drift.group): 220.0, id(free.group): 219.0}
-    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
+    accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
 
     def patterns(
         problem: object, entries: list[SimpleNamespace], *rest: object, **kind: bool
@@ -159,11 +142,11 @@ def test_a_formula_is_not_named_for_what_is_unexplained_on_joints_that_it_reache
     joints: tuple[int, ...], where: int | None, left: float, kept: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """An encoder's offset of a gain of 100 beside a pattern of 80 on joint 2, or on all."""
-    offset = _member("encoder_offset", 1, 100.0, 1)
+    offset = member_of("encoder_offset", 1, 100.0, 1)
     offset = replace(offset, group=replace(offset.group, joints=joints))
-    free = replace(_member("spring", 2, 80.0, 15), hypothesis=Hypothesis(Pattern("angle"), where))
+    free = replace(member_of("spring", 2, 80.0, 15), hypothesis=Hypothesis(Pattern("angle"), where))
     gains = {id(offset.group): 100.0, id(free.group): 80.0}
-    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
+    accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
     monkeypatch.setattr(comparing, "score", lambda problem, group, beside: SimpleNamespace(gain=left))
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: ([free], [1e-30]))
     monkeypatch.setattr(verdict, "_holds", lambda *arguments: True)
@@ -189,9 +172,9 @@ def test_a_name_of_the_whole_robot_is_weighed_against_functions_of_a_joint(
     free: float, degrees: int, holds: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A tilted base of a gain of 500 and two parameters, named for what happens on one joint."""
-    tilt = _member("base_tilt", None, 500.0, 2)
+    tilt = member_of("base_tilt", None, 500.0, 2)
     pattern = Hypothesis(Pattern("drag", 3), 1)
-    other = replace(_member("spring", 1, free, degrees), hypothesis=pattern)
+    other = replace(member_of("spring", 1, free, degrees), hypothesis=pattern)
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: ([other], [1e-30]))
     found = Found(tilt, 1e-9, ())
     problem = SimpleNamespace(rows=ROWS)
@@ -201,10 +184,10 @@ def test_a_name_of_the_whole_robot_is_weighed_against_functions_of_a_joint(
 
 def test_several_names_on_one_joint_must_fit_better_than_one_free_function(monkeypatch: pytest.MonkeyPatch) -> None:
     """A spring and a presliding of 309 together are a cable that relaxes, if that explains as much by itself."""
-    pair = [_member("spring", 1, 200.0, 3), _member("presliding_hysteresis", 1, 109.0, 2)]
-    free = replace(_member("spring", 1, 299.0, 4), hypothesis=Hypothesis(Pattern("memory"), 1))
+    pair = [member_of("spring", 1, 200.0, 3), member_of("presliding_hysteresis", 1, 109.0, 2)]
+    free = replace(member_of("spring", 1, 299.0, 4), hypothesis=Hypothesis(Pattern("memory"), 1))
     gains = {id(pair[0].group): 200.0, id(pair[1].group): 109.0, id(free.group): 299.0}
-    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
+    accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
     problem = SimpleNamespace(rows=ROWS)
 
     def held(functions: list[Member]) -> bool:
@@ -217,42 +200,19 @@ def test_several_names_on_one_joint_must_fit_better_than_one_free_function(monke
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "believed"),
-    [
-        ("encoder_offset", 0.5, False),
-        ("encoder_offset", -0.495, False),
-        ("encoder_offset", -0.02, True),
-        ("current_clipping", 1.0, True),
-    ],
-)
-def test_a_value_at_the_edge_of_what_machines_have_is_no_name(
-    name: str, value: float, believed: bool, arm: Robot
-) -> None:
-    """An encoder half a radian off wants to be more than that; all of a torque may be cut off; teeth have some play."""
-    problem = SimpleNamespace(situation=SimpleNamespace(robot=arm))
-    member = replace(_member(name, 1, 300.0, 1), coefficients=np.array([value]))
-    assert verdict._believable(problem, member) is believed  # type: ignore[arg-type]
-    for seconds in (5.0, 20.0):
-        hot = replace(_member("torque_constant_heat", 1, 300.0, 1), coefficients=np.array([-0.1]), shape=(seconds,))
-        assert verdict._believable(problem, hot) is (seconds > 5.0)  # type: ignore[arg-type]
-    assert EFFECTS["backlash"].believable(arm, 1, np.full(1, 1e-6))
-    assert not EFFECTS["backlash"].believable(arm, 1, np.full(1, 1e-7))
-
-
-@pytest.mark.parametrize(
     ("gains", "stays"), [((300.0, 250.0, 250.0), True), ((490.0, 450.0), False), ((600.0,), False)]
 )
 def test_what_does_more_than_free_functions_does_not_borrow_from_them(
     gains: tuple[float, ...], stays: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A delay of a gain of 1000, of which ringing joints imitate more than it keeps beside them."""
-    delay = _member("time_delay", None, 1000.0, 2)
+    delay = member_of("time_delay", None, 1000.0, 2)
     free = [
-        replace(_member("spring", k, gain, 5), hypothesis=Hypothesis(Pattern("ringing"), k))
+        replace(member_of("spring", k, gain, 5), hypothesis=Hypothesis(Pattern("ringing"), k))
         for k, gain in enumerate(gains, start=1)
     ]
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: (free, []))
-    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=1000.0 * len(groups)))
+    accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=1000.0 * len(groups)))
     monkeypatch.setattr(comparing, "score", lambda problem, group, beside: SimpleNamespace(gain=450.0))
     found = Found(delay, 1e-9, ())
     problem: Any = SimpleNamespace(rows=ROWS)
@@ -262,9 +222,9 @@ def test_what_does_more_than_free_functions_does_not_borrow_from_them(
 def test_small_names_beside_one_that_holds_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Three names on a joint are beaten by free functions; the strongest by itself is not: the others were its rest."""
     stribeck, spring, push = (
-        _member("stribeck", 3, 700.0, 3),
-        _member("spring", 3, 90.0, 4),
-        _member("spring", 2, 9.0, 4),
+        member_of("stribeck", 3, 700.0, 3),
+        member_of("spring", 3, 90.0, 4),
+        member_of("spring", 2, 9.0, 4),
     )
     seen: list[tuple[str, ...]] = []
 
@@ -272,7 +232,7 @@ def test_small_names_beside_one_that_holds_are_left_out(monkeypatch: pytest.Monk
         seen.append(tuple(m.hypothesis.label for m in named if m.hypothesis.joint == joint))
         return len(seen[-1]) == 1
 
-    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=800.0))
+    accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=800.0))
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: ([], []))
     monkeypatch.setattr(verdict, "refine", lambda problem, hypothesis, shape, beside: replace(stribeck, gain=705.0))
     monkeypatch.setattr(verdict, "_holds", holds)
@@ -288,59 +248,11 @@ def test_small_names_beside_one_that_holds_are_left_out(monkeypatch: pytest.Monk
     assert seen == [("spring of joint 2",), ("stribeck of joint 3", "spring of joint 3"), ("stribeck of joint 3",)]
 
 
-@pytest.mark.parametrize(
-    ("worth", "believed", "kept"),
-    [
-        (90.0, True, True),  # with reversals as late as all else it explains nearly as much: a machine may have that
-        (60.0, True, False),  # without its torn reversals it is another effect
-        (90.0, False, False),  # that form is no machine's either
-    ],
-)
-def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
-    worth: float, believed: bool, kept: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A delay of a gain of 100 stands at the end of the range that its reversals allow it."""
-    torn = replace(_member("time_delay", None, 100.0, 0), shape=(0.004,), coefficients=np.array([near(0.004)[0][1]]))
-
-    def refined(
-        problem: object, hypothesis: Hypothesis, shape: tuple[float, ...], beside: object, *, effort: int
-    ) -> Member:
-        assert effort == 0
-        return replace(
-            torn, shape=shape, gain=worth, coefficients=np.array([shape[0] if believed else near(shape[0])[0][1]])
-        )
-
-    _accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=0.0))
-    monkeypatch.setattr(verdict, "refine", refined)
-    problem: Any = SimpleNamespace(rows=ROWS, sees=lambda effect: None, situation=SimpleNamespace(robot=None))
-    given = verdict._buildable(problem, Found(torn, 1e-9, ()), [torn])
-    assert (given is not None) is kept
-    if given is not None:
-        assert given.member.shape == (near(0.004)[0][1],)
-
-
-@pytest.mark.parametrize(
-    ("rival", "worse", "stays_open"),
-    [
-        ("spring", verdict.CLOSE - 1.0, True),
-        ("spring", verdict.CLOSE + 1.0, False),
-        ("load_heat", RARE - 1.0, True),  # as rare as it is, the data speak for it as much
-        ("load_heat", RARE + 1.0, False),
-    ],
-)
-def test_a_rare_rival_leaves_a_name_open_where_the_data_alone_speak_for_it(
-    rival: str, worse: float, stays_open: bool
-) -> None:
-    """Its BIC is that much worse beforehand."""
-    other = _member(rival, 1, 100.0, 2)
-    assert verdict.is_open(Found(_member("thermal_friction", 1, 110.0, 2), 1e-9, ((other, worse),))) is stays_open
-
-
 @pytest.mark.parametrize(("gain", "holds"), [(526.0, False), (480.0, True)])
 def test_a_tank_that_empties_is_no_step(gain: float, holds: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """A step of 468 and five parameters, where a body that changes slowly explains clearly more with twelve."""
-    step = _member("payload_change", None, 468.0, 5)
-    drains = replace(_member("spring", None, gain, 12), hypothesis=Hypothesis(Draining(), None))
+    step = member_of("payload_change", None, 468.0, 5)
+    drains = replace(member_of("spring", None, gain, 12), hypothesis=Hypothesis(Draining(), None))
     entry = SimpleNamespace(hypothesis=drains.hypothesis)
 
     def free(problem: object, patterns: list[Any], *rest: object) -> tuple[list[Member], list[float]]:

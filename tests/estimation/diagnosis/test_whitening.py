@@ -1,4 +1,4 @@
-"""Specification of the noise model, of the band that is kept, and of rows whose direction of motion is unknown."""
+"""Specification of the noise model, and of rows whose direction of motion is unknown."""
 
 from __future__ import annotations
 
@@ -10,45 +10,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.diagnosis.band import Band
 from estimation.diagnosis.excess import period_differences, period_mean, residual_shares
 from estimation.diagnosis.gaps import find_gaps
-from estimation.diagnosis.noise import estimate_whitening, quiet_joints
+from estimation.diagnosis.noise import estimate_whitening
 from estimation.diagnosis.orthonormal import orthonormal
 from estimation.diagnosis.periods import Cycle
-from estimation.diagnosis.states import Recording
 from estimation.diagnosis.whitening import Whitening
-
-STEP = 0.004
-
-
-def _recording(rows: int = 10_000, n: int = 2, unsure: np.ndarray | None = None) -> Recording:
-    zero = np.zeros((rows, n))
-    return Recording(
-        t=STEP * np.arange(rows),
-        starts=(0,),
-        q=zero,
-        dq=zero,
-        ddq=zero,
-        tau=zero,
-        step=STEP,
-        cycles=(None,),
-        cutoff=50.0,
-        floor=np.full(n, 1e-20),
-        unsure=np.zeros((rows, n), dtype=bool) if unsure is None else unsure,
-        clear=np.zeros((rows, n), dtype=bool),
-        jolts=np.zeros(n),
-        names=("log",),
-    )
-
-
-def _noise(rows: int, seed: int = 0) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    white = rng.standard_normal((rows, 2))
-    coloured = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], rng.standard_normal((rows, 2)), axis=0)
-    mixed = (white + coloured) * [2.0, 0.5]
-    mixed[:, 1] += 0.1 * mixed[:, 0]
-    return mixed
+from tests.estimation.diagnosis.noisy_logs import STEP, noise_of, recording_of
 
 
 def test_coloured_noise_becomes_white_and_of_unit_density_in_the_band() -> None:
@@ -56,8 +24,8 @@ def test_coloured_noise_becomes_white_and_of_unit_density_in_the_band() -> None:
 
     Each of five stretches of the band holds some 700 frequencies: the standard error of its mean power is 4 %.
     """
-    residual = _noise(10_000)
-    whitening = estimate_whitening(_recording(), residual, 0, np.eye(2))
+    residual = noise_of(10_000)
+    whitening = estimate_whitening(recording_of(), residual, 0, np.eye(2))
     white = whitening.all(residual)[50:]
     power = np.abs(np.fft.rfft(white, axis=0)) ** 2 / len(white)
     f = np.fft.rfftfreq(len(white), STEP * whitening.stride)
@@ -66,18 +34,6 @@ def test_coloured_noise_becomes_white_and_of_unit_density_in_the_band() -> None:
         assert power[(f >= low) & (f < high)].mean(axis=0) == pytest.approx([1.0, 1.0], abs=0.2)
     correlation = np.linalg.inv(whitening.precision)
     assert correlation[0, 1] == pytest.approx(np.corrcoef(white.T)[0, 1], abs=0.04)
-
-
-def test_the_band_passes_slow_signals_and_stops_fast_ones() -> None:
-    """Below three quarters of the cut-off a signal comes through unchanged, above 1.1 times it is gone."""
-    whitening = estimate_whitening(_recording(), _noise(10_000), 0, np.eye(2))
-    band = whitening.bands[0]
-    t = STEP * np.arange(10_000)
-    for frequency, factor in ((0.7 * band.cutoff, 1.0), (1.15 * band.cutoff, 0.0)):
-        wave = np.sin(2 * np.pi * frequency * t)
-        passed = band.passed(wave)[50:-50]
-        # The Kaiser window of shape 6 leaves ripples of 63 dB.
-        assert np.abs(passed - factor * wave[:: band.stride][50:-50]).max() < 2e-3
 
 
 def _level(whitening: Whitening, residual: np.ndarray, rows: slice = slice(None)) -> np.ndarray:
@@ -93,10 +49,10 @@ def test_a_slow_effect_is_not_taken_for_noise() -> None:
 
     The mean over some 500 frequencies has a standard error of 4.5 %; at rest a process fitted above 1 Hz says a fifth.
     """
-    noise = _noise(20_000)
+    noise = noise_of(20_000)
     t = STEP * np.arange(20_000)[:, None]
     slow = 4 * noise.std(axis=0) * np.sin(2 * np.pi * np.array([0.05, 0.6]) * t)
-    recording = _recording(20_000)
+    recording = recording_of(20_000)
     alone = estimate_whitening(recording, noise, 0, np.eye(2))
     beside = estimate_whitening(recording, noise + slow, 0, np.eye(2))
     assert _level(beside, noise) == pytest.approx(_level(alone, noise), rel=0.05)
@@ -119,7 +75,7 @@ def test_noise_that_wanders_is_noise(memory: float) -> None:
     noise = (rng.standard_normal((rows, 2)) + slow) * [2.0, 0.5]
     phase = 2 * np.pi * 0.3 * STEP * np.arange(rows)
     wave = np.column_stack([np.sin(phase), np.cos(phase)])
-    found = estimate_whitening(_recording(rows), noise, 0, np.eye(2), spared=(wave, wave))
+    found = estimate_whitening(recording_of(rows), noise, 0, np.eye(2), spared=(wave, wave))
     true = np.sqrt(1 + (1 + memory) / (1 - memory)) * np.array([2.0, 0.5])
     share = found.at_rest * np.sqrt(found.stride) / true
     assert np.all((share > 0.8) & (share < 2.2))
@@ -127,7 +83,7 @@ def test_noise_that_wanders_is_noise(memory: float) -> None:
 
 def test_kicks_at_reversals_and_times_at_rest_do_not_change_the_level() -> None:
     """Rows of unknown direction, short or long, whatever is in them, leave the level of the noise as it is."""
-    noise = _noise(20_000)
+    noise = noise_of(20_000)
     unsure = np.zeros((20_000, 2), dtype=bool)
     residual = noise.copy()
     for start in range(100, 10_000, 200):
@@ -135,7 +91,7 @@ def test_kicks_at_reversals_and_times_at_rest_do_not_change_the_level() -> None:
         residual[start : start + 6, 0] += 50 * noise[:, 0].std()
     unsure[10_000:18_000] = True  # both joints stand for two fifths of the time, held by brakes
     residual[10_000:18_000] = 0.0
-    whitening = estimate_whitening(_recording(20_000, unsure=unsure), residual, 0, np.eye(2))
+    whitening = estimate_whitening(recording_of(20_000, unsure=unsure), residual, 0, np.eye(2))
     stride = whitening.stride
     assert _level(whitening, noise, slice(9_900 // stride)) == pytest.approx([1.0, 1.0], abs=0.2)
     assert whitening.weights is not None
@@ -143,35 +99,12 @@ def test_kicks_at_reversals_and_times_at_rest_do_not_change_the_level() -> None:
     assert np.median(whitening.weights[: 9_000 // stride], axis=0) == pytest.approx([1.0, 1.0])
 
 
-def test_filtering_columns_together_is_filtering_each() -> None:
-    """Columns of very different size, and of zeros, come out as convolution written out has them."""
-    rng = np.random.default_rng(0)
-    band = estimate_whitening(_recording(), _noise(10_000), 0, np.eye(2)).bands[0]
-    columns = rng.standard_normal((1000, 5)) * [1.0, 1e9, 0.0, 1e-9, 1.0]
-    after = np.array([1.0, -0.5, 0.2])
-    together = band.passed(columns, after)
-    half = len(band.taps) // 2
-    for column, result in zip(columns.T, together.T, strict=True):
-        full = np.convolve(column, band.taps)
-        # The first rows feel what the filter puts before the log.
-        lead = full[half % band.stride :: band.stride]
-        first = half // band.stride
-        expected = np.convolve(lead, after)[first : first + len(result)]
-        assert result == pytest.approx(expected, abs=1e-12 * max(np.abs(column).max(), 1e-300))
-        assert result == pytest.approx(band.passed(column, after), abs=1e-12 * np.abs(column).max())
-    assert not together[:, 2].any()
-    # A number so small that one over it is none: the cube of a joint's position that stands at zero.
-    tiny = band.passed(np.stack([columns[:, 0], np.full(1000, 7e-314)], axis=1), single=True)
-    assert tiny[:, 0] == pytest.approx(band.passed(columns[:, 0]), abs=1e-5)
-    assert not tiny[:, 1].any()
-
-
 def test_rows_of_unknown_direction_do_not_count() -> None:
     """A torque of any size within a short gap leaves no trace behind the whitening."""
     unsure = np.zeros((10_000, 2), dtype=bool)
     unsure[3000:3006, 0] = True
-    recording = _recording(unsure=unsure)
-    whitening = replace(estimate_whitening(recording, _noise(10_000), 0, np.eye(2)), weights=None)
+    recording = recording_of(unsure=unsure)
+    whitening = replace(estimate_whitening(recording, noise_of(10_000), 0, np.eye(2)), weights=None)
     kick = np.zeros(10_000)
     kick[3001:3005] = 1000.0
     plain = replace(whitening, gaps=find_gaps(np.zeros_like(unsure), (0,)))
@@ -188,8 +121,8 @@ def test_the_adjoint_has_the_products_of_the_filter() -> None:
     rows = 6_000
     unsure = np.zeros((rows, 2), dtype=bool)
     unsure[1_000:1_400] = unsure[2_500:2_504] = True
-    recording = replace(_recording(rows, unsure=unsure), starts=(0, 3_001), cycles=(None, None), names=("a", "b"))
-    noise = _noise(rows) * np.repeat([1.0, 0.3], [3_001, rows - 3_001])[:, None]
+    recording = replace(recording_of(rows, unsure=unsure), starts=(0, 3_001), cycles=(None, None), names=("a", "b"))
+    noise = noise_of(rows) * np.repeat([1.0, 0.3], [3_001, rows - 3_001])[:, None]
     whitening = estimate_whitening(recording, noise, 0, 0.2 * np.eye(2))
     whitening = replace(whitening, bands=tuple(replace(band, stride=2) for band in whitening.bands))
     whitening = replace(whitening, weights=None, gaps=replace(whitening.gaps, free=()))
@@ -208,7 +141,7 @@ def test_where_in_a_gap_friction_turns_round_does_not_matter() -> None:
     """Signs that change within rows of unknown direction, one here, one there, are one and the same when white."""
     unsure = np.zeros((10_000, 2), dtype=bool)
     unsure[3000:3016, 0] = True
-    whitening = estimate_whitening(_recording(unsure=unsure), _noise(10_000), 0, np.eye(2))
+    whitening = estimate_whitening(recording_of(unsure=unsure), noise_of(10_000), 0, np.eye(2))
     early, late = (np.where(np.arange(10_000) < turn, -1.0, 1.0) for turn in (3002, 3013))
     assert whitening.apply(early, 0) == pytest.approx(whitening.apply(late, 0), abs=1e-12)
     # But not where the direction is known.
@@ -243,7 +176,7 @@ def test_differences_between_repetitions_hold_the_noise_and_nothing_that_repeats
 def test_what_reversals_leave_does_not_repeat_as_an_effect_does() -> None:
     """Ten periods of noise: a sign that errs beside reversals adds nothing, a wave as large as the noise half."""
     rows, period = 10_000, 1000
-    recording = replace(_recording(rows), cycles=(Cycle(0, rows, period * STEP, 10),))
+    recording = replace(recording_of(rows), cycles=(Cycle(0, rows, period * STEP, 10),))
     noise, phase = np.random.default_rng(4).standard_normal((rows, 2)), np.arange(rows) % period
     turns = np.isin(phase, (100, 101, 600, 601))
     noise[turns] += 20.0
@@ -262,37 +195,21 @@ def test_an_orthonormal_basis_leaves_out_what_is_not_determined() -> None:
     assert basis.T @ basis == pytest.approx(np.eye(2), abs=1e-12)
 
 
-def test_a_band_without_filter_only_thins() -> None:
-    """Without taps every stride-th row is kept as it is."""
-    series = np.arange(10.0)
-    assert Band(np.zeros(0), 2, 1.0).passed(series) == pytest.approx(series[::2])
-
-
 def test_a_push_counts_and_a_kick_at_a_reversal_does_not() -> None:
     """A push of a sixth of a second, twenty times the noise, keeps its weight; beside a reversal the same loses it."""
-    noise = _noise(20_000)
+    noise = noise_of(20_000)
     unsure = np.zeros((20_000, 2), dtype=bool)
     unsure[12_000:12_006] = True
     residual = noise.copy()
     push = 20 * noise.std(axis=0) * np.sin(np.pi * np.linspace(0, 1, 42))[:, None]
     residual[5_000:5_042] += push
     residual[12_008:12_050] += push
-    whitening = estimate_whitening(_recording(20_000, unsure=unsure), residual, 0, np.eye(2))
+    whitening = estimate_whitening(recording_of(20_000, unsure=unsure), residual, 0, np.eye(2))
     stride = whitening.stride
     assert whitening.weights is not None
     pushed, kicked = (whitening.weights[(at + 8) // stride : (at + 34) // stride] for at in (5_000, 12_008))
     assert np.mean(pushed == 1.0) > 0.8
     assert np.mean(kicked < 0.9) > 0.5
-
-
-def test_kicks_drown_where_their_torque_is_below_the_noise() -> None:
-    """Torque per acceleration times the accelerations' error, over a sample's noise: 0.9 drowns, 1.1 does not."""
-    residual = np.random.default_rng(0).standard_normal((10_000, 2)) * [3.0, 0.5]
-    slow = 100.0 * np.sin(0.5 * STEP * np.arange(10_000))[:, None]
-    recording = replace(_recording(), jolts=np.array([0.9 * 3.0 / 20.0, 1.1 * 0.5 / 2.0]))
-    # 10 000 samples tell the noise to 1 %.
-    assert quiet_joints(recording, residual + slow, np.diag([20.0, 2.0])).tolist() == [True, False]
-    assert quiet_joints(recording, 2.0 * residual + slow, np.diag([20.0, 2.0])).tolist() == [True, True]
 
 
 @pytest.mark.parametrize("seen", [0, 5])
@@ -302,15 +219,15 @@ def test_a_log_in_which_a_joint_stands_takes_nothing_from_the_others(seen: int) 
     Not more than a few rows of it are seen to move, by an encoder that flickers: they tell no level. Standard errors of
     the powers are 5 %.
     """
-    noise = _noise(30_000)
+    noise = noise_of(30_000)
     unsure = np.zeros((30_000, 2), dtype=bool)
     unsure[8_000:, 0] = True
     unsure[9_000 : 9_000 + 900 * seen : 900, 0] = False
     residual = noise.copy()
     residual[8_000:, 0] = 20.0  # a brake holds it
-    recording = replace(_recording(30_000, unsure=unsure), starts=(0, 8_000), cycles=(None, None), names=("a", "b"))
+    recording = replace(recording_of(30_000, unsure=unsure), starts=(0, 8_000), cycles=(None, None), names=("a", "b"))
     both = estimate_whitening(recording, residual, 0, np.eye(2))
-    alone = estimate_whitening(_recording(8_000), noise[:8_000], 0, np.eye(2))
+    alone = estimate_whitening(recording_of(8_000), noise[:8_000], 0, np.eye(2))
     assert [band.cutoff for band in both.bands] == pytest.approx([band.cutoff for band in alone.bands], rel=0.05)
     assert both.levels is not None
     assert both.levels == pytest.approx(1.0, abs=0.1)

@@ -46,3 +46,9 @@ def seen(random_robot):
         return situation(model, model.nominal, t, *_motion(robot, t), starts=starts)
 
     return build
+
+
+@pytest.fixture(params=[1, 3, 6])
+def now(request, seen):
+    """Give three random robots of five joints, each in one smooth motion."""
+    return seen(5, seed=request.param)

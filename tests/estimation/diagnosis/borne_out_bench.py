@@ -1,0 +1,118 @@
+"""Stands for the measurement of which names unseen data bear out: members, and what is shown of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+import numpy as np
+
+from estimation.diagnosis.borne_out import BorneOut, bear_out
+from estimation.diagnosis.findings import Gain
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.patterns import build_pattern
+from estimation.diagnosis.refinement import Member
+from estimation.diagnosis.selection import Found
+from estimation.diagnosis.verdict import Judgement
+from robots.terms.effects import EFFECTS
+from robots.terms.effects.base import Effect
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What unseen data say of a member: its gain's interval, its rise, shares kept and spoken for, its joint astray."""
+
+    low: float = 0.001
+    high: float = 0.003
+    rise: float = 0.95
+    kept: float = 1.0
+    speaks: float = 0.0
+    astray: bool = False
+
+
+HELPS, IDLE, HARMS = Shown(), Shown(-0.001, 0.002, 1.0), Shown(-0.004, -0.001, 1.02, speaks=-0.5)
+
+
+@dataclass
+class Bench:
+    """Stands for the measurement: what each label shows, also beside certain others, and what it was asked."""
+
+    shows: dict[str, Shown]
+    beside: dict[tuple[str, str], Shown] = field(default_factory=dict)
+    asked: list[tuple[str, ...]] = field(default_factory=list)
+
+    def __call__(self, members: Sequence[Member]) -> SimpleNamespace:
+        labels = tuple(label_of(member) for member in members)
+        self.asked.append(labels)
+        shown = [
+            next((self.beside[label, other] for other in labels if (label, other) in self.beside), self.shows[label])
+            for label in labels
+        ]
+        lost = {m.hypothesis.joint - 1 for m, s in zip(members, shown, strict=True) if m.hypothesis.joint and s.astray}
+        return SimpleNamespace(
+            unseen=SimpleNamespace(astray=lambda joint: joint in lost),
+            gains=tuple(
+                Gain(nrmse_before=0.03, nrmse_after=0.03 - (s.low + s.high) / 2, ci95=(s.low, s.high)) for s in shown
+            ),
+            rises=tuple(s.rise for s in shown),
+            worse=tuple(s.high < 0 for s in shown),
+            kept=tuple(s.kept for s in shown),
+            speaks=tuple(s.speaks for s in shown),
+        )
+
+
+def label_of(member: Member) -> str:
+    """What a bench knows a member by: its hypothesis, and its shape if it has one."""
+    return member.hypothesis.label + (f" {member.shape}" if member.shape else "")
+
+
+def member_of(name: str, joint: int | None) -> Member:
+    """A member by the name of its effect or pattern, which nothing was fitted to."""
+    effect = EFFECTS.get(name) or build_pattern(name)
+    assert effect is not None
+    return Member(Hypothesis(effect, joint), (), None, 100.0, np.zeros(1), 1, 1.0)  # type: ignore[arg-type]
+
+
+SPRING, STRIBECK = member_of("spring", 2), member_of("stribeck", 2)
+PRESLIDING, TILT, PUSH = (
+    member_of("presliding_hysteresis", 2),
+    member_of("base_tilt", None),
+    member_of("external_contact", None),
+)
+FREE, SWING = member_of("pattern:load:0:even", 3), member_of("pattern:swinging:0:even", None)
+LABELS = {m.hypothesis.name: m.hypothesis.label for m in (SPRING, STRIBECK, PRESLIDING, TILT, PUSH, FREE, SWING)}
+
+
+def bench_with(**shows: Shown) -> Bench:
+    """Members by the names of their effects; what is not listed helps."""
+    return Bench(
+        {label: shows.get(name.split(":")[1] if ":" in name else name, HELPS) for name, label in LABELS.items()}
+    )
+
+
+def borne(
+    bench: Bench,
+    *founds: Found,
+    free: Sequence[Member] = (),
+    p_values: Sequence[float] = (),
+    held_out: bool = True,
+    forms: Sequence[Member] = (),
+    faint: Sequence[Member] = (),
+    worths: Mapping[Member, float] | None = None,
+    unnamed: tuple[Member, float] | None = None,
+) -> BorneOut:
+    """What unseen data as a bench shows them bear out of names and free functions."""
+    judgement = Judgement("named", founds, tuple(free), tuple(p_values), 1.0)
+
+    def beyond(effect: Effect) -> bool:
+        return held_out and effect.passing
+
+    return bear_out(
+        judgement,
+        bench,  # type: ignore[arg-type]
+        beyond,
+        lambda members, i: forms if members[i] is SPRING else (),
+        lambda member: (worths or {}).get(member, 1.0 if member in faint else 100.0),
+        lambda member, beside: None if member in beside else unnamed,
+    )

@@ -1,0 +1,41 @@
+"""Logs of joints that stand still, and noise of two joints that is neither white nor alike."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import lfilter
+
+from estimation.diagnosis.states import Recording
+
+STEP = 0.004
+
+
+def recording_of(rows: int = 10_000, n: int = 2, unsure: np.ndarray | None = None) -> Recording:
+    """A recording of nothing, of some rows and joints."""
+    zero = np.zeros((rows, n))
+    return Recording(
+        t=STEP * np.arange(rows),
+        starts=(0,),
+        q=zero,
+        dq=zero,
+        ddq=zero,
+        tau=zero,
+        step=STEP,
+        cycles=(None,),
+        cutoff=50.0,
+        floor=np.full(n, 1e-20),
+        unsure=np.zeros((rows, n), dtype=bool) if unsure is None else unsure,
+        clear=np.zeros((rows, n), dtype=bool),
+        jolts=np.zeros(n),
+        names=("log",),
+    )
+
+
+def noise_of(rows: int, seed: int = 0) -> np.ndarray:
+    """Half AR(1), half white noise, of which the second joint has some of the first's."""
+    rng = np.random.default_rng(seed)
+    white = rng.standard_normal((rows, 2))
+    coloured = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], rng.standard_normal((rows, 2)), axis=0)
+    mixed = (white + coloured) * [2.0, 0.5]
+    mixed[:, 1] += 0.1 * mixed[:, 0]
+    return mixed
