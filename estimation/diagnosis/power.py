@@ -36,6 +36,7 @@ def detectable_energy(degrees: int, tries: int, *, false_alarm: float = 0.01, pe
     return float(brentq(lambda energy: ncx2.sf(level, degrees, energy) - POWER, 1e-9, 10.0 * level + 100.0))
 
 
+@lru_cache
 def resolving_energy(margin: float = MARGIN) -> float:
     """Gives the energy at which the wrong cause falls out of the possible ones with the chance `POWER`.
 

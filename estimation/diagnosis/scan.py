@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -17,7 +16,7 @@ from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.scoring import Accepted, score
 from robots.common.memory import give_back
-from robots.common.parallel import available_cores
+from robots.common.parallel import in_threads
 
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
@@ -122,10 +121,7 @@ def measure(
         advance(done / len(hypotheses))
         return entry
 
-    # Threads: the work is in BLAS and in filters, which run beside Python.
-    with ThreadPoolExecutor(min(4, available_cores())) as pool:
-        entries = list(pool.map(one, hypotheses))
-    return [entry for entry in entries if entry is not None]
+    return [entry for entry in in_threads(one, hypotheses) if entry is not None]
 
 
 def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
@@ -215,8 +211,7 @@ def scan(
     def one(entry: Entry) -> tuple[Outcome, Array]:
         return _outcome(problem, entry, accepted, draws)
 
-    with ThreadPoolExecutor(min(4, available_cores())) as pool:
-        results = list(pool.map(one, entries))
+    results = in_threads(one, entries)
     largest = np.zeros(draws)
     for entry, (outcome, null) in zip(entries, results, strict=True):
         if outcome.degrees:

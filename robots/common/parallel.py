@@ -6,7 +6,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from typing import TypeVar
@@ -16,6 +16,9 @@ from robots.common.progress import SILENT, Progress
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+MOST_THREADS = 4
+"""More of them wait for Python most of the time."""
 
 BLAS_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -72,6 +75,12 @@ def parallel_map(
         return _map_in_processes(function, work, count, progress)
     finally:
         progress.finish()
+
+
+def in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+    """Does the same in threads: for work in BLAS and in filters, which run beside Python, on data that all share."""
+    with ThreadPoolExecutor(min(MOST_THREADS, available_cores())) as pool:
+        return list(pool.map(function, items))
 
 
 def available_cores() -> int:
