@@ -13,6 +13,11 @@ import pytest
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
+# Nor do a core's threads gain by the other core, which has tests of its own: they wait for each other.
+if (_worker := os.environ.get("PYTEST_XDIST_WORKER", "gw")[2:]) and hasattr(os, "sched_setaffinity"):
+    _cores = sorted(os.sched_getaffinity(0))
+    os.sched_setaffinity(0, {_cores[int(_worker) % len(_cores)]})
+
 # A shell ignores Ctrl-C for what it starts in the background, and so would the tests of Ctrl-C.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
