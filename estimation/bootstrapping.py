@@ -16,10 +16,10 @@ from estimation.estimate import Estimate
 from estimation.moments import Moments
 from estimation.preparation import Prepared, Rows, prepare_all
 from estimation.preprocessing import Harmonics
-from estimation.regression import JointRegressor, chunks, threaded
+from estimation.regression import JointRegressor, chunks
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
-from robots.common.parallel import one_blas_thread
+from robots.common.parallel import one_blas_thread, threaded
 from robots.robot import Robot
 from robots.signals import Log
 

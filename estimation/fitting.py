@@ -15,9 +15,10 @@ from estimation.choices import Choice
 from estimation.estimators import Estimator, RegressionData, Solution
 from estimation.moments import Moments
 from estimation.preparation import Prepared, Rows
-from estimation.regression import CHUNK, JointRegressor, chunks, threaded
+from estimation.regression import CHUNK, JointRegressor, chunks
 from estimation.uncertainty import Part, batch_factors, covariance
 from robots.base_parameters import BaseParameters
+from robots.common.parallel import threaded
 
 Array = NDArray[np.float64]
 

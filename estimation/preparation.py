@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from estimation.known_setup import Load, load_of
 from estimation.preprocessing import LowPass, Resampled, Smoother, period_of, resample, smooth
-from estimation.regression import threaded
 from robots.common.errors import InputError
+from robots.common.parallel import threaded
 from robots.robot import Robot
 from robots.signals import Log, Motion
 

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, reduce
-from itertools import islice
-from typing import TypeVar
 
 import casadi
 import numpy as np
@@ -16,16 +13,11 @@ from numpy.typing import NDArray
 from estimation.moments import Moments
 from robots.base_parameters import BaseParameters
 from robots.batch import BatchFunction, batch_function
-from robots.common.parallel import available_cores
 from robots.regressor import TorqueModel
 
 Array = NDArray[np.float64]
-Item = TypeVar("Item")
-Result = TypeVar("Result")
 
 CHUNK = 2048
-# More threads than this wait for memory.
-MOST_THREADS = 4
 
 
 @dataclass(frozen=True)
@@ -137,25 +129,3 @@ def chunks(rows: int, size: int = CHUNK) -> Iterator[slice]:
     """Cuts so many rows into slices."""
     for start in range(0, rows, size):
         yield slice(start, min(start + size, rows))
-
-
-def threaded(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-    """Applies a function on some threads and gives the results in order, a few ahead of who takes them.
-
-    Compiled code, linear algebra and filters leave Python's lock; sums taken in order come out alike on any machine.
-    """
-    threads = min(available_cores(), MOST_THREADS)
-    if threads == 1:
-        yield from map(function, items)
-        return
-    queue = iter(items)
-    with ThreadPoolExecutor(threads) as pool:
-        pending = [pool.submit(function, item) for item in islice(queue, 2 * threads)]
-        try:
-            while pending:
-                result = pending.pop(0).result()
-                pending.extend(pool.submit(function, item) for item in islice(queue, 1))
-                yield result
-        finally:
-            for future in pending:
-                future.cancel()

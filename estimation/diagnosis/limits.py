@@ -16,7 +16,6 @@ from estimation.diagnosis.power import beside, detectable_energy, resolving_ener
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.scan import Entry
 from estimation.diagnosis.scoring import accept, visible_root
-from robots.common.parallel import in_threads
 from robots.terms.effects import EFFECTS
 
 Array = NDArray[np.float64]
@@ -90,14 +89,14 @@ def find_limits(problem: Problem, entries: Sequence[Entry], *, false_alarm: floa
     """
     tries = sum(entry.tries for entry in entries)
     known = {(entry.hypothesis.name, entry.hypothesis.joint): entry for entry in entries}
-
-    def one(hypothesis: Hypothesis) -> Limit:
+    limits = []
+    for hypothesis in all_hypotheses(problem.situation.robot, list(EFFECTS.values())):
         entry = known.get((hypothesis.name, hypothesis.joint))
         if entry is None:
-            return _none(hypothesis, _why_nothing(problem, hypothesis))
-        return _limit(problem, entry, known, tries, false_alarm)
-
-    return tuple(in_threads(one, all_hypotheses(problem.situation.robot, list(EFFECTS.values()))))
+            limits.append(_none(hypothesis, _why_nothing(problem, hypothesis)))
+        else:
+            limits.append(_limit(problem, entry, known, tries, false_alarm))
+    return tuple(limits)
 
 
 def told_in_one(limits: Sequence[Limit]) -> str:

@@ -12,7 +12,6 @@ from estimation.diagnosis.baseline import Baseline
 from estimation.diagnosis.carried import torque_on
 from estimation.diagnosis.kicks import FEWEST, Table, Turns, columns_about, edges_of, moved, reversals
 from estimation.diagnosis.recording import Recording
-from robots.common.parallel import in_threads
 
 Array = NDArray[np.float64]
 
@@ -108,12 +107,11 @@ def reversal_timing(
     lags, errors, kicks = np.zeros(recording.n), np.full(recording.n, np.inf), np.zeros(recording.n)
     coulomb = {column.joint - 1: i for i, column in enumerate(base.columns) if column.symbol == "f1"}
     signs = torque_on(base, recording, np.isin(np.arange(base.size), list(coulomb.values())).astype(float))
-
-    def one(j: int) -> tuple[float, float, float] | None:
-        turns, friction = reversals(recording, j, base, values), float(abs(values[coulomb[j]]))
-        return None if turns is None else _joint(recording, j, turns, residual[:, j], friction, signs[:, j])
-
-    for j, found in zip(coulomb, in_threads(one, coulomb), strict=True):
+    for j, i in coulomb.items():
+        turns = reversals(recording, j, base, values)
+        if turns is None:
+            continue
+        found = _joint(recording, j, turns, residual[:, j], float(abs(values[i])), signs[:, j])
         if found is not None:
             lags[j], errors[j], kicks[j] = found
     return Timing(lags, errors, kicks)

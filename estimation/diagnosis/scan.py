@@ -16,7 +16,7 @@ from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.scoring import Accepted, score
 from robots.common.memory import give_back
-from robots.common.parallel import in_threads
+from robots.common.parallel import threaded
 
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
@@ -121,7 +121,7 @@ def measure(
         advance(done / len(hypotheses))
         return entry
 
-    return [entry for entry in in_threads(one, hypotheses) if entry is not None]
+    return [entry for entry in threaded(one, hypotheses) if entry is not None]
 
 
 def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
@@ -211,7 +211,7 @@ def scan(
     def one(entry: Entry) -> tuple[Outcome, Array]:
         return _outcome(problem, entry, accepted, draws)
 
-    results = in_threads(one, entries)
+    results = list(threaded(one, entries))
     largest = np.zeros(draws)
     for entry, (outcome, null) in zip(entries, results, strict=True):
         if outcome.degrees:

@@ -17,7 +17,7 @@ from estimation.diagnosis.scan import Entry, Outcome, Scan, measure, scan
 from estimation.diagnosis.scoring import Accepted, accept, score
 from estimation.diagnosis.together import together
 from estimation.diagnosis.worthwhile import LEAST, beyond, is_sure, lasts, worth_it
-from robots.common.parallel import in_threads
+from robots.common.parallel import threaded
 
 # A member whose gain is within this share of what it was when it won over its rivals wins over them still.
 SAME = 0.02
@@ -198,7 +198,7 @@ def _best(
     """Refines contenders, from shapes that are known too, the best BIC first."""
     starts = [(o.hypothesis, o.shape) for o in outcomes]
     starts += [(o.hypothesis, known[o.hypothesis]) for o in outcomes if known and o.hypothesis in known]
-    refined = in_threads(lambda start: refine(problem, start[0], start[1], accepted), starts)
+    refined = threaded(lambda start: refine(problem, start[0], start[1], accepted), starts)
     best: dict[Hypothesis, Member] = {}
     for member in sorted(refined, key=lambda member: -member.bic(problem.rows)):
         best.setdefault(member.hypothesis, member)

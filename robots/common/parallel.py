@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from itertools import islice
 from typing import TypeVar
 
 from robots.common.errors import InputError, OedError
@@ -18,7 +19,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 MOST_THREADS = 4
-"""More of them wait for Python most of the time."""
+"""More threads than this wait for memory."""
 
 BLAS_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -77,10 +78,26 @@ def parallel_map(
         progress.finish()
 
 
-def in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """Does the same in threads: for work in BLAS and in filters, which run beside Python, on data that all share."""
-    with ThreadPoolExecutor(min(MOST_THREADS, available_cores())) as pool:
-        return list(pool.map(function, items))
+def threaded(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    """Applies a function on some threads and gives the results in order, a few ahead of who takes them.
+
+    Compiled code, linear algebra and filters leave Python's lock; sums taken in order come out alike on any machine.
+    """
+    threads = min(available_cores(), MOST_THREADS)
+    if threads == 1:
+        yield from map(function, items)
+        return
+    queue = iter(items)
+    with ThreadPoolExecutor(threads) as pool:
+        pending = [pool.submit(function, item) for item in islice(queue, 2 * threads)]
+        try:
+            while pending:
+                result = pending.pop(0).result()
+                pending.extend(pool.submit(function, item) for item in islice(queue, 1))
+                yield result
+        finally:
+            for future in pending:
+                future.cancel()
 
 
 def available_cores() -> int:

@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from estimation import regression
 from estimation.moments import Moments
-from estimation.regression import JointRegressor, chunks, summed, threaded
+from estimation.regression import JointRegressor, chunks, summed
 from robots.base_parameters import find_base_parameters
 from robots.regressor import default_model
 
@@ -62,13 +61,6 @@ def test_rows_of_a_group_are_summed():
     places, sums = summed(np.empty((0, 2)), np.empty(0, dtype=np.intp))
     assert places.shape == (0,)
     assert sums.shape == (0, 2)
-
-
-@pytest.mark.parametrize("cores", [1, 3])
-def test_threads_keep_the_order(monkeypatch, cores):
-    """Results come in the order of the items, on any number of cores."""
-    monkeypatch.setattr(regression, "available_cores", lambda: cores)
-    assert list(threaded(lambda x: x * x, range(50))) == [x * x for x in range(50)]
 
 
 def test_chunks_cover_all_rows_once():

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from robots.common import parallel
 from robots.common.errors import InputError, OedError
-from robots.common.parallel import BLAS_VARIABLES, available_cores, in_threads, parallel_map, single_blas_thread
+from robots.common.parallel import BLAS_VARIABLES, available_cores, parallel_map, single_blas_thread, threaded
 
 ROOT = Path(__file__).parents[3]
 
@@ -262,8 +263,11 @@ def test_interrupt_from_a_terminal_ends_workers_without_their_tracebacks(tmp_pat
     assert err == ""
 
 
-def test_threads_keep_the_order_and_raise_what_was_raised():
-    """The first item takes the longest and comes first all the same; an error is that of the function."""
-    assert in_threads(lambda wait: time.sleep(wait) or wait, [0.05, 0.02, 0.0]) == [0.05, 0.02, 0.0]
+@pytest.mark.parametrize("cores", [1, 3])
+def test_threads_keep_the_order_and_raise_what_was_raised(monkeypatch, cores):
+    """Results come in the order of the items, on any number of cores, also where the first takes the longest."""
+    monkeypatch.setattr(parallel, "available_cores", lambda: cores)
+    assert list(threaded(lambda x: x * x, range(50))) == [x * x for x in range(50)]
+    assert list(threaded(lambda wait: time.sleep(wait) or wait, [0.05, 0.02, 0.0])) == [0.05, 0.02, 0.0]
     with pytest.raises(ZeroDivisionError):
-        in_threads(lambda x: 1 / x, [1, 0])
+        list(threaded(lambda x: 1 / x, [1, 0]))
