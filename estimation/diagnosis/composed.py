@@ -53,7 +53,7 @@ def composed(problem: Problem, members: Sequence[Member], hypotheses: Sequence[H
 def known_without(problem: Problem, members: Sequence[Member], useless: Flags) -> Problem:
     """Tells all of the torque by the rows (N, n) that are of use, and members that do not act on all of it."""
     before = [member for member in members if not member.hypothesis.effect.last]
-    known = _Fit(problem, before, ~useless)
+    known = JointFit(problem, before, ~useless)
     return known.told(known.values(problem.recording.tau))
 
 
@@ -67,7 +67,7 @@ def known_beside(problem: Problem, members: Sequence[Member]) -> Problem:
     if not last or problem.whole is None:
         return problem
     before = [member for member in members if not member.hypothesis.effect.last]
-    known = _Fit(problem, before, np.ones_like(problem.recording.unsure))
+    known = JointFit(problem, before, np.ones_like(problem.recording.unsure))
     step = STEP * np.sqrt(np.mean(problem.recording.tau**2, axis=0))
     values = known.values(problem.recording.tau - _lost(problem, last))
     for _ in range(ROUNDS):
@@ -89,7 +89,7 @@ def _with_more(problem: Problem, torque: Array) -> Problem:
     return replace(problem, whole=whole.beside(torque + (whole.beyond if whole.beyond is not None else 0.0)))
 
 
-class _Fit:
+class JointFit:
     """Base model, nuisance and members fitted together to the rows (N, n) that count."""
 
     def __init__(self, problem: Problem, members: Sequence[Member], counted: Flags) -> None:
@@ -107,11 +107,15 @@ class _Fit:
 
     def moments(self, tau: Array, passes: Array | float = 1.0) -> tuple[Array, Array]:
         """Gives the normal equations (b, b), (b,) of such a fit."""
-        flat = (self.full * (self.weights * passes)[:, :, None]).reshape(-1, self.full.shape[2])
-        gram, cross = flat.T @ flat, flat.T @ (tau * self.weights).reshape(-1)
-        gram += self.timed.T @ self.timed
+        return self.normal(tau, self.full * np.broadcast_to(passes, self.weights.shape)[:, :, None])
+
+    def normal(self, tau: Array, columns: Array) -> tuple[Array, Array]:
+        """Gives those of torque (N, n) by columns (N, n, p), the first of which are members' as in `full`."""
+        flat = (columns * self.weights[:, :, None]).reshape(-1, columns.shape[2])
+        gram, cross, b = flat.T @ flat, flat.T @ (tau * self.weights).reshape(-1), self.full.shape[2]
+        gram[:b, :b] += self.timed.T @ self.timed
         if self.problem.timing is not None:
-            cross += self.timed.T @ self.problem.timing.residual
+            cross[:b] += self.timed.T @ self.problem.timing.residual
         return gram, cross
 
     def told(self, values: Array) -> Problem:
@@ -128,7 +132,7 @@ def fit(problem: Problem, members: Sequence[Member]) -> tuple[Array, Array, Arra
     Returns:
         All values (b,); what the fit leaves (N, n) on which noise is measured; all columns (N, n, b).
     """
-    both, tau = _Fit(problem, members, np.ones_like(problem.recording.unsure)), problem.recording.tau
+    both, tau = JointFit(problem, members, np.ones_like(problem.recording.unsure)), problem.recording.tau
     gram, cross = both.moments(tau)
     values = held(gram, cross, problem.pull)
     return values, tau - both.full @ (values if is_short(problem.recording) else free(gram, cross)), both.full

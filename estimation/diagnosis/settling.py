@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.carried import unloaded
 from estimation.diagnosis.composed import fit, known_beside, known_without
+from estimation.diagnosis.distorted import undistorted
 from estimation.diagnosis.extending import dense
 from estimation.diagnosis.own_functions import is_short
 from estimation.diagnosis.problem import Problem
@@ -66,7 +67,8 @@ def settle(problem: Problem, members: Sequence[Member]) -> Settled:
     """Fits base model and effects together.
 
     Torque that was cut off draws the base model towards what is left of it, and how much was cut is then told by that.
-    So the base model is fitted without such rows first, then to the torque as it is cut; and the cut beside it.
+    So the base model is fitted without such rows first, then to the torque as it is cut; and the cut beside it. What
+    distorts a reading is fitted beside it at once.
     """
     useless = [_useless(problem, member) for member in members]
     cut = [k for k, flags in enumerate(useless) if flags is not None]
@@ -74,6 +76,7 @@ def settle(problem: Problem, members: Sequence[Member]) -> Settled:
         flags = np.logical_or.reduce([flags for flags in useless if flags is not None])
         problem = known_beside(known_without(problem, members, flags), members)
         members = [_again(problem, members, k) if k in cut else member for k, member in enumerate(members)]
+    problem, members = undistorted(problem, members)
     values, left, full = fit(problem, members)
     known = len(problem.pull.target)
     effects = [(m.hypothesis.effect, len(m.coefficients)) for m in members]

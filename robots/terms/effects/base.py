@@ -45,6 +45,8 @@ class Effect(ABC):
         blurs: whether it lets friction turn round later or over some time: how sharp its sign is shows beside it only.
         waves: whether it goes up and down over the joint's range, as a spot of it does once.
         last: whether it acts on all of the torque, that of other effects too (`Situation.beyond`).
+        distorts: whether a reading of its joint's torque is wrong by it, as that torque has it: the base model follows
+            such readings, and both are then fitted at once. A `StaticJointEffect`.
         vague: what is said of it where the logs determine none of its coefficients; nothing by default.
         shapes: the parameters that the columns are not linear in.
         rivals: effects that resemble it, the closest first.
@@ -67,6 +69,7 @@ class Effect(ABC):
     blurs: ClassVar[bool] = False
     waves: ClassVar[bool] = False
     last: ClassVar[bool] = False
+    distorts: ClassVar[bool] = False
     vague: ClassVar[str] = ""
     shapes: ClassVar[tuple[Shape, ...]] = ()
     rivals: ClassVar[tuple[str, ...]] = ()

@@ -106,6 +106,13 @@ class StaticJointEffect(StaticEffect, JointEffect):
         signals = (np.ascontiguousarray(a[:, j]) for a in (s.q, s.dq, s.ddq, s.rigid, s.load, s.torque, s.sign))
         return _row_evaluator(self, s.robot, joint)(*signals, shapes)[0][:, 0]
 
+    def slopes(self, situation: Situation, joint: int, coefficients: Array, shape: tuple[float, ...]) -> Array:
+        """Evaluates how its torque changes with the base model's and with each shape value (N, 1 + s), exactly."""
+        s, j = situation, joint - 1
+        shapes, weights = (np.broadcast_to(np.asarray(x, dtype=float), (len(s), len(x))) for x in (shape, coefficients))
+        signals = (np.ascontiguousarray(a[:, j]) for a in (s.q, s.dq, s.ddq, s.rigid, s.load, s.torque, s.sign))
+        return _slope_evaluator(self, s.robot, joint)(*signals, shapes, weights)[0][:, 0]
+
     columns = JointEffect.columns
     acts_on = JointEffect.acts_on
 
@@ -123,3 +130,13 @@ def _row_evaluator(effect: StaticJointEffect, robot: Robot, joint: int) -> Batch
     at = Instant.symbols(1, len(effect.shapes))
     row = effect.row(robot, joint, at)
     return batch_function(casadi.Function(effect.name, list(at), [casadi.densify(row)]), "vectorised")
+
+
+@lru_cache(maxsize=512)
+@builds_expressions
+def _slope_evaluator(effect: StaticJointEffect, robot: Robot, joint: int) -> BatchFunction:
+    at = Instant.symbols(1, len(effect.shapes))
+    row = effect.row(robot, joint, at)
+    weights = casadi.SX.sym("coefficients", row.shape[1])
+    slopes = casadi.jacobian(row @ weights, casadi.vertcat(at.torque, at.shape))
+    return batch_function(casadi.Function(effect.name, [*at, weights], [casadi.densify(slopes)]), "vectorised")

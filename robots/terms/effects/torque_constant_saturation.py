@@ -31,6 +31,7 @@ class TorqueConstantSaturation(StaticJointEffect):
 
     name: ClassVar[str] = "torque_constant_saturation"
     title: ClassVar[str] = "a torque constant that falls at high torque (saturation)"
+    distorts: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("exponent", "1", 1.0, 8.0, "linear", (1.0, 2.0, 4.0)),
         Shape("at_torque", "N m", 0.0, np.inf, "linear", default=0.0),
