@@ -153,7 +153,9 @@ def with_rivals(
     for i, found in enumerate(selection.found):
         rivals: list[tuple[Member, float]] = []
         if found.member.hypothesis not in selection.seen:
-            beside, reference = all_but(problem, members, i), found.member.bic(problem.rows)
+            # It was found by what it is worth: a moment's cause has not all rows to pay for, in sight of others either.
+            beside, own = all_but(problem, members, i), found.member
+            reference = max(own.bic(problem.rows), own.worth(problem.rows))
             result = scan(problem, entries, beside, rng, nulls=False)
             near = contenders(problem, result, [*members[:i], *members[i + 1 :]], reference)
             rest = [o for o in near if o.hypothesis != found.member.hypothesis]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -154,23 +154,41 @@ def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
 @pytest.mark.parametrize("shown", [False, True])
 def test_what_the_torque_shows_by_itself_has_no_rivals(monkeypatch: pytest.MonkeyPatch, shown: bool) -> None:
     """Flat tops are a current limit, though they cost next to nothing and another cause explains that as well."""
+    rivals = _rivals(monkeypatch, bic=-7.0, worth=-7.0, seen={A} if shown else set())
+    assert [rival.hypothesis for rival, _ in rivals] == ([] if shown else [B])
 
-    def member(hypothesis: Hypothesis) -> SimpleNamespace:
-        return SimpleNamespace(hypothesis=hypothesis, group=hypothesis, shape=(), gain=5.0, bic=lambda rows: -7.0)
+
+def test_rivals_of_a_moment_s_cause_are_as_much_worse_as_it_is_worth_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A push is found by the rows of its moment; by all of a log's, others would seem better."""
+    ((rival, worse),) = _rivals(monkeypatch, bic=-33.0, worth=16.0)
+    assert rival.hypothesis == B
+    assert worse == pytest.approx(16.0 + 7.0)
+    ((_, doubted),) = _rivals(monkeypatch, bic=20.0, worth=16.0)
+    assert doubted == pytest.approx(20.0 + 7.0)
+
+
+def _rivals(
+    monkeypatch: pytest.MonkeyPatch, *, bic: float, worth: float, seen: Collection[Hypothesis] = ()
+) -> tuple[tuple[SimpleNamespace, float], ...]:
+    """Rivals of A, which has such a BIC and worth, where B is a contender of BIC -7 and like gain."""
+
+    def member(hypothesis: Hypothesis, bic: float, worth: float) -> SimpleNamespace:
+        values = {"group": hypothesis, "shape": (), "gain": 5.0}
+        return SimpleNamespace(hypothesis=hypothesis, bic=lambda rows: bic, worth=lambda rows: worth, **values)
 
     monkeypatch.setattr(selection, "accept", lambda problem, groups: groups)
     monkeypatch.setattr(selection, "all_but", _all_but)
-    monkeypatch.setattr(selection, "_measured", lambda problem, m, beside: m)
     monkeypatch.setattr(selection, "scan", lambda *args, **options: SimpleNamespace(outcomes=[]))
     monkeypatch.setattr(selection, "contenders", lambda *args: [SimpleNamespace(hypothesis=B)])
-    monkeypatch.setattr(selection, "_best", lambda problem, rest, beside: [member(o.hypothesis) for o in rest])
+    monkeypatch.setattr(
+        selection, "_best", lambda problem, rest, beside: [member(o.hypothesis, -7.0, -7.0) for o in rest]
+    )
     chosen = selection.Selection(
-        found=(selection.Found(member(A), 1e-30),),  # type: ignore[arg-type]
-        seen=frozenset({A} if shown else ()),
+        found=(selection.Found(member(A, bic, worth), 1e-30),),  # type: ignore[arg-type]
+        seen=frozenset(seen),
         first=None,  # type: ignore[arg-type]
         last=None,  # type: ignore[arg-type]
         accepted=None,  # type: ignore[arg-type]
     )
-    problem = SimpleNamespace(rows=1000)
-    told = selection.with_rivals(problem, [], chosen, np.random.default_rng(0))  # type: ignore[arg-type]
-    assert [rival.hypothesis for rival, _ in told.found[0].rivals] == ([] if shown else [B])
+    told = selection.with_rivals(SimpleNamespace(rows=1000), [], chosen, np.random.default_rng(0))  # type: ignore[arg-type]
+    return told.found[0].rivals  # type: ignore[return-value]
