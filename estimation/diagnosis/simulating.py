@@ -17,6 +17,7 @@ from estimation.diagnosis.simulation import Curves, Simulation
 from robots.plants.closed_loop import Driven, Loop, Reference, Tangent, drive
 from robots.regressor import TorqueModel
 from robots.terms.effects.situation import Situation
+from robots.terms.effects.static import StaticJointEffect
 
 Array = NDArray[np.float64]
 
@@ -73,6 +74,21 @@ class Plant:
             for j, X in zip(joints, parts, strict=True):
                 total[:, j] += X @ self.coefficients[i]
         return total
+
+    def unread(self, now: Situation, reading: Array) -> tuple[Plant, Array]:
+        """Gives the plant without effects that only distort the reading, and the torque (N, n) that was read so."""
+        wrong = [i for i, member in enumerate(self.members) if member.hypothesis.effect.distorts]
+        plain = [i for i in range(len(self.members)) if i not in wrong]
+        beyond, torque = self.beyond(now, plain), reading.copy()
+        for i in wrong:
+            effect, joint = self.members[i].hypothesis.effect, self.members[i].hypothesis.joint
+            assert isinstance(effect, StaticJointEffect)
+            assert joint is not None
+            own = (reading - beyond)[:, joint - 1]
+            true = effect.undone(now, joint, self.coefficients[i], self.members[i].shape, own)
+            torque[:, joint - 1] += true - own
+        members, coefficients = [self.members[i] for i in plain], [self.coefficients[i] for i in plain]
+        return replace(self, members=members, coefficients=coefficients), torque
 
 
 def compare(before: Plant, after: Plant, whole: Recording, rows: slice, loop: Loop | None = None) -> Simulation | None:
@@ -132,6 +148,8 @@ def _driven(
     """Follows one robot; says too whether its effects were evaluated along the simulated motion."""
     part = cut(whole, rows)
     measured = plant.at(part, (part.q, part.dq, part.ddq))
+    plant, torque = plant.unread(measured, reference.torque)
+    reference = replace(reference, torque=torque)
     width, coulomb, tangent = measured.velocity_scale, _coulomb(measured), _tangent(measured)
     effects = _Effects(plant, whole, rows, SEEN * loop.bandwidth)
 

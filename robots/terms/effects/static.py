@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from robots.robot import Robot
 
 Array = NDArray[np.float64]
+
+NEWTON, LEAST_SLOPE = 20, 0.1
+"""Steps by which a reading is undone; and what it is taken to rise by at least, where it would fall."""
 
 
 class Instant(NamedTuple):
@@ -112,6 +116,18 @@ class StaticJointEffect(StaticEffect, JointEffect):
         shapes, weights = (np.broadcast_to(np.asarray(x, dtype=float), (len(s), len(x))) for x in (shape, coefficients))
         signals = (np.ascontiguousarray(a[:, j]) for a in (s.q, s.dq, s.ddq, s.rigid, s.load, s.torque, s.sign))
         return _slope_evaluator(self, s.robot, joint)(*signals, shapes, weights)[0][:, 0]
+
+    def undone(
+        self, situation: Situation, joint: int, coefficients: Array, shape: tuple[float, ...], reading: Array
+    ) -> Array:
+        """Finds the base model's torque (N,) that is read as this (N,) with the effect, by Newton's method."""
+        torque = situation.torque.copy()
+        for _ in range(NEWTON):
+            now = replace(situation, torque=torque, _cache={})
+            off = torque[:, joint - 1] + self.local(now, joint, shape) @ coefficients - reading
+            slope = 1.0 + self.slopes(now, joint, coefficients, shape)[:, 0]
+            torque[:, joint - 1] -= off / np.maximum(slope, LEAST_SLOPE)
+        return torque[:, joint - 1]
 
     columns = JointEffect.columns
     acts_on = JointEffect.acts_on

@@ -75,3 +75,17 @@ def test_slopes_of_a_reading_are_exact(
     slopes = effect.slopes(situation, 1, c, shape)
     np.testing.assert_allclose(slopes[:, 0], (torque(h, 0) - torque(-h, 0)) / (2 * h), atol=1e-6)
     np.testing.assert_allclose(slopes[:, 1], (torque(0, h) - torque(0, -h)) / (2 * h), atol=1e-6)
+
+
+@pytest.mark.parametrize("error", [2.0, -0.2])
+def test_a_reading_is_undone(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], error: float
+) -> None:
+    """The torque that was read comes back, from another one as well."""
+    situation = pose_arm(record(arm, [arm_log()])).situation
+    effect, c, shape = SATURATION.effect, np.array([error]), (2.0, float(np.abs(situation.torque[:, 0]).max()))
+    assert isinstance(effect, StaticJointEffect)
+    true = situation.torque[:, 0]
+    reading = true + effect.local(situation, 1, shape) @ c
+    near = replace(situation, torque=1.3 * situation.torque + 0.5, _cache={})
+    np.testing.assert_allclose(effect.undone(near, 1, c, shape, reading), true, atol=1e-9)

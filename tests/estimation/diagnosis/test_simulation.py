@@ -144,6 +144,27 @@ def test_the_arm_moves_as_an_independent_solver_says(
     assert (np.sqrt(np.mean(wrong**2, axis=0)) < 0.03 * np.sqrt(np.mean(deviation**2, axis=0))).all()
 
 
+def test_what_is_read_wrong_does_not_drive_the_arm(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:
+    """Read as half as much again at its largest, the torque moves the arm as the true one; noise is undone as well."""
+    motion = fourier_motion(arm, 3, duration=8.0)
+    log = simulate(arm_plant(velocity_scale=0.02, torque_noise=0.02, encoder_counts=0.0), motion)
+    model = default_model(arm, friction="coulomb-viscous", velocity_scale=0.02)
+    base = find_base_parameters(model)
+    top, error = float(np.abs(log.tau[:, 0]).max()), 0.5
+    read = log.tau + error * np.column_stack([log.tau[:, 0] * (log.tau[:, 0] / top) ** 2, 0.0 * log.tau[:, 1]])
+    before = Plant(model=model, columns=base.independent, values=base.from_standard(model.nominal))
+    saturation = member("torque_constant_saturation", 1, (2.0, top), [error])
+    after = replace(before, members=(saturation,), coefficients=(np.array([error]),))
+    whole, distorted = (replace(record(arm, [x]), starts=(0,)) for x in (log, replace(log, tau=read)))
+    rows = slice(0, len(whole))
+    plain, simulation = compare(before, before, whole, rows), compare(before, after, distorted, rows)
+    assert plain is not None
+    assert simulation is not None
+    assert simulation.note == ""
+    assert (simulation.motion[1] < 1.05 * plain.motion[1]).all()
+    assert simulation.motion[0][0] > 3.0 * simulation.motion[1][0]
+
+
 def test_the_file_says_what_is_assumed() -> None:
     """Reading what was written gives the same."""
     pair = (np.array([0.02, 0.01]), np.array([0.01, np.nan]))
