@@ -168,8 +168,7 @@ class ThermalModel(ABC):
         homogeneous = self.rates({**p, "T0": 0.0}, [0.0] * size, still)
         A, b = np.empty((*shape, size, size)), np.empty((*shape, size))
         for column in range(size):
-            unit = [float(k == column) for k in range(size)]
-            moved = self.rates({**p, "T0": 0.0}, unit, still)
+            moved = self.rates({**p, "T0": 0.0}, [float(k == column) for k in range(size)], still)
             for row in range(size):
                 A[..., row, column] = moved[row] - homogeneous[row]
         for row, value in enumerate(self.rates(p, [0.0] * size, u)):
