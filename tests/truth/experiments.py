@@ -52,6 +52,9 @@ class KnownChange(Effect):
 
     name = "known change"
 
+    def load(self, ride: Ride) -> np.ndarray:
+        return self.torque(ride)
+
     def torque(self, ride: Ride) -> np.ndarray:
         rows = (ride.t >= self.start) & (ride.t <= self.end)
         motion = ride.link_q[rows], ride.link_v[rows], ride.link_a[rows]

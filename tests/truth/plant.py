@@ -88,7 +88,7 @@ def measure(ride: Ride, effects: Sequence[Effect]) -> tuple[np.ndarray, tuple[np
 
     An effect's part is what it adds to the torque that the base model asks for the logged motion.
     """
-    machine, ride.parts = ride.machine, []
+    machine, ride.parts, ride.carried = ride.machine, [], _carried(ride, effects)
     shares, apart = [], np.zeros_like(ride.q)
     for effect in effects:
         before = apart
@@ -115,6 +115,11 @@ def measure(ride: Ride, effects: Sequence[Effect]) -> tuple[np.ndarray, tuple[np
             seen += friction_of(machine.friction, v, np.tanh(v / machine.sign_width)) + machine.offset
             ride.parts[index] = ride.parts[index] + ride.base_torque() - seen
     return torque, errors
+
+
+def _carried(ride: Ride, effects: Sequence[Effect]) -> np.ndarray | None:
+    loads = [load for effect in effects if (load := effect.load(ride)) is not None]
+    return np.sum(loads, axis=0) if loads else None
 
 
 def parts_links(effect: Effect) -> bool:
@@ -168,6 +173,7 @@ def _closed_loop(
         + machine.known_rotor * a
         + friction_of(machine.known_friction, v, ride.sign)
     )
+    ride.carried = _carried(ride, effects)
     for effect in effects:
         extra = effect.torque(ride)
         if extra is not None:

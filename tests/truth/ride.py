@@ -17,7 +17,8 @@ class Ride:
     """All runs of a session, one after the other; time keeps running in the pauses between them.
 
     ``q, v, a`` are of the motors, seen at the joint; ``link_q, link_v, link_a`` of the links behind the gears: the same
-    until an elastic or loose gear parts them. ``parts`` collects what each effect adds.
+    until an elastic or loose gear parts them. ``parts`` collects what each effect adds; ``carried`` is the torque of a
+    payload or a gravity that a user changed, None for none.
     """
 
     machine: Machine
@@ -30,6 +31,7 @@ class Ride:
     link_v: np.ndarray = None
     link_a: np.ndarray = None
     rigid: np.ndarray = None
+    carried: np.ndarray | None = None
     parts: list[np.ndarray] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -51,6 +53,15 @@ class Ride:
     def sign(self) -> np.ndarray:
         """The smooth sign of the motors' velocities (N, n)."""
         return np.tanh(self.v / self.machine.sign_width)
+
+    @property
+    def load(self) -> np.ndarray:
+        """Torque that the gears bear (N, n)."""
+        return self.borne(self.rigid)
+
+    def borne(self, rigid: np.ndarray) -> np.ndarray:
+        """Adds what is carried to the robot's own torque (N, n)."""
+        return rigid if self.carried is None else rigid + self.carried
 
     def friction(self) -> np.ndarray:
         """Friction of the base model (N, n)."""

@@ -15,10 +15,11 @@ from tests.truth.cases import Hidden, draw_case
 from tests.truth.description import urdf_of, write_description
 from tests.truth.dynamics import rigid_torque
 from tests.truth.effects import KNOWN, STRANGERS
-from tests.truth.effects.friction import LuGre, Stribeck, _bristles
+from tests.truth.effects.friction import LoadDependent, LuGre, Stribeck, _bristles
 from tests.truth.effects.strangers import CrossWave
 from tests.truth.effects.surroundings import Payload
 from tests.truth.effects.transmission import Backlash, Elastic
+from tests.truth.experiments import KnownChange, Stage
 from tests.truth.machines import KINDS, draw_machine
 from tests.truth.oracle import ask_oracle
 from tests.truth.plant import measure, open_loop
@@ -196,6 +197,31 @@ def test_payload_acts_on_all_joints_from_its_moment() -> None:
     after = ride.t > 4.1
     wanted = rigid_torque(heavier, ride.q[after], ride.v[after], ride.a[after]) - ride.rigid[after]
     np.testing.assert_allclose(torque[after], wanted, atol=1e-9)
+
+
+def test_gears_feel_what_a_user_changes() -> None:
+    """Friction grows, a gear twists and its play turns by what a tilted base and a payload add to the load, too."""
+    machine = draw_machine("ur10", np.random.default_rng(12))
+    reference = draw_periodic(machine, np.random.default_rng(13), cycles=1)
+    stage = Stage(t=np.zeros(1), q=np.zeros((1, 6)), payload=5.0, gravity=np.array([3.0, 0.0, -9.3]))
+    change = KnownChange(stage=stage, start=2.0, end=8.0, turn=np.eye(3))
+    lossy = LoadDependent(joint=1, amount=0.1, back=1.0)
+    ride, plain = (open_loop(machine, [reference], effects, step=0.01) for effects in ([lossy, change], [lossy]))
+    added = change.torque(ride)[:, 0]
+    wanted = 0.1 * np.abs(ride.rigid[:, 0] + added) * ride.sign[:, 0]
+    np.testing.assert_allclose(ride.parts[0][:, 0], wanted, atol=1e-12)
+    # An upright first joint bears no weight until its base is tilted.
+    assert np.abs(ride.parts[0]).max() > 1.5 * np.abs(plain.parts[0]).max()
+    before = ride.t < 2.0
+    np.testing.assert_allclose(ride.parts[0][before], plain.parts[0][before], atol=1e-12)
+    twists = []
+    for effects in ([change], []):
+        ride = open_loop(machine, [reference], [Elastic(joint=2, amount=1e-5), *effects], step=0.01)
+        twists.append((ride.q - ride.link_q)[:, 1])
+    middle = (ride.t > 2.5) & (ride.t < 7.5)
+    np.testing.assert_allclose(
+        (twists[0] - twists[1])[middle], 1e-5 * change.torque(ride)[middle, 1], rtol=0.01, atol=1e-6
+    )
 
 
 def test_a_stranger_shows_beyond_the_base_model_and_its_own_column_brings_a_gain() -> None:

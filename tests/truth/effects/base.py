@@ -48,6 +48,10 @@ class Effect:
         """Extra torque (N, n) that the motors must give."""
         return None
 
+    def load(self, ride: Ride) -> np.ndarray | None:
+        """What of it gears feel as load (N, n) besides the robot's own, where that is much: what a user changes."""
+        return None
+
     def signal(self, ride: Ride, torque: np.ndarray) -> np.ndarray:
         """The torque as it is logged."""
         return torque

@@ -116,7 +116,7 @@ class LoadDependent(Effect):
         return cls(joint=joint, back=rng.uniform(0.4, 1.0))
 
     def torque(self, ride: Ride) -> np.ndarray:
-        load, v = ride.rigid[:, self.j], ride.v[:, self.j]
+        load, v = ride.load[:, self.j], ride.v[:, self.j]
         driving = load * v > 0
         loss = np.where(driving, self.amount, self.amount * self.back) * np.abs(load)
         return self.on_joint(ride, loss * ride.sign[:, self.j])

@@ -35,10 +35,10 @@ class Ripple(Effect):
 
     def torque(self, ride: Ride) -> np.ndarray:
         angle = self.order * self.gear * ride.q[:, self.j] + self.phase
-        load = ride.rigid[:, self.j]
+        load, first = ride.load[:, self.j], ride.runs[0]
         # Of a joint that carries next to nothing, teeth mesh no harder for what rounding makes of its load.
-        whole = np.sqrt((ride.base_torque()[:, self.j] ** 2).mean())
-        share = load / max(np.sqrt((load**2).mean()), LOADED * whole)
+        whole = np.sqrt((ride.base_torque()[first, self.j] ** 2).mean())
+        share = load / max(np.sqrt((load[first] ** 2).mean()), LOADED * whole)
         wave = np.cos(angle) * (1 - self.loaded + self.loaded * share)
         return self.on_joint(ride, self.amount * wave)
 
@@ -64,8 +64,9 @@ class Elastic(Effect):
         return cls(joint=joint, soft=rng.uniform(0.0, 0.15))
 
     def part(self, ride: Ride) -> None:
-        through = ride.smooth(rigid_torque(ride.machine.model, ride.link_q, ride.link_v, ride.link_a), 0.004)[:, self.j]
-        level = np.sqrt((through**2).mean())
+        through = rigid_torque(ride.machine.model, ride.link_q, ride.link_v, ride.link_a)
+        through = ride.smooth(ride.borne(through), 0.004)[:, self.j]
+        level = np.sqrt((through[ride.runs[0]] ** 2).mean())
         twist = self.amount * (through + self.soft * level * np.tanh(through / level))
         rate = ride.derivative(twist)
         for name, change in (("q", twist), ("v", rate), ("a", ride.derivative(rate))):
@@ -88,7 +89,7 @@ class Backlash(Effect):
 
     def part(self, ride: Ride) -> None:
         machine = ride.machine
-        through = rigid_torque(machine.model, ride.q, ride.v, ride.a)[:, self.j]
+        through = ride.borne(rigid_torque(machine.model, ride.q, ride.v, ride.a))[:, self.j]
         rate = ride.derivative(through)
         data = machine.model.createData()
         side, side1, side2 = (np.zeros(len(through)) for _ in range(3))
