@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.free_functions import SURE
+from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.patterns import PREFIX, is_of_time, swings_by_itself
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.selection import Found
@@ -20,6 +21,8 @@ BY_ITSELF = 1e-5  # chance from which on a swing of which unseen data cannot say
 SLIGHT, PLAIN = 0.1, 50.0  # share of the strongest name's worth, and BIC, below which another hardly stands out
 AGAINST = 0.1  # share of an effect's gain by which unseen data must speak against it
 HARM = 1.05  # times the unseen error: an effect that makes it so much larger is left out, sure or not
+RUINS = 1.2  # the same, whatever unseen rows say of it: where they go beyond what was fitted, its formula does not hold
+SAYS, PLAINLY = 0.4, 30.0  # share and size of the growth by which unseen rows speak for an effect, whatever the error
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +51,7 @@ class BorneOut:
 
 def bear_out(
     judgement: Judgement,
-    measure: Callable[[Sequence[Member]], Measured],
+    measure: Callable[[Sequence[Member], frozenset[int]], Measured],
     beyond: Callable[[Effect], bool],
     forms: Callable[[Sequence[Member], int], Sequence[Member]],
     worth: Callable[[Member], float],
@@ -61,7 +64,7 @@ def bear_out(
 
     Args:
         judgement: what was found.
-        measure: measures members on unseen data.
+        measure: measures members on unseen data, which are without some of them, by their place.
         beyond: tells of which effects those data can say nothing.
         forms: lists other forms of one of some members, the likeliest first.
         worth: how clearly a name stands out of the noise, by its BIC. Of one that hardly does, or hardly beside a far
@@ -74,13 +77,18 @@ def bear_out(
     spoiling: list[tuple[Member, float, Gain]] = []
     notes: list[str] = []
     refuted: list[tuple[Member, float, Gain]] = []
-    seen = measure(members)
+    gone: set[Hypothesis] = set()
+
+    def look(members: Sequence[Member]) -> Measured:
+        return measure(members, frozenset(i for i, member in enumerate(members) if member.hypothesis in gone))
+
+    seen = look(members)
     strongest = max((worth(found.member) for found in founds), default=0.0)
     while idle := [i for i in range(len(founds)) if _idle(seen, i, members[i], beyond, worth, strongest)]:
         notes.append(_FAINT.format(members[idle[0]].hypothesis.label))
         for items in (founds, members, p_values):
             items.pop(idle[0])
-        seen = measure(members)
+        seen = look(members)
     while harmful := [i for i, member in enumerate(members) if _harms(seen, i, member, beyond)]:
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         label = members[worst].hypothesis.label
@@ -93,7 +101,11 @@ def bear_out(
         elif worst >= len(founds):
             # A free function that errs elsewhere is no model; that something is unexplained is as true as before.
             spoiling.append((members.pop(worst), p_values.pop(worst), seen.gains[worst]))
-        elif instead := _instead(founds[worst], worst, members, measure, beyond, forms):
+        elif (undone := _undone(members, worst, gone, look)) is not None:
+            seen = undone
+            notes.append(_UNDONE.format(label))
+            continue
+        elif instead := _instead(founds[worst], worst, members, look, beyond, forms):
             founds[worst], seen = instead
             members[worst] = founds[worst].member
             if members[worst].hypothesis.label != label:
@@ -107,7 +119,7 @@ def bear_out(
             if (free := unnamed(refused, members)) is not None:
                 members.append(free[0])
                 p_values.append(free[1])
-        seen = measure(members)
+        seen = look(members)
     joints = sorted({member.hypothesis.joint or 0 for member, _, _ in spoiling})
     notes += [_SPOILING.format(f"joint {joint}" if joint else _WHOLE) for joint in joints]
     return BorneOut(tuple(founds), tuple(members), tuple(p_values), seen, tuple(spoiling), tuple(notes), tuple(refuted))
@@ -116,11 +128,32 @@ def bear_out(
 _FAINT = "A fit of {} hardly stood out, and unseen data do not speak for it: left out."
 _DROPPED = "A fit of {} stood out of the noise, but does not help on unseen data: left out."
 _REPLACED = "A fit of {} stood out of the noise, but does not help on unseen data; {}, which fits about as well, does."
+_UNDONE = (
+    "The unseen data are without {}: they are as they would be if that had been undone before them, as a payload that "
+    "is put down. Errors are measured so; the model has it from its moment on."
+)
 _WHOLE = "the robot as a whole"
 _SPOILING = (
     "On {} something is unexplained, but unseen data do not bear out the free function that shows it: it is no part of "
     "the extended model."
 )
+
+
+def _undone(
+    members: Sequence[Member], place: int, gone: set[Hypothesis], look: Callable[[Sequence[Member]], Measured]
+) -> Measured | None:
+    """Measures unseen data that a change is gone from again, such as a payload; None where that is no better."""
+    hypothesis = members[place].hypothesis
+    effect = hypothesis.effect
+    comes = effect.depends_on == "time" and not effect.passing and any(shape.moment for shape in effect.shapes)
+    if hypothesis in gone or not comes:
+        return None
+    gone.add(hypothesis)
+    seen = look(members)
+    if seen.gains[place].ci95[0] > 0:
+        return seen
+    gone.remove(hypothesis)
+    return None
 
 
 def _instead(
@@ -189,7 +222,8 @@ def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bo
     effect, joint = member.hypothesis.effect, member.hypothesis.joint
     if beyond(effect):
         return False
-    told = seen.speaks[i] >= LEFT and seen.gains[i].ci95[0] > 0
+    gain, speaks = seen.gains[i], seen.speaks[i]
+    told = (speaks >= LEFT and gain.ci95[0] > 0) or (speaks >= SAYS and speaks * member.gain > PLAINLY)
     if effect.depends_on == "state" and seen.kept[i] < LEFT and not told:
         return True
     if joint is not None and seen.unseen.astray(joint - 1):
@@ -199,7 +233,7 @@ def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bo
     # A free function claims no cause: what it brings elsewhere is all that it is good for.
     idle = effect.name.startswith(PREFIX) and seen.gains[i].ci95[1] < 0
     # By less of its gain than this a base model that errs there, too, makes them speak against a cause.
-    against = seen.worse[i] and seen.speaks[i] < -AGAINST
+    against = seen.worse[i] and speaks < -AGAINST
     # Base parameters that it moves may err elsewhere by more than it is, whatever those rows say of it.
-    risen = seen.rises[i] > HARM and seen.speaks[i] < LEFT
+    risen = seen.rises[i] > (HARM if speaks < LEFT else RUINS) and (speaks < LEFT or gain.ci95[0] <= 0)
     return (against and not stored) or idle or risen

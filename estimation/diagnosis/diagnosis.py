@@ -105,7 +105,9 @@ class Diagnosis:
             of = "wind-up" if finding.measured_by else "torque"
             before, after = (f"{100 * value:.2f} %" for value in (gain.nrmse_before, gain.nrmse_after))
             fall = " to ".join(f"{100 * value:.2f}" for value in gain.ci95)
-            lines.append(f"    unseen error{finding.elsewhere} {before} -> {after} of the {of} (fall {fall} %)")
+            # Its own gain is what the model loses without it alone.
+            beside = ", beside the other findings" if len(self.findings) > 1 and not finding.measured_by else ""
+            lines.append(f"    unseen error{finding.elsewhere} {before} -> {after} of the {of}{beside} (fall {fall} %)")
             # Coefficients of a free function mean nothing each.
             named = finding.effect != "unexplained"
             open_ = [_open(parameter) for parameter in finding.parameters if named and not parameter.determined]
@@ -274,7 +276,10 @@ _VERDICTS = {
 def _open(parameter: Parameter) -> str:
     """Names a parameter that is not determined, with its interval where it has one."""
     low, high = parameter.ci95
-    return f"{parameter.name} ({low:.3g} to {high:.3g})" if np.isfinite([low, high]).all() else parameter.name
+    if not np.isfinite([low, high]).all():
+        return parameter.name
+    unit = "" if parameter.unit in ("", "1") else f" {parameter.unit}"
+    return f"{parameter.name} ({low:.3g} to {high:.3g}{unit})"
 
 
 def _p(value: float) -> str:

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 STRANGE, FAR, ODD = 1.5, 0.035, 0.2
 # Unseen speeds beyond the fitted ones by this factor are worth one, too.
 FASTER = 1.3
+# So are positions beyond the fitted ones by this share of their range, for this share of the time.
+FARTHER, PLACED = 0.05, ("spring", "unexplained")
 # So is a joint on which the extended model errs by so many times what the base model does, and so much more.
 WORSE, LITTLE = 1.1, 0.001
 CLIPPING = CurrentClipping()
@@ -154,6 +156,27 @@ def faster_joints(problem: Problem, seen: Measured) -> list[str]:
     return [_FASTER.format("s" if len(fast) > 1 else "", names, ratio[fast].max())] if len(fast) else []
 
 
+def farther_joints(problem: Problem, seen: Measured, findings: Sequence[Finding]) -> list[str]:
+    """Says where unseen data go beyond the positions by which a function of a joint's position was fitted."""
+    if seen.whole is problem.recording:
+        return []
+    unseen = cut(seen.whole, slice(seen.first, len(seen.whole)))
+    notes = []
+    placed = {f.joint for f in findings if f.effect in PLACED and f.coordinate.startswith("position of joint")}
+    for joint in sorted(joint for joint in placed if joint):
+        known, there = (np.ptp(recording.q[:, joint - 1]) for recording in (problem.recording, unseen))
+        low, high = (float(limit(problem.recording.q[:, joint - 1])) for limit in (np.min, np.max))
+        q = unseen.q[:, joint - 1]
+        beyond = float(np.mean((q < low - FARTHER * known) | (q > high + FARTHER * known)))
+        if beyond > FARTHER:
+            notes.append(_FARTHER.format(joint, 100 * beyond, there / max(known, 1e-9)))
+    return notes
+
+
+_FARTHER = (
+    "Joint {}: for {:.0f} % of the time the unseen data are beyond the positions in the logs of the fit ({:.1f} times "
+    "their range). What was found to depend on its position is not known there: error and gain may be far off."
+)
 _FASTER = (
     "Joint{} {}: up to {:.1f} times as fast on the unseen data as in the logs of the fit. What a polynomial fitted to "
     "slower motion says of friction there may be far off, and with it error and gain; coulomb-viscous errs less."

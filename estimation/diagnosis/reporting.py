@@ -19,7 +19,7 @@ from estimation.diagnosis.gain import Unseen
 from estimation.diagnosis.hypotheses import all_hypotheses
 from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
-from estimation.diagnosis.notes import faster_joints, notes_of, worse_joints
+from estimation.diagnosis.notes import farther_joints, faster_joints, notes_of, worse_joints
 from estimation.diagnosis.patterns import all_patterns
 from estimation.diagnosis.predicting import smoothed_best, with_band
 from estimation.diagnosis.problem import Problem
@@ -66,7 +66,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     judgement = replace(told.judgement, kept=completed(problem, told.judgement.kept))
     held = bear_out(
         judgement,
-        lambda members: measure_unseen(robot, problem, members, told.held_out, told.seed + 3),
+        lambda members, gone: measure_unseen(robot, problem, members, told.held_out, told.seed + 3, gone),
         partial(_is_beyond, told),
         partial(alike_forms, problem),
         lambda member: member.worth(problem.rows),
@@ -135,6 +135,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
             *notes_of(problem, told.false_alarm, findings, apart, after, [m.hypothesis.name for m in timed]),
             *worse_joints(before, after),
             *faster_joints(problem, seen),
+            *farther_joints(problem, seen, findings),
             *held.notes,
             *lost,
         ),

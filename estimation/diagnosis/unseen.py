@@ -56,6 +56,7 @@ class Measured:
         effects: columns (N, n, k) of each member on the data of the fit.
         torque: of all members together on the unseen data (M, n).
         pull: on base model, nuisance and members, of all fits.
+        gone: members that came with a change, and that the unseen data are taken to be without.
     """
 
     unseen: Unseen
@@ -70,10 +71,16 @@ class Measured:
     effects: tuple[Array, ...]
     torque: Array
     pull: Pull
+    gone: frozenset[int] = frozenset()
 
 
 def measure_unseen(
-    robot: Robot, problem: Problem, members: Sequence[Member], held_out: Sequence[Log], seed: int
+    robot: Robot,
+    problem: Problem,
+    members: Sequence[Member],
+    held_out: Sequence[Log],
+    seed: int,
+    gone: frozenset[int] = frozenset(),
 ) -> Measured:
     """Measures on held-out logs, or on each part of the logs by a fit to the others.
 
@@ -83,12 +90,13 @@ def measure_unseen(
         members: what was found.
         held_out: logs that the fit has not seen; none to leave parts out in turn.
         seed: of the intervals.
+        gone: members that held-out logs are taken to be without.
     """
     effects = tuple(dense(problem, member.hypothesis, member.shape) for member in members)
     rng = np.random.default_rng(seed)
     pull = pull_on(problem, members)
     if held_out:
-        unseen, states, whole, first, columns = _on_logs(robot, problem, members, effects, held_out, pull)
+        unseen, states, whole, first, columns = _on_logs(robot, problem, members, effects, held_out, pull, gone)
     else:
         unseen = _left_out(problem, effects, pull)
         states = [problem.sees(member.hypothesis.effect) for member in members]
@@ -113,6 +121,7 @@ def measure_unseen(
         effects=effects,
         torque=torque,
         pull=pull,
+        gone=gone,
     )
 
 
@@ -176,11 +185,12 @@ def simulate_unseen(
     b = known.size
     before = Plant(model=known.model, columns=known.independent, values=base[:b])
     edges = np.cumsum([b + problem.baseline.nuisance.shape[2], *(X.shape[2] for X in measured.effects)])
+    there = [i for i in range(len(members)) if i not in measured.gone]
     after = replace(
         before,
         values=extended[:b],
-        members=tuple(members),
-        coefficients=tuple(extended[start:stop] for start, stop in pairwise(edges)),
+        members=tuple(members[i] for i in there),
+        coefficients=tuple(extended[edges[i] : edges[i + 1]] for i in there),
     )
     return compare(before, after, whole, rows)
 
@@ -262,6 +272,7 @@ def _on_logs(
     effects: Sequence[Array],
     held_out: Sequence[Log],
     pull: Pull,
+    gone: frozenset[int],
 ) -> tuple[Unseen, list[Situation], Recording, int, list[Array]]:
     recording = problem.recording
     travel = np.max([np.ptp(recording.q[run], axis=0) for run in recording.runs], axis=0)
@@ -272,7 +283,7 @@ def _on_logs(
     whole = following(recording, other) if later else other
     first = len(recording) if later else 0
     states, columns = columns_on(problem, whole, members)
-    columns = [X[first:] for X in columns]
+    columns = [X[first:] * (i not in gone) for i, X in enumerate(columns)]
     baseline = problem.baseline
     base = regressor_on(baseline.base, other)
     nuisance = np.zeros((len(other), robot.n, baseline.nuisance.shape[2]))

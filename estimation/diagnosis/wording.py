@@ -117,8 +117,9 @@ def _parameters(
     errors = np.sqrt(np.maximum(np.diag(extension.covariance), 0.0))
     largest = NOTHING * float(np.abs(extension.coefficients).max(initial=0.0))
     result = []
-    for own, value, error, sure in zip(described, values, errors, known, strict=True):
-        if not own.name or (isinstance(own, Shape) and own.is_left(value)):
+    unused = {len(extension.coefficients) + k for k in effect.unused(extension.shape)}
+    for k, (own, value, error, sure) in enumerate(zip(described, values, errors, known, strict=True)):
+        if not own.name or k in unused or (isinstance(own, Shape) and own.is_left(value)):
             continue
         if isinstance(own, Coefficient) and abs(value) <= largest and not np.isfinite(error):
             # A column that is none in these logs, such as a knot of a short drift.

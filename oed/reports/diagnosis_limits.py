@@ -14,6 +14,8 @@ from robots.terms.effects import EFFECTS
 
 CLEAR = 0.02
 """Share of the torque below which a limit counts as small: what robot models commonly leave."""
+ALL = 1.0
+"""Share of the torque from which a size is none."""
 MUCH = 2.0
 """Times a limit from which the one of the kind that shows least is told beside it."""
 
@@ -116,7 +118,7 @@ def _cell(limit: Limit | None) -> Cell:
         return None
     if not np.isfinite(limit.detectable):
         return "hidden"
-    named = f"{100 * limit.attributable:.2g}" if np.isfinite(limit.attributable) else "never"
+    named = f"{100 * limit.attributable:.2g}" if limit.attributable < ALL else "never"
     return f"{100 * limit.detectable:.2g}{_worst(limit)} / {named}"
 
 
@@ -124,4 +126,4 @@ def _worst(limit: Limit) -> str:
     """Says from what size on the kind of it that shows least would be found, where that is much more."""
     if limit.at_worst <= MUCH * limit.detectable:
         return ""
-    return f" ({100 * limit.at_worst:.2g})" if np.isfinite(limit.at_worst) else " (never)"
+    return f" ({100 * limit.at_worst:.2g})" if limit.at_worst < ALL else " (never)"

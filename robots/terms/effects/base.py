@@ -79,6 +79,10 @@ class Effect(ABC):
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the k linear coefficients, in the order of the columns."""
 
+    def unused(self, shape: tuple[float, ...]) -> frozenset[int]:
+        """Gives which shape parameters mean nothing at these values."""
+        return frozenset()
+
     def described(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[Coefficient, ...]:
         """Describes them at some shape values, where those say what they mean; one of no use there has no name."""
         return self.parameters(robot, joint)

@@ -144,10 +144,12 @@ class ExternalContact(Effect):
         """Says what the values mean."""
         when = f"from t = {shape[0]:.2f} s for {shape[1]:.2g} s"
         if on_the_flange(shape):
-            pushed = np.linalg.norm(coefficients[:3])
+            # What no joint feels of them is none.
+            sizes = zip(("force", "moment"), (coefficients[:3], coefficients[3:6]), ("N", "N m"), strict=True)
+            told = [f"a {word} of {np.linalg.norm(part):.3g} {unit}" for word, part, unit in sizes if part.any()]
             return (
-                f"Something pushed the flange {when}, with a force of {pushed:.3g} N that stayed the same (along the "
-                "base's axes; the signs are those of the arm's push against it)."
+                f"Something pushed the flange {when}, with {' and '.join(told)} that stayed the same (along the base's "
+                "axes; the signs are those of the arm's push against it)."
             )
         size = np.abs(coefficients)
         most, last = int(np.argmax(size)) + 1, int(np.flatnonzero(size > 0.05 * size.max())[-1]) + 1

@@ -59,6 +59,16 @@ class Spring(StaticJointEffect):
             Coefficient("preload", force),
         )
 
+    def described(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[Coefficient, ...]:
+        """Describes them without what a lever's third order is, and what pulls a plain spring: the model's offset."""
+        stiffness, second, third, preload = self.parameters(robot, joint)
+        none = Coefficient("", "")
+        return (stiffness, second, none, preload) if _has_lever(shape) else (stiffness, second, third, none)
+
+    def unused(self, shape: tuple[float, ...]) -> frozenset[int]:
+        """Gives ratio and dead centre of levers that are none."""
+        return frozenset() if _has_lever(shape) else frozenset((0, 1))
+
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists a spring without levers, and levers where a joint turns far enough to tell them."""
         assert joint is not None
@@ -105,21 +115,22 @@ class Spring(StaticJointEffect):
         length: str = "rad",
     ) -> str:
         """Says what the values mean."""
-        if shape and shape[0] >= SHORTEST:
-            return (
-                f"A spring between two levers of ratio {shape[0]:.2g} acts on joint {joint}; its ends are nearest at "
-                f"{np.remainder(shape[1] + np.pi, 2 * np.pi) - np.pi:.3g} {length}."
-            )
+        if _has_lever(shape):
+            # Ratio and dead centre are told with their intervals: of many pairs all do about as well.
+            return f"A spring between two levers, as a balancer is, acts on joint {joint}."
         return (
             f"A spring or cable acts on joint {joint}: {coefficients[0]:.3g} {force}/{length} at the middle of its "
-            f"range; its quadratic and cubic parts are {coefficients[1]:.3g} {force}/{length}2 and "
-            f"{coefficients[2]:.3g} {force}/{length}3."
+            "range."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the position."""
         assert joint is not None
         return f"position of joint {joint} [rad]", situation.q[:, joint - 1]
+
+
+def _has_lever(shape: tuple[float, ...]) -> bool:
+    return bool(shape) and shape[0] >= SHORTEST
 
 
 def _middle(robot: Robot, joint: int) -> float:

@@ -36,18 +36,23 @@ HELPS, IDLE, HARMS = Shown(), Shown(-0.001, 0.002, 1.0), Shown(-0.004, -0.001, 1
 
 @dataclass
 class Bench:
-    """Stands for the measurement: what each label shows, also beside certain others, and what it was asked."""
+    """Stands for the measurement: what each label shows, also beside certain others or gone, and what it was asked."""
 
     shows: dict[str, Shown]
     beside: dict[tuple[str, str], Shown] = field(default_factory=dict)
     asked: list[tuple[str, ...]] = field(default_factory=list)
+    without: dict[str, Shown] = field(default_factory=dict)
 
-    def __call__(self, members: Sequence[Member]) -> SimpleNamespace:
+    def __call__(self, members: Sequence[Member], gone: frozenset[int] = frozenset()) -> SimpleNamespace:
         labels = tuple(label_of(member) for member in members)
         self.asked.append(labels)
         shown = [
-            next((self.beside[label, other] for other in labels if (label, other) in self.beside), self.shows[label])
-            for label in labels
+            self.without.get(label, self.shows[label])
+            if k in gone
+            else next(
+                (self.beside[label, other] for other in labels if (label, other) in self.beside), self.shows[label]
+            )
+            for k, label in enumerate(labels)
         ]
         lost = {m.hypothesis.joint - 1 for m, s in zip(members, shown, strict=True) if m.hypothesis.joint and s.astray}
         return SimpleNamespace(

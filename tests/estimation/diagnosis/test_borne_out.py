@@ -275,3 +275,36 @@ def test_a_name_that_unseen_rows_speak_for_stays_whatever_base_parameters_do_the
     """An error a sixth larger on faster motion, to which friction's polynomial is carried on, is no word against it."""
     bench = bench_with(spring=Shown(-0.008, -0.0002, 1.17, speaks=speaks))
     assert bool(borne(bench, Found(SPRING, 1e-9, ())).founds) is stays
+
+
+def test_a_name_that_ruins_unseen_data_is_left_out_whatever_rows_say() -> None:
+    """A spring that was a ripple: unseen rows speak for it, and beyond the fitted positions it errs by a fifth more."""
+    ruins = Shown(low=-0.018, high=0.004, rise=1.23, speaks=0.46)
+    assert borne(bench_with(spring=ruins), Found(SPRING, 1e-9, ())).members == ()
+    for shown in (Shown(low=-0.004, high=0.001, rise=1.1, speaks=0.46), Shown(low=0.001, rise=1.23, speaks=0.46)):
+        assert borne(bench_with(spring=shown), Found(SPRING, 1e-9, ())).members == (SPRING,)
+
+
+def test_a_name_that_unseen_rows_plainly_speak_for_stays() -> None:
+    """Where base parameters of other logs err by more than it brings, what all logs say together counts."""
+    plain = Shown(low=-0.003, high=0.001, rise=1.02, kept=-0.4, speaks=0.48)
+    assert borne(bench_with(spring=plain), Found(SPRING, 1e-9, ()), held_out=False).members == (SPRING,)
+    for shown in (Shown(low=-0.003, high=0.001, rise=1.02, kept=-0.4, speaks=0.25),):
+        assert borne(bench_with(spring=shown), Found(SPRING, 1e-9, ()), held_out=False).members == ()
+
+
+def test_what_was_undone_before_the_unseen_data_stays() -> None:
+    """A payload that is put down: unseen data speak against it, and for it where they are taken to be without it."""
+    payload = member_of("payload_change", None)
+    bench = bench_with()
+    bench.shows["payload_change"] = HARMS
+    bench.without["payload_change"] = HELPS
+    result = borne(bench, Found(payload, 1e-9, ()))
+    assert result.members == (payload,)
+    (note,) = result.notes
+    assert "undone" in note
+    bench.without["payload_change"] = IDLE
+    assert borne(bench, Found(payload, 1e-9, ())).members == ()
+    # A spring does not come and go.
+    bench.shows["spring of joint 2"], bench.without["spring of joint 2"] = HARMS, HELPS
+    assert borne(bench, Found(SPRING, 1e-9, ())).members == ()
