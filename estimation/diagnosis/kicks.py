@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from estimation.diagnosis.periods import Cycle
 from estimation.diagnosis.recording import Recording
@@ -28,6 +31,8 @@ PERIODS, SHORTEST, RINGS = 1.0, 0.04, 2.0
 FINE = 8  # points of tables in a sample
 # A reversal stays the same one while it moves by less than this [s]; of a repeated motion it is by its phase [s].
 MOVES, SAME = 0.02, 0.01
+# Reversals in two logs are one and the same where positions and acceleration differ by this share of their range.
+ALIKE = 2e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +90,7 @@ class Turns:
         at: moments (R,), in rows.
         way: signs (R,) of the acceleration.
         run: log (R,) of each.
-        kind: number (R,) of each: those of a repeated motion that are alike have one.
+        kind: number (R,) of each: those of a motion that is repeated, within a log or in others, have one.
         inertia: of the joint there (R,) [kg m2 or kg].
     """
 
@@ -107,6 +112,10 @@ def reversals(recording: Recording, j: int, base: BaseParameters, values: Array)
         kind.append(_kinds(moments * recording.step, recording.cycles[k]))
     moments, rate, runs = (np.concatenate(parts) for parts in (at, rates, run))
     kinds = np.unique(np.column_stack([runs, np.concatenate(kind)]), axis=0, return_inverse=True)[1].ravel()
+    if len(recording.runs) > 1 and len(kinds):
+        rows, spread = np.arange(len(recording)), np.maximum(np.ptp(recording.q, axis=0), 1e-9)
+        place = np.column_stack([np.interp(moments, rows, column) for column in (recording.q / spread).T])
+        kinds = _alike(kinds, place, rate)
     fast = np.abs(rate) >= SLOWEST * np.median(np.abs(rate)) if len(rate) else np.zeros(0, dtype=bool)
     if fast.sum() < FEWEST:
         return None
@@ -136,6 +145,19 @@ def _kinds(moments: Array, cycle: Cycle | None) -> NDArray[np.intp]:
     number = np.empty(len(moments), dtype=np.intp)
     number[order] = np.cumsum(np.diff(phase[order], prepend=-np.inf) > SAME)
     return number
+
+
+def _alike(kinds: NDArray[np.intp], q: Array, rate: Array) -> NDArray[np.intp]:
+    """Numbers kinds (R,) anew, as one where all joints were in the same place (R, n) and this one turned alike (R,).
+
+    Logs of one motion err alike in it: an encoder's steps are where they were.
+    """
+    counts = np.bincount(kinds)
+    about = np.column_stack([q, rate / np.max(np.abs(rate))])
+    mean = np.stack([np.bincount(kinds, column) / counts for column in about.T], axis=1)
+    pairs = cKDTree(mean).query_pairs(ALIKE, p=np.inf, output_type="ndarray")
+    links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(counts), len(counts)))
+    return np.asarray(connected_components(links, directed=False)[1][kinds], dtype=np.intp)
 
 
 def columns_about(

@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.kicks import reversals
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import BESIDE, Recording
 from estimation.diagnosis.refinement import Member, _borne_out
 from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.states import record
 from estimation.diagnosis.upper import WIDER
+from robots.plants import simulate
 from robots.robot import Robot
-from robots.signals import Log
+from robots.signals import Log, Motion
 from robots.terms.effects import EFFECTS
 
 ELASTIC, PLAY = Hypothesis(EFFECTS["joint_elasticity"], 2), Hypothesis(EFFECTS["backlash"], 2)
@@ -63,6 +65,24 @@ def test_rows_beside_reversals_and_the_ends_of_rests_are_not_calm(recording: Rec
     known = replace(recording, unsure=unsure)
     np.testing.assert_array_equal(known.calm(), ~disturbed)
     np.testing.assert_array_equal(known.calm(3), ~disturbed[::3])
+
+
+def test_reversals_of_one_motion_in_several_logs_are_of_one_kind(
+    arm: Robot, arm_plant: Callable, fourier_motion: Callable[..., Motion], pose_arm: Callable[..., Problem]
+) -> None:
+    """Played thrice they have the kinds of one log; another motion adds its own."""
+    plant = arm_plant(torque_noise=0.02)
+
+    def kinds(*motions: int) -> int:
+        logs = [simulate(plant, fourier_motion(arm, m, duration=20.0), seed=k) for k, m in enumerate(motions)]
+        problem = pose_arm(record(arm, [replace(log, t=log.t + 40.0 * k) for k, log in enumerate(logs)]))
+        base = problem.baseline.base
+        turns = reversals(problem.recording, 0, base, problem.situation.parameters[list(base.independent)])
+        assert turns is not None
+        return len(np.unique(turns.kind))
+
+    assert kinds(3, 3, 3) == kinds(3)
+    assert kinds(3, 4) == kinds(3) + kinds(4)
 
 
 def test_the_parts_of_a_torque_are_the_whole(problem: Problem) -> None:
