@@ -113,8 +113,8 @@ def reversals(recording: Recording, j: int, base: BaseParameters, values: Array)
     moments, rate, runs = (np.concatenate(parts) for parts in (at, rates, run))
     kinds = np.unique(np.column_stack([runs, np.concatenate(kind)]), axis=0, return_inverse=True)[1].ravel()
     if len(recording.runs) > 1 and len(kinds):
-        rows, spread = np.arange(len(recording)), np.maximum(np.ptp(recording.q, axis=0), 1e-9)
-        place = np.column_stack([np.interp(moments, rows, column) for column in (recording.q / spread).T])
+        numbers, spread = np.arange(len(recording)), np.maximum(np.ptp(recording.q, axis=0), 1e-9)
+        place = np.column_stack([np.interp(moments, numbers, column) for column in (recording.q / spread).T])
         kinds = _alike(kinds, place, rate)
     fast = np.abs(rate) >= SLOWEST * np.median(np.abs(rate)) if len(rate) else np.zeros(0, dtype=bool)
     if fast.sum() < FEWEST:
