@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from estimation.diagnosis.band import SHARE, find_bands, unbiased
+from estimation.diagnosis.bursts import bursts
 from estimation.diagnosis.colour import PLAIN, SPARING, fit_process
 from estimation.diagnosis.gaps import find_gaps, free_columns, long_gap
 from estimation.diagnosis.lines import without_lines
@@ -82,9 +83,14 @@ def estimate_whitening(
     widths = 1 / (2 * cutoffs * recording.step)
     resting = rests.resting(recording.starts, len(residual), stride, int(np.ceil(1.5 * widths.max())) + 2)
     measured = ~resting if colour.held else _measured(recording, stride, widths, ~resting)
-    counts = np.maximum(measured.sum(axis=0), 1).astype(float)
-    beside = Beside([gaps.bridged(X, j) for j, X in enumerate(spared)], bands, recording.runs, measured)
-    pieces = beside.left(pieces)
+    spared = [gaps.bridged(X, j) for j, X in enumerate(spared)]
+    beside = Beside(spared, bands, recording.runs, measured)
+    left = beside.left(pieces)
+    if (moments := bursts(left, measured, step)).any():
+        measured &= ~moments
+        beside = Beside(spared, bands, recording.runs, measured)
+        left = beside.left(pieces)
+    counts, pieces = np.maximum(measured.sum(axis=0), 1).astype(float), left
     slowest, fastest = max(colour.flat, FEWEST / (sum(map(len, pieces)) * step)), INSIDE * cutoffs
     slowest = slowest if slowest <= PLAIN.flat else 0.0
     period = next((cycle.period for cycle in recording.cycles if cycle is not None), None)
@@ -126,9 +132,9 @@ def estimate_whitening(
     )
     free = free_columns(recording.unsure, longest, plain, widths.tolist())
     plain = replace(plain, gaps=replace(gaps, free=free))
-    left = np.where(resting, np.nan, np.abs(plain.all(residual)))
-    level = np.array([np.nanmedian(column) if np.isfinite(column).any() else 1.0 for column in left.T]) / 0.6745
-    weights = np.minimum(1.0, HUBER * np.maximum(level, 0.1) / np.maximum(left, 1e-12))
+    white_left = np.where(resting, np.nan, np.abs(plain.all(residual)))
+    level = np.array([np.nanmedian(column) if np.isfinite(column).any() else 1.0 for column in white_left.T]) / 0.6745
+    weights = np.minimum(1.0, HUBER * np.maximum(level, 0.1) / np.maximum(white_left, 1e-12))
     weights[_pushed(weights < 1.0, recording, stride, cutoffs)] = 1.0
     return replace(plain, weights=np.where(resting, 0.0, weights))
 
