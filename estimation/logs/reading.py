@@ -68,7 +68,7 @@ def read_log(
     }
     if torque and "tau" not in signals and "current" not in signals:
         raise InputError(
-            f"neither tau1..tau{count} nor i1..i{count}",
+            f"neither tau1..tau{count} nor i1..i{count}" if count > 1 else "neither tau1 nor i1",
             file=table.path,
             column="tau1",
             row=_header_row(table),

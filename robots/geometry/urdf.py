@@ -219,7 +219,13 @@ class UrdfTree:
             )
         if joint.type != "continuous" and (limit.velocity is None or limit.effort is None):
             missing = "velocity" if limit.velocity is None else "effort"
-            raise InputError(f"<limit> states no {missing}", file=self.file, joint=joint.name)
+            raise InputError(
+                f"<limit> states no {missing}",
+                file=self.file,
+                joint=joint.name,
+                allowed="velocity [rad/s or m/s] and effort [N m or N]",
+                remedy="state it there",
+            )
         velocity = np.inf if limit.velocity is None else limit.velocity
         effort = np.inf if limit.effort is None else limit.effort
         # Both zero is what exporters write, and what URDF assumes, where nothing was filled in.

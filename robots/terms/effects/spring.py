@@ -117,7 +117,7 @@ class Spring(StaticJointEffect):
         """Says what the values mean."""
         if _has_lever(shape):
             # Ratio and dead centre are told with their intervals: of many pairs all do about as well.
-            return f"A spring between two levers, as a balancer is, acts on joint {joint}."
+            return f"A spring between two levers acts on joint {joint}."
         return (
             f"A spring or cable acts on joint {joint}: {coefficients[0]:.3g} {force}/{length} at the middle of its "
             "range."
