@@ -165,8 +165,9 @@ def refine(
                 at[:] = slopes[int(np.argmax(gains))]
                 climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)
 
-    # What is known now may have been free, or another, where the search comes from.
-    start = tuple(min(max(value, low), high) for value, (low, high) in zip(start, bounds, strict=True))
+    if hypothesis.effect.last or hypothesis.effect.distorts:
+        # What is known now may have been free, or another, where the search comes from.
+        start = tuple(min(max(value, low), high) for value, (low, high) in zip(start, bounds, strict=True))
     evaluate(start)
     if loose and effort:
         # What the effect is whole without comes last, from where the rest led.
