@@ -24,6 +24,7 @@ HOLD = 0.1  # of one that lasts
 LONGER = (1.0, 2.0, 4.0, 8.0)
 FROM = (0.0, 0.5, 1.0)
 ALONE = 0.05  # share of what a joint feels below which others feel nothing
+NONE = 1e-6  # share of force or moment [N or N m] below which the other is none
 WRENCH = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
 
 
@@ -144,9 +145,11 @@ class ExternalContact(Effect):
         """Says what the values mean."""
         when = f"from t = {shape[0]:.2f} s for {shape[1]:.2g} s"
         if on_the_flange(shape):
-            # What no joint feels of them is none.
-            sizes = zip(("force", "moment"), (coefficients[:3], coefficients[3:6]), ("N", "N m"), strict=True)
-            told = [f"a {word} of {np.linalg.norm(part):.3g} {unit}" for word, part, unit in sizes if part.any()]
+            # What no joint feels of them is none, or rounding.
+            push, turn = (float(np.linalg.norm(part)) for part in (coefficients[:3], coefficients[3:6]))
+            sizes = (("force", push, "N"), ("moment", turn, "N m"))
+            least = NONE * max(push, turn)
+            told = [f"a {word} of {size:.3g} {unit}" for word, size, unit in sizes if size > least]
             return (
                 f"Something pushed the flange {when}, with {' and '.join(told)} that stayed the same (along the base's "
                 "axes; the signs are those of the arm's push against it)."

@@ -145,3 +145,16 @@ def test_an_axis_along_gravity_carries_no_weight(seen):
     weight = np.einsum("njk,nk->nj", now.sensitivity("gravity"), now.gravity)
     for j in range(now.robot.n):
         assert X[:, j, 4 * j + 3].any() == (np.abs(weight[:, j]).max() > 1e-6)
+
+
+def test_a_push_is_told_by_what_joints_feel_of_it() -> None:
+    """A force that is rounding beside the moment is none, and so is a moment beside a force."""
+    shape = (21.3, 1.5, 0.1, 1.0)
+    for told, size in (
+        ("a moment of 1.26 N m", [1e-9, 0.0, 2e-10, 0.0, 1.26, 0.0]),
+        ("a force of 5 N", [3.0, 4.0, 0, 0, 0, 0]),
+    ):
+        sentence = EFFECTS["external_contact"].describe(None, np.array(size), shape)
+        assert f"with {told} that stayed" in sentence
+    both = EFFECTS["external_contact"].describe(None, np.array([3.0, 4.0, 0.0, 0.0, 2.0, 0.0]), shape)
+    assert "with a force of 5 N and a moment of 2 N m" in both
