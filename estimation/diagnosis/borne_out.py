@@ -231,9 +231,9 @@ def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bo
     # Heat that was stored before the unseen data, and what a pause left of it, are told by neither.
     stored = any(shape.name == "time_constant" for shape in effect.shapes)
     # A free function claims no cause: what it brings elsewhere is all that it is good for.
-    idle = effect.name.startswith(PREFIX) and seen.gains[i].ci95[1] < 0
+    idle = effect.name.startswith(PREFIX) and gain.ci95[1] < 0
     # By less of its gain than this a base model that errs there, too, makes them speak against a cause.
     against = seen.worse[i] and speaks < -AGAINST
     # Base parameters that it moves may err elsewhere by more than it is, whatever those rows say of it.
-    risen = seen.rises[i] > (HARM if speaks < LEFT else RUINS) and (speaks < LEFT or gain.ci95[0] <= 0)
+    risen = seen.rises[i] > HARM if speaks < LEFT else seen.rises[i] > RUINS and gain.ci95[0] <= 0
     return (against and not stored) or idle or risen

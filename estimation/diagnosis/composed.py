@@ -101,13 +101,13 @@ class JointFit:
         self.timed = timed(members, edges[:-1].tolist(), (recording.n, self.full.shape[2]))
         self.weights = (counted & ~recording.unsure) / problem.whitening.scales(len(recording))
 
-    def values(self, tau: Array, passes: Array | float = 1.0) -> Array:
+    def values(self, tau: Array, passes: Array | None = None) -> Array:
         """Fits torque (N, n), of whose changes a share passes (N, n)."""
         return held(*self.moments(tau, passes), self.problem.pull)
 
-    def moments(self, tau: Array, passes: Array | float = 1.0) -> tuple[Array, Array]:
+    def moments(self, tau: Array, passes: Array | None = None) -> tuple[Array, Array]:
         """Gives the normal equations (b, b), (b,) of such a fit."""
-        return self.normal(tau, self.full * np.broadcast_to(passes, self.weights.shape)[:, :, None])
+        return self.normal(tau, self.full if passes is None else self.full * passes[:, :, None])
 
     def normal(self, tau: Array, columns: Array) -> tuple[Array, Array]:
         """Gives those of torque (N, n) by columns (N, n, p), the first of which are members' as in `full`."""

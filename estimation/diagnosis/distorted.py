@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.composed import JointFit
 from estimation.diagnosis.extending import dense
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.refinement import Member, all_but, refine
+from estimation.diagnosis.refinement import Member, all_but, refine, within
 from estimation.diagnosis.regularisation import held
 from robots.terms.effects.static import StaticJointEffect
 
@@ -101,7 +101,7 @@ class _Search:
             coefficients = member.coefficients + share * (goal[at : at + k] - member.coefficients)
             for i, value in zip(loose, goal[at + k : at + k + len(loose)], strict=True):
                 shape[i] += share * (float(value) - shape[i])
-            moved.append(replace(member, coefficients=coefficients, shape=_within(shape, bounds)))
+            moved.append(replace(member, coefficients=coefficients, shape=within(shape, bounds)))
             at += k + len(loose)
         return values + share * (goal[: len(values)] - values), moved
 
@@ -126,7 +126,3 @@ class _Search:
 
 def _bounds(problem: Problem, member: Member) -> tuple[tuple[float, float], ...]:
     return member.hypothesis.effect.bounds(problem.situation, member.hypothesis.joint)
-
-
-def _within(shape: Sequence[float], bounds: Sequence[tuple[float, float]]) -> tuple[float, ...]:
-    return tuple(min(max(value, low), high) for value, (low, high) in zip(shape, bounds, strict=True))

@@ -167,7 +167,7 @@ def refine(
 
     if hypothesis.effect.last or hypothesis.effect.distorts:
         # What is known now may have been free, or another, where the search comes from.
-        start = tuple(min(max(value, low), high) for value, (low, high) in zip(start, bounds, strict=True))
+        start = within(start, bounds)
     evaluate(start)
     if loose and effort:
         # What the effect is whole without comes last, from where the rest led.
@@ -189,6 +189,11 @@ def refine(
         owed = owed_to_moments(problem, hypothesis.joint, found.group, found.gain, accepted)
         return replace(found, doubt=owed)
     return replace(found, scatter=_borne_out(problem, found, accepted)) if hypothesis.effect.kicks else found
+
+
+def within(shape: Sequence[float], bounds: Sequence[tuple[float, float]]) -> tuple[float, ...]:
+    """Brings each value of a shape into its bounds."""
+    return tuple(min(max(value, low), high) for value, (low, high) in zip(shape, bounds, strict=True))
 
 
 def _agreed(problem: Problem, member: Member, accepted: Accepted) -> Member:
