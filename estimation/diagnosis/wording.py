@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from estimation.diagnosis.selection import Found
 from robots.robot import Robot
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effects import EFFECTS
-from robots.terms.effects.base import Coefficient, Shape
+from robots.terms.effects.base import Coefficient, Effect, Shape
 
 # A parameter that an effect is not linear in is determined where its interval reaches no farther than this share of it;
 # a moment, so many seconds.
@@ -141,7 +141,25 @@ def _parameters(
                 determined=bool(sure) and not rough,
             )
         )
-    return tuple(result)
+    idle = _perhaps_unused(effect, extension.shape, {parameter.name: parameter.ci95 for parameter in result})
+    return tuple(_opened(told) if told.name in idle else told for told in result)
+
+
+def _opened(parameter: Parameter) -> Parameter:
+    return replace(parameter, standard_error=float("nan"), ci95=(-np.inf, np.inf), determined=False)
+
+
+def _perhaps_unused(effect: Effect, shape: tuple[float, ...], intervals: Mapping[str, tuple[float, float]]) -> set[str]:
+    """Names shape parameters that mean nothing at a value that another may have: levers perhaps none have no angle."""
+    names: set[str] = set()
+    for k, own in enumerate(effect.shapes):
+        if own.default is None or own.name not in intervals:
+            continue
+        low, high = intervals[own.name]
+        if low <= own.default <= high:
+            idle = effect.unused((*shape[:k], own.default, *shape[k + 1 :]))
+            names |= {effect.shapes[i].name for i in idle if i != k}
+    return names
 
 
 def _roughly(shape: Shape, value: float, interval: tuple[float, float]) -> bool:

@@ -58,6 +58,22 @@ def test_an_interval_holds_what_machines_may_have(arm: Robot) -> None:
     assert not exponent.determined
 
 
+@pytest.mark.parametrize(("error", "told"), [(0.02, True), (0.3, False)])
+def test_levers_that_are_perhaps_none_have_no_dead_centre(arm: Robot, error: float, told: bool) -> None:
+    """An angle is told, however narrow its interval, where the ratio beside it is surely more than zero."""
+    coefficients = np.array([400.0, -300.0, 0.0, 900.0])
+    member = Member(Hypothesis(EFFECTS["spring"], 1), (0.3, -2.9), None, 100.0, coefficients, 6, 1.0)  # type: ignore[arg-type]
+    covariance = np.diag([4.0, 3.0, 0.0, 9.0, error, 0.1]) ** 2
+    extension = Extension(
+        effect="spring", joint=1, shape=member.shape, coefficients=coefficients, covariance=covariance
+    )
+    fitted: Any = SimpleNamespace(model=SimpleNamespace(extensions=[extension]))
+    centre = _parameters(arm, member, fitted, 0, np.ones(6, dtype=bool))[-1]
+    assert centre.name == "dead_centre"
+    assert centre.determined is told
+    assert bool(np.isfinite(centre.ci95).all()) is told
+
+
 def test_what_is_no_part_of_the_model_says_so() -> None:
     """A free function that errs, and a name that unseen data refuted: neither may be taken for a cause."""
     finding = Finding(
