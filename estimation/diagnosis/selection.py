@@ -16,14 +16,12 @@ from estimation.diagnosis.refinement import Member, all_but, refine
 from estimation.diagnosis.scan import Entry, Outcome, Scan, measure, scan
 from estimation.diagnosis.scoring import Accepted, accept, score
 from estimation.diagnosis.together import together
-from estimation.diagnosis.worthwhile import LEAST, beyond, is_sure, lasts, worth_it
+from estimation.diagnosis.worthwhile import LEAST, SURE, beyond, is_sure, lasts, worth_it
 from robots.common.parallel import threaded
 
 # A member whose gain is within this share of what it was when it won over its rivals wins over them still.
 SAME = 0.02
 MOST = 4  # effects at once
-# But for a single effect whose p-value is below this share of the false-alarm chance: it must be worth them at all.
-SURE = 0.2
 FAR_MORE = 1.5  # times the gain
 SHOWN = 40  # outcomes whose p-values are computed
 
@@ -97,8 +95,11 @@ def select(
         refined = _best(problem, contenders(problem, result, members), accepted, known)
         chance = {member.hypothesis: chances.get(member.hypothesis, 1.0) for member in refined}
         able = [m for m in refined if chance[m.hypothesis] <= false_alarm and m.hypothesis not in spurned]
-        alone = SURE * false_alarm if not members else 0.0
-        best = [m for m in able if worth_it(problem, m, members) or is_sure(problem, m, chance[m.hypothesis], alone)]
+        best = [
+            m
+            for m in able
+            if worth_it(problem, m, members) or is_sure(problem, m, chance[m.hypothesis], members, false_alarm)
+        ]
         best = [m for m in best if not m.hypothesis.effect.passing or lasts(problem, m, accepted)]
         if not best:
             break
@@ -114,7 +115,7 @@ def select(
         seen |= {member.hypothesis for member in more}
         members, p_values = [*members, *more], [*p_values, *sure]
         if len(members) > 1:
-            members, p_values = _polished(problem, entries, members, p_values, seen, won, rng)
+            members, p_values = _polished(problem, entries, members, p_values, seen, won, rng, false_alarm)
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
         now = {member.hypothesis for member in members}
@@ -128,14 +129,15 @@ def select(
         Found(_measured(problem, member, all_but(problem, members, i)), p_value)
         for i, (member, p_value) in enumerate(zip(members, p_values, strict=True))
     ]
-    others, alone = members[1:], SURE * false_alarm if len(members) == 1 else 0.0
-    kept = [
-        f
-        for f in found
-        if f.member.hypothesis in seen
-        or worth_it(problem, f.member, others)
-        or is_sure(problem, f.member, f.p_value, alone)
-    ]
+    kept = []
+    for i, f in enumerate(found):
+        others = [*members[:i], *members[i + 1 :]]
+        if (
+            f.member.hypothesis in seen
+            or worth_it(problem, f.member, others)
+            or is_sure(problem, f.member, f.p_value, others, false_alarm)
+        ):
+            kept.append(f)
     order = sorted(kept, key=lambda f: -f.member.gain)
     last = result if members else first
     return Selection(tuple(order), frozenset(seen), first, last, accept(problem, tuple(f.member.group for f in order)))
@@ -227,6 +229,7 @@ def _polished(
     seen: Collection[Hypothesis],
     won: dict[Hypothesis, float],
     rng: np.random.Generator,
+    false_alarm: float,
 ) -> tuple[list[Member], list[float]]:
     """Refines each member beside the others, lets its rivals take its place, and drops what is no longer needed.
 
@@ -258,7 +261,13 @@ def _polished(
             won[best.hypothesis] = best.gain
         if not changed:
             break
-    keep = [i for i, m in enumerate(members) if m.hypothesis in seen or m.worth(problem.rows) > LEAST]
+    keep = [
+        i
+        for i, m in enumerate(members)
+        if m.hypothesis in seen
+        or m.worth(problem.rows) > LEAST
+        or is_sure(problem, m, p_values[i], [*members[:i], *members[i + 1 :]], false_alarm)
+    ]
     return [members[i] for i in keep], [p_values[i] for i in keep]
 
 

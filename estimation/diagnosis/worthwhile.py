@@ -15,6 +15,8 @@ from estimation.diagnosis.shocks import beside_a_shock
 
 # What is reported must be worth its parameters by so much (Schwarz): strong evidence, beside a small p-value.
 LEAST = 10.0
+# But where no other effect acts, below this share of the false-alarm chance: no other formula leaves it there.
+SURE = 0.2
 
 
 def worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
@@ -25,9 +27,11 @@ def worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) -> 
     return worth > LEAST
 
 
-def is_sure(problem: Problem, candidate: Member, p_value: float, chance: float) -> bool:
-    """Whether an effect has a p-value below a chance, and is worth its parameters at all."""
-    return p_value < chance and candidate.bic(problem.rows) - candidate.doubt > 0
+def is_sure(problem: Problem, candidate: Member, p_value: float, others: Sequence[Member], false_alarm: float) -> bool:
+    """Whether an effect on joints where no other acts is far from chance, and worth its parameters at all."""
+    joints = set(candidate.group.joints)
+    apart = not any(joints.intersection(other.group.joints) for other in others)
+    return apart and p_value < SURE * false_alarm and candidate.bic(problem.rows) - candidate.doubt > 0
 
 
 def lasts(problem: Problem, candidate: Member, accepted: Accepted) -> bool:
@@ -60,8 +64,11 @@ def beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bo
             default=0.0,
         )
     ]
+    if len(able) == len(candidate.group.joints):
+        # None of it is another's: whether it is worth its parameters is all there is to ask.
+        return True
     lost = candidate.gain - candidate.gain_on(able)
-    return not members or candidate.bic(problem.rows) - lost > LEAST
+    return candidate.bic(problem.rows) - lost > LEAST
 
 
 def _agreed(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:

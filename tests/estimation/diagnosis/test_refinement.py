@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from estimation.diagnosis.groups import Group
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.refinement import RARE, Member
 from estimation.diagnosis.scan import Outcome
-from estimation.diagnosis.worthwhile import beyond, worth_it
+from estimation.diagnosis.worthwhile import LEAST, SURE, beyond, is_sure, worth_it
 from robots.terms.effects import EFFECTS, Shape
 from robots.terms.effects.stribeck import Stribeck
 
@@ -143,6 +144,34 @@ def test_what_a_log_shows_by_itself_is_no_leftover() -> None:
     assert counts(small, flat)
     assert not counts(small, tau)
     assert not counts(other, flat)
+
+
+@pytest.mark.parametrize(
+    ("beside", "chance", "gain", "sure"),
+    [
+        ((), 0.5, 25.0, True),
+        ((1,), 0.5, 25.0, False),  # where another acts, its formula may leave as much
+        ((2,), 0.5, 25.0, True),
+        ((2,), 2.0, 25.0, False),  # by chance that often
+        ((2,), 0.5, 10.0, False),  # not worth its parameters
+        ((2, None), 0.5, 25.0, False),  # a push is felt by all joints
+    ],
+)
+def test_what_is_far_from_chance_is_sure_on_a_joint_of_its_own(
+    beside: tuple[int | None, ...], chance: float, gain: float, sure: bool
+) -> None:
+    """Joint 1's friction by load, beside effects of other joints, at so many times the chance that is asked for."""
+    rng = np.random.default_rng(7)
+
+    def on(joint: int | None) -> Member:
+        name, column = ("external_contact" if joint is None else "stribeck"), rng.normal(size=(ROWS, 1))
+        member = _member(name, joint, (column, column) if joint is None else (column,))
+        return replace(member, group=replace(member.group, joints=(0, 1) if joint is None else (joint - 1,)))
+
+    own = replace(on(1), gain=gain, degrees=2)
+    assert own.bic(ROWS) < LEAST
+    problem: Any = SimpleNamespace(rows=ROWS)
+    assert is_sure(problem, own, chance * SURE * 0.01, [on(joint) for joint in beside], 0.01) is sure
 
 
 @pytest.mark.parametrize(

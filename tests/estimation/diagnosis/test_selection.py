@@ -54,7 +54,7 @@ def _searching(
         replace(name, lambda *args: True)
     replace(
         "_polished",
-        lambda problem, entries, members, p_values, seen, won, rng: (kept := polished(members), p_values[: len(kept)]),
+        lambda problem, entries, members, p_values, *rest: (kept := polished(members), p_values[: len(kept)]),
     )
     replace("_measured", lambda problem, member, beside: member)
     return scans
@@ -145,6 +145,7 @@ def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
         set(),
         won,
         np.random.default_rng(0),
+        0.01,
     )
     assert len(looked) == int(tried)
     assert [m.hypothesis for m in members] == [C if tried else A, B]
