@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.base import Coefficient, Place, Situation
+from robots.terms.effects.base import Coefficient, Place, Shape, Situation
 from robots.terms.effects.static import Instant, StaticEffect
 
 if TYPE_CHECKING:
@@ -17,17 +17,23 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+WAYS = (1.0, -1.0)
+
 
 class JointCoupling(StaticEffect):
-    """Of joint k and j = k - 1: tau_j = I ddq_k + a dq_k + F s, tau_k = I ddq_j + b dq_j + F s, s = sign(dq_j + dq_k).
+    """Of joint k and j = k - 1: tau_j = I ddq_k + a dq_k + F s, tau_k = I ddq_j + b dq_j + w F s.
 
-    The rotor of a drive that passes through another (Gautier 1995). Rotors and seals that both motions turn give a = b;
-    each is free, so that drag one way is seen as well. Counted at the outer joint.
+    s = sign(dq_j + w dq_k). The rotor of a drive that passes through another (Gautier 1995). Rotors and seals that both
+    motions turn give a = b; each is free, so that drag one way is seen as well. The way w is -1 where the description's
+    axes of both joints turn the seal between them against each other. Counted at the outer joint.
     """
 
     name: ClassVar[str] = "joint_coupling"
     title: ClassVar[str] = "drives that run through each other (coupling)"
     sharp: ClassVar[bool] = True
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("way", "", -1.0, 1.0, "linear", WAYS, default=1.0, beside=True, choices=WAYS),
+    )
     rivals: ClassVar[tuple[str, ...]] = ("torque_crosstalk", "position_dependent_friction", "load_dependent_friction")
     experiments: ClassVar[tuple[str, ...]] = ("single_joint",)
 
@@ -46,15 +52,22 @@ class JointCoupling(StaticEffect):
             Coefficient("coupled_coulomb", force),
         )
 
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float | None, ...], ...]:
+        """Gives both ways round."""
+        return tuple((way,) for way in WAYS)
+
     def expression(self, robot: Robot, joint: Place, at: Instant) -> casadi.SX:
         """Builds the four columns on both joints."""
         assert joint is not None
-        outer, inner = joint - 1, joint - 2
+        outer, inner, way = joint - 1, joint - 2, at.shape[0]
         X = casadi.SX(robot.n, 4)
         X[inner, 0], X[outer, 0] = at.ddq[outer], at.ddq[inner]
         X[inner, 1], X[outer, 2] = at.dq[outer], at.dq[inner]
         # Two smooth signs are not the sign of a sum: it has the same slope at rest, a millirad per second wide.
-        X[inner, 3] = X[outer, 3] = casadi.tanh((at.dq[inner] + at.dq[outer]) / COULOMB_SCALE)
+        X[inner, 3] = casadi.tanh((at.dq[inner] + way * at.dq[outer]) / COULOMB_SCALE)
+        X[outer, 3] = way * X[inner, 3]
         return X
 
     def acts_on(self, robot: Robot, joint: Place) -> tuple[int, ...]:
@@ -76,7 +89,7 @@ class JointCoupling(StaticEffect):
         return (
             f"Joints {joint - 1} and {joint} drag each other: the motion of one costs torque of the other "
             f"({coefficients[1]:.3g} and {coefficients[2]:.3g} {force} s/{length}, {coefficients[3]:.3g} {force} of "
-            f"common Coulomb friction)."
+            f"Coulomb friction of their {'difference' if shape and shape[0] < 0 else 'sum'})."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

@@ -111,7 +111,7 @@ def test_the_grid_lies_within_the_bounds(effect, seen):
         for point in effect.grid(now, joint):
             assert len(point) == len(effect.shapes)
             for value, (lower, upper), shape in zip(point, bounds, effect.shapes, strict=True):
-                assert lower <= value <= upper
+                assert value in shape.choices or lower <= value <= upper
                 assert shape.lower <= value <= shape.upper
 
 
