@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.extension import Extension
+from estimation.diagnosis.going_on import going_on
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member
@@ -58,7 +59,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         rest = [m for k, m in enumerate(members) if k != i]
         steps = shape_errors(problem, member, accept(problem, tuple(m.group for m in rest)))
         member = between_logs(problem, member, rest)
-        steps = hidden_moments(problem, member, rest, steps)
+        steps = going_on(problem, member, rest, hidden_moments(problem, member, rest, steps))
         told.append(member)
         X = dense(problem, member.hypothesis, member.shape)
         slopes = [_slope(problem, member, k, abs(step)) for k, step in enumerate(steps)]

@@ -79,11 +79,19 @@ def word_finding(
 
 
 def _when(sentence: str, parameters: Sequence[Parameter]) -> str:
-    """Says between which times a change came where it is not known better."""
+    """Says between which times a change came where it is not known better, and at least when something pushed."""
     for own in parameters:
         if own.name == "change_time" and not own.determined and np.isfinite(own.ci95).all():
             between = f"between t = {own.ci95[0]:.1f} and {own.ci95[1]:.1f} s"
             sentence = sentence.replace(f"at t = {own.value:.2f} s", between)
+    spell = {own.name: own for own in parameters if own.name in ("start", "duration")}
+    if len(spell) == 2 and not all(np.isfinite(own.ci95).all() for own in spell.values()):
+        start, duration = (spell[name].value for name in ("start", "duration"))
+        told, least = (
+            f"from t = {start:.2f} s for {duration:.2g} s",
+            f"from t = {start:.1f} to {start + duration:.1f} s",
+        )
+        sentence = sentence.replace(told, f"{least} at least")
     return sentence
 
 

@@ -177,6 +177,13 @@ class Effect(ABC):
         """
         return ()
 
+    def beyond(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
+        """Lists what it would be where it may go on beside a refined shape, by a formula that is near to it only.
+
+        Each with the shape parameter that is then not told.
+        """
+        return ()
+
     def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists shapes that a log may not tell apart though other motions do; the likeliest is taken of those."""
         return ()

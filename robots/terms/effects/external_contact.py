@@ -100,6 +100,11 @@ class ExternalContact(Effect):
             ),
         )
 
+    def beyond(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
+        """Gives pushes as long as this, just before and just after: what pushes an arm that moves is no such pulse."""
+        start, duration = shape[:2]
+        return tuple((k, (at, duration, HOLD, 0.0)) for k, at in ((0, start - duration), (1, start + duration)))
+
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates a pulse on each joint, or the joints' torques of one on the flange (N, n, k), k = n or 6."""
         n, during = situation.robot.n, pulse(situation.t, shape)

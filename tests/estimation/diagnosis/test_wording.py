@@ -139,3 +139,14 @@ def test_a_change_is_told_at_its_time_or_between_two() -> None:
     rough = replace(sure, ci95=(59.72, 361.04), determined=False)
     assert _when(sentence, [rough]) == "The payload grew by 0.2 kg between t = 59.7 and 361.0 s."
     assert _when(sentence, [replace(rough, ci95=(-np.inf, np.inf))]) == sentence
+
+
+def test_a_push_whose_edges_are_not_told_lasted_at_least_so_long() -> None:
+    """Where one of start and duration may be anything; both within an interval are told as they are."""
+    sentence = "Something pushed the arm from t = 43.04 s for 4 s: joint 1 felt 1.26 N m."
+    start = Parameter(name="start", value=43.04, unit="s", standard_error=0.03, ci95=(42.9, 43.1), determined=True)
+    duration = replace(start, name="duration", value=3.95, ci95=(3.6, 4.4))
+    assert _when(sentence, [start, duration]) == sentence
+    open_ = replace(start, ci95=(-np.inf, np.inf), determined=False)
+    told = _when(sentence, [open_, duration])
+    assert told == "Something pushed the arm from t = 43.0 to 47.0 s at least: joint 1 felt 1.26 N m."

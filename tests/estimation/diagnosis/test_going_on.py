@@ -1,0 +1,64 @@
+"""Specification of what is told of a push whose torques are not those of its formula."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.going_on import going_on
+from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.problem import Problem
+from estimation.diagnosis.refinement import refine
+from estimation.diagnosis.scoring import accept
+from estimation.diagnosis.states import record
+from robots.robot import Robot
+from robots.signals import Log
+from robots.terms.effects import EFFECTS
+
+PUSH = Hypothesis(EFFECTS["external_contact"], None)
+STEP = Hypothesis(EFFECTS["friction_step"], 1)
+SIZE = 0.5  # N m
+ERRORS = [0.01, 0.02, 0.03, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "open_"),
+    [(0.0, 0.0, ()), (0.4, 0.0, (0,)), (0.0, -0.4, (1,)), (0.4, 0.4, (0, 1))],
+)
+def test_a_push_that_goes_on_has_no_edge_there(
+    arm: Robot,
+    arm_log: Callable[..., Log],
+    pose_arm: Callable[..., Problem],
+    before: float,
+    after: float,
+    open_: tuple[int, ...],
+) -> None:
+    """Of a push for a second, told as such, with shares of it for as long before and after: 20 of its noise each."""
+    recording = record(arm, [arm_log(torque_noise=0.02)])
+    start = float(recording.t[len(recording) // 2])
+    since = recording.t - start
+    course = np.select(
+        [(since > -1.0) & (since < 0.0), (since > 0.0) & (since < 1.0), (since > 1.0) & (since < 2.0)],
+        [before, 1.0, after],
+        0.0,
+    )
+    problem = pose_arm(replace(recording, tau=recording.tau + SIZE * course[:, None]), draws=4)
+    member = refine(problem, PUSH, (start, 1.0, 0.05, 0.0), accept(problem, ()), effort=0)
+    wanted = [np.inf if k in open_ else error for k, error in enumerate(ERRORS)]
+    assert going_on(problem, member, [], ERRORS) == wanted
+
+
+def test_a_push_at_the_log_s_end_and_what_is_no_push_have_their_errors(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
+) -> None:
+    """Beyond the last row nothing is to be seen; a change of friction goes on for good."""
+    recording = record(arm, [arm_log(torque_noise=0.02)])
+    problem = pose_arm(recording, draws=4)
+    last = float(recording.t[-1])
+    member = refine(problem, PUSH, (last - 1.0, 1.0, 0.05, 0.0), accept(problem, ()), effort=0)
+    assert going_on(problem, member, [], ERRORS) == ERRORS
+    step = refine(problem, STEP, (last - 1.0,), accept(problem, ()), effort=0)
+    assert going_on(problem, step, [], [0.01]) == [0.01]
