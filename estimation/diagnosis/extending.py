@@ -57,8 +57,9 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
     told: list[Member] = []
     for i, member in enumerate(members):
         rest = [m for k, m in enumerate(members) if k != i]
-        steps = shape_errors(problem, member, accept(problem, tuple(m.group for m in rest)))
+        # How far it may be is asked from the middle of a pause, not from the end of it that the search came to.
         member = between_logs(problem, member, rest)
+        steps = shape_errors(problem, member, accept(problem, tuple(m.group for m in rest)))
         steps = going_on(problem, member, rest, hidden_moments(problem, member, rest, steps))
         told.append(member)
         X = dense(problem, member.hypothesis, member.shape)

@@ -39,8 +39,9 @@ LEAST, MOST = 1 / 8, 8.0
 HOVERS = 0.05
 """Share of its root mean square that a load must get beyond zero to have changed sides."""
 
-INEXACT = 0.05
-"""Share by which a play errs besides: no link flies quite freely, nor does it stop at once on the other flank."""
+INEXACT = 0.2
+"""Share by which a play errs besides: a gear that winds up behind its flanks looks like more play, by a third to four
+fifths where it winds up as far as that under the loads about zero; nor does a link fly quite freely."""
 SMALLEST = 5e-7
 """Half a play below which there is none [rad or m]: at a radius of a tenth of a metre, what teeth are rough by."""
 

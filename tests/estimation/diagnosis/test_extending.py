@@ -68,6 +68,32 @@ def test_what_a_log_leaves_open_has_no_interval(
     assert estimable.sum() == {"payload_change": 4, "torque_sensor_drift": 2, "friction_step": 2}[name]
 
 
+@pytest.mark.parametrize(
+    ("effect", "joint", "known", "size"),
+    [("friction_step", 1, (), (0.5, 0.3)), ("payload_change", None, (1.0,), (0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0))],
+)
+def test_a_change_between_two_logs_is_within_the_pause(
+    arm: Robot,
+    arm_log: Callable[..., Log],
+    pose_arm: Callable[..., Problem],
+    effect: str,
+    joint: int | None,
+    known: tuple[float, ...],
+    size: tuple[float, ...],
+) -> None:
+    """Its interval is the pause, whichever end of it the search came to."""
+    first, hypothesis = arm_log(torque_noise=0.02), Hypothesis(EFFECTS[effect], joint)
+    logs = record(arm, [first, replace(first, t=first.t + float(np.ptp(first.t)) + 30.0)])
+    ends, begins = (float(logs.t[at]) for at in (logs.starts[1] - 1, logs.starts[1]))
+    columns = dense(pose_arm(logs), hypothesis, (begins, *known))
+    posed = pose_arm(replace(logs, tau=logs.tau + columns @ np.array(size)))
+    member = refine(posed, hypothesis, (begins, *known), accept(posed, ()))
+    extension = fit_extended(posed, [member], {}).model.extensions[0]
+    error = float(np.sqrt(extension.covariance[len(size), len(size)]))
+    assert extension.shape[0] == pytest.approx((ends + begins) / 2)
+    assert 1.96 * error == pytest.approx((begins - ends) / 2, rel=0.02)
+
+
 def test_no_log_knows_a_delay_better_than_its_formula(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
