@@ -24,6 +24,8 @@ PLAIN = (0.0, 0.0)
 RATIOS, CENTRES, TOLD = (0.35,), tuple(float(x) for x in np.arange(-np.pi, np.pi, np.pi / 4)), 1.0
 # A shorter lever (as a share of the other) is none.
 SHORTEST = 0.1
+# Ends of levers so alike would nearly meet where the joint passes their dead centre: no spring is as short.
+MEETING = 0.8
 LEVER = Shape("lever_ratio", "", 0.0, 0.95, "linear", inexact=0.1, default=0.0)
 CENTRE = Shape("dead_centre", "rad", -1.5 * np.pi, 1.5 * np.pi, "linear", inexact=0.1, default=0.0)
 
@@ -68,6 +70,12 @@ class Spring(StaticJointEffect):
     def unused(self, shape: tuple[float, ...]) -> frozenset[int]:
         """Gives ratio and dead centre of levers that are none."""
         return frozenset() if _has_lever(shape) else frozenset((0, 1))
+
+    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+        """Whether its ends stay apart: a catch at one angle resembles a spring whose ends nearly meet there."""
+        assert joint is not None
+        meets = _has_lever(shape) and shape[0] > MEETING and _passes(robot, joint, shape[1])
+        return not meets and super().believable(robot, joint, coefficients, shape)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists a spring without levers, and levers where a joint turns far enough to tell them."""
@@ -131,6 +139,12 @@ class Spring(StaticJointEffect):
 
 def _has_lever(shape: tuple[float, ...]) -> bool:
     return bool(shape) and shape[0] >= SHORTEST
+
+
+def _passes(robot: Robot, joint: int, angle: float) -> bool:
+    """Whether an angle, or one some turns from it, is within a joint's limits."""
+    lower, upper = float(robot.limits.lower[joint - 1]), float(robot.limits.upper[joint - 1])
+    return not np.isfinite(lower + upper) or lower + (angle - lower) % (2 * np.pi) <= upper
 
 
 def _middle(robot: Robot, joint: int) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -58,3 +60,14 @@ def test_a_joint_that_hardly_turns_tells_no_lever(seen):
     assert len(SPRING.grid(over(2.0), joint)) > 1
     assert SPRING.grid(over(0.8), joint) == ((0.0, 0.0),)
     assert SPRING.bounds(over(0.8), joint) == ((0.0, 0.0), (0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("ratio", "angle", "believed"),
+    [(0.75, 0.3, True), (0.9, 0.3, False), (0.9, 0.3 - 2 * np.pi, False), (0.9, 2.5, True), (0.0, 0.0, True)],
+)
+def test_the_ends_of_a_spring_do_not_meet_where_the_joint_passes(random_robot, ratio, angle, believed):
+    """On a joint that turns a radian each way: at an angle there, or a turn from it; beyond its stops they may."""
+    robot = random_robot(2, 2)
+    robot = replace(robot, limits=replace(robot.limits, lower=np.full(2, -1.0), upper=np.full(2, 1.0)))
+    assert SPRING.believable(robot, 1, np.array([400.0, -300.0, 0.0, 900.0]), (ratio, angle)) is believed
