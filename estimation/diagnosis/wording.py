@@ -136,7 +136,7 @@ def _parameters(
         if isinstance(own, Shape) and own.scale == "log" and np.isfinite(error) and value > 0:
             factor = float(np.exp(1.96 * error / value))
             interval = (value / factor, value * factor)
-        rough = isinstance(own, Shape) and _roughly(own, value, interval)
+        rough = isinstance(own, Shape) and (_roughly(own, value, interval) or _stopped(own, value))
         # No machine has what lies beyond, whatever the data leave open.
         interval = (min(max(interval[0], own.lower), value), max(min(interval[1], own.upper), value))
         result.append(
@@ -151,6 +151,11 @@ def _parameters(
         )
     idle = _perhaps_unused(effect, extension.shape, {parameter.name: parameter.ci95 for parameter in result})
     return tuple(_opened(told) if told.name in idle else told for told in result)
+
+
+def _stopped(shape: Shape, value: float) -> bool:
+    """Whether a size is the least or the largest that machines have: what the data would have beyond is not known."""
+    return shape.scale == "log" and value != shape.default and bool(np.isclose(value, [shape.lower, shape.upper]).any())
 
 
 def _opened(parameter: Parameter) -> Parameter:

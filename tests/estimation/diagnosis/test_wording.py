@@ -13,7 +13,7 @@ from estimation.diagnosis.extension import Extension
 from estimation.diagnosis.findings import Finding, Gain, Parameter
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.refinement import Member
-from estimation.diagnosis.wording import _parameters, _roughly, _when, no_part
+from estimation.diagnosis.wording import _parameters, _roughly, _stopped, _when, no_part
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
 
@@ -38,6 +38,21 @@ def test_a_fifth_of_a_value_or_of_a_second(
 ) -> None:
     """A nonlinear parameter is known roughly where its interval is wider, a moment by the clock."""
     assert _roughly(EFFECTS[effect].shapes[shape], value, interval) is roughly
+
+
+@pytest.mark.parametrize(
+    ("effect", "shape", "value", "stopped"),
+    [
+        ("presliding_hysteresis", 0, 0.2, True),
+        ("presliding_hysteresis", 0, 1e-5, True),
+        ("presliding_hysteresis", 0, 0.19, False),
+        ("backlash", 1, 0.3, False),  # what it is where nothing is said
+        ("torque_constant_saturation", 0, 1.0, False),  # a power, and no size
+    ],
+)
+def test_a_size_at_its_bound_is_not_determined(effect: str, shape: int, value: float, stopped: bool) -> None:
+    """However narrow its interval is, cut at the bound as it is."""
+    assert _stopped(EFFECTS[effect].shapes[shape], value) is stopped
 
 
 def test_an_interval_holds_what_machines_may_have(arm: Robot) -> None:
