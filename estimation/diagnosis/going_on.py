@@ -25,12 +25,12 @@ def going_on(problem: Problem, member: Member, others: Sequence[Member], errors:
         errors: by the profiles.
     """
     result, effect = list(errors), member.hypothesis.effect
-    for k, shape in effect.beyond(member.shape):
+    for k, shape in effect.further(member.shape):
         _, columns = problem.columns_of(member.hypothesis, shape)
         if not any(part.any() for part in columns):
             continue
         beside = accept(problem, tuple(m.group for m in (member, *others)))
-        further = refine(problem, member.hypothesis, shape, beside, effort=0)
-        if further.worth(problem.rows) > LEAST:
+        there = refine(problem, member.hypothesis, shape, beside, effort=0)
+        if there.worth(problem.rows) > LEAST:
             result[k] = np.inf
     return result

@@ -177,7 +177,7 @@ class Effect(ABC):
         """
         return ()
 
-    def beyond(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
+    def further(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
         """Lists what it would be where it may go on beside a refined shape, by a formula that is near to it only.
 
         Each with the shape parameter that is then not told.

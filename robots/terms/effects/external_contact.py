@@ -100,7 +100,7 @@ class ExternalContact(Effect):
             ),
         )
 
-    def beyond(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
+    def further(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
         """Gives pushes as long as this, just before and just after: what pushes an arm that moves is no such pulse."""
         start, duration = shape[:2]
         return tuple((k, (at, duration, HOLD, 0.0)) for k, at in ((0, start - duration), (1, start + duration)))
