@@ -103,7 +103,9 @@ def select(
         best = [m for m in best if not m.hypothesis.effect.passing or lasts(problem, m, accepted)]
         if not best:
             break
-        if not beyond(problem, best[0], members):
+        # What is sure is on joints where no other acts, and so none leaves anything.
+        sure_alone = is_sure(problem, best[0], chance[best[0].hypothesis], members, false_alarm)
+        if not (sure_alone or beyond(problem, best[0], members)):
             if (formed := _formed_anew(problem, best[0], members)) is None:
                 break
             *members, best[0] = formed

@@ -64,11 +64,8 @@ def beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bo
             default=0.0,
         )
     ]
-    if len(able) == len(candidate.group.joints):
-        # None of it is another's: whether it is worth its parameters is all there is to ask.
-        return True
     lost = candidate.gain - candidate.gain_on(able)
-    return candidate.bic(problem.rows) - lost > LEAST
+    return not members or candidate.bic(problem.rows) - lost > LEAST
 
 
 def _agreed(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
