@@ -16,7 +16,7 @@ def checked_time(value: ArrayLike) -> FloatArray:
     if len(t) == 0:
         raise InputError("no samples", column="t", allowed="one or more")
     require_finite("t", t[:, None], joints=False)
-    backward = np.flatnonzero(np.diff(t) <= 0.0)
+    backward = np.flatnonzero(t[1:] <= t[:-1])
     if len(backward):
         first = int(backward[0])
         times = f"{float(t[first + 1])!r} after {float(t[first])!r}"

@@ -133,6 +133,12 @@ def test_silent_temperature_sensor_is_accepted(name):
     assert (error.column, error.row) == (name, 3)
 
 
+def test_times_are_compared_not_subtracted() -> None:
+    """Of times at either end of what a number holds the difference overflows; they increase all the same."""
+    times = np.array([-1.7e308, 1.7e308])
+    np.testing.assert_array_equal(Log(times, np.zeros((2, 1)), tau=np.zeros((2, 1))).t, times)
+
+
 @pytest.mark.parametrize("make", [motion, log])
 @pytest.mark.parametrize(("last", "word"), [(0.012, "repeats"), (0.001, "backward")])
 def test_time_increases(make, last, word):
