@@ -24,13 +24,10 @@ def going_on(problem: Problem, member: Member, others: Sequence[Member], errors:
         others: what else was found.
         errors: by the profiles.
     """
-    result, effect = list(errors), member.hypothesis.effect
-    for k, shape in effect.further(member.shape):
-        _, columns = problem.columns_of(member.hypothesis, shape)
-        if not any(part.any() for part in columns):
-            continue
+    result, further = list(errors), member.hypothesis.effect.further(member.shape)
+    if further:
         beside = accept(problem, tuple(m.group for m in (member, *others)))
-        there = refine(problem, member.hypothesis, shape, beside, effort=0)
-        if there.worth(problem.rows) > LEAST:
-            result[k] = np.inf
+        for k, shape in further:
+            if refine(problem, member.hypothesis, shape, beside, effort=0).worth(problem.rows) > LEAST:
+                result[k] = np.inf
     return result

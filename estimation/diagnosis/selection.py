@@ -16,7 +16,7 @@ from estimation.diagnosis.refinement import Member, all_but, refine
 from estimation.diagnosis.scan import Entry, Outcome, Scan, measure, scan
 from estimation.diagnosis.scoring import Accepted, accept, score
 from estimation.diagnosis.together import together
-from estimation.diagnosis.worthwhile import LEAST, SURE, beyond, is_sure, lasts, worth_it
+from estimation.diagnosis.worthwhile import LEAST, SURE, beyond, is_sure, is_told, lasts
 from robots.common.parallel import threaded
 
 # A member whose gain is within this share of what it was when it won over its rivals wins over them still.
@@ -95,11 +95,7 @@ def select(
         refined = _best(problem, contenders(problem, result, members), accepted, known)
         chance = {member.hypothesis: chances.get(member.hypothesis, 1.0) for member in refined}
         able = [m for m in refined if chance[m.hypothesis] <= false_alarm and m.hypothesis not in spurned]
-        best = [
-            m
-            for m in able
-            if worth_it(problem, m, members) or is_sure(problem, m, chance[m.hypothesis], members, false_alarm)
-        ]
+        best = [m for m in able if is_told(problem, m, chance[m.hypothesis], members, false_alarm)]
         best = [m for m in best if not m.hypothesis.effect.passing or lasts(problem, m, accepted)]
         if not best:
             break
@@ -131,15 +127,12 @@ def select(
         Found(_measured(problem, member, all_but(problem, members, i)), p_value)
         for i, (member, p_value) in enumerate(zip(members, p_values, strict=True))
     ]
-    kept = []
-    for i, f in enumerate(found):
-        others = [*members[:i], *members[i + 1 :]]
-        if (
-            f.member.hypothesis in seen
-            or worth_it(problem, f.member, others)
-            or is_sure(problem, f.member, f.p_value, others, false_alarm)
-        ):
-            kept.append(f)
+    kept = [
+        f
+        for i, f in enumerate(found)
+        if f.member.hypothesis in seen
+        or is_told(problem, f.member, f.p_value, [*members[:i], *members[i + 1 :]], false_alarm)
+    ]
     order = sorted(kept, key=lambda f: -f.member.gain)
     last = result if members else first
     return Selection(tuple(order), frozenset(seen), first, last, accept(problem, tuple(f.member.group for f in order)))

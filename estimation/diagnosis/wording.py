@@ -87,11 +87,8 @@ def _when(sentence: str, parameters: Sequence[Parameter]) -> str:
     spell = {own.name: own for own in parameters if own.name in ("start", "duration")}
     if len(spell) == 2 and not all(np.isfinite(own.ci95).all() for own in spell.values()):
         start, duration = (spell[name].value for name in ("start", "duration"))
-        told, least = (
-            f"from t = {start:.2f} s for {duration:.2g} s",
-            f"from t = {start:.1f} to {start + duration:.1f} s",
-        )
-        sentence = sentence.replace(told, f"{least} at least")
+        least = f"from t = {start:.1f} to {start + duration:.1f} s at least"
+        sentence = sentence.replace(f"from t = {start:.2f} s for {duration:.2g} s", least)
     return sentence
 
 

@@ -27,6 +27,11 @@ def worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) -> 
     return worth > LEAST
 
 
+def is_told(problem: Problem, candidate: Member, p_value: float, others: Sequence[Member], false_alarm: float) -> bool:
+    """Whether an effect is worth its parameters beside others, or sure without that."""
+    return worth_it(problem, candidate, others) or is_sure(problem, candidate, p_value, others, false_alarm)
+
+
 def is_sure(problem: Problem, candidate: Member, p_value: float, others: Sequence[Member], false_alarm: float) -> bool:
     """Whether an effect on joints where no other acts is far from chance, and worth its parameters at all."""
     joints = set(candidate.group.joints)

@@ -42,7 +42,8 @@ class Shape:
         default: what it is where a description does not say; None where it must be said.
         beside: whether the effect is whole without it: it is sought once the others are found, and is one of its
             parameters only where it is not the default.
-        choices: the only values that machines have, where these are few: `likely` lists them, and nothing is searched.
+        choices: the only values that machines have, where these are few: `likely` lists them, and nothing between is
+            searched.
     """
 
     name: str

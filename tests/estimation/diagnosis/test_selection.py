@@ -50,7 +50,7 @@ def _searching(
             SimpleNamespace(hypothesis=o.hypothesis, group=o.hypothesis, shape=(), gain=1.0) for o in outcomes
         ],
     )
-    for name in ("worth_it", "is_sure", "beyond"):
+    for name in ("is_told", "is_sure", "beyond"):
         replace(name, lambda *args: True)
     replace(
         "_polished",
