@@ -121,8 +121,15 @@ def _stretches(log: Log, gate: GateReport) -> tuple[Log, ...]:
     """Cuts a log at its gaps and where a column hung; it is left whole where no stretch is long enough by itself."""
     spans = [(first, stop) for first, stop in gate.parts if log.t[stop - 1] - log.t[first] >= SHORTEST]
     if gate.parts == ((0, len(log)),) or not spans:
-        return (log,)
-    parts = (log.rows(slice(first, stop)) for first, stop in spans)
+        return (_fresh(log, gate, 0, len(log)),)
+    parts = (_fresh(log, gate, first, stop) for first, stop in spans)
     return tuple(
         replace(part, name=f"{log.name or 'log'} from {part.t[0]:.4g} to {part.t[-1]:.4g} s") for part in parts
     )
+
+
+def _fresh(log: Log, gate: GateReport, first: int, stop: int) -> Log:
+    """The rows of a stretch that are no copies of those before."""
+    if not len(gate.copies):
+        return log if stop - first == len(log) else log.rows(slice(first, stop))
+    return log.rows(np.setdiff1d(np.arange(first, stop), gate.copies))

@@ -17,12 +17,13 @@ from estimation.gate.motion import check_motion, standing
 from estimation.gate.orientations import check_orientations
 from estimation.gate.physics import joint_physics, mean_inertias
 from estimation.gate.quick_fit import Rows
+from estimation.gate.repeats import check_repeats, without_hung
 from estimation.gate.report import FEWEST, GateReport, pick_rows, worst_first
 from estimation.gate.resolution import check_clipping, check_resolution
 from estimation.gate.scales import check_scales, check_size
 from estimation.gate.signs import check_signs
 from estimation.gate.spikes import check_spikes
-from estimation.gate.timing import Timing, check_repeats, check_timing, without_hung
+from estimation.gate.timing import Timing, check_timing
 from estimation.gate.units import beyond_findings, check_speed, suspect_position_unit
 from estimation.gate.values import (
     absurd_values,
@@ -77,7 +78,8 @@ def check_log(robot: Robot, log: Log) -> GateReport:
     samples, duration = len(log), log.duration
     columns = Columns.of(log)
     timing = check_timing(log, robot.period)
-    findings: list[Finding] = [*too_short(log), *timing.findings, *check_repeats(log, columns)]
+    repeats, copies = check_repeats(log, columns)
+    findings: list[Finding] = [*too_short(log), *timing.findings, *repeats]
     findings += check_resolution(columns)
     found, spikes = check_spikes(columns)
     breaks = np.array([first for first, _ in timing.parts[1:]], dtype=np.intp)
@@ -90,10 +92,11 @@ def check_log(robot: Robot, log: Log) -> GateReport:
         *check_motion(robot, columns),
         *check_jumps(log.t, columns, spikes, breaks, standing(robot, columns)),
     ]
-    if len(spikes):
-        log = pick_rows(log, np.delete(np.arange(len(log)), spikes))
+    left_out = np.union1d(spikes, copies)
+    if len(left_out):
+        log = pick_rows(log, np.delete(np.arange(len(log)), left_out))
         columns = Columns.of(log)
-    dynamics, found = _physics(robot, log, columns, check_timing(log, robot.period) if len(spikes) else timing)
+    dynamics, found = _physics(robot, log, columns, check_timing(log, robot.period) if len(left_out) else timing)
     findings += found
     return GateReport(
         robot=robot.name,
@@ -104,12 +107,13 @@ def check_log(robot: Robot, log: Log) -> GateReport:
         findings=worst_first(once(findings)),
         parts=without_hung(timing.parts, findings),
         spikes=spikes,
+        copies=copies,
         **dynamics,
     )
 
 
 def _physics(robot: Robot, log: Log, columns: Columns, timing: Timing) -> tuple[dict[str, Array], list[Finding]]:
-    """Looks at derivatives and torques of a log without spikes."""
+    """Looks at derivatives and torques of a log without spikes and copies."""
     dynamics: dict[str, Array] = {
         name: np.full(robot.n, np.nan) for name in ("delay", "delay_error", "unexplained", "information")
     }

@@ -37,6 +37,8 @@ class GateReport:
         parts: (first, stop) sample indices of the stretches without a gap, and in which no column hung; what lies
             between is not bridged.
         spikes: indices of single rows that stick out of their neighbours, which a fit must leave out.
+        copies: indices of rows that repeat the row before while the arm moves, where they are many: a fit must leave
+            them out, for they are old.
         delay: by which the torque lags the position (n,) [s], NaN where the log does not tell.
         delay_error: its standard error (n,) [s].
         unexplained: torque error on stretches that the fit had not seen over the torque's standard deviation (n,), by
@@ -53,6 +55,7 @@ class GateReport:
     findings: tuple[Finding, ...]
     parts: tuple[tuple[int, int], ...]
     spikes: NDArray[np.intp]
+    copies: NDArray[np.intp]
     delay: Array
     delay_error: Array
     unexplained: Array
@@ -95,7 +98,7 @@ class GateReport:
         )
 
     def usable(self, log: Log) -> tuple[Log, ...]:
-        """Leaves out the rows with spikes and cuts the log at its gaps, so that nothing is interpolated across them.
+        """Leaves out spikes and copies, and cuts the log at its gaps, so that nothing is interpolated across them.
 
         Args:
             log: the log that was checked.
@@ -108,10 +111,10 @@ class GateReport:
         """
         if len(log) != self.samples:
             raise InputError(f"{len(log)} rows", allowed=f"{self.samples}, as the log that was checked")
-        if self.parts == ((0, len(log)),) and not len(self.spikes):
+        if self.parts == ((0, len(log)),) and not len(self.spikes) and not len(self.copies):
             return (log,)
         kept = np.ones(len(log), dtype=bool)
-        kept[self.spikes] = False
+        kept[self.spikes] = kept[self.copies] = False
         parts = [np.arange(first, stop)[kept[first:stop]] for first, stop in self.parts]
         logs = tuple(pick_rows(log, part) for part in parts if len(part) >= FEWEST)
         if not logs:
@@ -142,6 +145,7 @@ class GateReport:
             "duration": self.duration,
             "period": self.period,
             "spikes": [int(row) + 1 for row in self.spikes],
+            "copies": [int(row) + 1 for row in self.copies],
             "parts": [list(part) for part in self.parts],
             **{name: [_plain(value) for value in getattr(self, name)] for name in arrays},
             "findings": [{**finding.to_dict(), "value": _plain(finding.value)} for finding in self.findings],

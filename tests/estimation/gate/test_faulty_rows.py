@@ -86,6 +86,31 @@ def test_repeated_rows_are_counted(good, spoilt):
     assert finding.severity == "warning"
 
 
+def test_rows_that_a_logger_writes_again_are_left_out(good, spoilt):
+    """A logger that asks four times as often as the controller answers has three old rows to a new one."""
+    log = good()
+    rows = 4 * (np.arange(len(log)) // 4)
+    q, tau = log.q[rows], log.tau[rows]
+    report = spoilt(q=q, tau=tau)
+    (finding,) = found(report, "repeated_rows")
+    assert "left out" in finding.action
+    (usable,) = report.usable(replace(log, q=q, tau=tau))
+    moving = slice(100, -100)
+    assert (np.diff(usable.t)[moving] > 3.5 * np.diff(log.t).mean()).all()
+    assert np.isin(usable.t[moving], log.t[::4]).all()
+
+
+def test_a_slow_arm_with_coarse_sensors_repeats_itself(good, spoilt):
+    """Rows that are equal because nothing has changed by a count of the encoder, nor of the torque, are no copies."""
+    log = good()
+    counts = 8.0 * np.median(np.abs(np.diff(log.q, axis=0)), axis=0)
+    coarse = {"q": np.round(log.q / counts) * counts, "tau": np.round(log.tau / log.tau.std(axis=0)) * 1.0}
+    report = spoilt(**coarse)
+    assert found(report, "repeated_rows")
+    assert not len(report.copies)
+    assert report.usable(replace(log, **coarse))[0] is not None
+
+
 def test_hung_column_is_told(good, spoilt):
     """A torque that holds one value while the arm moves, and jumps then, hung."""
     tau = good().tau.copy()
