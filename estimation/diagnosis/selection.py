@@ -10,6 +10,7 @@ import numpy as np
 
 from estimation.diagnosis.composed import composed
 from estimation.diagnosis.contenders import NEAR, contenders
+from estimation.diagnosis.going_on import as_it_lasts
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member, all_but, refine
@@ -105,6 +106,8 @@ def select(
             if (formed := _formed_anew(problem, best[0], members)) is None:
                 break
             *members, best[0] = formed
+            accepted = accept(problem, tuple(member.group for member in members))
+        best[0] = as_it_lasts(problem, best[0], accepted)
         members.append(best[0])
         p_values.append(chance[best[0].hypothesis])
         won[best[0].hypothesis] = best[0].gain

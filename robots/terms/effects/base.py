@@ -184,6 +184,13 @@ class Effect(ABC):
         """
         return ()
 
+    def lasting(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+        """Lists shapes of formulas that stay true while it lasts, where a refined one's is near to it only.
+
+        As if it acted throughout; when it does are the first two of its shape parameters, a start and a duration [s].
+        """
+        return ()
+
     def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists shapes that a log may not tell apart though other motions do; the likeliest is taken of those."""
         return ()

@@ -26,6 +26,8 @@ FROM = (0.0, 0.5, 1.0)
 ALONE = 0.05  # share of what a joint feels below which others feel nothing
 NONE = 1e-6  # share of force or moment [N or N m] below which the other is none
 WRENCH = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
+# Of a force F at the place r of a body, the first along the base's axes, the second along the body's.
+PLACED = tuple(f"place_{i}_force_{k}" for i in "xyz" for k in "xyz")
 
 
 class ExternalContact(Effect):
@@ -33,7 +35,8 @@ class ExternalContact(Effect):
 
     A force anywhere on the arm: during so short a time the pose, and with it what each joint feels, stays nearly the
     same. The hardness h makes it a half sine (1), a hold (near 0), or what lies between. One that lasts while the arm
-    moves is tau = J(q)' w p(t) instead: a force and a moment on the flange, constant in the base frame.
+    moves is tau = J(q)' w p(t) instead: a force and a moment on the flange, constant in the base frame; or a force F,
+    constant there, at a place r of one of the bodies, J_b(q, r)' F p(t), which is linear in F and in all r_i F_k.
     """
 
     name: ClassVar[str] = "external_contact"
@@ -46,6 +49,7 @@ class ExternalContact(Effect):
         Shape("duration", "s", 0.03, 60.0, "log", (0.2, 0.5, 1.25, 3.2), 0.05),
         Shape("hardness", "", 0.05, 2.0, "log", (BETWEEN,), 0.1, BETWEEN),
         Shape("on_the_flange", "", 0.0, 1.0, "linear", (0.0,), default=0.0),
+        Shape("on_body", "", 0.0, np.inf, "linear", (0.0,), default=0.0),
     )
     rivals: ClassVar[tuple[str, ...]] = ("payload_change", "hand_guiding", "friction_step", "torque_sensor_drift")
     experiments: ClassVar[tuple[str, ...]] = ("repeat",)
@@ -55,8 +59,10 @@ class ExternalContact(Effect):
         return self.described(robot, joint, ())
 
     def described(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[Coefficient, ...]:
-        """Describes what each joint feels at the peak, or the force and the moment on the flange."""
-        if on_the_flange(shape):
+        """Describes what each joint feels at the peak, or force and moment on the flange, or force and place."""
+        if on_body(shape):
+            told = [Coefficient(name, "N") for name in WRENCH[:3]] + [Coefficient(name, "N m") for name in PLACED]
+        elif on_the_flange(shape):
             told = [Coefficient(name, "N" if name.startswith("force") else "N m") for name in WRENCH]
         else:
             told = [Coefficient(f"peak_on_joint_{j + 1}", force_unit(robot, j)) for j in range(robot.n)]
@@ -70,30 +76,33 @@ class ExternalContact(Effect):
         """
         size = np.abs(coefficients[: robot.n])
         most = int(np.argmax(size))
-        alone = not on_the_flange(shape) and most >= 2 and bool((size[:most] < ALONE * size[most]).all())
+        told = not on_the_flange(shape) and not on_body(shape)
+        alone = told and most >= 2 and bool((size[:most] < ALONE * size[most]).all())
         return not alone and super().believable(robot, joint, coefficients, shape)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists durations, each starting every half of it."""
-        return tuple((*spell, BETWEEN, 0.0) for spell in spells(situation, self.shapes[1].grid))
+        return tuple((*spell, BETWEEN, 0.0, 0.0) for spell in spells(situation, self.shapes[1].grid))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Keeps the contact within the data."""
         first, last = float(situation.t[0]), float(situation.t[-1])
         longest = min(self.shapes[1].upper, max(last - first, 0.1))
         hardness = (self.shapes[2].lower, self.shapes[2].upper)
-        return (first, last), (self.shapes[1].lower, longest), hardness, (0.0, 0.0)
+        return (first, last), (self.shapes[1].lower, longest), hardness, (0.0, 0.0), (0.0, 0.0)
 
     def elsewhere(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[tuple[float, ...], ...], ...]:
         """Gives pushes on the flange that last, of which this may be the part in which the arm moves least."""
+        if on_body(shape):
+            return ()
         (first, last), (_, longest), *_ = self.bounds(situation, joint)
         start, duration, hardness = shape[:3]
         lasting = [min(duration * factor, longest) for factor in LONGER]
         return (
             tuple(
-                (float(np.clip(start - share * (length - duration), first, last)), length, hard, 1.0)
+                (float(np.clip(start - share * (length - duration), first, last)), length, hard, 1.0, 0.0)
                 for length in dict.fromkeys(lasting)
                 for share in (FROM if length > duration else FROM[:1])
                 for hard in (hardness, HOLD)
@@ -103,14 +112,28 @@ class ExternalContact(Effect):
     def further(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
         """Gives pushes as long as this, just before and just after: what pushes an arm that moves is no such pulse."""
         start, duration = shape[:2]
-        return tuple((k, (at, duration, HOLD, 0.0)) for k, at in ((0, start - duration), (1, start + duration)))
+        times = ((0, start - duration), (1, start + duration))
+        return tuple((k, (at, duration, HOLD, 0.0, 0.0)) for k, at in times)
+
+    def lasting(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+        """Gives forces at a place of each of the bodies."""
+        if on_body(shape):
+            return ()
+        first, last = float(situation.t[0]), float(situation.t[-1])
+        ever = (2 * first - last - 1.0, 3 * (last - first + 1.0), HOLD)
+        return tuple((*ever, 0.0, float(body + 1)) for body in range(situation.robot.n))
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates a pulse on each joint, or the joints' torques of one on the flange (N, n, k), k = n or 6."""
+        """Evaluates a pulse on each joint, or the joints' torques of one on the flange or a body (N, n, k)."""
         n, during = situation.robot.n, pulse(situation.t, shape)
         X = np.zeros((len(situation), n, _count(n)))
-        if on_the_flange(shape):
-            acts = np.flatnonzero(during)
+        acts = np.flatnonzero(during)
+        if on_body(shape):
+            links = situation.sensitivity("links")[acts]
+            X[acts, :, : len(WRENCH[:3]) + len(PLACED)] = during[acts, None, None] * _at_body(
+                situation.robot, links, round(shape[4])
+            )
+        elif on_the_flange(shape):
             X[acts, :, : len(WRENCH)] = during[acts, None, None] * situation.sensitivity("jacobian")[acts].transpose(
                 0, 2, 1
             )
@@ -149,6 +172,12 @@ class ExternalContact(Effect):
     ) -> str:
         """Says what the values mean."""
         when = f"from t = {shape[0]:.2f} s for {shape[1]:.2g} s"
+        if on_body(shape):
+            push = float(np.linalg.norm(coefficients[:3]))
+            return (
+                f"Something pushed the arm {when}, as a force of {push:.3g} N at one place of body {shape[4]:.0f} does "
+                "that stays the same (along the base's axes; the signs are those of the arm's push against it)."
+            )
         if on_the_flange(shape):
             # What no joint feels of them is none, or rounding.
             push, turn = (float(np.linalg.norm(part)) for part in (coefficients[:3], coefficients[3:6]))
@@ -168,12 +197,39 @@ class ExternalContact(Effect):
 
 
 def _count(joints: int) -> int:
-    return max(joints, len(WRENCH))
+    return max(joints, len(WRENCH[:3]) + len(PLACED))
+
+
+def _at_body(robot: Robot, links: Array, body: int) -> Array:
+    """The joints' torques (N, n, 12) of forces on a body, from 1: at its origin, and as they grow with the place.
+
+    Args:
+        robot: its joints.
+        links: each link's rotation and origin (N, 12, n).
+        body: the link.
+    """
+    turns, origins = links[:, :9].reshape(len(links), 3, 3, robot.n), links[:, 9:]
+    axes = turns[:, :, :, body - 1]
+    X = np.zeros((len(links), robot.n, len(WRENCH[:3]) + len(PLACED)))
+    for j, joint in enumerate(robot.chain.joints[:body]):
+        axis = turns[:, :, :, j] @ joint.axis
+        if joint.kind != "revolute":
+            X[:, j, :3] = axis
+            continue
+        X[:, j, :3] = np.cross(axis, origins[:, :, body - 1] - origins[:, :, j])
+        # a . (R e_i x e_k) = (a x R e_i)_k
+        X[:, j, 3:] = np.cross(axis[:, None], axes.transpose(0, 2, 1)).reshape(len(links), len(PLACED))
+    return X
 
 
 def on_the_flange(shape: tuple[float, ...]) -> bool:
     """Whether a push is a force on the flange that lasts while the arm moves."""
     return len(shape) > 3 and shape[3] > 0.5
+
+
+def on_body(shape: tuple[float, ...]) -> bool:
+    """Whether a push is a force at a place of a body that lasts while the arm moves."""
+    return len(shape) > 4 and shape[4] > 0.5
 
 
 def pulse(t: Array, shape: tuple[float, ...]) -> Array:

@@ -137,6 +137,10 @@ def _flange(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casad
     return _forward(chain, q)[1]
 
 
+def _links(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    return casadi.horzcat(*(casadi.vertcat(casadi.vec(turn.T), origin) for turn, origin in _frames(chain, q)))
+
+
 def _frames(chain: Chain, q: casadi.SX) -> list[tuple[casadi.SX, casadi.SX]]:
     """Gives each link's rotation and origin in the base frame."""
     rotation, origin = casadi.SX.eye(3), casadi.SX(3, 1)
@@ -194,4 +198,5 @@ KINDS: dict[str, Callable[..., casadi.SX]] = {
     "jacobian": _jacobian,
     "flange": _flange,
     "moment": _moment,
+    "links": _links,
 }

@@ -165,7 +165,8 @@ class Situation:
                 rotors, ``gravity`` d rigid/d(gravity in the base frame) (N, n, 3), ``tool`` torque per inertial
                 parameter of a body on the flange, in its frame (N, n, 10), ``jacobian`` of the flange in the base
                 frame, linear then angular (N, 6, n), ``flange`` its place there (N, 3, 1), ``moment`` the first moment
-                of the links' masses there [kg m] (N, 3, 1).
+                of the links' masses there [kg m] (N, 3, 1), ``links`` of each link's frame there the rotation matrix,
+                row by row, and the origin [m] (N, 12, n).
         """
         from robots.terms.effects.sensitivities import evaluate
 

@@ -111,9 +111,9 @@ def test_a_moment_while_the_arm_stands_may_be_anywhere_there(
     problem = pose_arm(replace(recording, unsure=stands))
     begins, ends = recording.t[1000], recording.t[1199]
     push = refine(
-        problem, Hypothesis(EFFECTS["external_contact"], None), (begins + 0.1, 1.0, 0.5, 0.0), accept(problem, ())
+        problem, Hypothesis(EFFECTS["external_contact"], None), (begins + 0.1, 1.0, 0.5, 0.0, 0.0), accept(problem, ())
     )
-    there = replace(push, shape=(begins + 0.1, 1.0, 0.5, 0.0))
+    there = replace(push, shape=(begins + 0.1, 1.0, 0.5, 0.0, 0.0))
     start, duration, *rest = hidden_moments(problem, there, [], [0.01, 0.02, 0.03, 0.0])
     assert 1.96 * start == pytest.approx(ends - begins - 0.1)
     assert duration == start
@@ -142,7 +142,9 @@ def test_a_change_between_two_logs_may_have_come_at_any_time_there(
     before = replace(step, shape=(ends - 1.0,))
     assert between_logs(problem, before, []) is before
     # A push has its own beginning and end.
-    push = refine(problem, Hypothesis(EFFECTS["external_contact"], None), (begins, 1.0, 0.5, 0.0), accept(problem, ()))
+    push = refine(
+        problem, Hypothesis(EFFECTS["external_contact"], None), (begins, 1.0, 0.5, 0.0, 0.0), accept(problem, ())
+    )
     assert between_logs(problem, push, []) is push
 
 

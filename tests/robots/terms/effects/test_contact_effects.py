@@ -23,7 +23,7 @@ def test_a_push_anywhere_is_felt_by_each_joint(now, twin):
         torque[i] = jacobian.T @ wrench
     X = EFFECTS["external_contact"].columns(now, None, shape)
     assert not X[now.t >= 2.3].any()
-    flat = X.reshape(-1, 6)
+    flat = X.reshape(-1, X.shape[2])
     left = torque.reshape(-1) - flat @ np.linalg.lstsq(flat, torque.reshape(-1), rcond=None)[0]
     # The pulse lies between a half sine and a hold: 2 % of a half sine's energy, and what the pose changes.
     assert np.sum(left**2) < 0.1 * np.sum(torque**2)
@@ -33,12 +33,12 @@ def test_a_push_on_a_further_joint_alone_is_none(catalogue_robot) -> None:
     """A force that only joint 4 feels would miss three axes; across the arm one may well miss all but the first."""
     push, brief, lasting = EFFECTS["external_contact"], (3.0, 0.4, 0.6, 0.0), (3.0, 0.4, 0.6, 1.0)
     robot = catalogue_robot("er3a")
-    n = robot.n
-    alone = np.eye(n)[3] * 5.0 + 0.04
+    each = np.eye(12)
+    alone = each[3] * 5.0 + 0.04 * each[: robot.n].sum(axis=0)
     assert not push.believable(robot, None, alone, brief)
-    assert push.believable(robot, None, alone + 0.4 * np.eye(n)[1], brief)
-    assert push.believable(robot, None, np.eye(n)[0] * 5.0, brief)
-    assert push.believable(robot, None, np.eye(n)[1] * 5.0, brief)
+    assert push.believable(robot, None, alone + 0.4 * each[1], brief)
+    assert push.believable(robot, None, each[0] * 5.0, brief)
+    assert push.believable(robot, None, each[1] * 5.0, brief)
     assert push.believable(robot, None, alone, lasting)
 
 
@@ -48,7 +48,7 @@ def test_a_push_that_lasts_is_a_wrench_on_the_flange(now, twin):
     push = EFFECTS["external_contact"]
     model = twin(now.robot).model
     data = model.createData()
-    wrench = np.array([30.0, -10.0, 20.0, 2.0, -1.0, 3.0])
+    wrench, more = np.array([30.0, -10.0, 20.0, 2.0, -1.0, 3.0]), np.zeros(6)
     X = push.columns(now, None, (1.0, 1.5, 0.1, 1.0))
     during = np.flatnonzero((now.t > 1.1) & (now.t < 2.4))[::20]
     strength = np.sin(np.pi * (now.t[during] - 1.0) / 1.5) ** 0.1
@@ -59,7 +59,7 @@ def test_a_push_that_lasts_is_a_wrench_on_the_flange(now, twin):
         own = pin.getJointJacobian(model, data, model.njoints - 1, pin.LOCAL_WORLD_ALIGNED)
         lever = place - data.oMi[model.njoints - 1].translation
         moment = wrench[3:] + np.cross(lever, wrench[:3])
-        np.testing.assert_allclose(X[i] @ wrench, p * own.T @ np.concatenate([wrench[:3], moment]), atol=1e-6)
+        np.testing.assert_allclose(X[i] @ [*wrench, *more], p * own.T @ np.concatenate([wrench[:3], moment]), atol=1e-6)
     assert [c.name for c in push.described(now.robot, None, (1.0, 1.5, 0.1, 1.0))][:3] == [
         "force_x",
         "force_y",
@@ -68,10 +68,33 @@ def test_a_push_that_lasts_is_a_wrench_on_the_flange(now, twin):
     assert "force of 37.4 N" in push.describe(None, wrench, (1.0, 1.5, 0.1, 1.0))
 
 
+def test_a_push_on_a_body_is_a_force_at_one_place_of_it(now, twin):
+    """By pinocchio: the Jacobian of a place of that body, whatever the arm does meanwhile."""
+    body = (now.robot.n + 1) // 2
+    pin = pytest.importorskip("pinocchio")
+    push = EFFECTS["external_contact"]
+    model = twin(now.robot).model
+    data = model.createData()
+    force, place = np.array([30.0, -10.0, 20.0]), np.array([0.1, -0.2, 0.3])
+    X = push.columns(now, None, (1.0, 1.5, 0.1, 0.0, float(body)))
+    assert not X[now.t > 2.5].any()
+    coefficients = np.concatenate([force, np.outer(place, force).ravel()])
+    during = np.flatnonzero((now.t > 1.1) & (now.t < 2.4))[::20]
+    for i in during:
+        pin.computeJointJacobians(model, data, now.q[i])
+        own = pin.getJointJacobian(model, data, body, pin.LOCAL_WORLD_ALIGNED)
+        lever = data.oMi[body].rotation @ place
+        wrench = np.concatenate([force, np.cross(lever, force)])
+        strength = np.sin(np.pi * (now.t[i] - 1.0) / 1.5) ** 0.1
+        np.testing.assert_allclose(X[i] @ coefficients, strength * own.T @ wrench, atol=1e-6)
+    told = push.describe(None, coefficients, (1.0, 1.5, 0.1, 0.0, float(body)))
+    assert f"force of 37.4 N at one place of body {body}" in told
+
+
 def test_a_push_that_lasts_is_looked_for_about_a_brief_one(now):
     """From the part in which the arm moves least the whole is found: so long before, about and after it."""
-    (points,) = EFFECTS["external_contact"].elsewhere(now, None, (2.0, 0.3, 0.6, 0.0), np.zeros(6))
-    assert all(0.0 <= start <= now.t[-1] and flange == 1.0 for start, _, _, flange in points)
+    (points,) = EFFECTS["external_contact"].elsewhere(now, None, (2.0, 0.3, 0.6, 0.0, 0.0), np.zeros(12))
+    assert all(0.0 <= start <= now.t[-1] and flange == 1.0 for start, _, _, flange, _ in points)
     spans = {(round(start, 3), round(start + duration, 3)) for start, duration, *_ in points}
     assert {(2.0, 2.3), (2.0, 3.2), (1.1, 2.3), (1.55, 2.75)} <= spans
 
@@ -84,7 +107,7 @@ def test_a_search_for_pushes_finds_the_moment(now):
     """
     rng = np.random.default_rng(1)
     X = EFFECTS["external_contact"].columns(now, None, (3.1, 0.8))
-    torque = X @ np.array([20.0, 30.0, -10.0, 5.0, 5.0, 0.0])
+    torque = X @ np.array([20.0, 30.0, -10.0, 5.0, 5.0, 0.0, *np.zeros(6)])
     size = np.sqrt(np.mean(torque**2, axis=0))
     slow = lfilter([0.01], [1, -0.99], rng.normal(size=torque.shape), axis=0)
     for noise in (2 * rng.normal(size=torque.shape), slow):
