@@ -80,6 +80,7 @@ def mended(robot: Robot, log: Log, which: str) -> Mended:
         for finding in gate.findings
         if _is_told(finding)
     ]
+    log = gate.on_time(log)
     return Mended(_stretches(_filled(log) if len(gate.spikes) else log, gate), tuple(notes))
 
 
@@ -129,7 +130,7 @@ def _stretches(log: Log, gate: GateReport) -> tuple[Log, ...]:
 
 
 def _fresh(log: Log, gate: GateReport, first: int, stop: int) -> Log:
-    """The rows of a stretch that are no copies of those before."""
-    if not len(gate.copies):
+    """The rows of a stretch that are of their time."""
+    if not len(gate.stale):
         return log if stop - first == len(log) else log.rows(slice(first, stop))
-    return log.rows(np.setdiff1d(np.arange(first, stop), gate.copies))
+    return log.rows(np.setdiff1d(np.arange(first, stop), gate.stale))

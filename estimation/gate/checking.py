@@ -23,6 +23,7 @@ from estimation.gate.resolution import check_clipping, check_resolution
 from estimation.gate.scales import check_scales, check_size
 from estimation.gate.signs import check_signs
 from estimation.gate.spikes import check_spikes
+from estimation.gate.stalls import check_stalls
 from estimation.gate.timing import Timing, check_timing
 from estimation.gate.units import beyond_findings, check_speed, suspect_position_unit
 from estimation.gate.values import (
@@ -76,10 +77,12 @@ def check_log(robot: Robot, log: Log) -> GateReport:
         raise InputError(f"{log.n} joints", file=file or None, allowed=f"{robot.n}, as {robot.name} has")
     robot = set_up(robot, log)
     samples, duration = len(log), log.duration
+    stalls = check_stalls(log)
+    log = replace(log, t=stalls.t)
     columns = Columns.of(log)
     timing = check_timing(log, robot.period)
     repeats, copies = check_repeats(log, columns)
-    findings: list[Finding] = [*too_short(log), *timing.findings, *repeats]
+    findings: list[Finding] = [*too_short(log), *timing.findings, *stalls.findings, *repeats]
     findings += check_resolution(columns)
     found, spikes = check_spikes(columns)
     breaks = np.array([first for first, _ in timing.parts[1:]], dtype=np.intp)
@@ -92,7 +95,8 @@ def check_log(robot: Robot, log: Log) -> GateReport:
         *check_motion(robot, columns),
         *check_jumps(log.t, columns, spikes, breaks, standing(robot, columns)),
     ]
-    left_out = np.union1d(spikes, copies)
+    stale = np.union1d(copies, stalls.lost)
+    left_out = np.union1d(spikes, stale)
     if len(left_out):
         log = pick_rows(log, np.delete(np.arange(len(log)), left_out))
         columns = Columns.of(log)
@@ -107,7 +111,8 @@ def check_log(robot: Robot, log: Log) -> GateReport:
         findings=worst_first(once(findings)),
         parts=without_hung(timing.parts, findings),
         spikes=spikes,
-        copies=copies,
+        stale=stale,
+        t=stalls.t,
         **dynamics,
     )
 

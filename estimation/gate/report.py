@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,8 +37,9 @@ class GateReport:
         parts: (first, stop) sample indices of the stretches without a gap, and in which no column hung; what lies
             between is not bridged.
         spikes: indices of single rows that stick out of their neighbours, which a fit must leave out.
-        copies: indices of rows that repeat the row before while the arm moves, where they are many: a fit must leave
-            them out, for they are old.
+        stale: indices of rows that are not of their time, which a fit must leave out: those that repeat the row before
+            while the arm moves, where they are many, and those that were written late, it cannot be told by how much.
+        t: times of the rows [s], those that were written late set back where it can.
         delay: by which the torque lags the position (n,) [s], NaN where the log does not tell.
         delay_error: its standard error (n,) [s].
         unexplained: torque error on stretches that the fit had not seen over the torque's standard deviation (n,), by
@@ -55,7 +56,8 @@ class GateReport:
     findings: tuple[Finding, ...]
     parts: tuple[tuple[int, int], ...]
     spikes: NDArray[np.intp]
-    copies: NDArray[np.intp]
+    stale: NDArray[np.intp]
+    t: Array
     delay: Array
     delay_error: Array
     unexplained: Array
@@ -98,7 +100,7 @@ class GateReport:
         )
 
     def usable(self, log: Log) -> tuple[Log, ...]:
-        """Leaves out spikes and copies, and cuts the log at its gaps, so that nothing is interpolated across them.
+        """Leaves out spikes and stale rows, and cuts the log at its gaps, so that nothing is interpolated across them.
 
         Args:
             log: the log that was checked.
@@ -111,15 +113,20 @@ class GateReport:
         """
         if len(log) != self.samples:
             raise InputError(f"{len(log)} rows", allowed=f"{self.samples}, as the log that was checked")
-        if self.parts == ((0, len(log)),) and not len(self.spikes) and not len(self.copies):
+        log = self.on_time(log)
+        if self.parts == ((0, len(log)),) and not len(self.spikes) and not len(self.stale):
             return (log,)
         kept = np.ones(len(log), dtype=bool)
-        kept[self.spikes] = kept[self.copies] = False
+        kept[self.spikes] = kept[self.stale] = False
         parts = [np.arange(first, stop)[kept[first:stop]] for first, stop in self.parts]
         logs = tuple(pick_rows(log, part) for part in parts if len(part) >= FEWEST)
         if not logs:
             raise InputError("no stretch of the log is long enough", file=self.log or None, allowed=f"{FEWEST} rows")
         return logs
+
+    def on_time(self, log: Log) -> Log:
+        """Gives the log that was checked at the times at which its rows were measured."""
+        return log if np.array_equal(self.t, log.t) else replace(log, t=self.t)
 
     def summary(self) -> str:
         """Says the verdict and lists the findings, the worst first."""
@@ -145,7 +152,7 @@ class GateReport:
             "duration": self.duration,
             "period": self.period,
             "spikes": [int(row) + 1 for row in self.spikes],
-            "copies": [int(row) + 1 for row in self.copies],
+            "stale": [int(row) + 1 for row in self.stale],
             "parts": [list(part) for part in self.parts],
             **{name: [_plain(value) for value in getattr(self, name)] for name in arrays},
             "findings": [{**finding.to_dict(), "value": _plain(finding.value)} for finding in self.findings],

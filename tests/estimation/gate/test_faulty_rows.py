@@ -107,7 +107,7 @@ def test_a_slow_arm_with_coarse_sensors_repeats_itself(good, spoilt):
     coarse = {"q": np.round(log.q / counts) * counts, "tau": np.round(log.tau / log.tau.std(axis=0)) * 1.0}
     report = spoilt(**coarse)
     assert found(report, "repeated_rows")
-    assert not len(report.copies)
+    assert not len(report.stale)
     assert report.usable(replace(log, **coarse))[0] is not None
 
 
