@@ -62,28 +62,37 @@ def base_parameters(
     return find_base_parameters(default_model(robot, friction=friction, velocity_scale=scales), gravities=gravities)
 
 
-def build_baseline(base: BaseParameters, recording: Recording, residual_scale: Array | None = None) -> Baseline:
+def build_baseline(
+    base: BaseParameters,
+    recording: Recording,
+    residual_scale: Array | None = None,
+    known: Recording | None = None,
+) -> Baseline:
     """Chooses the sharpness of each joint's sign by the fit, and evaluates the columns.
 
     Args:
         base: base parameters with any sharpness.
         recording: the data.
         residual_scale: standard deviation of the noise (n,); by default a share of the torque.
+        known: the same rows without what is known of effects: torque, and the motion that it was needed for. Friction
+            that is logged late turns round beside its own sign, and would look less sharp than it is.
     """
-    scale = recording.tau.std(axis=0) if residual_scale is None else residual_scale
-    least = 1e-9 * max(1.0, float(np.abs(recording.tau).max()))
+    seen = recording if known is None else known
+    scale = seen.tau.std(axis=0) if residual_scale is None else residual_scale
+    least = 1e-9 * max(1.0, float(np.abs(seen.tau).max()))
     Y = regressor_on(base, recording)
     signs = [i for i, column in enumerate(base.columns) if column.symbol == "f1"]
     chosen = None
     if signs:
-        fit = _Signs(Y, signs, base, recording, 1.0 / np.maximum(scale, least))
+        trial = Y if np.array_equal(seen.dq, recording.dq) else regressor_on(base, seen)
+        fit = _Signs(trial, signs, base, seen, 1.0 / np.maximum(scale, least))
         narrow = np.full(recording.n, WIDEST)
         chosen = fit.sharpness(narrow)
         fast = np.maximum(narrow, SHARE * np.abs(recording.dq).max(axis=0))
         if np.any((fast > narrow) & (np.array(chosen) == max(v0 for v0 in SCALES if v0 <= WIDEST))):
             # A log that the base model does not describe at all would have any sign: each counts by what is left of it.
             left = np.maximum(fit.left(chosen), least)
-            chosen = _Signs(Y, signs, base, recording, 1.0 / left).sharpness(fast)
+            chosen = _Signs(trial, signs, base, seen, 1.0 / left).sharpness(fast)
         model = default_model(
             base.model.robot,
             friction="polynomial" if any(c.symbol == "f4" for c in base.model.columns) else "coulomb-viscous",

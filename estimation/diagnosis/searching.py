@@ -62,7 +62,6 @@ def search(
     hypotheses = all_hypotheses(base.model.robot, effects)
     recording = _relied_on(base, recording)
     baseline, settled = fit_plain(base, recording)
-    tau = recording.tau
     last: Search | None = None
     blurred = False
     known: dict[Hypothesis, tuple[float, ...]] = {}
@@ -80,7 +79,7 @@ def search(
             last = None
             give_back()
             if blurred:
-                baseline = build_baseline(base, replace(recording, tau=settled.without_effects(tau)))
+                baseline = build_baseline(base, recording, known=settled.followed_motion(recording, members))
         rng = np.random.default_rng(seed)
         posed = pose(
             recording, baseline, whitening, draws=DRAWS, rng=rng, extra=settled.extra, followed=settled.followed

@@ -16,6 +16,8 @@ from estimation.diagnosis.own_functions import is_short
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scoring import accept
+from estimation.diagnosis.states import Recording
+from estimation.diagnosis.thinning import earlier
 from estimation.diagnosis.whitening import Whitening
 
 Array = NDArray[np.float64]
@@ -58,9 +60,15 @@ class Settled:
             return self.residual, self.extra
         return self.residual + self.late, self.extra - self.late
 
-    def without_effects(self, tau: Array) -> Array:
-        """Takes the torque of the effects off the measured one (N, n)."""
-        return tau if self.extra is None else tau - self.extra
+    def followed_motion(self, recording: Recording, members: Sequence[Member]) -> Recording:
+        """What shows how sharply friction turns round: torque without what blurs that, motion as late as all of it is.
+
+        What other effects have at low speeds may stand for a sign that was taken to be less sharp than it is.
+        """
+        late = [m for m in members if m.hypothesis.effect.lags and m.hypothesis.effect.whole_robot]
+        beyond = self.but_late()[1]
+        blurring = 0.0 if beyond is None or self.followed is None else beyond - self.followed
+        return earlier(replace(recording, tau=recording.tau - blurring), sum(m.shape[0] for m in late))
 
 
 def settle(problem: Problem, members: Sequence[Member]) -> Settled:

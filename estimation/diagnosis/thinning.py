@@ -62,6 +62,22 @@ def thin(finer: Recording, stride: int) -> Recording:
     )
 
 
+def earlier(recording: Recording, by: float) -> Recording:
+    """Gives a recording with the motion of a moment [s] before: what torque that is logged so late was needed for."""
+    if by == 0.0:
+        return recording
+    moved: dict[str, Array] = {}
+    for name in ("q", "dq", "ddq"):
+        values = getattr(recording, name)
+        moved[name] = np.empty_like(values)
+        for run in recording.runs:
+            t = recording.t[run]
+            at = np.clip(t - by, t[0], t[-1])
+            moved[name][run] = np.column_stack([np.interp(at, t, x) for x in values[run].T])
+    finer = None if recording.finer is None else earlier(recording.finer, by)
+    return replace(recording, **moved, finer=finer)  # type: ignore[arg-type]
+
+
 def at_all_samples(recording: Recording, evaluate: Callable[[Recording], Array]) -> Array:
     """Evaluates rows (N, ...) on a recording: of one that is thinned, on all samples, and thinned as its torque was."""
     if recording.finer is None:

@@ -11,9 +11,11 @@ import pytest
 from estimation.diagnosis.baseline import base_parameters, build_baseline
 from estimation.diagnosis.diagnosing import diagnose
 from estimation.diagnosis.searching import fit_plain
-from estimation.diagnosis.states import record
+from estimation.diagnosis.states import Recording, record
+from estimation.diagnosis.thinning import earlier
 from robots.plants import simulate
 from robots.robot import Robot
+from robots.signals import Log
 
 
 @pytest.mark.parametrize("share", [0.01, 0.02, 0.04])
@@ -58,3 +60,22 @@ def test_beside_reversals_a_fit_to_the_other_rows_leaves_no_more_than_the_torque
     recording = replace(recording, unsure=recording.unsure | (np.abs(recording.dq) < 0.05))
     _, settled = fit_plain(base_parameters(arm, "polynomial", (0.001, 0.001)), recording)
     assert np.all(np.abs(settled.residual).max(axis=0) < np.abs(recording.tau).max(axis=0))
+
+
+def test_friction_that_is_logged_late_is_as_sharp_as_it_is(arm: Robot, arm_log: Callable[..., Log]) -> None:
+    """Its sign, by the motion of as long before, is no wider than that of torque on time; by that of now it is."""
+    log = arm_log(velocity_scale=1e-4, torque_noise=0.02)
+    coarse, late = 3, 2
+    rows = np.arange(coarse, len(log), coarse)
+    by = late * float(np.diff(log.t).mean())
+    recordings = [record(arm, [replace(log.rows(rows), tau=log.tau[rows - lag])]) for lag in (0, late)]
+
+    def sharpness(recording: Recording, **known: Recording) -> np.ndarray:
+        chosen = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording, **known)
+        return chosen.situation(recording, np.zeros(chosen.base.size)).velocity_scale
+
+    on_time, blurred = (sharpness(recording) for recording in recordings)
+    known = sharpness(recordings[1], known=earlier(recordings[1], by))
+    assert (known < 0.5 * blurred).all()
+    assert (known <= on_time).all()
+    assert earlier(recordings[1], 0.0) is recordings[1]
