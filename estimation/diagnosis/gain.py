@@ -203,7 +203,10 @@ def on_held_out(
     for chosen in models(base.shape[2], effects):
         values = held(gram[np.ix_(chosen, chosen)], cross[chosen], pull.columns(chosen))
         errors.append(unseen.tau - other[:, :, chosen] @ values)
-    how = f"{len(unseen.runs)} log{'s' if len(unseen.runs) > 1 else ''} that the fit has not seen"
+    # Stretches of a log that was cut at gaps are named after it.
+    logs = len({name.rpartition(" from ")[0] or name for name in unseen.names})
+    how = f"{logs} log{'s' if logs > 1 else ''} that the fit has not seen"
+    how += f", in {len(unseen.runs)} stretches" if len(unseen.runs) > logs else ""
     weights = ~unseen.unsure / problem.whitening.scale
     target = unseen.tau * weights
     more, square = _moments(other * weights[:, :, None], target), float(np.sum(target**2))

@@ -89,6 +89,16 @@ def test_faults_of_a_recording_are_no_effects(arm: Robot, log: Log) -> None:
     assert taken.baseline[1] > 3 * sound.baseline[1]
 
 
+def test_stretches_of_a_log_are_told_as_one_log(arm: Robot, log: Log) -> None:
+    """Who gives one log of unseen data has not given two."""
+    half = len(log) // 2
+    other = log.rows(slice(half, None))
+    middle = (other.duration / 2, other.duration / 2 + 0.5)
+    for unseen, told in ((other, ""), (_holed(other, middle), ", in 2 stretches")):
+        result = diagnose(arm, log.rows(slice(half)), held_out=unseen, candidates=FEW[:1], friction="coulomb-viscous")
+        assert result.how_unseen == f"1 log that the fit has not seen{told}"
+
+
 @pytest.mark.parametrize("field", ["held_out", "logs"])
 def test_a_log_in_other_units_is_refused(arm: Robot, log: Log, field: str) -> None:
     """Times in milliseconds, of either kind of log: what the gate refuses for identification."""
