@@ -166,7 +166,11 @@ def find_base_parameters(
     neglected = float(np.linalg.norm(scaled - scaled[:, independent] @ combination, axis=0).max())
     if neglected > _ROUNDING:
         log.warning(
-            "%s is close to a special geometry: %.1e of the regressor is neglected", model.robot.name, neglected
+            "%s: axes that are nearly parallel, at right angles or through one point are taken to be so "
+            "(%.1e of the regressor is neglected); angles that its description rounds, "
+            "such as 1.5708 for pi / 2, make them so",
+            model.robot.name,
+            neglected,
         )
     grouping = combination * scale[None, :] / scale[independent][:, None]
     # What is as small as the neglected part is noise of it.
