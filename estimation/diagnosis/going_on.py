@@ -36,6 +36,8 @@ def going_on(problem: Problem, member: Member, others: Sequence[Member], errors:
 def as_it_lasts(problem: Problem, member: Member, beside: Accepted) -> Member:
     """Gives an effect of a moment by the formula that stays true while it lasts, where that is worth its parameters."""
     hypothesis = member.hypothesis
+    if not hypothesis.effect.passing:
+        return member
     shapes = hypothesis.effect.lasting(problem.sees(hypothesis.effect), member.shape)
     if not shapes:
         return member

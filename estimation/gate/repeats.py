@@ -18,8 +18,9 @@ Array = NDArray[np.float64]
 
 # Share of rows that repeat the row before while the arm moves, worth a warning.
 REPEATED = 0.02
-# A joint that moves by so many of its encoder's steps a row shows each row's position.
-FAST = 2.0
+# A joint that moves by so many of its encoder's steps a row shows each row's position. Where so large a share of such
+# rows are copies, a logger asks more often than the controller answers; a message that comes twice makes nothing late.
+FAST, COPIED = 2.0, 0.1
 # A column jumps with a step of so many times its hundredth-largest.
 JUMP = 3.0
 # The jump is one, too, beyond this times the largest step in so many rows on either side.
@@ -47,7 +48,7 @@ def check_repeats(log: Log, columns: Columns) -> tuple[list[Finding], NDArray[np
     repeated = same & moving
     share = float(repeated.sum() / max(int(moving.sum()), 1))
     fast = _moving(log, columns, steps=FAST)[1:]
-    copied = float((same & fast).sum()) > REPEATED * max(int(fast.sum()), 1)
+    copied = float((same & fast).sum()) > COPIED * max(int(fast.sum()), 1)
     copies = np.flatnonzero(repeated) + 1 if copied else none
     if repeated.any() and share > 1e-3:
         first = int(np.argmax(repeated))
