@@ -116,7 +116,7 @@ def _other_motion(seed: int, effect: float, there: float) -> Unseen:
             scales=lambda count: np.ones((count, 1)), scale=np.ones(1), at_rest=np.ones(1), stride=1
         ),
     )
-    other = Rows(unsure=moving, tau=unseen, t=t, step=0.01, runs=[slice(0, rows)])
+    other = Rows(unsure=moving, tau=unseen, t=t, step=0.01, runs=[slice(0, rows)], names=("other",))
     return on_held_out(problem, [X], other, Z, [W], Pull(np.zeros((3, 3)), np.zeros(3)))  # type: ignore[arg-type]
 
 
