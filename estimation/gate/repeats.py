@@ -47,9 +47,11 @@ def check_repeats(log: Log, columns: Columns) -> tuple[list[Finding], NDArray[np
     moving = _moving(log, columns)[1:]
     repeated = same & moving
     share = float(repeated.sum() / max(int(moving.sum()), 1))
-    fast = _moving(log, columns, steps=FAST)[1:]
-    copied = float((same & fast).sum()) > COPIED * max(int(fast.sum()), 1)
-    copies = np.flatnonzero(repeated) + 1 if copied else none
+    copies = none
+    if repeated.any():
+        fast = _moving(log, columns, steps=FAST)[1:]
+        if float((same & fast).sum()) > COPIED * max(int(fast.sum()), 1):
+            copies = np.flatnonzero(repeated) + 1
     if repeated.any() and share > 1e-3:
         first = int(np.argmax(repeated))
         findings.append(

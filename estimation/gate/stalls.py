@@ -64,11 +64,10 @@ def check_stalls(log: Log) -> Stalls:
         if end == begin + 1:
             continue  # rows that are missing
         begins.append(begin)
-        inside = np.arange(begin + 1, end)
         if abs(log.t[end] - log.t[begin] - (end - begin) * period) < FILLED * period:
             even[begin + 1 : end + 1] = log.t[begin] + period * np.arange(1, end - begin + 1)
         else:
-            lost.append(inside)
+            lost.append(np.arange(begin + 1, end))
     late, left_out = np.flatnonzero(even != log.t), np.concatenate(lost)
     if not _fits(log, even, late):
         even, late = log.t, none
