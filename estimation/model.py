@@ -15,10 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from estimation.diagnosis.carried import with_body
 from estimation.diagnosis.extension import Extension, extension_torque, read_extension
 from estimation.known_setup import require_known
+from estimation.robot_in_file import build_robot, describe_robot, require_described
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
-from robots.geometry.chain import Chain, Joint
-from robots.limits import Limits
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.terms import Column, build_term, describe_term
@@ -163,7 +162,7 @@ class Model:
         return {
             "format": FORMAT,
             "format_version": FORMAT_VERSION,
-            "robot": {"name": robot.name, "origin": robot.origin, "sha256": robot.digest, **_describe_chain(robot)},
+            "robot": describe_robot(robot),
             "terms": [describe_term(term) for term in self.torque_model.terms],
             "parameters": parameters,
             "covariance": self.covariance.tolist(),
@@ -183,7 +182,7 @@ class Model:
 def load_model(path: str | Path) -> Model:
     """Reads a `model.json`, or the one in a folder.
 
-    The file holds the robot's geometry, so that a prediction needs nothing else.
+    The file holds what the model refers to of the robot, so that a prediction needs nothing else.
 
     Raises:
         InputError: a missing file, or one that is no model.
@@ -211,7 +210,7 @@ def load_model(path: str | Path) -> Model:
 
 def _from_dict(data: Mapping[str, Any]) -> Model:
     terms = tuple(build_term(term) for term in data["terms"])
-    torque_model = TorqueModel(_build_robot(data["robot"]), terms)
+    torque_model = TorqueModel(build_robot(data["robot"]), terms)
     index = {name: i for i, name in enumerate(torque_model.names)}
     parameters = data["parameters"]
     unknown = [item["name"] for item in parameters if item["name"] not in index]
@@ -225,6 +224,8 @@ def _from_dict(data: Mapping[str, Any]) -> Model:
         raise InputError("parameters are missing or repeated", allowed="one or more, each once")
     if not (np.isfinite(values).all() and np.isfinite(covariance).all()):
         raise InputError("values or covariances that are not finite", remedy="identify the robot again")
+    if data.get("extensions"):
+        require_described(data["robot"])
     cutoff = data["provenance"].get("cutoff_hz", 1.0)
     if isinstance(cutoff, bool) or not (isinstance(cutoff, int | float) and 0 < cutoff < np.inf):
         raise InputError(f"provenance: cutoff_hz is {cutoff!r}", allowed="a positive number [Hz]")
@@ -237,34 +238,4 @@ def _from_dict(data: Mapping[str, Any]) -> Model:
         formulas=tuple(item["stands_for"] for item in parameters),
         provenance=data["provenance"],
         extensions=tuple(read_extension(item, torque_model.robot) for item in data.get("extensions", [])),
-    )
-
-
-def _describe_chain(robot: Robot) -> dict[str, Any]:
-    joints = [
-        {
-            "name": joint.name,
-            "kind": joint.kind,
-            "rotation": joint.rotation.tolist(),
-            "translation": joint.translation.tolist(),
-            "axis": joint.axis.tolist(),
-        }
-        for joint in robot.chain.joints
-    ]
-    # A log of currents is compared by these; NaN, which JSON cannot hold, where unknown.
-    constants = [float(value) if np.isfinite(value) else None for value in robot.torque_constant]
-    return {"gravity": robot.chain.gravity.tolist(), "joints": joints, "torque_constant": constants}
-
-
-def _build_robot(data: Mapping[str, Any]) -> Robot:
-    joints = tuple(Joint(**joint) for joint in data["joints"])
-    free = np.full(len(joints), np.inf)
-    limits = Limits(lower=-free, upper=free, velocity=free, acceleration=free, jerk=free, torque=free)
-    return Robot(
-        name=data["name"],
-        chain=Chain(joints, np.array(data["gravity"])),
-        limits=limits,
-        torque_constant=np.array(data.get("torque_constant", [None] * len(joints)), dtype=float),
-        origin=data["origin"],
-        digest=data["sha256"],
     )

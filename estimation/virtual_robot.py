@@ -17,7 +17,7 @@ def virtual_robot(model: Model, robot: Robot | None = None, sensors: Sensors | N
 
     Args:
         model: identified, or extended by a diagnosis.
-        robot: with gear ratios and limits, which a model file does not hold; by default the model's own geometry alone.
+        robot: whose gears, behind which its encoders are, replace those in the model's file.
         sensors: what the log sees.
 
     Raises:
@@ -27,7 +27,8 @@ def virtual_robot(model: Model, robot: Robot | None = None, sensors: Sensors | N
     if robot is not None:
         if robot.n != model.robot.n:
             raise InputError(f"a model of {model.robot.n} joints", allowed=f"{robot.n}, as {robot.name} has")
-        torque_model = replace(torque_model, robot=robot)
+        # Its limits may have changed since, but what the model's effects refer to has not.
+        torque_model = replace(torque_model, robot=replace(model.robot, gear_ratio=robot.gear_ratio))
     parameters = np.zeros(torque_model.size)
     # Base parameters stand for sums: with the others zero they give the same torques.
     parameters[list(model.columns)] = model.values

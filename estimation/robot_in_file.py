@@ -1,0 +1,90 @@
+"""The robot within a model file: all of its description that a model's torque refers to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.common.errors import InputError
+from robots.geometry.chain import Chain, Joint
+from robots.limits import Limits
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+_BY_JOINT = ("rotor_inertia", "gear_ratio", "torque_constant")
+
+
+def describe_robot(robot: Robot) -> dict[str, Any]:
+    """Writes a robot as plain data.
+
+    Terms need its chain alone. Effects refer to more of it: a spring to the middle of a joint's range, saturation to
+    the torque limit, what the load does to the rotor that the base model does not tell from the link.
+    """
+    joints = [
+        {
+            "name": joint.name,
+            "kind": joint.kind,
+            "rotation": joint.rotation.tolist(),
+            "translation": joint.translation.tolist(),
+            "axis": joint.axis.tolist(),
+        }
+        for joint in robot.chain.joints
+    ]
+    return {
+        "name": robot.name,
+        "origin": robot.origin,
+        "sha256": robot.digest,
+        "gravity": robot.chain.gravity.tolist(),
+        "joints": joints,
+        **{name: _finite(getattr(robot, name)) for name in _BY_JOINT},
+        "limits": {item.name: _finite(getattr(robot.limits, item.name)) for item in fields(Limits)},
+    }
+
+
+def build_robot(data: Mapping[str, Any]) -> Robot:
+    """Reads what `describe_robot` wrote; what older files do not state is unknown.
+
+    Raises:
+        InputError: values that no robot has.
+    """
+    joints = tuple(Joint(**joint) for joint in data["joints"])
+    n, limits = len(joints), data.get("limits", {})
+    bounds = {item.name: _array(limits.get(item.name), n, np.inf) for item in fields(Limits) if item.name != "lower"}
+    return Robot(
+        name=data["name"],
+        chain=Chain(joints, np.array(data["gravity"])),
+        limits=Limits(lower=_array(limits.get("lower"), n, -np.inf), **bounds),
+        rotor_inertia=_array(data.get("rotor_inertia"), n, 0.0),
+        gear_ratio=_array(data.get("gear_ratio"), n, 1.0),
+        torque_constant=_array(data.get("torque_constant"), n, np.nan),
+        origin=data["origin"],
+        digest=data["sha256"],
+    )
+
+
+def require_described(data: Mapping[str, Any]) -> None:
+    """Refuses the robot of a file that does not state what effects refer to.
+
+    Raises:
+        InputError: a file of an older version.
+    """
+    if "limits" not in data:
+        raise InputError(
+            "has effects, but not the robot's limits, to which some of them refer",
+            remedy="it was written by another version: diagnose the logs again",
+        )
+
+
+def _finite(values: Array) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def _array(values: Any, n: int, unknown: float) -> Array:
+    """What JSON cannot hold was written as null, and what a file does not state is as unknown."""
+    given = [None] * n if values is None else values
+    return np.array([unknown if value is None else float(value) for value in given])
