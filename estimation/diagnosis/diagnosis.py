@@ -109,9 +109,10 @@ class Diagnosis:
             beside = ", beside the other findings" if len(self.findings) > 1 and not finding.measured_by else ""
             lines.append(f"    unseen error{finding.elsewhere} {before} -> {after} of the {of}{beside} (fall {fall} %)")
             # Coefficients of a free function mean nothing each.
-            named = finding.effect != "unexplained"
-            open_ = [_open(parameter) for parameter in finding.parameters if named and not parameter.determined]
-            if open_:
+            parameters = finding.parameters if finding.effect != "unexplained" else ()
+            if known := [_with_interval(parameter) for parameter in parameters if parameter.determined]:
+                lines.append(f"    95 % intervals: {', '.join(known)}")
+            if open_ := [_with_interval(parameter) for parameter in parameters if not parameter.determined]:
                 lines.append(f"    not well determined by these logs: {', '.join(open_)}")
             close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]
             if close:
@@ -273,8 +274,8 @@ _VERDICTS = {
 }
 
 
-def _open(parameter: Parameter) -> str:
-    """Names a parameter that is not determined, with its interval where it has one."""
+def _with_interval(parameter: Parameter) -> str:
+    """Names a parameter, with its interval where it has one."""
     low, high = parameter.ci95
     if not np.isfinite([low, high]).all():
         return parameter.name

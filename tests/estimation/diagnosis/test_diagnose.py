@@ -104,9 +104,11 @@ def test_a_diagnosis_survives_its_file(stepped: tuple[Diagnosis, Log], tmp_path:
 
 
 def test_the_summary_names_cause_joint_and_gain(stepped: tuple[Diagnosis, Log]) -> None:
-    """A person reads what was found, where, and what it brings on which data."""
+    """A person reads what was found, where, how well each number is known, and what it brings on which data."""
     text = stepped[0].summary()
     assert "friction_step (joint 2)" in text
+    for parameter in stepped[0].findings[0].parameters:
+        assert f"{parameter.name} ({parameter.ci95[0]:.3g} to {parameter.ci95[1]:.3g}" in text
     assert "not seen" in text
     assert len(stepped[0].to_frame()) == sum(len(f.parameters) for f in stepped[0].findings)
 
