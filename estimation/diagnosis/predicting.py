@@ -1,4 +1,4 @@
-"""What an extended model needs to predict other logs: how their motion is smoothed, and how far it may be off."""
+"""What an extended model needs to predict other logs: their smoothing, the sign's sharpness, how far it may be off."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.comparison import band_of
+from estimation.diagnosis.baseline import SCALES
 from estimation.diagnosis.gain import PARTS, Unseen
 from estimation.diagnosis.problem import Problem
 from estimation.model import Model
-from estimation.prediction import predict
+from estimation.prediction import Prediction, predict
 from robots.signals import Log
+from robots.terms import Column, FrictionPolynomial
+from robots.terms.effects.of_model import velocity_scale
 
 Array = NDArray[np.float64]
 
@@ -35,12 +38,64 @@ def smoothed_best(model: Model, problem: Problem, logs: Sequence[Log]) -> Model:
     """
     cutoffs = [problem.recording.cutoff, *(band.cutoff for band in problem.whitening.bands)]
     low, high = min(cutoffs), max(cutoffs)
-    log = max(logs, key=lambda log: float(log.t[-1] - log.t[0]))
-    middle = 0.5 * float(log.t[0] + log.t[-1])
-    part = log.rows(slice(*np.searchsorted(log.t, (middle - 0.5 * STRETCH, middle + 0.5 * STRETCH)).tolist()))
+    part = _part(logs)
     tried = np.geomspace(low, high, POINTS if high > low else 1)
     stated = [replace(model, provenance={**model.provenance, "cutoff_hz": float(cutoff)}) for cutoff in tried]
     return min(stated, key=lambda one: _misfit(one, part))
+
+
+def as_sharp(model: Model, logs: Sequence[Log]) -> Model:
+    """States the sharpness of each joint's sign with which a model predicts its own logs best.
+
+    A diagnosis gives up rows about reversals, and may be left with those that any sharpness suits: its model would turn
+    friction round too gradually. A prediction has all rows, and another error by that in each of them.
+
+    Args:
+        model: whose terms get the velocities v0 of tanh(dq / v0), and whose provenance states them.
+        logs: those of the fit, with torque.
+    """
+    signs = {c.joint - 1: float(value) for c, value in zip(model.parameters, model.values, strict=True) if _is_sign(c)}
+    part, now = _part(logs), velocity_scale(model.torque_model)
+    before = predict(model, part)
+    error, chosen = _error(before), now.copy()
+    for joint, coulomb in signs.items():
+        dq = before.motion.dq[:, joint]
+        own = error[:, joint] + coulomb * _sign(dq, now[joint])
+        squares = [np.nansum((own - coulomb * _sign(dq, v0)) ** 2) for v0 in (now[joint], *SCALES)]
+        chosen[joint] = (now[joint], *SCALES)[int(np.argmin(squares))]
+    trial = _with_scales(model, chosen)
+    # Effects turn round as sharply as the model's sign does: with theirs a joint may be worse off.
+    better = predict(trial, part).error_rms < before.error_rms
+    return _with_scales(model, np.where(better, chosen, now)) if better.any() else model
+
+
+def _part(logs: Sequence[Log]) -> Log:
+    """The middle of the longest log."""
+    log = max(logs, key=lambda log: float(log.t[-1] - log.t[0]))
+    middle = 0.5 * float(log.t[0] + log.t[-1])
+    return log.rows(slice(*np.searchsorted(log.t, (middle - 0.5 * STRETCH, middle + 0.5 * STRETCH)).tolist()))
+
+
+def _is_sign(column: Column) -> bool:
+    return column.symbol == "f1"
+
+
+def _sign(dq: Array, v0: float) -> Array:
+    return np.asarray(np.tanh(dq / v0) if v0 > 0 else np.sign(dq))
+
+
+def _with_scales(model: Model, scales: Array) -> Model:
+    """Gives the model whose signs are as sharp as v0 (n,) says."""
+    stated = tuple(float(v0) for v0 in scales)
+    terms = tuple(
+        replace(term, velocity_scale=stated) if isinstance(term, FrictionPolynomial) else term
+        for term in model.torque_model.terms
+    )
+    return replace(
+        model,
+        torque_model=replace(model.torque_model, terms=terms),
+        provenance={**model.provenance, "velocity_scales": list(stated)},
+    )
 
 
 def _misfit(model: Model, log: Log) -> float:
@@ -62,21 +117,20 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
         unseen: the errors on those.
     """
     if held_out:
-        errors = [np.abs(part) for log in held_out for part in np.array_split(_errors(model, log), PARTS)]
+        errors = [np.abs(part) for log in held_out for part in np.array_split(_error(predict(model, log)), PARTS)]
         shares = [
             np.mean(error <= band_of(np.concatenate(errors[:k] + errors[k + 1 :])), axis=0)
             for k, error in enumerate(errors)
         ]
         covered = np.average(shares, axis=0, weights=[len(error) for error in errors])
     else:
-        errors = [np.abs(_errors(model, log)) * unseen.growing() for log in logs]
+        errors = [np.abs(_error(predict(model, log))) * unseen.growing() for log in logs]
         covered = np.full(model.robot.n, np.nan)
     stated = {"band95": _known(band_of(np.concatenate(errors))), "band95_coverage": _known(covered)}
     return replace(model, provenance={**model.provenance, **stated})
 
 
-def _errors(model: Model, log: Log) -> Array:
-    prediction = predict(model, log)
+def _error(prediction: Prediction) -> Array:
     assert prediction.measured is not None
     return prediction.measured - prediction.predicted
 

@@ -21,7 +21,7 @@ from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.notes import farther_joints, faster_joints, notes_of, worse_joints
 from estimation.diagnosis.patterns import all_patterns
-from estimation.diagnosis.predicting import smoothed_best, with_band
+from estimation.diagnosis.predicting import as_sharp, smoothed_best, with_band
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import cut
 from estimation.diagnosis.refinement import Member
@@ -115,7 +115,8 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     lost = (_LOST,) if members and simulation is None else ()
     timed = [member for member in members if member.group.by_reversals]
     whole = replace(fitted.model, extensions=(*fitted.model.extensions, *added))
-    model = with_band(smoothed_best(whole, problem, told.logs), told.logs, told.held_out, unseen)
+    whole = as_sharp(smoothed_best(whole, problem, told.logs), told.logs)
+    model = with_band(whole, told.logs, told.held_out, unseen)
     # Of a joint that rests in all of them unseen data say nothing: that is no error of zero.
     shown = unseen.counts.any(axis=0)
     before, after = (np.where(shown, unseen.nrmse(model), np.nan) for model in (0, len(unseen.errors) - 1))

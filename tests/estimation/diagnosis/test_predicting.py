@@ -10,11 +10,12 @@ import pytest
 
 from estimation import diagnose
 from estimation.diagnosis.gain import Unseen
-from estimation.diagnosis.predicting import smoothed_best, with_band
+from estimation.diagnosis.predicting import as_sharp, smoothed_best, with_band
 from estimation.diagnosis.states import record
 from estimation.prediction import predict
 from robots.robot import Robot
 from robots.signals import Log
+from robots.terms import FrictionPolynomial
 
 
 def test_a_model_predicts_unseen_motion_about_as_well_as_any_smoothing_lets_it(
@@ -70,3 +71,25 @@ def test_its_band_grows_as_errors_do_on_parts_left_out(arm: Robot, arm_log: Call
     assert with_band(model, [log], [], unseen).provenance["band95"] == pytest.approx((seen * [2.0, 1.0]).tolist())
     plain = replace(unseen, fitted=None)
     assert with_band(model, [log], [], plain).provenance["band95"] == pytest.approx(seen.tolist())
+
+
+def test_friction_turns_round_as_sharply_as_all_rows_say(arm: Robot, arm_log: Callable[..., Log]) -> None:
+    """A sign that is too gradual or too sharp gets its sharpness back from rows about reversals, and predicts better.
+
+    A diagnosis gives up those rows. The plant's sign is tanh(dq / 1 mrad/s), and its log has 2 % of noise.
+    """
+    log, other = (arm_log(torque_noise=0.02, motion_seed=k, seed=k) for k in range(2))
+    model = diagnose(arm, log).model
+    for v0, worse in ((5e-4, 1.0), (0.016, 1.3)):
+        terms = tuple(
+            replace(term, velocity_scale=v0) if isinstance(term, FrictionPolynomial) else term
+            for term in model.torque_model.terms
+        )
+        wrong = replace(model, torque_model=replace(model.torque_model, terms=terms))
+        again = as_sharp(wrong, [log])
+        assert again.provenance["velocity_scales"] == pytest.approx([1e-3, 1e-3], rel=0.5)
+        before, after = predict(wrong, other).nrmse, predict(again, other).nrmse
+        assert np.all(after <= before)
+        # Friction is most of the second joint's torque, a little of the first's.
+        assert before[1] > worse * after[1]
+    assert model.provenance["velocity_scales"] == pytest.approx([1e-3, 1e-3], rel=0.5)
