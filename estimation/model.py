@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -46,6 +46,8 @@ class Model:
         formulas: (b,) the sum of standard parameters that each value stands for.
         provenance: logs with hashes, method, residual level per joint, tool version.
         extensions: effects beyond the terms, as a diagnosis found them.
+        felt: base parameters (b,) by which the extensions reckon load and friction, those that they were fitted beside;
+            None for `values`. The two differ where an effect and the base model share a torque.
     """
 
     torque_model: TorqueModel
@@ -56,6 +58,7 @@ class Model:
     formulas: tuple[str, ...]
     provenance: Mapping[str, Any] = field(default_factory=dict)
     extensions: tuple[Extension, ...] = ()
+    felt: Array | None = None
 
     @property
     def gravities(self) -> tuple[tuple[float, ...], ...]:
@@ -109,18 +112,19 @@ class Model:
         model = self.torque_model.under(gravity)
         if model is not self.torque_model:
             require_known(self.torque_model, self.columns, self.gravities, np.asarray(gravity, dtype=float))
-        parameters = np.zeros(model.size)
-        parameters[list(self.columns)] = self.values
+        parameters, felt = (
+            _with_payload(model, self.columns, values, payload)
+            for values in (self.values, self.values if self.felt is None else self.felt)
+        )
         asked: tuple[int, ...] = self.columns
         if payload is not None:
-            parameters = with_body(model, parameters, np.asarray(payload, dtype=float))
             asked = tuple(np.union1d(asked, np.flatnonzero(parameters)).tolist())
         own = model.torque(q, dq, ddq, parameters[list(asked)], columns=asked)
         if t is None or not self.extensions:
             return own
-        arrays = [np.atleast_2d(np.asarray(array, dtype=float)) for array in (q, dq, ddq)]
-        state = situation(model, parameters, np.asarray(t, dtype=float), *arrays)
-        return own + extension_torque(self.extensions, joined([state], self.torque_model))
+        arrays = [np.asarray(t, dtype=float), *(np.atleast_2d(np.asarray(x, dtype=float)) for x in (q, dq, ddq))]
+        states = [joined([situation(model, known, *arrays)], self.torque_model) for known in (felt, parameters)]
+        return own + extension_torque(self.extensions, *states)
 
     def to_frame(self) -> pd.DataFrame:
         """Gives a row per parameter: joint, value, standard error, percent, unit, determined, formula."""
@@ -168,6 +172,7 @@ class Model:
             "covariance": self.covariance.tolist(),
             "provenance": dict(self.provenance),
             **({"extensions": [extension.to_dict(robot) for extension in self.extensions]} if self.extensions else {}),
+            **({"felt_by_extensions": self.felt.tolist()} if self.extensions and self.felt is not None else {}),
         }
 
     def save(self, path: Path, *, force: bool = False) -> None:
@@ -220,9 +225,10 @@ def _from_dict(data: Mapping[str, Any]) -> Model:
     columns = tuple(index[item["name"]] for item in parameters)
     values = np.array([item["value"] for item in parameters], dtype=float)
     covariance = np.array(data["covariance"], dtype=float).reshape(len(parameters), len(parameters))
+    felt = np.array(data.get("felt_by_extensions", values), dtype=float).reshape(len(parameters))
     if not columns or len(set(columns)) < len(columns):
         raise InputError("parameters are missing or repeated", allowed="one or more, each once")
-    if not (np.isfinite(values).all() and np.isfinite(covariance).all()):
+    if not all(np.isfinite(numbers).all() for numbers in (values, covariance, felt)):
         raise InputError("values or covariances that are not finite", remedy="identify the robot again")
     if data.get("extensions"):
         require_described(data["robot"])
@@ -238,4 +244,12 @@ def _from_dict(data: Mapping[str, Any]) -> Model:
         formulas=tuple(item["stands_for"] for item in parameters),
         provenance=data["provenance"],
         extensions=tuple(read_extension(item, torque_model.robot) for item in data.get("extensions", [])),
+        felt=felt if "felt_by_extensions" in data else None,
     )
+
+
+def _with_payload(model: TorqueModel, columns: Sequence[int], values: Array, payload: ArrayLike | None) -> Array:
+    """Standard parameters (p,) of base parameters, with a body at the flange."""
+    parameters = np.zeros(model.size)
+    parameters[list(columns)] = values
+    return parameters if payload is None else with_body(model, parameters, np.asarray(payload, dtype=float))

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.model import Model
 from robots.common.errors import InputError
 from robots.plants import Plant, Sensors
 from robots.robot import Robot
+from robots.terms.effects import Situation
 
 
 def virtual_robot(model: Model, robot: Robot | None = None, sensors: Sensors | None = None) -> Plant:
@@ -32,6 +34,16 @@ def virtual_robot(model: Model, robot: Robot | None = None, sensors: Sensors | N
     parameters = np.zeros(torque_model.size)
     # Base parameters stand for sums: with the others zero they give the same torques.
     parameters[list(model.columns)] = model.values
-    return Plant(
-        model=torque_model, parameters=parameters, sensors=sensors or Sensors(), effects=tuple(model.extensions)
-    )
+    effects = (_Beyond(model),) if model.extensions else ()
+    return Plant(model=torque_model, parameters=parameters, sensors=sensors or Sensors(), effects=effects)
+
+
+@dataclass(frozen=True, eq=False)
+class _Beyond:
+    """What a model's extensions do together."""
+
+    model: Model
+
+    def torque(self, situation: Situation, /) -> NDArray[np.float64]:
+        motion = (situation.q, situation.dq, situation.ddq)
+        return self.model.torque(*motion, situation.t) - self.model.torque(*motion)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.carried import unloaded
 from estimation.diagnosis.extension import Extension
 from estimation.diagnosis.going_on import going_on
 from estimation.diagnosis.hypotheses import Hypothesis
@@ -143,6 +144,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         formulas=baseline.base.formulas(),
         provenance=provenance,
         extensions=tuple(extensions),
+        felt=unloaded(problem)[list(baseline.base.independent)],
     )
     return Fitted(model, tuple(known), values[: base.shape[2]])
 

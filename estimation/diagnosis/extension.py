@@ -122,16 +122,22 @@ def find_effect(name: str) -> Effect:
     return pattern
 
 
-def extension_torque(extensions: Sequence[Extension], state: Situation) -> Array:
+def extension_torque(extensions: Sequence[Extension], felt: Situation, own: Situation | None = None) -> Array:
     """Evaluates the extensions of a model in what its base model says of a motion (N, n) [N m or N].
 
     What acts on all of the torque comes after the others: what makes it late, then what cuts it off.
+
+    Args:
+        extensions: the effects.
+        felt: what they depend on, by the base parameters that they were fitted beside.
+        own: the same by the model's own parameters, for what cuts off the torque: it is fitted to all of it; by default
+            those are the same.
     """
-    total = np.zeros_like(state.q)
+    total, own = np.zeros_like(felt.q), felt if own is None else own
     for stage in range(3):
-        now = state.beside(total) if stage else state
-        own = [extension for extension in extensions if _stage(extension.source) == stage]
-        total = total + sum((extension.torque(now) for extension in own), start=np.zeros_like(total))
+        now = (felt, felt.beside(total), own.beside(total))[stage]
+        acting = [extension for extension in extensions if _stage(extension.source) == stage]
+        total = total + sum((extension.torque(now) for extension in acting), start=np.zeros_like(total))
     return total
 
 

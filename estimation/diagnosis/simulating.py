@@ -39,6 +39,7 @@ class Plant:
         values: their values (b,).
         members: effects beside it; none of the base model alone.
         coefficients: of each effect.
+        felt: base parameters (b,) by which effects reckon load and friction; None for `values`.
     """
 
     model: TorqueModel
@@ -46,11 +47,19 @@ class Plant:
     values: Array
     members: Sequence[Member] = ()
     coefficients: Sequence[Array] = ()
+    felt: Array | None = None
 
     def at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
-        """Gives what effects may depend on along a motion at the times of a recording."""
+        """Gives what the base model says along a motion at the times of a recording."""
+        return self._by(self.values, part, motion)
+
+    def felt_at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
+        """Gives what effects depend on there."""
+        return self._by(self.values if self.felt is None else self.felt, part, motion)
+
+    def _by(self, values: Array, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
         q, dq, ddq = motion
-        return situation_on(replace(part, q=q, dq=dq, ddq=ddq), self.model, self.values, self.columns)
+        return situation_on(replace(part, q=q, dq=dq, ddq=ddq), self.model, values, self.columns)
 
     def base(self, part: Recording, motion: tuple[Array, Array, Array]) -> Array:
         """Evaluates the base model's torque (N, n) along a motion of one log, with its gravity and payload."""
@@ -148,7 +157,7 @@ def _driven(
     """Follows one robot; says too whether its effects were evaluated along the simulated motion."""
     part = cut(whole, rows)
     measured = plant.at(part, (part.q, part.dq, part.ddq))
-    plant, torque = plant.unread(measured, reference.torque)
+    plant, torque = plant.unread(plant.felt_at(part, (part.q, part.dq, part.ddq)), reference.torque)
     reference = replace(reference, torque=torque)
     width, coulomb, tangent = measured.velocity_scale, _coulomb(measured), _tangent(measured)
     effects = _Effects(plant, whole, rows, SEEN * loop.bandwidth)
@@ -201,7 +210,7 @@ class _Effects:
         return smooth + self.history[0], turning + self.history[1]
 
     def _parts(self, part: Recording, motion: tuple[Array, Array, Array], members: list[int]) -> tuple[Array, Array]:
-        now = self.plant.at(part, motion)
+        now = self.plant.felt_at(part, motion)
         total = self.plant.beyond(now, members)
         smooth = self.plant.beyond(replace(now, velocity_scale=np.full(part.n, NO_SIGN), _cache={}), members)
         return smooth, _factor(total - smooth, now.sign)

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.carried import lightened, regressor_on
+from estimation.diagnosis.carried import lightened, regressor_on, unloaded
 from estimation.diagnosis.composed import columns_on
 from estimation.diagnosis.extending import dense
 from estimation.diagnosis.findings import Gain
@@ -189,6 +189,7 @@ def simulate_unseen(
     after = replace(
         before,
         values=extended[:b],
+        felt=unloaded(problem)[list(known.independent)],
         members=tuple(members[i] for i in there),
         coefficients=tuple(extended[edges[i] : edges[i + 1]] for i in there),
     )

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from estimation.diagnosis.extending import _covariance, _narrowed, dense, fit_extended
+from estimation.diagnosis.extension import find_effect
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.refinement import Member, refine
 from estimation.diagnosis.scoring import accept
 from estimation.diagnosis.states import record
+from estimation.model import load_model
+from estimation.virtual_robot import virtual_robot
 from robots.robot import Robot
-from robots.signals import Log
+from robots.signals import Log, Motion
 from robots.terms.effects import EFFECTS
 
 MIDDLE = 10.0
@@ -92,6 +96,36 @@ def test_a_change_between_two_logs_is_within_the_pause(
     error = float(np.sqrt(extension.covariance[len(size), len(size)]))
     assert extension.shape[0] == pytest.approx((ends + begins) / 2)
     assert 1.96 * error == pytest.approx((begins - ends) / 2, rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["pattern:load:0:even", "load_dependent_friction", "joint_elasticity"])
+def test_the_model_is_what_was_fitted(
+    arm: Robot, recording: Recording, pose_arm: Callable[..., Problem], tmp_path: Path, name: str
+) -> None:
+    """Its torque, from its file too, is that of base model and effect together, whatever the two take from each other.
+
+    A function of the load, as gravity is: the fit shares a torque between the two, and the base model's load is then
+    another than the one that the function was fitted in.
+    """
+    effect = find_effect(name)
+    hypothesis, problem = Hypothesis(effect, 1), pose_arm(recording)
+    shape = effect.grid(problem.situation, 1)[0]
+    columns = dense(problem, hypothesis, shape)
+    size = 0.2 * recording.tau[:, 0].std() / columns[:, 0].std(axis=0).max()
+    posed = pose_arm(replace(recording, tau=recording.tau + size * columns[:, :, 0]))
+    member = refine(posed, hypothesis, shape, accept(posed, ()))
+    fitted = fit_extended(posed, [member], {"gravities": []})
+    base = posed.baseline.regressor @ fitted.values[: posed.baseline.base.size]
+    own = dense(posed, hypothesis, member.shape) @ fitted.model.extensions[0].coefficients
+    motion = (recording.q, recording.dq, recording.ddq, recording.t)
+    fitted.model.save(tmp_path / "model.json")
+    for model in (fitted.model, load_model(tmp_path)):
+        np.testing.assert_allclose(model.torque(*motion), base + own, rtol=0, atol=1e-8 * recording.tau.std())
+        played = virtual_robot(model).torque(Motion(recording.t, *motion[:3]))
+        np.testing.assert_allclose(played, base + own, rtol=0, atol=1e-8 * recording.tau.std())
+    if effect.name.startswith("pattern"):
+        other = replace(fitted.model, felt=None).torque(*motion)
+        assert np.abs(other - base - own).max() > 1e-3 * recording.tau.std()
 
 
 def test_no_log_knows_a_delay_better_than_its_formula(
