@@ -92,6 +92,15 @@ class Diagnosis:
         """Whether the question is answered: nothing found, or named without a rival left."""
         return self.verdict in ("none", "named")
 
+    @property
+    def every_row(self) -> Array:
+        """NRMSE (n,) of the extended model on unseen data as `predict` has it; NaN where it is not known.
+
+        `baseline` and `extended` leave out rows in which a joint's direction of motion is not known.
+        """
+        stated = self.model.provenance.get("unseen_nrmse")
+        return np.full(self.model.robot.n, np.nan) if stated is None else np.array([number(value) for value in stated])
+
     def summary(self) -> str:
         """Says what was found, what it brings, and what stays open."""
         robot = self.model.robot
@@ -117,13 +126,15 @@ class Diagnosis:
             close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]
             if close:
                 lines.append(f"    not told apart from: {', '.join(close)}")
-        before, after = (
+        before, after, every = (
             " ".join(f"{100 * value:.2f}" if np.isfinite(value) else "-" for value in errors)
-            for errors in (self.baseline, self.extended)
+            for errors in (self.baseline, self.extended, self.every_row)
         )
         lines.append(f"  unseen error per joint [% of torque RMS]: {before}")
         if self.findings:
             lines.append(f"                          with the extension: {after}")
+        if np.isfinite(self.every_row).any():
+            lines.append(f"       every row counted, as in `oed predict`: {every}")
         lines.append(f"  measured on {self.how_unseen}")
         if self.simulation is not None:
             lengths = [length_unit(robot, j) for j in range(robot.n)]

@@ -14,6 +14,7 @@ from estimation.diagnosis.gain import PARTS, Unseen
 from estimation.diagnosis.problem import Problem
 from estimation.model import Model
 from estimation.prediction import Prediction, predict
+from estimation.preparation import torque_of
 from robots.signals import Log
 from robots.terms import Column, FrictionPolynomial
 from robots.terms.effects.of_model import velocity_scale
@@ -109,24 +110,26 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
     """States the half-widths of a band that holds 95 % of the model's errors on data that its fit has not seen.
 
     Args:
-        model: whose provenance gets them (n,) [N m or N], and the share of each part of the held-out logs that the band
-            of the other parts holds (n,); None of a joint without any.
+        model: whose provenance gets them (n,) [N m or N], the share of each part of the held-out logs that the band of
+            the other parts holds (n,), None of a joint without any, and the errors' RMS over the torque's (n,).
         logs: those of the fit, with torque.
         held_out: others. Without any, errors on the logs of the fit count as many times as much as errors grew on parts
             of them that fits had not seen.
         unseen: the errors on those.
     """
+    growth = np.ones(model.robot.n) if held_out else unseen.growing()
+    errors = [np.abs(_error(predict(model, log))) * growth for log in held_out or logs]
+    covered = np.full(model.robot.n, np.nan)
     if held_out:
-        errors = [np.abs(part) for log in held_out for part in np.array_split(_error(predict(model, log)), PARTS)]
+        parts = [part for error in errors for part in np.array_split(error, PARTS)]
         shares = [
-            np.mean(error <= band_of(np.concatenate(errors[:k] + errors[k + 1 :])), axis=0)
-            for k, error in enumerate(errors)
+            np.mean(part <= band_of(np.concatenate(parts[:k] + parts[k + 1 :])), axis=0) for k, part in enumerate(parts)
         ]
-        covered = np.average(shares, axis=0, weights=[len(error) for error in errors])
-    else:
-        errors = [np.abs(_error(predict(model, log))) * unseen.growing() for log in logs]
-        covered = np.full(model.robot.n, np.nan)
-    stated = {"band95": _known(band_of(np.concatenate(errors))), "band95_coverage": _known(covered)}
+        covered = np.average(shares, axis=0, weights=[len(part) for part in parts])
+    every, torque = np.concatenate(errors), np.concatenate([torque_of(model.robot, log) for log in held_out or logs])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.sqrt(np.mean(every**2, axis=0) / np.mean(torque**2, axis=0))
+    stated = {"band95": _known(band_of(every)), "band95_coverage": _known(covered), "unseen_nrmse": _known(share)}
     return replace(model, provenance={**model.provenance, **stated})
 
 

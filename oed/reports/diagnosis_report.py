@@ -131,14 +131,18 @@ def _torque(view: DiagnosisView) -> Section:
     titles = joint_titles(view.joint_names, len(view.joint_names))
     rows: list[tuple[Cell, ...]] = []
     for j, title in enumerate(titles):
-        old, new = (None if not np.isfinite(e[j]) else 100 * float(e[j]) for e in (view.nrmse_before, view.nrmse_after))
+        old, new, every = (
+            None if not np.isfinite(e[j]) else 100 * float(e[j])
+            for e in (view.nrmse_before, view.nrmse_after, view.nrmse_every)
+        )
         gain = None if old is None or new is None or not old else 100 * (1 - new / old)
-        rows.append((title, old, new, gain))
+        rows.append((title, old, new, gain, every))
     table = Table(
-        headings=("joint", "base model [%]", "extended model [%]", "less error [%]"),
+        headings=("joint", "base model [%]", "extended model [%]", "less error [%]", "every row [%]"),
         rows=tuple(rows),
         caption="Error of the simulated torque over the torque's RMS, on data that the fit has not seen. Rows in which "
-        "a joint stands or turns round do not count for it: its friction may have any value there.",
+        "a joint stands or turns round do not count for it: its friction may have any value there. The last column is "
+        "the extended model's error with every row counted, as `oed predict` has it.",
     )
     return Section(
         title="Measured and simulated torque",

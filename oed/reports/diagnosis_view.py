@@ -82,6 +82,7 @@ class DiagnosisView:
         extended: the extended model's (N, n).
         nrmse_before: error over torque RMS per joint on unseen data (n,).
         nrmse_after: with what was found (n,).
+        nrmse_every: the same with every row counted (n,); NaN where it is not known.
         unseen: what the unseen data are.
         limits: what could have been seen.
         next_kind: the next experiment's kind in words; empty for none.
@@ -106,6 +107,7 @@ class DiagnosisView:
     extended: Array
     nrmse_before: Array
     nrmse_after: Array
+    nrmse_every: Array
     unseen: str
     limits: tuple[Limit, ...]
     next_kind: str = ""
@@ -141,6 +143,7 @@ def view_of(diagnosis: Diagnosis) -> DiagnosisView:
         extended=trace.measured - trace.after,
         nrmse_before=diagnosis.baseline,
         nrmse_after=diagnosis.extended,
+        nrmse_every=diagnosis.every_row,
         unseen=diagnosis.how_unseen,
         limits=diagnosis.limits,
         next_kind="" if following is None else _experiment(following.kind, following.times),

@@ -84,6 +84,10 @@ def test_the_extended_model_predicts_an_unseen_log_as_its_file_does(
     assert whole.predicted == pytest.approx(predict(result.model, unseen).predicted)
     alone = predict(replace(model, extensions=()), unseen)
     assert whole.nrmse[1] < alone.nrmse[1]
+    # What is said of the unseen log is what a prediction of it comes to, rows about reversals included.
+    np.testing.assert_allclose(result.every_row, whole.nrmse, rtol=1e-9)
+    np.testing.assert_allclose(result.extended, whole.nrmse, rtol=0.15)
+    assert " ".join(f"{100 * value:.2f}" for value in whole.nrmse) in result.summary()
     with pytest.raises(InputError, match="exists"):
         result.save(tmp_path)
 

@@ -57,6 +57,8 @@ def test_its_band_holds_most_errors_on_other_unseen_motions(
     shares = np.mean([predict(model, one).band_coverage for one in more], axis=0)
     assert np.all(np.abs(shares - 0.95) < 0.05)
     covered = model.provenance["band95_coverage"]
+    told = np.array(model.provenance["unseen_nrmse"])
+    np.testing.assert_allclose(told, predict(model, other).nrmse, rtol=1e-9 if held_out else 0.2)
     assert np.allclose(covered, 0.95, atol=0.03) if held_out else covered == [None, None]
 
 

@@ -68,6 +68,7 @@ def view():
         extended=base + bend,
         nrmse_before=np.array([0.05, 0.1]),
         nrmse_after=np.array([0.05, 0.05]),
+        nrmse_every=np.array([0.07, np.nan]),
         unseen="a log that the fit has not seen",
         limits=LIMITS,
         next_kind="constant speeds",
@@ -121,6 +122,13 @@ def test_what_brings_nothing_explains_nothing(interval, told, view):
     page = diagnosis_page(replace(view, verdict="unexplained", findings=(finding,)))
     assert page.verdict.startswith("A part of the error is explained") == told
     assert page.verdict.endswith(finding.sentence)
+
+
+def test_the_error_of_every_row_is_told_where_it_is_known(view):
+    """Beside the error of rows that count stands that of `oed predict`, which has them all."""
+    (table,) = next(s for s in diagnosis_page(view).sections if s.title.startswith("Measured")).tables
+    assert table.headings[-1] == "every row [%]"
+    assert [row[-1] for row in table.rows] == [pytest.approx(7.0), None]
 
 
 def test_the_error_told_is_that_of_a_joint_with_a_finding(view):
