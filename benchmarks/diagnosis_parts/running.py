@@ -132,7 +132,7 @@ def diagnose_case(case: Case, robot: Robot) -> tuple[Any, dict[str, Any]]:
     ]
     if unseen and case.effects:
         # On the same rows: the diagnosis leaves out ends, where filters err, and rows whose direction it does not know.
-        counted = [_counted(diagnosis.trace, log) for log in unseen]
+        counted = [_counted(diagnosis.trace, log.t) for log in unseen]
         oracle = ask_oracle(case, counted, logged=True)
         squares = [(log.tau**2 * counts).sum(axis=0) for log, counts in zip(unseen, counted, strict=True)]
         size = np.sum(squares, axis=0) / np.sum([counts.sum(axis=0) for counts in counted], axis=0)
@@ -140,14 +140,31 @@ def diagnose_case(case: Case, robot: Robot) -> tuple[Any, dict[str, Any]]:
             row[f"oracle_{name}"] = (getattr(oracle, name) / size).tolist()
         told = [np.square(np.array(said[name]["nrmse"], dtype=float)) for name in ("baseline", "extended")]
         row["before"], row["after_extension"] = told[0].tolist(), told[1].tolist()
+        row["by_file"] = _by_file(diagnosis, unseen)
     return diagnosis, row
 
 
-def _counted(trace: Any, log: Log) -> np.ndarray:
+def _by_file(diagnosis: Any, unseen: Sequence[Log]) -> list[float]:
+    """Squared NRMSE (n,) on rows that count, of what the model that the diagnosis wrote predicts of the unseen logs."""
+    from estimation import load_model, predict
+
+    with tempfile.TemporaryDirectory() as folder:
+        diagnosis.save(folder)
+        model = load_model(folder)
+    squares, torques = [], []
+    for log in unseen:
+        prediction = predict(model, log)
+        counted = _counted(diagnosis.trace, prediction.motion.t)
+        squares.append(((prediction.measured - prediction.predicted) ** 2 * counted).sum(axis=0))
+        torques.append((prediction.measured**2 * counted).sum(axis=0))
+    return (np.sum(squares, axis=0) / np.maximum(np.sum(torques, axis=0), 1e-300)).tolist()
+
+
+def _counted(trace: Any, t: np.ndarray) -> np.ndarray:
     """Marks the samples (N, n) of an unseen log on which the diagnosis measured its gain, by its curves."""
-    nearest = np.clip(np.searchsorted(trace.t, log.t), 1, len(trace.t) - 1)
-    nearest -= log.t - trace.t[nearest - 1] < trace.t[nearest] - log.t
-    close = np.abs(trace.t[nearest] - log.t) <= np.median(np.diff(trace.t))
+    nearest = np.clip(np.searchsorted(trace.t, t), 1, len(trace.t) - 1)
+    nearest -= t - trace.t[nearest - 1] < trace.t[nearest] - t
+    close = np.abs(trace.t[nearest] - t) <= np.median(np.diff(trace.t))
     return np.isfinite(trace.before[nearest]) & close[:, None]
 
 

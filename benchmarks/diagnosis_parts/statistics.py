@@ -125,6 +125,19 @@ def errors_left(rows: Iterable[Row]) -> np.ndarray:
     return np.array([np.sum(row["after_extension"]) / np.sum(row["oracle_after"]) for row in able])
 
 
+def file_over_told(rows: Iterable[Row]) -> np.ndarray:
+    """Unseen error of each joint by the model's file over what the diagnosis says of it, where something was found."""
+    able = (row for row in rows if row["findings"] and row.get("by_file") is not None)
+    return np.array(
+        [
+            np.sqrt(file / told)
+            for row in able
+            for file, told in zip(row["by_file"], row["after_extension"], strict=True)
+            if np.isfinite(told) and told > 0
+        ]
+    )
+
+
 def parameter_errors(rows: Iterable[Row], wanted: dict[str, tuple[str, ...]]) -> list[dict[str, Any]]:
     """Errors of parameters of effects rightly found: absolute, relative, and whether the interval holds the truth."""
     errors = []

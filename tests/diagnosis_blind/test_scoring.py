@@ -13,6 +13,7 @@ from benchmarks.diagnosis_parts.statistics import (
     both,
     detected,
     errors_left,
+    file_over_told,
     first_is_right,
     gain_ratios,
     interval,
@@ -76,6 +77,15 @@ def test_a_worse_base_model_keeps_its_gain_and_makes_none(before: float, after: 
     """An error with and without the effect is no part of the gain, and a base model's own that goes is no gain."""
     seen = row([("stribeck", 2)], [("stribeck", 2)], **AFTER | {"before": before, "after_extension": after})
     assert gain_ratios([seen]) == pytest.approx([ratio])
+
+
+def test_the_file_of_a_model_is_held_to_what_was_told_of_it() -> None:
+    """Joint by joint where something was found; what a diagnosis says of an unseen log, its model must predict."""
+    errors = {"before": [4e-3, 1e-3], "after_extension": [1e-4, 4e-4], "by_file": [1e-4, 9e-4]}
+    seen = row([("stribeck", 2)], [("stribeck", 2)], **AFTER | errors)
+    assert file_over_told([seen]) == pytest.approx([1.0, 1.5])
+    assert "largest 1.50" in figures([seen])
+    assert not len(file_over_told([row([], [("stribeck", 2)], **AFTER | errors)]))
 
 
 def test_a_gain_is_held_to_formulas_and_logged_positions_too() -> None:
