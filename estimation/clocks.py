@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
+from estimation.provenance import is_described
 from robots.common.errors import InputError
 from robots.signals import Log
 
 PAUSE = 60.0
 """Pause [s] taken between two logs where nobody noted it."""
+
+OWN = 1.0
+"""Up to this difference of their starts [s] a log and one of a fit are on the same clock."""
 
 
 def on_one_clock(logs: Sequence[Log], pause: float = PAUSE) -> list[Log]:
@@ -95,6 +100,34 @@ _OVERLAP = (
 _UNDATED = (
     "The held-out logs overlap the others in time: they count as recorded {:.0f} s after them. What changes with time "
     "may be otherwise there: where they speak against it, it is kept all the same."
+)
+
+
+def later_by(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
+    """How much later than its own clock says a log counts beside those that a model was fitted to, and a word on that.
+
+    Two recordings of one robot cannot overlap: one that does began its clock anew, and counts as recorded after them.
+
+    Args:
+        logs: of the model's fit, as its provenance describes them; those of older files state no start.
+        log: another, or one of them.
+    """
+    if not logs or any(known.get("start") is None for known in logs):
+        return 0.0, ""
+    for known in logs:
+        if is_described(log, known):
+            # Some rows at its beginning may have been left out of the fit.
+            late = float(known["start"] - log.t[0])
+            return (late if abs(late) > OWN else 0.0), ""
+    first, last = min(known["start"] for known in logs), max(known["start"] + known["duration"] for known in logs)
+    if log.t[0] > last or log.t[-1] < first:
+        return 0.0, ""
+    return float(last + PAUSE - log.t[0]), _LATER.format(PAUSE)
+
+
+_LATER = (
+    "The log overlaps in time those that the model was fitted to, in which something changed: it counts as recorded "
+    "{:.0f} s after them."
 )
 
 

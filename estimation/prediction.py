@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.clocks import later_by
 from estimation.known_setup import HEAT, require_plain
 from estimation.model import Model
 from estimation.preparation import torque_of
@@ -165,7 +166,8 @@ def predict(
     Args:
         model: an identified model.
         log: positions over time; its torque, if any, is compared with the prediction and not used otherwise. A payload
-            or a gravity that it states counts.
+            or a gravity that it states counts. Where it overlaps in time the logs in which a model's change was found,
+            it counts as recorded after them (`clock_of`).
         thermal: this model with its thermal models: friction falls as the motion heats the joints.
         start: temperatures of each joint's zones at first [degC]; those of the surroundings by default.
         ambient: temperature of the surroundings where the log does not state it [degC]; each model's by default.
@@ -187,7 +189,8 @@ def predict(
     has_torque = log.tau is not None or log.current is not None
     if thermal is None:
         states = (motion.q, motion.dq, motion.ddq)
-        predicted = model.torque(*states, motion.t, gravity=log.gravity, payload=log.payload)
+        later, _ = clock_of(model, log)
+        predicted = model.torque(*states, motion.t + later, gravity=log.gravity, payload=log.payload)
     else:
         from estimation.thermal.history import surroundings
 
@@ -201,6 +204,16 @@ def predict(
         band=_band(model, motion, log.gravity),
         cutoff=cutoff,
     )
+
+
+def clock_of(model: Model, log: Log) -> tuple[float, str]:
+    """How much later [s] than its clock says a log counts for a model that something changed in, and a word on that.
+
+    What comes, goes or builds up does so on the clock of the logs that the model was fitted to (`later_by`).
+    """
+    if not any(extension.source.depends_on == "time" for extension in model.extensions):
+        return 0.0, ""
+    return later_by(model.provenance.get("logs", ()), log)
 
 
 def _smoother(model: Model, cutoff: float) -> Smoother:

@@ -49,6 +49,7 @@ def predict(
     with console.working() as progress:
         from estimation import load_model, read_log
         from estimation import predict as run
+        from estimation.prediction import clock_of
 
         identified = load_model(model)
         robot = identified.robot
@@ -58,8 +59,10 @@ def predict(
         heat = _heat(model, identified, recorded, before or [], ambient, mapping)
         result = run(identified, recorded, **heat.options)
         result.save(out, band=band, force=force)
-    summary = "\n".join([result.summary(), *([heat.assumed] if heat.assumed else []), f"written to {out}"])
-    console.result(summary, {"file": str(out), **result.to_dict(), "heat": heat.assumed or None})
+        _, clock = clock_of(identified, recorded)
+    summary = "\n".join([result.summary(), *(word for word in (heat.assumed, clock) if word), f"written to {out}"])
+    words = {"heat": heat.assumed or None, "clock": clock or None}
+    console.result(summary, {"file": str(out), **result.to_dict(), **words})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from estimation import on_one_clock
-from estimation.clocks import clocked
+from estimation import on_one_clock, read_log, write_log
+from estimation.clocks import PAUSE, clocked, later_by
+from estimation.provenance import describe_logs
 from robots.common.errors import InputError
 from robots.signals import Log
 
@@ -62,3 +64,27 @@ def test_a_copy_is_refused() -> None:
     assert clocked([log, again], []).notes
     with pytest.raises(InputError, match="given twice"):
         clocked([log], [again, again])
+
+
+def test_a_log_of_the_fit_keeps_its_place_and_another_comes_after() -> None:
+    """By start and samples one of the fit is known; what overlaps none stays; older files say nothing."""
+    q = np.zeros((11, 1))
+    first, second = (Log(t=start + 0.1 * np.arange(11), q=q) for start in (0.0, 100.0))
+    known = describe_logs([first, second])
+    assert later_by(known, second) == later_by(known, replace(first, t=first.t + 500.0)) == (0.0, "")
+    assert later_by(known, replace(first, t=first.t - 50.0)) == (0.0, "")
+    late, word = later_by(known, replace(first, t=first.t + 0.3))
+    assert late == pytest.approx(101.0 + PAUSE - 0.3)
+    assert "recorded 60 s after" in word
+    assert later_by([{**known[0], "start": None}], replace(first, t=first.t + 0.3)) == (0.0, "")
+    assert later_by([], first) == (0.0, "")
+
+
+def test_a_file_of_the_fit_is_put_where_the_fit_had_it(tmp_path: Path) -> None:
+    """Logs that each began their clock anew were put one after the other: each file is known again."""
+    logs = []
+    for k in range(2):
+        write_log(tmp_path / f"{k}.csv", Log(t=0.1 * np.arange(11), q=np.full((11, 1), 0.1 * k)))
+        logs.append(read_log(tmp_path / f"{k}.csv", torque=False))
+    known = describe_logs(on_one_clock(logs))
+    assert [later_by(known, log)[0] for log in logs] == pytest.approx([0.0, 1.0 + PAUSE])

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from estimation import load_model, predict
+from estimation.clocks import PAUSE
 from estimation.diagnosis import Diagnosis, diagnose
+from estimation.prediction import clock_of
 from oed.reports.diagnosis_view import view_of
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.plants import simulate
@@ -90,6 +92,22 @@ def test_the_extended_model_predicts_an_unseen_log_as_its_file_does(
     assert " ".join(f"{100 * value:.2f}" for value in whole.nrmse) in result.summary()
     with pytest.raises(InputError, match="exists"):
         result.save(tmp_path)
+
+
+def test_a_log_that_began_its_clock_anew_is_predicted_as_after_the_change(
+    stepped: tuple[Diagnosis, Log], tmp_path: Path
+) -> None:
+    """It overlaps the log of the fit in time, and counts as recorded after it; the log of the fit itself does not."""
+    result, unseen = stepped
+    result.save(tmp_path)
+    model = load_model(tmp_path)
+    anew = replace(unseen, t=unseen.t - unseen.t[0] + 0.5)
+    later, word = clock_of(model, anew)
+    assert later == pytest.approx(model.provenance["logs"][0]["duration"] + PAUSE - 0.5)
+    assert "counts as recorded 60 s after" in word
+    np.testing.assert_allclose(predict(model, anew).predicted, predict(model, unseen).predicted, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(predict(model, anew).motion.t, predict(model, unseen).motion.t - 99.5, atol=1e-6)
+    assert clock_of(model, unseen) == clock_of(replace(model, extensions=()), anew) == (0.0, "")
 
 
 def test_a_diagnosis_survives_its_file(stepped: tuple[Diagnosis, Log], tmp_path: Path) -> None:
