@@ -48,7 +48,8 @@ def lattice_step(values: Array) -> float:
     low = multiples < 10.5
     if not low.any() or near[low].mean() < 0.95:
         return 0.0
-    return float(np.median(distances[low] / np.round(multiples[low])))
+    steps = low & (multiples > 0.5)
+    return float(np.median(distances[steps] / np.round(multiples[steps])))
 
 
 def check_resolution(columns: Columns) -> list[Finding]:
