@@ -17,7 +17,7 @@ PAUSE = 60.0
 """Pause [s] taken between two logs where nobody noted it."""
 
 OWN = 1.0
-"""Up to this difference of their starts [s] a log and one of a fit are on the same clock."""
+"""So far [s] a log may reach beyond what is known of it in a fit, to be on the same clock."""
 
 
 def on_one_clock(logs: Sequence[Log], pause: float = PAUSE) -> list[Log]:
@@ -116,9 +116,10 @@ def later_by(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
         return 0.0, ""
     for known in logs:
         if is_described(log, known):
-            # Some rows at its beginning may have been left out of the fit.
+            # Some of its rows may have been left out of the fit, and it may be a part of it.
             late = float(known["start"] - log.t[0])
-            return (late if abs(late) > OWN else 0.0), ""
+            within = -late > -OWN and log.t[-1] < known["start"] + known["duration"] + OWN
+            return (0.0 if within else late), ""
     first, last = min(known["start"] for known in logs), max(known["start"] + known["duration"] for known in logs)
     if log.t[0] > last or log.t[-1] < first:
         return 0.0, ""

@@ -160,6 +160,7 @@ def predict(
     thermal: ThermalTorqueModel | None = None,
     start: Sequence[Array | None] | None = None,
     ambient: float | None = None,
+    later: float | None = None,
 ) -> Prediction:
     """Predicts the torques of a log's motion.
 
@@ -171,6 +172,7 @@ def predict(
         thermal: this model with its thermal models: friction falls as the motion heats the joints.
         start: temperatures of each joint's zones at first [degC]; those of the surroundings by default.
         ambient: temperature of the surroundings where the log does not state it [degC]; each model's by default.
+        later: how much later [s] than its own clock says the log counts; by default what `clock_of` says.
 
     Returns:
         The torques at the log's own times.
@@ -189,8 +191,8 @@ def predict(
     has_torque = log.tau is not None or log.current is not None
     if thermal is None:
         states = (motion.q, motion.dq, motion.ddq)
-        later, _ = clock_of(model, log)
-        predicted = model.torque(*states, motion.t + later, gravity=log.gravity, payload=log.payload)
+        after = clock_of(model, log)[0] if later is None else later
+        predicted = model.torque(*states, motion.t + after, gravity=log.gravity, payload=log.payload)
     else:
         from estimation.thermal.history import surroundings
 

@@ -57,7 +57,7 @@ def as_sharp(model: Model, logs: Sequence[Log]) -> Model:
     """
     signs = {c.joint - 1: float(value) for c, value in zip(model.parameters, model.values, strict=True) if _is_sign(c)}
     part, now = _part(logs), velocity_scale(model.torque_model)
-    before = predict(model, part)
+    before = _predicted(model, part)
     error, chosen = _error(before), now.copy()
     for joint, coulomb in signs.items():
         dq = before.motion.dq[:, joint]
@@ -66,7 +66,7 @@ def as_sharp(model: Model, logs: Sequence[Log]) -> Model:
         chosen[joint] = (now[joint], *SCALES)[int(np.argmin(squares))]
     trial = _with_scales(model, chosen)
     # Effects turn round as sharply as the model's sign does: with theirs a joint may be worse off.
-    better = predict(trial, part).error_rms < before.error_rms
+    better = _predicted(trial, part).error_rms < before.error_rms
     return _with_scales(model, np.where(better, chosen, now)) if better.any() else model
 
 
@@ -101,7 +101,7 @@ def _with_scales(model: Model, scales: Array) -> Model:
 
 def _misfit(model: Model, log: Log) -> float:
     """Mean over the joints of the logarithm of a prediction's error over the torque's spread."""
-    spread = predict(model, log).relative_spread
+    spread = _predicted(model, log).relative_spread
     told = spread[np.isfinite(spread) & (spread > 0)]
     return float(np.mean(np.log(told))) if len(told) else 0.0
 
@@ -118,7 +118,7 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
         unseen: the errors on those.
     """
     growth = np.ones(model.robot.n) if held_out else unseen.growing()
-    errors = [np.abs(_error(predict(model, log))) * growth for log in held_out or logs]
+    errors = [np.abs(_error(_predicted(model, log))) * growth for log in held_out or logs]
     covered = np.full(model.robot.n, np.nan)
     if held_out:
         parts = [part for error in errors for part in np.array_split(error, PARTS)]
@@ -131,6 +131,11 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
         share = np.sqrt(np.mean(every**2, axis=0) / np.mean(torque**2, axis=0))
     stated = {"band95": _known(band_of(every)), "band95_coverage": _known(covered), "unseen_nrmse": _known(share)}
     return replace(model, provenance={**model.provenance, **stated})
+
+
+def _predicted(model: Model, log: Log) -> Prediction:
+    """Predicts a log, or a part of one, that is on the clock of the fit."""
+    return predict(model, log, later=0.0)
 
 
 def _error(prediction: Prediction) -> Array:

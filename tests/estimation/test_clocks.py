@@ -88,3 +88,5 @@ def test_a_file_of_the_fit_is_put_where_the_fit_had_it(tmp_path: Path) -> None:
         logs.append(read_log(tmp_path / f"{k}.csv", torque=False))
     known = describe_logs(on_one_clock(logs))
     assert [later_by(known, log)[0] for log in logs] == pytest.approx([0.0, 1.0 + PAUSE])
+    # A part of one stays within it.
+    assert later_by(known, on_one_clock(logs)[1].rows(slice(5, None)))[0] == 0.0
