@@ -16,7 +16,7 @@ from robots.common.errors import InputError
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.terms.effects import Situation
-from robots.terms.effects.of_model import velocity_scale
+from robots.terms.effects.of_model import sign_of, velocity_scale
 from robots.terms.effects.sensitivities import moved_body
 from robots.terms.effects.situation import Finer, joined, situation, with_finer
 
@@ -58,12 +58,7 @@ def regressor_on(base: BaseParameters, recording: Recording) -> Array:
 
 def signs_on(recording: Recording, joint: int, scales: Array) -> Array:
     """Evaluates a joint's signs (N, k), from 0, as smooth as `scales` (k,) say, 0 for the sharp one."""
-
-    def evaluate(samples: Recording) -> Array:
-        dq = samples.dq[:, joint, None]
-        return np.where(scales > 0, np.tanh(dq / np.where(scales > 0, scales, 1.0)), np.sign(dq))
-
-    return at_all_samples(recording, evaluate)
+    return at_all_samples(recording, lambda samples: sign_of(samples.dq[:, joint, None], scales))
 
 
 def _regressor(base: BaseParameters, recording: Recording) -> Array:

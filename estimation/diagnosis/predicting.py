@@ -16,8 +16,8 @@ from estimation.model import Model
 from estimation.prediction import Prediction, predict
 from estimation.preparation import torque_of
 from robots.signals import Log
-from robots.terms import Column, FrictionPolynomial
-from robots.terms.effects.of_model import velocity_scale
+from robots.terms import FrictionPolynomial
+from robots.terms.effects.of_model import sign_of, velocity_scale
 
 Array = NDArray[np.float64]
 
@@ -55,14 +55,15 @@ def as_sharp(model: Model, logs: Sequence[Log]) -> Model:
         model: whose terms get the velocities v0 of tanh(dq / v0), and whose provenance states them.
         logs: those of the fit, with torque.
     """
-    signs = {c.joint - 1: float(value) for c, value in zip(model.parameters, model.values, strict=True) if _is_sign(c)}
+    columns = zip(model.parameters, model.values, strict=True)
+    signs = {column.joint - 1: float(value) for column, value in columns if column.symbol == "f1"}
     part, now = _part(logs), velocity_scale(model.torque_model)
     before = _predicted(model, part)
     error, chosen = _error(before), now.copy()
     for joint, coulomb in signs.items():
         dq = before.motion.dq[:, joint]
-        own = error[:, joint] + coulomb * _sign(dq, now[joint])
-        squares = [np.nansum((own - coulomb * _sign(dq, v0)) ** 2) for v0 in (now[joint], *SCALES)]
+        own = error[:, joint] + coulomb * sign_of(dq, now[joint])
+        squares = [np.nansum((own - coulomb * sign_of(dq, v0)) ** 2) for v0 in (now[joint], *SCALES)]
         chosen[joint] = (now[joint], *SCALES)[int(np.argmin(squares))]
     trial = _with_scales(model, chosen)
     # Effects turn round as sharply as the model's sign does: with theirs a joint may be worse off.
@@ -75,14 +76,6 @@ def _part(logs: Sequence[Log]) -> Log:
     log = max(logs, key=lambda log: float(log.t[-1] - log.t[0]))
     middle = 0.5 * float(log.t[0] + log.t[-1])
     return log.rows(slice(*np.searchsorted(log.t, (middle - 0.5 * STRETCH, middle + 0.5 * STRETCH)).tolist()))
-
-
-def _is_sign(column: Column) -> bool:
-    return column.symbol == "f1"
-
-
-def _sign(dq: Array, v0: float) -> Array:
-    return np.asarray(np.tanh(dq / v0) if v0 > 0 else np.sign(dq))
 
 
 def _with_scales(model: Model, scales: Array) -> Model:

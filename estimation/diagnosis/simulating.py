@@ -16,6 +16,7 @@ from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.simulation import Curves, Simulation
 from robots.plants.closed_loop import Driven, Loop, Reference, Tangent, drive
 from robots.regressor import TorqueModel
+from robots.terms.effects.of_model import sign_of
 from robots.terms.effects.situation import Situation
 from robots.terms.effects.static import StaticJointEffect
 
@@ -166,7 +167,7 @@ def _driven(
         def resistance(q: Array, dq: Array, ddq: Array) -> tuple[Array, Array]:
             base = plant.base(part, (q, dq, ddq))
             smooth, turning = effects.along((q, dq, ddq)) if moving else effects.measured
-            return base - coulomb * _sign(dq, width) + smooth, coulomb + turning
+            return base - coulomb * sign_of(dq, width) + smooth, coulomb + turning
 
         return drive(reference, resistance, tangent, inertia=inertia, sign_width=width, loop=loop)
 
@@ -236,10 +237,6 @@ def _coulomb(now: Situation) -> Array:
     return result
 
 
-def _sign(dq: Array, width: Array) -> Array:
-    return np.where(width > 0, np.tanh(dq / np.where(width > 0, width, 1.0)), np.sign(dq))
-
-
 def _tangent(now: Situation) -> Tangent:
     inertia, damping = now.sensitivity("inertia").copy(), now.sensitivity("velocity").copy()
     for i, column in enumerate(now.model.columns):
@@ -248,7 +245,7 @@ def _tangent(now: Situation) -> Tangent:
     # Friction but for its sign, by differences.
     step = 1e-3 * np.maximum(np.sqrt(np.mean(now.dq**2, axis=0)), 1e-9)
     up, down = now.dq + step, now.dq - step
-    turning = _coulomb(now) * (_sign(up, now.velocity_scale) - _sign(down, now.velocity_scale))
+    turning = _coulomb(now) * (sign_of(up, now.velocity_scale) - sign_of(down, now.velocity_scale))
     rows = np.arange(now.robot.n)
     damping[:, rows, rows] += (now.friction_at(up) - now.friction_at(down) - turning) / (2 * step)
     return Tangent(inertia=inertia, damping=damping, stiffness=now.sensitivity("position"))

@@ -30,6 +30,11 @@ def rotor_inertias(model: TorqueModel, parameters: Array) -> Array:
     return result
 
 
+def sign_of(dq: Array, v0: float | Array) -> Array:
+    """Gives the sign of velocities as a base model takes it: tanh(dq / v0), the sharp sign where v0 is 0."""
+    return np.where(v0 > 0, np.tanh(dq / np.where(v0 > 0, v0, 1.0)), np.sign(dq))
+
+
 def velocity_scale(model: TorqueModel) -> Array:
     """Gives v0 (n,) of a model's sign, tanh(dq / v0); 0 for the sharp sign."""
     scales = [term.velocity_scale for term in model.terms if hasattr(term, "velocity_scale")]

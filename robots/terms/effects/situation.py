@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from robots.common.errors import InputError
 from robots.robot import Robot
-from robots.terms.effects.of_model import rotor_inertias, velocity_scale
+from robots.terms.effects.of_model import rotor_inertias, sign_of, velocity_scale
 
 if TYPE_CHECKING:
     from robots.regressor import TorqueModel
@@ -116,8 +116,7 @@ class Situation:
         """The sign of the velocities as the base model takes it (N, n), low-passed where logs are thinned."""
         if self.finer is not None:
             return self.finer.thinned(self.finer.situation.sign)
-        v0 = np.broadcast_to(self.velocity_scale, self.dq.shape)
-        return np.where(v0 > 0, np.tanh(self.dq / np.where(v0 > 0, v0, 1.0)), np.sign(self.dq))
+        return sign_of(self.dq, self.velocity_scale)
 
     @cached_property
     def rotors(self) -> Array:
