@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from estimation.provenance import is_described
+from estimation.provenance import are_one, describe_logs
 from robots.common.errors import InputError
 from robots.signals import Log
 
@@ -114,8 +114,9 @@ def later_by(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
     """
     if not logs or any(known.get("start") is None for known in logs):
         return 0.0, ""
+    (own,) = describe_logs([log])
     for known in logs:
-        if is_described(log, known):
+        if are_one(own, known):
             # Some of its rows may have been left out of the fit, and it may be a part of it.
             late = float(known["start"] - log.t[0])
             within = -late > -OWN and log.t[-1] < known["start"] + known["duration"] + OWN

@@ -57,9 +57,9 @@ def predict(
         (recorded,) = told([read], payload, gravity)
         progress.start("predicting", None)
         heat = _heat(model, identified, recorded, before or [], ambient, mapping)
-        result = run(identified, recorded, **heat.options)
+        later, clock = clock_of(identified, recorded)
+        result = run(identified, recorded, later=later, **heat.options)
         result.save(out, band=band, force=force)
-        _, clock = clock_of(identified, recorded)
     summary = "\n".join([result.summary(), *(word for word in (heat.assumed, clock) if word), f"written to {out}"])
     words = {"heat": heat.assumed or None, "clock": clock or None}
     console.result(summary, {"file": str(out), **result.to_dict(), **words})
