@@ -21,7 +21,7 @@ from robots.common.files import write_atomic
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.terms import Column, build_term, describe_term
-from robots.terms.effects.situation import joined, situation
+from robots.terms.effects.situation import Situation, joined, situation
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -123,8 +123,12 @@ class Model:
         if t is None or not self.extensions:
             return own
         arrays = [np.asarray(t, dtype=float), *(np.atleast_2d(np.asarray(x, dtype=float)) for x in (q, dq, ddq))]
-        states = [joined([situation(model, known, *arrays)], self.torque_model) for known in (felt, parameters)]
-        return own + extension_torque(self.extensions, *states)
+
+        def state(known: Array) -> Situation:
+            return joined([situation(model, known, *arrays)], self.torque_model)
+
+        cut = any(extension.source.last for extension in self.extensions)
+        return own + extension_torque(self.extensions, state(felt), state(parameters) if cut else None)
 
     def to_frame(self) -> pd.DataFrame:
         """Gives a row per parameter: joint, value, standard error, percent, unit, determined, formula."""
