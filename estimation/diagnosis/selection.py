@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,16 +11,14 @@ from estimation.diagnosis.composed import composed
 from estimation.diagnosis.contenders import NEAR, contenders
 from estimation.diagnosis.going_on import as_it_lasts
 from estimation.diagnosis.hypotheses import Hypothesis
+from estimation.diagnosis.polishing import best, measured, polished
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member, all_but, refine
-from estimation.diagnosis.scan import Entry, Outcome, Scan, measure, scan
-from estimation.diagnosis.scoring import Accepted, accept, score
+from estimation.diagnosis.scan import Entry, Scan, measure, scan
+from estimation.diagnosis.scoring import Accepted, accept
 from estimation.diagnosis.together import together
-from estimation.diagnosis.worthwhile import LEAST, SURE, beyond, is_sure, is_told, lasts
-from robots.common.parallel import threaded
+from estimation.diagnosis.worthwhile import SURE, beyond, is_sure, is_told, lasts
 
-# A member whose gain is within this share of what it was when it won over its rivals wins over them still.
-SAME = 0.02
 MOST = 4  # effects at once
 FAR_MORE = 1.5  # times the gain
 SHOWN = 40  # outcomes whose p-values are computed
@@ -93,41 +90,41 @@ def select(
         if not chances[result.outcomes[0].hypothesis] <= false_alarm:
             break
         advance(f"{result.outcomes[0].hypothesis.label}")
-        refined = _best(problem, contenders(problem, result, members), accepted, known)
+        refined = best(problem, contenders(problem, result, members), accepted, known)
         chance = {member.hypothesis: chances.get(member.hypothesis, 1.0) for member in refined}
         able = [m for m in refined if chance[m.hypothesis] <= false_alarm and m.hypothesis not in spurned]
-        best = [m for m in able if is_told(problem, m, chance[m.hypothesis], members, false_alarm)]
-        best = [m for m in best if not m.hypothesis.effect.passing or lasts(problem, m, accepted)]
-        if not best:
+        told = [m for m in able if is_told(problem, m, chance[m.hypothesis], members, false_alarm)]
+        told = [m for m in told if not m.hypothesis.effect.passing or lasts(problem, m, accepted)]
+        if not told:
             break
         # What is sure is on joints where no other acts, and so none leaves anything.
-        sure_alone = is_sure(problem, best[0], chance[best[0].hypothesis], members, false_alarm)
-        if not (sure_alone or beyond(problem, best[0], members)):
-            if (formed := _formed_anew(problem, best[0], members)) is None:
+        sure_alone = is_sure(problem, told[0], chance[told[0].hypothesis], members, false_alarm)
+        if not (sure_alone or beyond(problem, told[0], members)):
+            if (formed := _formed_anew(problem, told[0], members)) is None:
                 break
-            *members, best[0] = formed
+            *members, told[0] = formed
             accepted = accept(problem, tuple(member.group for member in members))
-        best[0] = as_it_lasts(problem, best[0], accepted)
-        members.append(best[0])
-        p_values.append(chance[best[0].hypothesis])
-        won[best[0].hypothesis] = best[0].gain
+        told[0] = as_it_lasts(problem, told[0], accepted)
+        members.append(told[0])
+        p_values.append(chance[told[0].hypothesis])
+        won[told[0].hypothesis] = told[0].gain
         # What is known of the torque now may come near what the log shows.
         more, sure = _seen(problem, entries, false_alarm, rng, members)
         seen |= {member.hypothesis for member in more}
         members, p_values = [*members, *more], [*p_values, *sure]
         if len(members) > 1:
-            members, p_values = _polished(problem, entries, members, p_values, seen, won, rng, false_alarm)
+            members, p_values = polished(problem, entries, members, p_values, seen, won, rng, false_alarm)
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
         now = {member.hypothesis for member in members}
-        if best[0].hypothesis not in now:
-            spurned.add(best[0].hypothesis)
+        if told[0].hypothesis not in now:
+            spurned.add(told[0].hypothesis)
         elif now in visited:
             break
         visited.append(now)
     members = together(problem, members)
     found = [
-        Found(_measured(problem, member, all_but(problem, members, i)), p_value)
+        Found(measured(problem, member, all_but(problem, members, i)), p_value)
         for i, (member, p_value) in enumerate(zip(members, p_values, strict=True))
     ]
     kept = [
@@ -159,7 +156,7 @@ def with_rivals(
             result = scan(problem, entries, beside, rng, nulls=False)
             near = contenders(problem, result, [*members[:i], *members[i + 1 :]], reference)
             rest = [o for o in near if o.hypothesis != found.member.hypothesis]
-            able = [rival for rival in _best(problem, rest, beside) if rival.gain >= NEAR * found.member.gain]
+            able = [rival for rival in best(problem, rest, beside) if rival.gain >= NEAR * found.member.gain]
             rivals = [(rival, reference - rival.bic(problem.rows)) for rival in able]
         told.append(replace(found, rivals=tuple(rivals)))
     return replace(selection, found=tuple(told))
@@ -191,87 +188,13 @@ def _seen(
     return found, p_values
 
 
-def _best(
-    problem: Problem,
-    outcomes: Sequence[Outcome],
-    accepted: Accepted,
-    known: Mapping[Hypothesis, tuple[float, ...]] | None = None,
-) -> list[Member]:
-    """Refines contenders, from shapes that are known too, the best BIC first."""
-    starts = [(o.hypothesis, o.shape) for o in outcomes]
-    starts += [(o.hypothesis, known[o.hypothesis]) for o in outcomes if known and o.hypothesis in known]
-    refined = threaded(lambda start: refine(problem, start[0], start[1], accepted), starts)
-    best: dict[Hypothesis, Member] = {}
-    for member in sorted(refined, key=lambda member: -member.bic(problem.rows)):
-        best.setdefault(member.hypothesis, member)
-    return list(best.values())
-
-
 def _formed_anew(problem: Problem, candidate: Member, members: Sequence[Member]) -> list[Member] | None:
     """Gives members and a candidate refined together, if beside it they take forms that leave it far more; or None.
 
     A gear that loses less when driven back follows a motor that saturates for most of what that does.
     """
     moved = together(problem, [*members, candidate])
-    own = _measured(problem, moved[-1], all_but(problem, moved, len(members)))
+    own = measured(problem, moved[-1], all_but(problem, moved, len(members)))
     if own.gain < FAR_MORE * candidate.gain or not beyond(problem, own, moved[:-1]):
         return None
     return [*moved[:-1], own]
-
-
-def _polished(
-    problem: Problem,
-    entries: Sequence[Entry],
-    members: list[Member],
-    p_values: list[float],
-    seen: Collection[Hypothesis],
-    won: dict[Hypothesis, float],
-    rng: np.random.Generator,
-    false_alarm: float,
-) -> tuple[list[Member], list[float]]:
-    """Refines each member beside the others, lets its rivals take its place, and drops what is no longer needed.
-
-    What was seen in the torque stays. Rivals of one that has `won` over them with the gain that it has still, whatever
-    is beside it now, are not tried again.
-    """
-    for _ in range(2):
-        changed = False
-        for i in range(len(members)):
-            others = [m for k, m in enumerate(members) if k != i]
-            beside = all_but(problem, members, i)
-            now = composed(problem, members, [members[i].hypothesis])
-            reached = _measured(problem, members[i], beside)
-            before = won.get(members[i].hypothesis)
-            still = before is not None and abs(reached.gain - before) <= SAME * before
-            if still or members[i].hypothesis in seen:
-                members[i] = refine(now, members[i].hypothesis, members[i].shape, beside)
-                continue
-            result = scan(problem, entries, beside, rng, nulls=False)
-            near = contenders(problem, result, others, reached.bic(problem.rows))
-            rest = [o for o in near if o.hypothesis != members[i].hypothesis][:4]
-            # All at once: the refinement of its own shape takes as long as those of its rivals.
-            with ThreadPoolExecutor(1) as apart:
-                own = apart.submit(refine, now, members[i].hypothesis, members[i].shape, beside)
-                rivals = _best(problem, rest, beside)
-            best = max([own.result(), *rivals], key=lambda m: m.bic(problem.rows))
-            changed |= best.hypothesis != members[i].hypothesis
-            members[i] = best
-            won[best.hypothesis] = best.gain
-        if not changed:
-            break
-    keep = [
-        i
-        for i, m in enumerate(members)
-        if m.hypothesis in seen
-        or m.worth(problem.rows) > LEAST
-        or is_sure(problem, m, p_values[i], [*members[:i], *members[i + 1 :]], false_alarm)
-    ]
-    return [members[i] for i in keep], [p_values[i] for i in keep]
-
-
-def _measured(problem: Problem, member: Member, beside: Accepted) -> Member:
-    """Measures a member anew, at its shape, beside what is accepted."""
-    result = score(problem, member.group, beside)
-    bounds = member.hypothesis.coefficient_bounds(problem.situation.robot, member.shape)
-    gain, coefficients = result.bounded(*bounds)
-    return replace(member, gain=gain, coefficients=coefficients, visible=result.visible)

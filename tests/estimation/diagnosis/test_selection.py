@@ -45,7 +45,7 @@ def _searching(
     replace("scan", scan)
     replace("contenders", lambda problem, result, members: result.outcomes)
     replace(
-        "_best",
+        "best",
         lambda problem, outcomes, accepted, known=None: [
             SimpleNamespace(hypothesis=o.hypothesis, group=o.hypothesis, shape=(), gain=1.0) for o in outcomes
         ],
@@ -53,29 +53,11 @@ def _searching(
     for name in ("is_told", "is_sure", "beyond"):
         replace(name, lambda *args: True)
     replace(
-        "_polished",
+        "polished",
         lambda problem, entries, members, p_values, *rest: (kept := polished(members), p_values[: len(kept)]),
     )
-    replace("_measured", lambda problem, member, beside: member)
+    replace("measured", lambda problem, member, beside: member)
     return scans
-
-
-def test_a_shape_that_is_known_is_refined_from_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of two tops of one effect, the one that is higher counts, whichever start leads to it; others start once."""
-    starts = []
-
-    def refine(problem, hypothesis, shape, accepted):
-        starts.append((hypothesis, shape))
-        return SimpleNamespace(hypothesis=hypothesis, shape=shape, bic=lambda rows: 10.0 * shape[0])
-
-    monkeypatch.setattr(selection, "refine", refine)
-    outcomes = [SimpleNamespace(hypothesis=A, shape=(1.0,)), SimpleNamespace(hypothesis=B, shape=(2.0,))]
-    problem = SimpleNamespace(rows=100)
-    best = selection._best(problem, outcomes, None, {A: (3.0,), C: (9.0,)})  # type: ignore[arg-type]
-    assert [(m.hypothesis, m.shape) for m in best] == [(A, (3.0,)), (B, (2.0,))]
-    assert len(starts) == 3
-    worse = selection._best(problem, outcomes, None, {A: (0.5,)})  # type: ignore[arg-type]
-    assert [(m.hypothesis, m.shape) for m in worse] == [(B, (2.0,)), (A, (1.0,))]
 
 
 def _selected() -> set[Hypothesis]:
@@ -105,51 +87,6 @@ def test_two_that_drop_each_other_end_the_search(monkeypatch: pytest.MonkeyPatch
     scans = _searching(monkeypatch, lambda members: members[-1:], showing=(A, B))
     assert len(_selected()) == 1
     assert len(scans) <= 4
-
-
-@pytest.mark.parametrize(("gain", "tried"), [(99.0, False), (90.0, True), (110.0, True)])
-def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
-    gain: float, tried: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """An effect that won with a gain of 100, and one beside it of its old gain, which is left in peace.
-
-    A rival, twice as good now, takes the place of the first where it is looked at.
-    """
-
-    def member(hypothesis: Hypothesis, gain: float) -> SimpleNamespace:
-        return SimpleNamespace(
-            hypothesis=hypothesis, group=hypothesis, shape=(), gain=gain, bic=lambda rows: gain, worth=lambda rows: gain
-        )
-
-    looked: list[int] = []
-    gains = {A: gain, B: 100.0, C: 2 * gain}
-
-    def scan(problem, entries, accepted, rng, *, nulls):
-        looked.append(1)
-        return SimpleNamespace(outcomes=[])
-
-    monkeypatch.setattr(selection, "accept", lambda problem, groups: groups)
-    monkeypatch.setattr(selection, "all_but", _all_but)
-    monkeypatch.setattr(selection, "composed", lambda problem, members, hypotheses: problem)
-    monkeypatch.setattr(selection, "refine", lambda problem, h, shape, beside: member(h, gains[h]))
-    monkeypatch.setattr(selection, "_measured", lambda problem, m, beside: member(m.hypothesis, gains[m.hypothesis]))
-    monkeypatch.setattr(selection, "scan", scan)
-    monkeypatch.setattr(selection, "contenders", lambda *args: [SimpleNamespace(hypothesis=C)])
-    monkeypatch.setattr(selection, "_best", lambda problem, rest, beside: [member(C, gains[C])] if rest else [])
-    won = {A: 100.0, B: 100.0}
-    members, _ = selection._polished(
-        SimpleNamespace(rows=1000),  # type: ignore[arg-type]
-        [],
-        [member(A, 100.0), member(B, 100.0)],  # type: ignore[list-item]
-        [0.0, 0.0],
-        set(),
-        won,
-        np.random.default_rng(0),
-        0.01,
-    )
-    assert len(looked) == int(tried)
-    assert [m.hypothesis for m in members] == [C if tried else A, B]
-    assert won.get(C, 0.0) == (2 * gain if tried else 0.0)
 
 
 @pytest.mark.parametrize("shown", [False, True])
@@ -182,7 +119,7 @@ def _rivals(
     monkeypatch.setattr(selection, "scan", lambda *args, **options: SimpleNamespace(outcomes=[]))
     monkeypatch.setattr(selection, "contenders", lambda *args: [SimpleNamespace(hypothesis=B)])
     monkeypatch.setattr(
-        selection, "_best", lambda problem, rest, beside: [member(o.hypothesis, -7.0, -7.0) for o in rest]
+        selection, "best", lambda problem, rest, beside: [member(o.hypothesis, -7.0, -7.0) for o in rest]
     )
     chosen = selection.Selection(
         found=(selection.Found(member(A, bic, worth), 1e-30),),  # type: ignore[arg-type]
