@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.findings import Finding, Parameter, finite, number, read_finding
+from estimation.diagnosis.findings import Finding, finite, number, read_finding
 from estimation.diagnosis.limits import Limit, told_in_one
 from estimation.diagnosis.next_experiment import NextExperiment
 from estimation.diagnosis.simulation import Simulation, read_simulation
@@ -119,9 +119,9 @@ class Diagnosis:
             lines.append(f"    unseen error{finding.elsewhere} {before} -> {after} of the {of}{beside} (fall {fall} %)")
             # Coefficients of a free function mean nothing each.
             parameters = finding.parameters if finding.effect != "unexplained" else ()
-            if known := [_with_interval(parameter) for parameter in parameters if parameter.determined]:
+            if known := [parameter.told for parameter in parameters if parameter.determined]:
                 lines.append(f"    95 % intervals: {', '.join(known)}")
-            if open_ := [_with_interval(parameter) for parameter in parameters if not parameter.determined]:
+            if open_ := [parameter.told for parameter in parameters if not parameter.determined]:
                 lines.append(f"    not well determined by these logs: {', '.join(open_)}")
             close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]
             if close:
@@ -283,15 +283,6 @@ _VERDICTS = {
     "ambiguous": "the model lacks a cause, and more than one fits",
     "unexplained": "the model lacks something that no effect of the catalogue explains",
 }
-
-
-def _with_interval(parameter: Parameter) -> str:
-    """Names a parameter, with its interval where it has one."""
-    low, high = parameter.ci95
-    if not np.isfinite([low, high]).all():
-        return parameter.name
-    unit = "" if parameter.unit in ("", "1") else f" {parameter.unit}"
-    return f"{parameter.name} ({low:.3g} to {high:.3g}{unit})"
 
 
 def _p(value: float) -> str:

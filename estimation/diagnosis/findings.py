@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +29,19 @@ class Parameter:
     standard_error: float
     ci95: tuple[float, float]
     determined: bool
+
+    @property
+    def told(self) -> str:
+        """Its name, with its interval where it has one, or its value where that was chosen among a few."""
+        low, high = self.ci95
+        if not np.isfinite([low, high]).all():
+            return self.name
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        if high <= low:
+            return f"{self.name} = {self.value:.3g}{unit}"
+        # As many digits as tell the ends of a narrow interval apart.
+        digits = max(3, 1 + math.ceil(math.log10(max(abs(low), abs(high)) / (high - low))))
+        return f"{self.name} ({low:.{digits}g} to {high:.{digits}g}{unit})"
 
     def to_dict(self) -> dict[str, Any]:
         """Writes it as plain data; what is not determined is None."""

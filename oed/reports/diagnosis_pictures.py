@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from oed.reports.joint_units import joint_titles
 from oed.reports.pictures import Line, Panel, Picture, Series
+from oed.reports.significant import NORMAL_95
 from robots.common.errors import InputError
 
 Array = NDArray[np.float64]
@@ -105,7 +106,7 @@ def binned(x: Array, values: Array) -> tuple[Array, Array, Array]:
     mean = np.array([values[part].mean() for part in parts])
     # Samples in succession are no independent ones: only breaks in their order count.
     passes = np.array([1 + np.count_nonzero(np.diff(np.sort(part)) > 1) for part in parts])
-    error = np.array([1.96 * values[part].std() for part in parts]) / np.sqrt(passes)
+    error = np.array([NORMAL_95 * values[part].std() for part in parts]) / np.sqrt(passes)
     merged = np.concatenate([[True], np.diff(middle) > 0])
     return middle[merged], mean[merged], error[merged]
 

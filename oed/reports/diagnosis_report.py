@@ -18,7 +18,7 @@ from oed.reports.joint_units import joint_titles, joint_units
 from oed.reports.page import Cell, Fact, Page, Section, Status, Table
 from oed.reports.pictures import Picture
 from oed.reports.saving import footer, save_page
-from oed.reports.significant import significant
+from oed.reports.significant import NORMAL_95, significant
 from oed.reports.torque_pictures import torque_picture
 from robots.common.files import ResultFolder
 
@@ -160,13 +160,14 @@ def _finding(view: DiagnosisView, index: int) -> Section:
     unit = finding.unit or joint_units(view.kinds, len(view.kinds))[finding.shown_on - 1].torque
     values: list[tuple[Cell, ...]] = []
     for name, value, unit_of, lower, upper in finding.parameters:
-        known = np.isfinite(lower) and np.isfinite(upper)
-        interval = (
-            f"{significant(lower, digits=3)} to {significant(upper, digits=3)}"
-            if known
-            else "not determined by these logs"
-        )
-        values.append((name.replace("_", " "), significant(value), unit_of, interval))
+        error = (upper - lower) / (2 * NORMAL_95)
+        if not np.isfinite(error):
+            interval = "not determined by these logs"
+        elif error <= 0:
+            interval = "one of a few that machines have"
+        else:
+            interval = f"{significant(lower, error)} to {significant(upper, error)}"
+        values.append((name.replace("_", " "), significant(value, error), unit_of, interval))
     tables = [
         Table(
             headings=("parameter", "value", "unit", "95 % interval"),

@@ -10,11 +10,10 @@ from numpy.typing import ArrayLike
 from oed.reports.joint_units import joint_titles, joint_units
 from oed.reports.palette import joint_role, sequence_role
 from oed.reports.pictures import Line, Panel, Picture, Series
-from oed.reports.significant import with_error
+from oed.reports.significant import NORMAL_95, with_error
 from robots.common.errors import InputError
 from robots.signals import FloatArray
 
-NORMAL_95 = 1.96
 LABEL_LENGTH = 14
 """Longer names of base parameters are cut on the axis; the whole stands in the hover text."""
 

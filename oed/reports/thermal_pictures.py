@@ -12,6 +12,7 @@ from estimation.thermal import RunFit, ThermalEstimate
 from oed.reports.joint_units import joint_titles, joint_units
 from oed.reports.palette import sequence_role
 from oed.reports.pictures import Line, Panel, Picture, Series
+from oed.reports.significant import NORMAL_95
 from oed.reports.thinning import thin_indices
 from robots.signals import Log
 from robots.thermal import cold_friction
@@ -119,7 +120,9 @@ def time_constant_picture(fits: Fits, *, joint_names: Sequence[str] | None = Non
             points = np.array(known.get(name, []), dtype=np.float64).reshape(-1, 3)
             if len(points):
                 x, y, error = points.T
-                series.append(Series(x=x, y=y / 60.0, error=1.96 * error / 60.0, kind="markers", role=sequence_role(k)))
+                series.append(
+                    Series(x=x, y=y / 60.0, error=NORMAL_95 * error / 60.0, kind="markers", role=sequence_role(k))
+                )
         panels.append(Panel(title=title, x_label="W [W]", y_label="[min]", series=tuple(series)))
     return Picture(
         title="Time constants against friction power",

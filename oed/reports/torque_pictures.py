@@ -10,11 +10,10 @@ from numpy.typing import ArrayLike
 from oed.reports.joint_units import joint_titles, joint_units
 from oed.reports.palette import joint_role
 from oed.reports.pictures import Band, Line, Panel, Picture, Series
-from oed.reports.significant import percent, significant
+from oed.reports.significant import NORMAL_95, percent, significant
 from robots.common.errors import InputError
 from robots.signals import FloatArray
 
-NORMAL_95 = 1.96
 BINS = 41
 LAGS = 200
 """Longest lag of the autocorrelation, in samples."""

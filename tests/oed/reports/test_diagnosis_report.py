@@ -43,7 +43,12 @@ def view():
         title="more friction at low speed (Stribeck)",
         sentence="Joint 2 needs 1 N m more than its Coulomb friction to break away.",
         joint=2,
-        parameters=(("stribeck_torque", 1.0, "N m", 0.9, 1.1), ("exponent", 1.3, "1", np.nan, np.nan)),
+        parameters=(
+            ("stribeck_torque", 1.0, "N m", 0.9, 1.1),
+            ("exponent", 1.3, "1", np.nan, np.nan),
+            ("order", 320.0, "periods per turn", 319.967, 320.033),
+            ("friction_share", 1.0, "1", 1.0, 1.0),
+        ),
         p_value=0.001,
         delta_bic=86.0,
         before=0.1,
@@ -84,6 +89,8 @@ def test_the_page_tells_all(view):
     for part in ("Joint 2 needs 1 N m more", "stribeck torque", "0.900 to 1.10", "presliding", "10 → 5 %", "hidden"):
         assert part in text, part
     assert "not determined by these logs" in text
+    assert "319.967 to 320.033" in text
+    assert "one of a few that machines have" in text
     assert "Make constant speeds" in text
     assert "two <joints>" not in text
 

@@ -1,0 +1,26 @@
+"""Specification of how a finding's parameters are told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.findings import Parameter
+
+
+@pytest.mark.parametrize(
+    ("value", "ci95", "unit", "told"),
+    [
+        (0.5, (0.4, 0.6), "N m", "size (0.4 to 0.6 N m)"),
+        (320.0, (319.967, 320.033), "periods per turn", "size (319.97 to 320.03 periods per turn)"),
+        (41.2574, (41.25738, 41.25742), "s", "size (41.25738 to 41.25742 s)"),
+        (0.0, (-1e-9, 1e-9), "1", "size (-1e-09 to 1e-09)"),
+        (1.0, (1.0, 1.0), "", "size = 1"),
+        (0.0, (0.0, 0.0), "s", "size = 0 s"),
+        (3.0, (-np.inf, np.inf), "N m", "size"),
+    ],
+)
+def test_both_ends_of_an_interval_are_told_apart(value: float, ci95: tuple, unit: str, told: str) -> None:
+    """A narrow one has the digits for that, a choice among a few no interval, what is open none either."""
+    parameter = Parameter(name="size", value=value, unit=unit, standard_error=1.0, ci95=ci95, determined=True)
+    assert parameter.told == told
