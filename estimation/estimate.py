@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from estimation.choices import Choice
 from estimation.gate import GateReport
 from estimation.model import Model
+from robots.common.plain import finite
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -184,12 +185,12 @@ class Estimate:
                     "torque_rms": joint.torque_rms,
                     "residual_rms": joint.residual_rms,
                     "held_out_rms": joint.held_out_rms,
-                    "held_out_nrmse": _finite(joint.nrmse),
+                    "held_out_nrmse": finite(joint.nrmse),
                     "constant_rms": joint.torque_spread,
-                    "nominal_rms": _finite(joint.nominal_rms),
+                    "nominal_rms": finite(joint.nominal_rms),
                     "noise_floor": joint.noise_floor,
                     "band95": joint.band,
-                    "band95_coverage": _finite(joint.band_coverage),
+                    "band95_coverage": finite(joint.band_coverage),
                 }
                 for joint in self.joints
             ],
@@ -217,10 +218,6 @@ class Estimate:
             InputError: the file is there, and force is not given.
         """
         self.model.save(Path(folder) / MODEL, force=force)
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def colour_of(errors: Array, white: Array, determined: NDArray[np.bool_]) -> float:

@@ -18,6 +18,7 @@ from estimation.preprocessing import LowPass, Smoother, SmoothingSpline, resampl
 from estimation.preprocessing.smoothing import low_pass
 from estimation.regression import chunks
 from robots.common.errors import InputError
+from robots.common.plain import all_finite, finite
 from robots.common.tables import write_table
 from robots.signals import Log, Motion
 
@@ -127,8 +128,8 @@ class Prediction:
         }
         return {
             "samples": len(self.motion),
-            "cutoff_hz": self.cutoff if np.isfinite(self.cutoff) else None,
-            **{name: [float(v) if np.isfinite(v) else None for v in values] for name, values in quantities.items()},
+            "cutoff_hz": finite(self.cutoff),
+            **{name: all_finite(values) for name, values in quantities.items()},
         }
 
     def to_frame(self) -> pd.DataFrame:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
+from robots.common.plain import all_finite, number
 from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits
 from robots.robot import Robot
@@ -41,8 +42,8 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
         "sha256": robot.digest,
         "gravity": robot.chain.gravity.tolist(),
         "joints": joints,
-        **{name: _finite(getattr(robot, name)) for name in _BY_JOINT},
-        "limits": {item.name: _finite(getattr(robot.limits, item.name)) for item in fields(Limits)},
+        **{name: all_finite(getattr(robot, name)) for name in _BY_JOINT},
+        "limits": {item.name: all_finite(getattr(robot.limits, item.name)) for item in fields(Limits)},
     }
 
 
@@ -80,11 +81,7 @@ def require_described(data: Mapping[str, Any]) -> None:
         )
 
 
-def _finite(values: Array) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]
-
-
 def _array(values: Any, n: int, unknown: float) -> Array:
     """What JSON cannot hold was written as null, and what a file does not state is as unknown."""
     given = [None] * n if values is None else values
-    return np.array([unknown if value is None else float(value) for value in given])
+    return np.array([number(value, unknown) for value in given])

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.findings import Finding, finite, number, read_finding
+from estimation.diagnosis.findings import Finding, read_finding
 from estimation.diagnosis.limits import Limit, told_in_one
 from estimation.diagnosis.next_experiment import NextExperiment
 from estimation.diagnosis.simulation import Simulation, read_simulation
 from estimation.model import Model, load_model
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
+from robots.common.plain import finite, number
 from robots.terms.base import length_unit
 
 if TYPE_CHECKING:

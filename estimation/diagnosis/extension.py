@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.patterns import build_pattern
 from robots.common.errors import InputError
+from robots.common.plain import all_finite, finite
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS, Effect
 from robots.terms.effects.situation import Situation
@@ -56,7 +57,7 @@ class Extension:
         values = [*self.coefficients.tolist(), *self.shape]
         errors = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         return [
-            {"name": name, "unit": unit, "value": float(value), "standard_error": _finite(error)}
+            {"name": name, "unit": unit, "value": float(value), "standard_error": finite(error)}
             for (name, unit), value, error in zip(described, values, errors, strict=True)
             if name
         ]
@@ -68,7 +69,7 @@ class Extension:
             "joint": self.joint,
             "shape": list(self.shape),
             "coefficients": self.coefficients.tolist(),
-            "covariance": [[_finite(value) for value in row] for row in self.covariance.tolist()],
+            "covariance": [all_finite(row) for row in self.covariance.tolist()],
             "parameters": self.parameters(robot),
         }
 
@@ -149,7 +150,3 @@ def _described(effect: Effect, robot: Robot, joint: int | None, shape: tuple[flo
     """Lists names and units: the linear parameters, then the shape."""
     linear = [(c.name, c.unit) for c in effect.described(robot, joint, shape)]
     return linear + [(s.name, s.unit_at(robot, joint)) for s in effect.shapes]
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

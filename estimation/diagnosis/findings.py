@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from robots.common.plain import finite, number
+
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
@@ -170,13 +172,3 @@ def read_finding(item: dict[str, Any]) -> Finding:
         pattern=item.get("pattern", ""),
         measured_by=item.get("measured_by", ""),
     )
-
-
-def finite(value: float) -> float | None:
-    """Gives None for what JSON has no number for."""
-    return float(value) if np.isfinite(value) else None
-
-
-def number(value: float | None, missing: float = np.nan) -> float:
-    """Gives back what `finite` made None."""
-    return missing if value is None else float(value)

@@ -16,6 +16,7 @@ from estimation.diagnosis.power import beside, detectable_energy, resolving_ener
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.scan import Entry
 from estimation.diagnosis.scoring import accept, visible_root
+from robots.common.plain import finite
 from robots.terms.effects import EFFECTS
 
 Array = NDArray[np.float64]
@@ -67,9 +68,9 @@ class Limit:
         return {
             "effect": self.effect,
             "joint": self.joint,
-            "detectable": _finite(self.detectable),
-            "at_worst": _finite(self.at_worst),
-            "attributable": _finite(self.attributable),
+            "detectable": finite(self.detectable),
+            "at_worst": finite(self.at_worst),
+            "attributable": finite(self.attributable),
             "toughest_rival": self.toughest,
             "visible": self.visible,
             "note": self.note,
@@ -238,7 +239,3 @@ def _none(hypothesis: Hypothesis, note: str) -> Limit:
         visible=0.0,
         note=note,
     )
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None

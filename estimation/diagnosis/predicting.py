@@ -15,6 +15,7 @@ from estimation.diagnosis.problem import Problem
 from estimation.model import Model
 from estimation.prediction import Prediction, predict
 from estimation.preparation import torque_of
+from robots.common.plain import all_finite
 from robots.signals import Log
 from robots.terms import FrictionPolynomial
 from robots.terms.effects.of_model import sign_of, velocity_scale
@@ -122,7 +123,11 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
     every, torque = np.concatenate(errors), np.concatenate([torque_of(model.robot, log) for log in held_out or logs])
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.sqrt(np.mean(every**2, axis=0) / np.mean(torque**2, axis=0))
-    stated = {"band95": _known(band_of(every)), "band95_coverage": _known(covered), "unseen_nrmse": _known(share)}
+    stated = {
+        "band95": all_finite(band_of(every)),
+        "band95_coverage": all_finite(covered),
+        "unseen_nrmse": all_finite(share),
+    }
     return replace(model, provenance={**model.provenance, **stated})
 
 
@@ -134,7 +139,3 @@ def _predicted(model: Model, log: Log) -> Prediction:
 def _error(prediction: Prediction) -> Array:
     assert prediction.measured is not None
     return prediction.measured - prediction.predicted
-
-
-def _known(values: Array) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]

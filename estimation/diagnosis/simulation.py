@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.findings import finite, number
+from robots.common.plain import finite, number
 from robots.plants.closed_loop import Loop
 
 Array = NDArray[np.float64]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from estimation.gate.finding import SEVERITIES, Finding, Severity
 from robots.common.errors import InputError, NotIdentifiableError
+from robots.common.plain import all_finite, finite
 from robots.signals import Log
 
 if TYPE_CHECKING:
@@ -154,8 +155,8 @@ class GateReport:
             "spikes": [int(row) + 1 for row in self.spikes],
             "stale": [int(row) + 1 for row in self.stale],
             "parts": [list(part) for part in self.parts],
-            **{name: [_plain(value) for value in getattr(self, name)] for name in arrays},
-            "findings": [{**finding.to_dict(), "value": _plain(finding.value)} for finding in self.findings],
+            **{name: all_finite(getattr(self, name)) for name in arrays},
+            "findings": [{**finding.to_dict(), "value": finite(finding.value)} for finding in self.findings],
         }
 
     def _repr_html_(self) -> str:
@@ -176,7 +177,3 @@ def worst_first(findings: list[Finding]) -> tuple[Finding, ...]:
 
 def _names(findings: tuple[Finding, ...]) -> list[str]:
     return list(dict.fromkeys(finding.name for finding in findings))
-
-
-def _plain(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from estimation.thermal.derived import Quantity
 from robots.common.errors import InputError
 from robots.common.files import existing_file, write_atomic
+from robots.common.plain import finite
 from robots.thermal import ThermalModel, build_thermal_model
 
 if TYPE_CHECKING:
@@ -156,7 +157,7 @@ class ThermalEstimate:
         """Writes the estimate as plain data, without the measurements."""
 
         def plain(item: Quantity) -> dict[str, Any]:
-            error = item.standard_error if np.isfinite(item.standard_error) else None
+            error = finite(item.standard_error)
             return {**asdict(item), "standard_error": error}
 
         return {

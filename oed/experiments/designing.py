@@ -28,6 +28,7 @@ from oed.trajectories import FourierSeries, count_periods
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InfeasibleError, InputError
 from robots.common.parallel import one_blas_thread
+from robots.common.plain import finite
 from robots.common.progress import SILENT, Progress
 from robots.plants import PlantEffect
 from robots.robot import Robot
@@ -149,7 +150,7 @@ def design(
         "effects": [asdict(effect) for effect in effects],
         "seed": seed,
         "effort": asdict(work),
-        "time_limit": time_limit if np.isfinite(time_limit) else None,
+        "time_limit": finite(time_limit),
         "solver": {"name": local.name, **asdict(local)},
     }
     limits = usable_limits(robot.limits, velocity_fraction)

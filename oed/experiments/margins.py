@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.base_parameters import BaseParameters
+from robots.common.plain import finite
 from robots.limits import Limits, Margin, symmetric_margins
 from robots.plants import PlantEffect
 from robots.robot import Robot
@@ -77,7 +78,7 @@ def margin_data(margin: Margin) -> dict[str, Any]:
         "quantity": margin.quantity,
         "joint": margin.joint,
         "value": margin.value,
-        "limit": margin.limit if np.isfinite(margin.limit) else None,
+        "limit": finite(margin.limit),
         "time": margin.time,
         "slack_fraction": margin.slack_fraction,
     }

@@ -21,6 +21,7 @@ from oed.experiments.views import motion_frame, plot_velocities
 from oed.exports import write_trajectory
 from robots.base_parameters import BaseParameters
 from robots.common.files import write_atomic
+from robots.common.plain import all_finite, number
 from robots.limits import Margin
 from robots.plants import PlantEffect
 from robots.robot import Robot
@@ -59,13 +60,13 @@ class Outcome:
     def to_dict(self) -> dict[str, Any]:
         """Writes plain data; null where a point did not excite all parameters."""
         data = {name: None if value != value else value for name, value in asdict(self).items()}
-        return data | {"starts": [[float(v) if np.isfinite(v) else None for v in pair] for pair in self.starts]}
+        return data | {"starts": [all_finite(pair) for pair in self.starts]}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Outcome:
         """Reads what `to_dict` wrote."""
         values: dict[str, Any] = {name: np.nan if value is None else value for name, value in data.items()}
-        pairs = ((np.nan if v is None else v for v in pair) for pair in data.get("starts", ()))
+        pairs = (map(number, pair) for pair in data.get("starts", ()))
         values["starts"] = tuple((before, after) for before, after in pairs)
         return cls(**values)
 

@@ -21,6 +21,7 @@ from oed.retiming import Retimed
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InputError
 from robots.common.files import existing_file, write_atomic
+from robots.common.plain import all_finite, number
 from robots.limits import Margin
 from robots.loading import load_robot
 from robots.robot import Robot
@@ -250,10 +251,10 @@ def _usage_data(usage: Mapping[str, Array] | None) -> dict[str, Any] | None:
     """Plain lists; infinite use, of a limit of zero, is null."""
     if usage is None:
         return None
-    return {name: [float(v) if np.isfinite(v) else None for v in values] for name, values in usage.items()}
+    return {name: all_finite(values) for name, values in usage.items()}
 
 
 def _usage(data: Mapping[str, Any] | None) -> dict[str, Array] | None:
     if data is None:
         return None
-    return {name: np.array([np.inf if v is None else v for v in values]) for name, values in data.items()}
+    return {name: np.array([number(v, np.inf) for v in values]) for name, values in data.items()}

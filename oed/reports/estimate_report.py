@@ -14,6 +14,7 @@ from oed.reports.saving import footer, save_page
 from oed.reports.significant import significant, significant_error
 from oed.reports.torque_pictures import residual_picture, torque_picture
 from robots.common.files import ResultFolder
+from robots.common.plain import finite
 
 Array = NDArray[np.float64]
 
@@ -147,7 +148,7 @@ def _joints(estimate: Estimate) -> Table:
                 joint.name,
                 joint.torque_rms,
                 *(None if not np.isfinite(e) else 100 * e / scale for e in errors),
-                100 * joint.band_coverage if np.isfinite(joint.band_coverage) else None,
+                finite(100 * joint.band_coverage),
                 "yes" if joint.identified else "NO",
             )
         )

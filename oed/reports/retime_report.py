@@ -11,6 +11,7 @@ from oed.reports.page import Cell, Fact, Page, Section, Table
 from oed.reports.saving import footer, save_page
 from oed.reports.trajectory_pictures import trajectory_picture
 from robots.common.files import ResultFolder
+from robots.common.plain import finite
 from robots.signals import Motion
 
 
@@ -86,7 +87,7 @@ def _torque_sections(result: RetimedExperiment) -> tuple[Section, ...]:
             name,
             float(before.peak[joint]),
             float(after.peak[joint]),
-            float(limits[joint]) if np.isfinite(limits[joint]) else None,
+            finite(limits[joint]),
             float(before.rms[joint]),
             float(after.rms[joint]),
         )

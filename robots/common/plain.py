@@ -1,0 +1,21 @@
+"""Numbers as plain data: JSON has none for what is not known or infinite, and says null."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+
+def finite(value: float) -> float | None:
+    """Gives None for what JSON has no number for."""
+    return float(value) if math.isfinite(value) else None
+
+
+def all_finite(values: Iterable[float]) -> list[float | None]:
+    """Does what `finite` does to each."""
+    return [finite(value) for value in values]
+
+
+def number(value: float | None, missing: float = math.nan) -> float:
+    """Gives back what `finite` made None."""
+    return missing if value is None else float(value)
