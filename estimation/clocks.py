@@ -127,6 +127,32 @@ def later_by(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
     return float(last + PAUSE - log.t[0]), _LATER.format(PAUSE)
 
 
+def before_it(logs: Sequence[Log], motion: Log, start: float, shifts: Sequence[float]) -> tuple[list[Log], str]:
+    """Puts logs of what a robot did before a motion on the clock of that, and says what that takes for granted.
+
+    Args:
+        logs: of what came before, in the order in which they were recorded where their clocks each began anew.
+        motion: a log.
+        start: when it counts as begun [s].
+        shifts: how much later [s] than their clocks say the logs count, by what is known of them.
+    """
+    placed = [replace(log, t=log.t + shift) for log, shift in zip(logs, shifts, strict=True)]
+    if are_apart([*placed, begun := replace(motion, t=motion.t - motion.t[0] + start)]):
+        late = [log for log in placed if log.t[0] > begun.t[0]]
+        if late:
+            raise InputError(
+                "a log of what came before that comes after the motion",
+                file=late[0].metadata.get("file", late[0].name or None),
+                allowed="logs that end before the motion begins, on one clock, or that each begin their clock anew",
+            )
+        return sorted(placed, key=lambda log: float(log.t[0])), ""
+    *earlier, last = on_one_clock([*logs, motion])
+    shift = start - float(last.t[0])
+    return [replace(log, t=log.t + shift) for log in earlier], _ANEW.format(PAUSE)
+
+
+_ANEW = "the clocks of those logs and the motion's each began anew: they count in the order given, {:.0f} s apart"
+
 _LATER = (
     "The log overlaps in time those that the model was fitted to, in which something changed: it counts as recorded "
     "{:.0f} s after them."

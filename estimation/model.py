@@ -20,6 +20,7 @@ from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.regressor import TorqueModel
 from robots.robot import Robot
+from robots.signals import Motion
 from robots.terms import Column, build_term, describe_term
 from robots.terms.effects.situation import Situation, joined, situation
 
@@ -94,6 +95,7 @@ class Model:
         *,
         gravity: ArrayLike | None = None,
         payload: ArrayLike | None = None,
+        before: Sequence[Motion] = (),
     ) -> Array:
         """Predicts the torque (N, n) [N m or N] of a motion given by arrays (N, n).
 
@@ -105,6 +107,8 @@ class Model:
                 without, the terms alone.
             gravity: (3,) in the base frame [m/s2], where the base stands otherwise than the robot's description says.
             payload: ten inertial parameters of a body on the flange, in its frame, as `Log` has them.
+            before: motions that came before on the same clock, with the same gravity and payload: the heat they left
+                acts.
 
         Raises:
             InputError: a gravity that shows parameters which the model lacks.
@@ -125,10 +129,12 @@ class Model:
         arrays = [np.asarray(t, dtype=float), *(np.atleast_2d(np.asarray(x, dtype=float)) for x in (q, dq, ddq))]
 
         def state(known: Array) -> Situation:
-            return joined([situation(model, known, *arrays)], self.torque_model)
+            earlier = [situation(model, known, m.t, m.q, m.dq, m.ddq) for m in before]
+            return joined([*earlier, situation(model, known, *arrays)], self.torque_model)
 
         cut = any(extension.source.last for extension in self.extensions)
-        return own + extension_torque(self.extensions, state(felt), state(parameters) if cut else None)
+        extended = extension_torque(self.extensions, state(felt), state(parameters) if cut else None)
+        return own + extended[-len(own) :]
 
     def to_frame(self) -> pd.DataFrame:
         """Gives a row per parameter: joint, value, standard error, percent, unit, determined, formula."""

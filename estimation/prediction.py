@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.clocks import later_by
+from estimation.clocks import before_it, later_by
 from estimation.known_setup import HEAT, require_plain
 from estimation.model import Model
 from estimation.preparation import torque_of
@@ -162,6 +162,7 @@ def predict(
     start: Sequence[Array | None] | None = None,
     ambient: float | None = None,
     later: float | None = None,
+    before: Sequence[Log] = (),
 ) -> Prediction:
     """Predicts the torques of a log's motion.
 
@@ -174,13 +175,15 @@ def predict(
         start: temperatures of each joint's zones at first [degC]; those of the surroundings by default.
         ambient: temperature of the surroundings where the log does not state it [degC]; each model's by default.
         later: how much later [s] than its own clock says the log counts; by default what `clock_of` says.
+        before: logs of what the robot did before, for a model whose effects keep heat: without any it begins cold.
+            Beside `thermal`, `start` says that.
 
     Returns:
         The torques at the log's own times.
 
     Raises:
         InputError: another number of joints, or too few rows; a gravity that shows parameters which the model lacks; a
-            payload or a gravity beside heat.
+            payload or a gravity beside heat; logs before the motion that come after it, or of a model that keeps none.
     """
     robot = model.robot
     if log.n != robot.n:
@@ -193,7 +196,11 @@ def predict(
     if thermal is None:
         states = (motion.q, motion.dq, motion.ddq)
         after = clock_of(model, log)[0] if later is None else later
-        predicted = model.torque(*states, motion.t + after, gravity=log.gravity, payload=log.payload)
+        earlier = [
+            smooth(resample(own.t, own.q), _smoother(model, cutoff)) for own in warmed(model, before, log, after)[0]
+        ]
+        clock = motion.t + after
+        predicted = model.torque(*states, clock, gravity=log.gravity, payload=log.payload, before=earlier)
     else:
         from estimation.thermal.history import surroundings
 
@@ -217,6 +224,30 @@ def clock_of(model: Model, log: Log) -> tuple[float, str]:
     if not any(extension.source.depends_on == "time" for extension in model.extensions):
         return 0.0, ""
     return later_by(model.provenance.get("logs", ()), log)
+
+
+def warmed(model: Model, before: Sequence[Log], log: Log, later: float | None = None) -> tuple[list[Log], str]:
+    """Puts logs of what warmed a robot before another on the clock of a model, and says what that takes for granted.
+
+    Nothing is to be said of a model that keeps no heat.
+
+    Raises:
+        InputError: logs that come after the motion; any, of a model that keeps no heat.
+    """
+    if not any(extension.source.keeps for extension in model.extensions):
+        if before:
+            raise InputError("the model has no heat", remedy="fit one with oed thermal, or leave out what came before")
+        return [], ""
+    if not before:
+        return [], COLD
+    after = clock_of(model, log)[0] if later is None else later
+    shifts = [clock_of(model, own)[0] for own in before]
+    placed, anew = before_it(before, log, float(log.t[0]) + after, shifts)
+    count = "one log" if len(before) == 1 else f"{len(before)} logs"
+    return placed, f"heat: warmed by {count} before, beginning cold{f'; {anew}' if anew else ''}"
+
+
+COLD = "heat: the motion is taken to begin cold; --before says what warmed the robot"
 
 
 def _smoother(model: Model, cutoff: float) -> Smoother:

@@ -77,20 +77,21 @@ def _heat(path: Path, model: Model, log: Log, before: list[Path], ambient: float
     import json as codec
 
     from estimation import read_logs
+    from estimation.prediction import warmed
     from estimation.thermal import start_temperatures, thermal_from_dict
     from robots.common.errors import InputError
 
     file = path / "model.json" if path.is_dir() else path
     thermal = thermal_from_dict(model, codec.loads(file.read_text(encoding="utf-8")))
+    earlier = read_logs(before, n=model.robot.n, mapping=mapping, joints=model.robot.joint_names) if before else []
     if thermal is None:
-        if before or ambient is not None:
-            raise InputError("the model has no heat", file=file, remedy="fit one with oed thermal, or leave these out")
-        return _Heat()
+        if ambient is not None:
+            raise InputError("the model has no temperatures", file=file, remedy="leave out --ambient")
+        return _Heat(options={"before": earlier}, assumed=warmed(model, earlier, log)[1])
     if ambient is not None and not -30.0 <= ambient <= 60.0:
         raise InputError(f"--ambient {ambient}", allowed="-30 to 60 degC")
-    robot, start = model.robot, None
+    start = None
     if before:
-        earlier = read_logs(before, n=robot.n, mapping=mapping, joints=robot.joint_names)
         start = start_temperatures(thermal, earlier, float(log.t[0]), ambient=ambient)
         assumed = f"friction with heat: warmed by {len(earlier)} logs before, the first of which began cold"
     else:

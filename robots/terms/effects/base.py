@@ -33,6 +33,7 @@ class Effect(ABC):
         whole_robot: whether it acts on the robot as a whole; its joint is then None.
         rare: whether it is to be thought of last: it resembles a common effect, and robots seldom have it.
         depends_on: ``state`` where one and the same motion always meets it, ``time`` where it comes, goes or builds up.
+        keeps: whether what came before a log acts in it still: heat.
         passing: whether it belongs to the logs it is found in, and may be gone or different in others.
         alike: whether it has one coefficient, that all joints share: each joint tells it, and they must agree.
         lags: whether its one coefficient is a time: reversals tell that no better than their own moments are known.
@@ -58,6 +59,7 @@ class Effect(ABC):
     whole_robot: ClassVar[bool] = False
     rare: ClassVar[bool] = False
     depends_on: ClassVar[Literal["state", "time"]] = "state"
+    keeps: ClassVar[bool] = False
     passing: ClassVar[bool] = False
     alike: ClassVar[bool] = False
     lags: ClassVar[bool] = False

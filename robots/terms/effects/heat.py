@@ -22,6 +22,7 @@ class HeatEffect(JointEffect):
     """An effect of one joint whose first shape is the time constant of a heat that is kept."""
 
     depends_on: ClassVar[Literal["state", "time"]] = "time"
+    keeps: ClassVar[bool] = True
     falls: ClassVar[bool] = False
     """Whether its coefficients are falls of friction, Coulomb and viscous: what warms up loses some of it.
 
