@@ -86,6 +86,11 @@ class Model:
         """Standard errors (b,), infinite where the data do not determine the parameter."""
         return np.where(self.determined, np.sqrt(np.diag(self.covariance)), np.inf)
 
+    @property
+    def keeps_heat(self) -> bool:
+        """Whether what came before a motion acts in it still."""
+        return any(extension.source.keeps for extension in self.extensions)
+
     def torque(
         self,
         q: ArrayLike,

@@ -176,7 +176,7 @@ def predict(
         ambient: temperature of the surroundings where the log does not state it [degC]; each model's by default.
         later: how much later [s] than its own clock says the log counts; by default what `clock_of` says.
         before: logs of what the robot did before, for a model whose effects keep heat: without any it begins cold.
-            Beside `thermal`, `start` says that.
+            With `later` their times are as they count (`warmed`). Beside `thermal`, `start` says what was before.
 
     Returns:
         The torques at the log's own times.
@@ -195,11 +195,11 @@ def predict(
     has_torque = log.tau is not None or log.current is not None
     if thermal is None:
         states = (motion.q, motion.dq, motion.ddq)
-        after = clock_of(model, log)[0] if later is None else later
-        earlier = [
-            smooth(resample(own.t, own.q), _smoother(model, cutoff)) for own in warmed(model, before, log, after)[0]
-        ]
-        clock = motion.t + after
+        if later is None:
+            later = clock_of(model, log)[0]
+            before = warmed(model, before, log, later)[0]
+        smoother, clock = _smoother(model, cutoff), motion.t + later
+        earlier = [smooth(resample(own.t, own.q), smoother) for own in before]
         predicted = model.torque(*states, clock, gravity=log.gravity, payload=log.payload, before=earlier)
     else:
         from estimation.thermal.history import surroundings
@@ -226,23 +226,28 @@ def clock_of(model: Model, log: Log) -> tuple[float, str]:
     return later_by(model.provenance.get("logs", ()), log)
 
 
-def warmed(model: Model, before: Sequence[Log], log: Log, later: float | None = None) -> tuple[list[Log], str]:
+def warmed(model: Model, before: Sequence[Log], log: Log, later: float) -> tuple[list[Log], str]:
     """Puts logs of what warmed a robot before another on the clock of a model, and says what that takes for granted.
 
     Nothing is to be said of a model that keeps no heat.
 
+    Args:
+        model: with the effects.
+        before: the logs, in the order in which they were recorded where their clocks each began anew.
+        log: the motion.
+        later: how much later [s] than its own clock says that counts (`clock_of`).
+
     Raises:
         InputError: logs that come after the motion; any, of a model that keeps no heat.
     """
-    if not any(extension.source.keeps for extension in model.extensions):
+    if not model.keeps_heat:
         if before:
             raise InputError("the model has no heat", remedy="fit one with oed thermal, or leave out what came before")
         return [], ""
     if not before:
         return [], COLD
-    after = clock_of(model, log)[0] if later is None else later
     shifts = [clock_of(model, own)[0] for own in before]
-    placed, anew = before_it(before, log, float(log.t[0]) + after, shifts)
+    placed, anew = before_it(before, log, float(log.t[0]) + later, shifts)
     count = "one log" if len(before) == 1 else f"{len(before)} logs"
     return placed, f"heat: warmed by {count} before, beginning cold{f'; {anew}' if anew else ''}"
 

@@ -140,11 +140,11 @@ def diagnose_case(case: Case, robot: Robot) -> tuple[Any, dict[str, Any]]:
             row[f"oracle_{name}"] = (getattr(oracle, name) / size).tolist()
         told = [np.square(np.array(said[name]["nrmse"], dtype=float)) for name in ("baseline", "extended")]
         row["before"], row["after_extension"] = told[0].tolist(), told[1].tolist()
-        row["by_file"] = _by_file(diagnosis, unseen)
+        row["by_file"] = _by_file(diagnosis, logs, unseen)
     return diagnosis, row
 
 
-def _by_file(diagnosis: Any, unseen: Sequence[Log]) -> list[float]:
+def _by_file(diagnosis: Any, logs: Sequence[Log], unseen: Sequence[Log]) -> list[float]:
     """Squared NRMSE (n,) on rows that count, of what the model that the diagnosis wrote predicts of the unseen logs."""
     from estimation import load_model, predict
 
@@ -153,7 +153,7 @@ def _by_file(diagnosis: Any, unseen: Sequence[Log]) -> list[float]:
         model = load_model(folder)
     squares, torques = [], []
     for log in unseen:
-        prediction = predict(model, log)
+        prediction = predict(model, log, before=logs if model.keeps_heat else ())
         counted = _counted(diagnosis.trace, prediction.motion.t)
         squares.append(((prediction.measured - prediction.predicted) ** 2 * counted).sum(axis=0))
         torques.append((prediction.measured**2 * counted).sum(axis=0))

@@ -131,11 +131,13 @@ class Diagnosis:
             " ".join(f"{100 * value:.2f}" if np.isfinite(value) else "-" for value in errors)
             for errors in (self.baseline, self.extended, self.every_row)
         )
-        lines.append(f"  unseen error per joint [% of torque RMS]: {before}")
+        told = {"unseen error per joint [% of torque RMS]": before}
         if self.findings:
-            lines.append(f"                          with the extension: {after}")
+            told["with the extension"] = after
         if np.isfinite(self.every_row).any():
-            lines.append(f"       every row counted, as in `oed predict`: {every}")
+            told[f"every row counted, as in `oed predict{' --before' if self.model.keeps_heat else ''}`"] = every
+        width = 2 + max(map(len, told))
+        lines += [f"{name:>{width}}: {errors}" for name, errors in told.items()]
         lines.append(f"  measured on {self.how_unseen}")
         if self.simulation is not None:
             lengths = [length_unit(robot, j) for j in range(robot.n)]

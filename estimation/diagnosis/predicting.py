@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 
 # Of the longest log, this long a stretch in the middle [s] tells it, at so many cut-offs.
 STRETCH, POINTS = 30.0, 5
+# Rows of a log without which it tells no motion.
+FEWEST = 50
 
 
 def smoothed_best(model: Model, problem: Problem, logs: Sequence[Log]) -> Model:
@@ -40,10 +42,10 @@ def smoothed_best(model: Model, problem: Problem, logs: Sequence[Log]) -> Model:
     """
     cutoffs = [problem.recording.cutoff, *(band.cutoff for band in problem.whitening.bands)]
     low, high = min(cutoffs), max(cutoffs)
-    part = _part(logs)
+    part, before = _part(model, logs)
     tried = np.geomspace(low, high, POINTS if high > low else 1)
     stated = [replace(model, provenance={**model.provenance, "cutoff_hz": float(cutoff)}) for cutoff in tried]
-    return min(stated, key=lambda one: _misfit(one, part))
+    return min(stated, key=lambda one: _misfit(one, part, before))
 
 
 def as_sharp(model: Model, logs: Sequence[Log]) -> Model:
@@ -58,8 +60,8 @@ def as_sharp(model: Model, logs: Sequence[Log]) -> Model:
     """
     columns = zip(model.parameters, model.values, strict=True)
     signs = {column.joint - 1: float(value) for column, value in columns if column.symbol == "f1"}
-    part, now = _part(logs), velocity_scale(model.torque_model)
-    before = _predicted(model, part)
+    (part, earlier), now = _part(model, logs), velocity_scale(model.torque_model)
+    before = _predicted(model, part, earlier)
     error, chosen = _error(before), now.copy()
     for joint, coulomb in signs.items():
         dq = before.motion.dq[:, joint]
@@ -68,15 +70,24 @@ def as_sharp(model: Model, logs: Sequence[Log]) -> Model:
         chosen[joint] = (now[joint], *SCALES)[int(np.argmin(squares))]
     trial = _with_scales(model, chosen)
     # Effects turn round as sharply as the model's sign does: with theirs a joint may be worse off.
-    better = _predicted(trial, part).error_rms < before.error_rms
+    better = _predicted(trial, part, earlier).error_rms < before.error_rms
     return _with_scales(model, np.where(better, chosen, now)) if better.any() else model
 
 
-def _part(logs: Sequence[Log]) -> Log:
-    """The middle of the longest log."""
+def _part(model: Model, logs: Sequence[Log]) -> tuple[Log, list[Log]]:
+    """The middle of the longest log, and what came before."""
     log = max(logs, key=lambda log: float(log.t[-1] - log.t[0]))
     middle = 0.5 * float(log.t[0] + log.t[-1])
-    return log.rows(slice(*np.searchsorted(log.t, (middle - 0.5 * STRETCH, middle + 0.5 * STRETCH)).tolist()))
+    part = log.rows(slice(*np.searchsorted(log.t, (middle - 0.5 * STRETCH, middle + 0.5 * STRETCH)).tolist()))
+    return part, _before(model, part, logs)
+
+
+def _before(model: Model, log: Log, logs: Sequence[Log]) -> list[Log]:
+    """What of logs on one clock came before one of them, or a part of one, and has warmed it."""
+    if not model.keeps_heat:
+        return []
+    parts = [own.rows(slice(0, int(np.searchsorted(own.t, log.t[0])))) for own in logs if own.t[0] < log.t[0]]
+    return sorted((part for part in parts if len(part) >= FEWEST), key=lambda part: float(part.t[0]))
 
 
 def _with_scales(model: Model, scales: Array) -> Model:
@@ -93,9 +104,9 @@ def _with_scales(model: Model, scales: Array) -> Model:
     )
 
 
-def _misfit(model: Model, log: Log) -> float:
+def _misfit(model: Model, log: Log, before: Sequence[Log]) -> float:
     """Mean over the joints of the logarithm of a prediction's error over the torque's spread."""
-    spread = _predicted(model, log).relative_spread
+    spread = _predicted(model, log, before).relative_spread
     told = spread[np.isfinite(spread) & (spread > 0)]
     return float(np.mean(np.log(told))) if len(told) else 0.0
 
@@ -112,7 +123,8 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
         unseen: the errors on those.
     """
     growth = np.ones(model.robot.n) if held_out else unseen.growing()
-    errors = [np.abs(_error(_predicted(model, log))) * growth for log in held_out or logs]
+    every = [*logs, *held_out]
+    errors = [np.abs(_error(_predicted(model, log, _before(model, log, every)))) * growth for log in held_out or logs]
     covered = np.full(model.robot.n, np.nan)
     if held_out:
         parts = [part for error in errors for part in np.array_split(error, PARTS)]
@@ -120,20 +132,20 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
             np.mean(part <= band_of(np.concatenate(parts[:k] + parts[k + 1 :])), axis=0) for k, part in enumerate(parts)
         ]
         covered = np.average(shares, axis=0, weights=[len(part) for part in parts])
-    every, torque = np.concatenate(errors), np.concatenate([torque_of(model.robot, log) for log in held_out or logs])
+    found, torque = np.concatenate(errors), np.concatenate([torque_of(model.robot, log) for log in held_out or logs])
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.sqrt(np.mean(every**2, axis=0) / np.mean(torque**2, axis=0))
+        share = np.sqrt(np.mean(found**2, axis=0) / np.mean(torque**2, axis=0))
     stated = {
-        "band95": all_finite(band_of(every)),
+        "band95": all_finite(band_of(found)),
         "band95_coverage": all_finite(covered),
         "unseen_nrmse": all_finite(share),
     }
     return replace(model, provenance={**model.provenance, **stated})
 
 
-def _predicted(model: Model, log: Log) -> Prediction:
-    """Predicts a log, or a part of one, that is on the clock of the fit."""
-    return predict(model, log, later=0.0)
+def _predicted(model: Model, log: Log, before: Sequence[Log] = ()) -> Prediction:
+    """Predicts a log, or a part of one, that is on the clock of the fit, as are those before it."""
+    return predict(model, log, later=0.0, before=before)
 
 
 def _error(prediction: Prediction) -> Array:

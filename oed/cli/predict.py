@@ -56,8 +56,8 @@ def predict(
         read = read_log(log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names)
         (recorded,) = told([read], payload, gravity)
         progress.start("predicting", None)
-        heat = _heat(model, identified, recorded, before or [], ambient, mapping)
         later, clock = clock_of(identified, recorded)
+        heat = _heat(model, identified, recorded, before or [], ambient, mapping, later)
         result = run(identified, recorded, later=later, **heat.options)
         result.save(out, band=band, force=force)
     summary = "\n".join([result.summary(), *(word for word in (heat.assumed, clock) if word), f"written to {out}"])
@@ -73,7 +73,15 @@ class _Heat:
     assumed: str = ""
 
 
-def _heat(path: Path, model: Model, log: Log, before: list[Path], ambient: float | None, mapping: Path | None) -> _Heat:
+def _heat(
+    path: Path,
+    model: Model,
+    log: Log,
+    before: list[Path],
+    ambient: float | None,
+    mapping: Path | None,
+    later: float,
+) -> _Heat:
     import json as codec
 
     from estimation import read_logs
@@ -87,7 +95,8 @@ def _heat(path: Path, model: Model, log: Log, before: list[Path], ambient: float
     if thermal is None:
         if ambient is not None:
             raise InputError("the model has no temperatures", file=file, remedy="leave out --ambient")
-        return _Heat(options={"before": earlier}, assumed=warmed(model, earlier, log)[1])
+        placed, assumed = warmed(model, earlier, log, later)
+        return _Heat(options={"before": placed}, assumed=assumed)
     if ambient is not None and not -30.0 <= ambient <= 60.0:
         raise InputError(f"--ambient {ambient}", allowed="-30 to 60 degC")
     start = None

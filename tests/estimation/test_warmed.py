@@ -80,9 +80,9 @@ def test_clocks_that_began_anew_count_a_pause_apart(warming: Model, motion: Log)
     np.testing.assert_allclose(
         predict(warming, motion, before=[motion]).predicted, predict(warming, motion, before=[apart]).predicted
     )
-    assert "60 s apart" in warmed(warming, [motion], motion)[1]
-    assert "60 s apart" not in warmed(warming, [apart], motion)[1]
-    assert warmed(warming, [], motion)[1] == COLD
+    assert "60 s apart" in warmed(warming, [motion], motion, 0.0)[1]
+    assert "60 s apart" not in warmed(warming, [apart], motion, 0.0)[1]
+    assert warmed(warming, [], motion, 0.0)[1] == COLD
 
 
 def test_what_comes_after_or_warms_nothing_is_refused(warming: Model, motion: Log) -> None:
@@ -91,6 +91,6 @@ def test_what_comes_after_or_warms_nothing_is_refused(warming: Model, motion: Lo
     with pytest.raises(InputError, match="comes after the motion"):
         predict(warming, motion, before=[after])
     plain = replace(warming, extensions=())
-    assert warmed(plain, [], motion) == ([], "")
+    assert warmed(plain, [], motion, 0.0) == ([], "")
     with pytest.raises(InputError, match="no heat"):
         predict(plain, motion, before=[motion])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from estimation import diagnose
+from estimation.diagnosis.extension import Extension
 from estimation.diagnosis.gain import Unseen
 from estimation.diagnosis.predicting import as_sharp, smoothed_best, with_band
 from estimation.diagnosis.states import record
@@ -60,6 +61,27 @@ def test_its_band_holds_most_errors_on_other_unseen_motions(
     told = np.array(model.provenance["unseen_nrmse"])
     np.testing.assert_allclose(told, predict(model, other).nrmse, rtol=1e-9 if held_out else 0.2)
     assert np.allclose(covered, 0.95, atol=0.03) if held_out else covered == [None, None]
+
+
+def test_heat_of_the_logs_before_counts_in_its_errors(arm: Robot, arm_log: Callable[..., Log]) -> None:
+    """A joint that loses friction by its heat: the error on what follows is that of the joint as it was left, warm."""
+    first, other = (arm_log(torque_noise=0.02, motion_seed=k, seed=k) for k in range(2))
+    other = replace(other, t=other.t + first.t[-1] + 5.0)
+    plain = diagnose(arm, first).model
+    heat = Extension(
+        effect="thermal_friction",
+        joint=2,
+        shape=(300.0, 0.0, 0.0),
+        coefficients=np.array([3.0, 0.0]),
+        covariance=np.zeros((5, 5)),
+    )
+    model = replace(plain, extensions=(heat,))
+    parts = np.ones((50, 2))
+    unseen = Unseen("", np.arange(50.0), 1.0, parts, (parts, parts), parts > 0, None)
+    told = with_band(model, [first], [other], unseen).provenance["unseen_nrmse"]
+    warm, cold = predict(model, other, before=[first]).nrmse, predict(model, other).nrmse
+    np.testing.assert_allclose(told, warm, rtol=1e-9)
+    assert warm[1] > 1.05 * cold[1]
 
 
 def test_its_band_grows_as_errors_do_on_parts_left_out(arm: Robot, arm_log: Callable[..., Log]) -> None:
