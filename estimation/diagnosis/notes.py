@@ -27,6 +27,8 @@ FASTER = 1.3
 FARTHER, PLACED = 0.05, ("spring", "unexplained")
 # So is a joint on which the extended model errs by so many times what the base model does, and so much more.
 WORSE, LITTLE = 1.1, 0.001
+# So is a joint that errs so many times as much in all rows as in those that count, where this share or more does not.
+MUCH_MORE, SEVERAL = 2.0, 0.01
 CLIPPING = CurrentClipping()
 
 
@@ -142,6 +144,29 @@ def worse_joints(before: Array, after: Array) -> list[str]:
         return []
     told = ", ".join(f"{j + 1} ({100 * before[j]:.3g} -> {100 * after[j]:.3g} %)" for j in worse)
     return [f"The extended model errs more than the base model on joint{'s' if len(worse) > 1 else ''} {told}."]
+
+
+def turning_joints(every: Array, after: Array, counts: NDArray[np.bool_]) -> list[str]:
+    """Says on which joints rows that do not count make the model's error far larger, and why no model has less there.
+
+    Args:
+        every: its NRMSE with every row counted (n,).
+        after: of rows that count (n,).
+        counts: which those are (N, n).
+    """
+    aside = 1.0 - counts.mean(axis=0)
+    (joints,) = np.nonzero((every > MUCH_MORE * after) & (aside > SEVERAL))
+    if not len(joints):
+        return []
+    names = ", ".join(str(j + 1) for j in joints)
+    shares = sorted({f"{100 * share:.0f}" for share in (aside[joints].min(), aside[joints].max())}, key=float)
+    return [_TURNING.format("s" if len(joints) > 1 else "", names, " to ".join(shares))]
+
+
+_TURNING = (
+    "Joint{} {}: in {} % of the unseen rows the joint rests or turns round. Friction may hold against either side "
+    "there, and no model of motion knows which: the error with every row counted has those rows besides."
+)
 
 
 def faster_joints(problem: Problem, seen: Measured) -> list[str]:

@@ -19,7 +19,7 @@ from estimation.diagnosis.gain import Unseen
 from estimation.diagnosis.hypotheses import all_hypotheses
 from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
-from estimation.diagnosis.notes import farther_joints, faster_joints, notes_of, worse_joints
+from estimation.diagnosis.notes import farther_joints, faster_joints, notes_of, turning_joints, worse_joints
 from estimation.diagnosis.patterns import all_patterns
 from estimation.diagnosis.predicting import as_sharp, smoothed_best, with_band
 from estimation.diagnosis.problem import Problem
@@ -33,6 +33,7 @@ from estimation.diagnosis.windup import EFFECT as ELASTICITY
 from estimation.diagnosis.windup import Windup, measure_windups
 from estimation.diagnosis.wording import no_part, word_finding
 from estimation.provenance import describe_logs
+from robots.common.plain import number
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import Effect
@@ -120,6 +121,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     # Of a joint that rests in all of them unseen data say nothing: that is no error of zero.
     shown = unseen.counts.any(axis=0)
     before, after = (np.where(shown, unseen.nrmse(model), np.nan) for model in (0, len(unseen.errors) - 1))
+    every = np.array([number(value) for value in model.provenance["unseen_nrmse"]])
     return Diagnosis(
         verdict=verdict,
         findings=findings,
@@ -135,6 +137,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
             *told.notes,
             *notes_of(problem, told.false_alarm, findings, apart, after, [m.hypothesis.name for m in timed]),
             *worse_joints(before, after),
+            *turning_joints(every, after, unseen.counts),
             *faster_joints(problem, seen),
             *farther_joints(problem, seen, findings),
             *held.notes,

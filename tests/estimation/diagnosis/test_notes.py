@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimation.diagnosis.notes import LITTLE, WORSE, worse_joints
+from estimation.diagnosis.notes import LITTLE, WORSE, turning_joints, worse_joints
 
 
 def test_joints_that_the_extension_makes_worse_are_told() -> None:
@@ -18,3 +18,16 @@ def test_joints_that_the_extension_makes_worse_are_told() -> None:
     assert worse_joints(before[:1], after[:1]) == []
     (one,) = worse_joints(before[1:2], after[1:2])
     assert "on joint 1 (5 -> 7.4 %)" in one
+
+
+def test_rows_at_rest_explain_an_error_that_is_far_larger_with_them() -> None:
+    """Where several rows do not count and the error of all is twice that of those that do, their share is told."""
+    counts = np.ones((1000, 4), dtype=bool)
+    counts[:400, 0] = counts[:350, 1] = counts[:400, 2] = counts[:2, 3] = False
+    after = np.array([0.025, 0.025, 0.025, 0.025])
+    (note,) = turning_joints(np.array([0.31, 0.08, 0.04, 0.30]), after, counts)
+    assert note.startswith("Joints 1, 2: in 35 to 40 % of the unseen rows the joint rests or turns round.")
+    (one,) = turning_joints(np.array([0.31, 0.04, 0.04, 0.30]), after, counts)
+    assert one.startswith("Joint 1: in 40 % of the unseen rows")
+    assert turning_joints(np.full(4, np.nan), after, counts) == []
+    assert turning_joints(after, after, counts) == []
