@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DIAGNOSIS, MODEL = "diagnosis.json", "model.json"
+# Parameters of one finding that the summary lists, of each kind.
+TOLD = 8
 VERDICTS = ("none", "named", "ambiguous", "unexplained")
 
 
@@ -121,9 +124,9 @@ class Diagnosis:
             # Coefficients of a free function mean nothing each.
             parameters = finding.parameters if finding.effect != "unexplained" else ()
             if known := [parameter.told for parameter in parameters if parameter.determined]:
-                lines.append(f"    95 % intervals: {', '.join(known)}")
+                lines.append(f"    95 % intervals: {_some(known)}")
             if open_ := [parameter.told for parameter in parameters if not parameter.determined]:
-                lines.append(f"    not well determined by these logs: {', '.join(open_)}")
+                lines.append(f"    not well determined by these logs: {_some(open_)}")
             close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]
             if close:
                 lines.append(f"    not told apart from: {', '.join(close)}")
@@ -286,6 +289,12 @@ _VERDICTS = {
     "ambiguous": "the model lacks a cause, and more than one fits",
     "unexplained": "the model lacks something that no effect of the catalogue explains",
 }
+
+
+def _some(told: Sequence[str]) -> str:
+    """Lists parameters, no more than a line holds: a force at a place of a body has twelve."""
+    left = len(told) - TOLD
+    return ", ".join(told if left <= 1 else [*told[:TOLD], f"and {left} more in diagnosis.json"])
 
 
 def _p(value: float) -> str:
