@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.findings import Finding, read_finding
+from estimation.diagnosis.findings import Finding, listed, read_finding
 from estimation.diagnosis.limits import Limit, told_in_one
 from estimation.diagnosis.next_experiment import NextExperiment
 from estimation.diagnosis.simulation import Simulation, read_simulation
@@ -28,8 +27,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DIAGNOSIS, MODEL = "diagnosis.json", "model.json"
-# Parameters of one finding that the summary lists, of each kind.
-TOLD = 8
 VERDICTS = ("none", "named", "ambiguous", "unexplained")
 
 
@@ -124,9 +121,9 @@ class Diagnosis:
             # Coefficients of a free function mean nothing each.
             parameters = finding.parameters if finding.effect != "unexplained" else ()
             if known := [parameter.told for parameter in parameters if parameter.determined]:
-                lines.append(f"    95 % intervals: {_some(known)}")
+                lines.append(f"    95 % intervals: {listed(known)}")
             if open_ := [parameter.told for parameter in parameters if not parameter.determined]:
-                lines.append(f"    not well determined by these logs: {_some(open_)}")
+                lines.append(f"    not well determined by these logs: {listed(open_)}")
             close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]
             if close:
                 lines.append(f"    not told apart from: {', '.join(close)}")
@@ -289,12 +286,6 @@ _VERDICTS = {
     "ambiguous": "the model lacks a cause, and more than one fits",
     "unexplained": "the model lacks something that no effect of the catalogue explains",
 }
-
-
-def _some(told: Sequence[str]) -> str:
-    """Lists parameters, no more than a line holds: a force at a place of a body has twelve."""
-    left = len(told) - TOLD
-    return ", ".join(told if left <= 1 else [*told[:TOLD], f"and {left} more in diagnosis.json"])
 
 
 def _p(value: float) -> str:

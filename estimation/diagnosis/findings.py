@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from robots.common.plain import finite, number
+
+# Parameters of one finding that a summary lists.
+TOLD = 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,3 +176,9 @@ def read_finding(item: dict[str, Any]) -> Finding:
         pattern=item.get("pattern", ""),
         measured_by=item.get("measured_by", ""),
     )
+
+
+def listed(told: Sequence[str]) -> str:
+    """Lists parameters, no more than a line holds: a force at a place of a body has twelve."""
+    left = len(told) - TOLD
+    return ", ".join(told if left <= 1 else [*told[:TOLD], f"and {left} more in diagnosis.json"])

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimation.diagnosis.diagnosis import TOLD, _some
-from estimation.diagnosis.findings import Parameter
+from estimation.diagnosis.findings import TOLD, Parameter, listed
 
 
 @pytest.mark.parametrize(
@@ -30,6 +29,6 @@ def test_both_ends_of_an_interval_are_told_apart(value: float, ci95: tuple, unit
 def test_a_summary_lists_no_more_parameters_than_a_line_holds() -> None:
     """One more is listed, for its name is no longer than the word that it is left out; of more, their number."""
     names = [f"place_{k}" for k in range(12)]
-    assert _some(names[:TOLD]) == ", ".join(names[:TOLD])
-    assert _some(names[: TOLD + 1]) == ", ".join(names[: TOLD + 1])
-    assert _some(names) == ", ".join(names[:TOLD]) + ", and 4 more in diagnosis.json"
+    assert listed(names[:TOLD]) == ", ".join(names[:TOLD])
+    assert listed(names[: TOLD + 1]) == ", ".join(names[: TOLD + 1])
+    assert listed(names) == ", ".join(names[:TOLD]) + ", and 4 more in diagnosis.json"
