@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.free_functions import SURE
 from estimation.diagnosis.hypotheses import Hypothesis
@@ -22,6 +24,7 @@ SLIGHT, PLAIN = 0.1, 50.0  # share of the strongest name's worth, and BIC, below
 AGAINST = 0.1  # share of an effect's gain by which unseen data must speak against it
 HARM = 1.05  # times the unseen error: an effect that makes it so much larger is left out, sure or not
 RUINS = 1.2  # the same, whatever unseen rows say of it: where they go beyond what was fitted, its formula does not hold
+WORSE = 1.02  # times the base model's unseen error of a joint, by which free functions together are no model of it
 SAYS, PLAINLY = 0.4, 30.0  # share and size of the growth by which unseen rows speak for an effect, whatever the error
 
 
@@ -89,7 +92,10 @@ def bear_out(
         for items in (founds, members, p_values):
             items.pop(idle[0])
         seen = look(members)
-    while harmful := [i for i, member in enumerate(members) if _harms(seen, i, member, beyond)]:
+    while harmful := (
+        [i for i, member in enumerate(members) if _harms(seen, i, member, beyond)]
+        or _together(seen, members, len(founds))
+    ):
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         label = members[worst].hypothesis.label
         if len(members) == 1 > len(founds) and _unsure(members[0].hypothesis.effect, p_values[0]):
@@ -184,6 +190,17 @@ def _instead(
     return harmless[0] if harmless else None
 
 
+def _together(seen: Measured, members: Sequence[Member], named: int) -> list[int]:
+    """Lists free functions, after the named members, that are not sure to bring anything where all together harm.
+
+    Each may bring something beside the others, what those first took away.
+    """
+    before, after = seen.unseen.nrmse(0), seen.unseen.nrmse(-1)
+    worse = set((np.flatnonzero(after > WORSE * before) + 1).tolist())
+    free = range(named, len(members)) if len(members) > 1 else ()
+    return [i for i in free if seen.gains[i].ci95[0] <= 0 and (members[i].hypothesis.joint or 0) in worse]
+
+
 def _unsure(free: Effect, p_value: float) -> bool:
     """Whether a free function that is alone stands out so little that unseen data against it are the odds against it.
 
@@ -231,7 +248,8 @@ def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bo
     # Heat that was stored before the unseen data, and what a pause left of it, are told by neither.
     stored = any(shape.name == "time_constant" for shape in effect.shapes)
     # A free function claims no cause: what it brings elsewhere is all that it is good for.
-    idle = effect.name.startswith(PREFIX) and gain.ci95[1] < 0
+    least = gain.ci95[1] if len(seen.gains) == 1 or is_of_time(effect) else gain.nrmse_before - gain.nrmse_after
+    idle = effect.name.startswith(PREFIX) and least < 0
     # By less of its gain than this a base model that errs there, too, makes them speak against a cause.
     against = seen.worse[i] and speaks < -AGAINST
     # Base parameters that it moves may err elsewhere by more than it is, whatever those rows say of it.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -36,12 +37,16 @@ HELPS, IDLE, HARMS = Shown(), Shown(-0.001, 0.002, 1.0), Shown(-0.004, -0.001, 1
 
 @dataclass
 class Bench:
-    """Stands for the measurement: what each label shows, also beside certain others or gone, and what it was asked."""
+    """Stands for the measurement: what each label shows, also beside certain others or gone, and what it was asked.
+
+    On some joints several members together have an extra error beyond what each brings beside the others.
+    """
 
     shows: dict[str, Shown]
     beside: dict[tuple[str, str], Shown] = field(default_factory=dict)
     asked: list[tuple[str, ...]] = field(default_factory=list)
     without: dict[str, Shown] = field(default_factory=dict)
+    extra: dict[int, float] = field(default_factory=dict)
 
     def __call__(self, members: Sequence[Member], gone: frozenset[int] = frozenset()) -> SimpleNamespace:
         labels = tuple(label_of(member) for member in members)
@@ -56,7 +61,7 @@ class Bench:
         ]
         lost = {m.hypothesis.joint - 1 for m, s in zip(members, shown, strict=True) if m.hypothesis.joint and s.astray}
         return SimpleNamespace(
-            unseen=SimpleNamespace(astray=lambda joint: joint in lost),
+            unseen=SimpleNamespace(astray=lost.__contains__, nrmse=partial(self._left, members, shown)),
             gains=tuple(
                 Gain(nrmse_before=0.03, nrmse_after=0.03 - (s.low + s.high) / 2, ci95=(s.low, s.high)) for s in shown
             ),
@@ -65,6 +70,16 @@ class Bench:
             kept=tuple(s.kept for s in shown),
             speaks=tuple(s.speaks for s in shown),
         )
+
+    def _left(self, members: Sequence[Member], shown: Sequence[Shown], model: int) -> np.ndarray:
+        """Errors of the base model (0) and of all members together (-1) on each of eight joints."""
+        error = np.full(8, 0.03)
+        for member, what in zip(members, shown, strict=True) if model else ():
+            if member.hypothesis.joint is not None:
+                error[member.hypothesis.joint - 1] -= (what.low + what.high) / 2
+        for joint, more in self.extra.items():
+            error[joint - 1] += more * bool(model and sum(m.hypothesis.joint == joint for m in members) > 1)
+        return error
 
 
 def label_of(member: Member) -> str:

@@ -212,6 +212,31 @@ def test_a_free_function_that_errs_is_told_and_no_part_of_the_model() -> None:
     assert note.startswith("On joint 3 something is unexplained")
 
 
+def test_a_free_function_that_brings_nothing_beside_others_is_no_part_of_the_model() -> None:
+    """It claims no cause, and what it adds to the unseen error is no gain; all that was found by itself stays."""
+    slightly = Shown(-0.003, 0.001, 1.0)
+    result = borne(bench_with(load=slightly), Found(SPRING, 1e-9, ()), free=[FREE], p_values=[1e-4])
+    assert result.members == (SPRING,)
+    assert [member for member, *_ in result.spoiling] == [FREE]
+    alone = borne(bench_with(load=slightly), free=[FREE], p_values=[1e-7])
+    assert alone.members == (FREE,)
+
+
+@pytest.mark.parametrize(("extra", "kept"), [(0.004, 1), (0.0, 2)])
+def test_free_functions_that_harm_together_are_left_out_until_they_do_not(extra: float, kept: int) -> None:
+    """Beside the others each brings a little, not surely, and all of them more error than the base model has.
+
+    The one that may bring least goes.
+    """
+    other = member_of("pattern:acceleration:0:odd", 3)
+    bench = bench_with(load=Shown(-0.001, 0.0015, 1.0))
+    bench.shows[other.hypothesis.label] = Shown(-0.001, 0.003, 1.0)
+    bench.extra[3] = extra
+    result = borne(bench, free=[FREE, other], p_values=[1e-7, 1e-7])
+    assert result.members == ((FREE, other) if kept == 2 else (other,))
+    assert [member for member, *_ in result.spoiling] == ([] if kept == 2 else [FREE])
+
+
 def test_what_errs_on_all_joints_is_told_of_the_whole_robot() -> None:
     """What swings at the flange has no joint to name."""
     result = borne(bench_with(swinging=HARMS), free=[SWING], p_values=[1e-10])
