@@ -14,6 +14,9 @@ from robots.plants.closed_loop import Loop
 
 Array = NDArray[np.float64]
 
+# Times the torque that the loop adds without what was found, from which on that is worth a word.
+WORSE = 1.05
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curves:
@@ -71,10 +74,12 @@ class Simulation:
         """
         joint = self.telling
         (old, new), (far, near) = (tuple(part[joint] for part in pair) for pair in (self.torque, self.motion))
+        worse = ": what was found makes the simulation worse there" if new > WORSE * old else ""
         return (
             f"simulated forward from {self.start:.1f} to {self.end:.1f} s, driven by the measured torque under an "
             f"assumed {self.loop.bandwidth:g} Hz position loop: on joint {joint + 1} the loop adds {100 * old:.2f} -> "
             f"{100 * new:.2f} % of the torque, the motion is {1e3 * far:.3g} -> {1e3 * near:.3g} m{lengths[joint]} off"
+            f"{worse}{f'. {self.note}' if self.note else ''}"
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -61,6 +61,9 @@ def test_what_grows_worse_is_told_before_what_hardly_grows_better() -> None:
     torque = (np.array([0.0231, 0.042]), np.array([0.0230, 0.051]))
     made = Simulation(start=0.0, end=5.0, loop=Loop(), torque=torque, motion=(still, still))
     assert "on joint 2 the loop adds 4.20 -> 5.10 %" in made.summary(["rad", "rad"])
+    assert made.summary(["rad", "rad"]).endswith("off: what was found makes the simulation worse there")
+    better = replace(made, torque=made.torque[::-1], note="It did not settle.")
+    assert better.summary(["rad", "rad"]).endswith("mrad off. It did not settle.")
 
 
 def test_it_is_written_and_read(found: Diagnosis, tmp_path: object) -> None:
