@@ -48,6 +48,6 @@ class Draining(OverTime):
         """Says what is seen."""
         mass = waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients[:: len(_PARTS)]
         return (
-            "The residual torque of all joints is that of a body at the flange that changes slowly with time, as a "
-            f"tank that empties or a coil that unwinds does: by {float(np.ptp(mass)):.2g} kg over the logs."
+            "The residual torque of all joints looks like that of a body at the flange that changes slowly with "
+            f"time, as a tank that empties or a coil that unwinds does: by {float(np.ptp(mass)):.2g} kg over the logs."
         )

@@ -69,6 +69,6 @@ class Leaning(Effect):
                 "not as that of a base that gives way does: it has the other sign."
             )
         return (
-            "The residual torque of all joints is that of a base that leans to where the robot reaches: by up to "
-            f"{np.degrees(np.abs(coefficients[:3]).max()) * 1e3:.2g} deg per 1000 N m of its weight's moment."
+            "The residual torque of all joints looks like that of a base that leans to where the robot reaches: by "
+            f"up to {np.degrees(np.abs(coefficients[:3]).max()) * 1e3:.2g} deg per 1000 N m of its weight's moment."
         )

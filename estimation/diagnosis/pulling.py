@@ -47,6 +47,6 @@ class Pulling(Effect):
     ) -> str:
         """Says what is seen."""
         return (
-            "The residual torque of all joints is that of something that pulls at the flange by where it is, as a hose "
-            f"or a cable does: by up to {np.abs(coefficients[3:]).max():.2g} N/m."
+            "The residual torque of all joints looks like that of something that pulls at the flange by where it "
+            f"is, as a hose or a cable does: by up to {np.abs(coefficients[3:]).max():.2g} N/m."
         )

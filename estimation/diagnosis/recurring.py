@@ -90,7 +90,7 @@ class Spell(JointEffect):
     ) -> str:
         """Says what is seen."""
         return (
-            f"The residual torque of joint {joint} is that of {coefficients[0]:.2g} {force} of friction from "
+            f"The residual torque of joint {joint} looks like that of {coefficients[0]:.2g} {force} of friction from "
             f"t = {shape[0]:.1f} s for {shape[1]:.2g} s, and not before or after: a brake that drags does that."
         )
 
@@ -184,9 +184,9 @@ class Recurring(OverTime):
     ) -> str:
         """Says what is seen."""
         return (
-            f"The residual torque of all joints is that of a force of {np.linalg.norm(coefficients):.2g} N on the "
-            f"flange that comes every {shape[0]:.3g} s for {shape[2]:.2g} s, whatever the motion: another machine does "
-            "that."
+            f"The residual torque of all joints looks like that of a force of {np.linalg.norm(coefficients):.2g} N "
+            f"on the flange that comes every {shape[0]:.3g} s for {shape[2]:.2g} s, whatever the motion, as another "
+            "machine's would."
         )
 
 

@@ -133,7 +133,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         next_experiment=_next(problem, founds) if verdict == "ambiguous" else None,
         model=model,
         how_unseen=unseen.how,
-        notes=(
+        notes=_each_once(
             *told.notes,
             *notes_of(problem, told.false_alarm, findings, apart, after, [m.hypothesis.name for m in timed]),
             *worse_joints(before, after),
@@ -146,6 +146,11 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
         trace=_trace(unseen, [seen.coordinates[i] for i in order], twisted),
         simulation=simulation,
     )
+
+
+def _each_once(*notes: str) -> tuple[str, ...]:
+    """Several functions of one joint are told in the same words."""
+    return tuple(dict.fromkeys(notes))
 
 
 def _is_beyond(told: Told, effect: Effect) -> bool:

@@ -83,8 +83,8 @@ class BaseShift(Shift):
         """Says what is seen."""
         angle = np.degrees(np.hypot(*coefficients))
         return (
-            f"The residual torque of all joints is that of a base that tilts by {angle:.2g} deg at t = {shape[0]:.2f} "
-            "s and stays so: its mount gave way."
+            f"The residual torque of all joints looks like that of a base that tilts by {angle:.2g} deg at t = "
+            f"{shape[0]:.2f} s and stays so, as where its mount gives way."
         )
 
 
@@ -115,6 +115,7 @@ class ZeroShift(Shift):
     ) -> str:
         """Says what is seen."""
         return (
-            f"The residual torque is that of a joint {joint} that stands {coefficients[0]:.2g} {length} further than "
-            f"its encoder says, from t = {shape[0]:.2f} s on: a coupling slipped, or a reference was set anew."
+            f"The residual torque looks like that of a joint {joint} that stands {coefficients[0]:.2g} {length} "
+            f"further than its encoder says, from t = {shape[0]:.2f} s on, as where a coupling slips or a reference is "
+            "set anew."
         )

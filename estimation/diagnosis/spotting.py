@@ -127,6 +127,6 @@ class Spot(Placed):
         """Says where the spot is, how wide and how strong."""
         what = "friction" if self.odd else "torque"
         return (
-            f"The residual torque of joint {joint} is that of a spot at {shape[0]:.3g} {length}, {2 * shape[1]:.2g} "
-            f"{length} wide, with {coefficients[0]:.2g} {force} of {what}."
+            f"The residual torque of joint {joint} looks like that of a spot at {shape[0]:.3g} {length}, "
+            f"{2 * shape[1]:.2g} {length} wide, with {coefficients[0]:.2g} {force} of {what}."
         )

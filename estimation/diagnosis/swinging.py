@@ -55,8 +55,8 @@ class Swinging(Effect):
     ) -> str:
         """Says what is seen."""
         return (
-            f"The residual torque of all joints is that of something at the flange that swings at {shape[0]:.3g} Hz "
-            f"after its motion, of some {np.abs(coefficients).max():.2g} kg."
+            "The residual torque of all joints looks like that of something at the flange that swings at "
+            f"{shape[0]:.3g} Hz after its motion, of some {np.abs(coefficients).max():.2g} kg."
         )
 
 

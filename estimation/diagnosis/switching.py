@@ -46,6 +46,6 @@ class Switch(Sudden, JointEffect):
         """Says what is seen."""
         change = f"{100 * abs(coefficients[0]):.2g} % {'more' if coefficients[0] > 0 else 'less'}"
         return (
-            f"The residual torque of joint {joint} is that of a torque logged {change} from t = {shape[0]:.2f} s on "
-            "than before: another amplifier or sensor, or another of its ranges, does that."
+            f"The residual torque of joint {joint} looks like that of a torque logged {change} from t = "
+            f"{shape[0]:.2f} s on than before, as where another amplifier, sensor or range of it is used."
         )
