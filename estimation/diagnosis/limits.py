@@ -30,6 +30,8 @@ RESTS = "{:.0f} % of the log the arm stands, where its torque is that of a frict
 STILL = 1e-3
 """Travel of a joint [rad or m] below which it hardly moves."""
 MOST = 0.9
+NAMED = 4
+"""Effects that show at no size that a sentence names."""
 """Share of effects and places whose limits a sentence covers."""
 SHAPES = 3
 """Shapes of an effect that its limit is the median of."""
@@ -106,8 +108,14 @@ def told_in_one(limits: Sequence[Limit]) -> str:
     if not sizes:
         return ""
     half, most = (f"{100 * float(size):.1f} %" for size in np.quantile(sizes, (0.5, MOST)))
-    hidden = len(limits) - len(sizes)
-    rest = f", {hidden} more at no size" if hidden else ""
+    hidden = [
+        limit.effect + (f" of joint {limit.joint}" if limit.joint else "")
+        for limit in limits
+        if not np.isfinite(limit.detectable)
+    ]
+    more = len(hidden) - NAMED
+    rest = f"; at any size hidden: {', '.join(hidden if more <= 1 else [*hidden[:NAMED], f'and {more} more'])}"
+    rest = rest if hidden else ""
     return (
         f"Of {len(sizes)} effects and places half would have shown from {half} of the joint's torque on, nine in ten "
         f"from {most}{rest}"

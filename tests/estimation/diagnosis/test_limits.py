@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.limits import find_limits
+from estimation.diagnosis.limits import Limit, find_limits, told_in_one
 from estimation.diagnosis.planned import planned_limits, planned_problem
 from estimation.diagnosis.power import detectable_energy
 from estimation.diagnosis.scan import measure
@@ -159,3 +159,16 @@ def test_a_log_shorter_than_the_slowest_heat_is_told(ur10):
     limits = find_limits(problem, measure(problem, [Hypothesis(EFFECTS["thermal_friction"], 2)]))
     note = next(limit.note for limit in limits if (limit.effect, limit.joint) == ("thermal_friction", 2))
     assert "time constants beyond 16 s look alike" in note
+
+
+def test_what_shows_at_no_size_is_named() -> None:
+    """Four at most, and one more where its name is no longer than the word that it is left out."""
+    known = {"at_worst": 0.02, "attributable": 0.02, "toughest": "", "visible": 0.5}
+    seen = Limit(effect="spring", joint=1, detectable=0.01, **known)
+    hidden = [Limit(effect="backlash", joint=j + 1, detectable=np.inf, **known) for j in range(6)]
+    some = ", ".join(f"backlash of joint {j + 1}" for j in range(4))
+    assert "hidden" not in told_in_one([seen])
+    assert told_in_one([seen, *hidden[:4]]).endswith(f"; at any size hidden: {some}")
+    assert told_in_one([seen, *hidden[:5]]).endswith(f"{some}, backlash of joint 5")
+    assert told_in_one([seen, *hidden]).endswith(f"{some}, and 2 more")
+    assert told_in_one(hidden) == ""

@@ -101,7 +101,7 @@ def test_the_page_tells_all(view):
         (
             "none",
             "Nothing that the model leaves out was found. Of 3 effects and places half would have shown from 1.0 % of "
-            "the joint's torque on, nine in ten from 1.8 %, 1 more at no size.",
+            "the joint's torque on, nine in ten from 1.8 %; at any size hidden: stribeck of joint 2.",
             "Nothing is left to tell apart.",
         ),
         ("unexplained", "no effect of the catalogue explains", "no experiment of the catalogue gives it one"),
