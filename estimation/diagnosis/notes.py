@@ -90,9 +90,7 @@ def notes_of(
         if finding.effect in timed:
             notes.append(_TIMED.format(finding.effect))
         elif finding.gain.ci95[0] <= 0 and finding not in apart:
-            what = "what is unexplained" if finding.effect == "unexplained" else finding.effect
-            where = f"{what} of joint {finding.joint}" if finding.joint else what
-            notes.append((_UNSURE if finding.gain.ci95[1] >= 0 else _AGAINST).format(where))
+            notes.append(unsure_gain(finding))
     part = [finding for finding in findings if finding not in apart]
     open_ = sorted({finding.joint for finding in part if finding.effect == "unexplained" and finding.joint})
     if open_:
@@ -112,10 +110,23 @@ _TIMED = (
     "too little of when the joints turn round. Its gain there says nothing of it."
 )
 _UNSURE = "The gain of {} on unseen data is not sure: its interval begins below zero."
+_VAGUE = (
+    " Nor do these logs determine any of its parameters: they tell that something acts there, and the name is no more "
+    "than the likeliest for it."
+)
 _AGAINST = (
     "With {} the model predicts the unseen data worse: what is in the logs of the fit is not so there, has another "
     "cause, or moves base parameters that those logs hardly tell."
 )
+
+
+def unsure_gain(finding: Finding) -> str:
+    """Says that the interval of a gain begins below zero, and what else is open of a name."""
+    named = finding.effect != "unexplained"
+    what = finding.effect if named else "what is unexplained"
+    where = f"{what} of joint {finding.joint}" if finding.joint else what
+    vague = named and finding.parameters and not any(parameter.determined for parameter in finding.parameters)
+    return (_UNSURE if finding.gain.ci95[1] >= 0 else _AGAINST).format(where) + (_VAGUE if vague else "")
 
 
 def _strange(problem: Problem, after: Array) -> dict[int, str]:

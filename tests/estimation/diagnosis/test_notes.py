@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimation.diagnosis.notes import LITTLE, WORSE, turning_joints, worse_joints
+from estimation.diagnosis.findings import Finding, Gain, Parameter
+from estimation.diagnosis.notes import LITTLE, WORSE, turning_joints, unsure_gain, worse_joints
 
 
 def test_joints_that_the_extension_makes_worse_are_told() -> None:
@@ -31,3 +32,22 @@ def test_rows_at_rest_explain_an_error_that_is_far_larger_with_them() -> None:
     assert one.startswith("Joint 1: in 40 % of the unseen rows")
     assert turning_joints(np.full(4, np.nan), after, counts) == []
     assert turning_joints(after, after, counts) == []
+
+
+def test_a_name_of_which_nothing_is_determined_is_no_more_than_likely() -> None:
+    """Where its gain is not sure either; not of one with a parameter that is determined, nor of what claims no cause."""
+
+    def finding(effect: str, *determined: bool) -> Finding:
+        parameters = tuple(
+            Parameter(name="p", value=1.0, unit="1", standard_error=1.0, ci95=(0.0, 2.0), determined=known)
+            for known in determined
+        )
+        gain = Gain(nrmse_before=0.04, nrmse_after=0.036, ci95=(-0.01, 0.014))
+        told = {"p_value": 0.0, "delta_bic": 90.0, "rivals": (), "sentence": "", "visible": 1.0, "coordinate": ""}
+        return Finding(effect=effect, joint=2, parameters=parameters, gain=gain, **told)
+
+    open_ = unsure_gain(finding("stribeck", False, False))
+    assert open_.startswith("The gain of stribeck of joint 2 on unseen data is not sure")
+    assert open_.endswith("the name is no more than the likeliest for it.")
+    for other in (finding("stribeck", False, True), finding("unexplained", False), finding("stribeck")):
+        assert unsure_gain(other).endswith("its interval begins below zero.")
