@@ -50,7 +50,8 @@ class CurrentLag(Late, JointEffect):
         length: str = "rad",
     ) -> str:
         """Says what the values mean."""
-        return f"The torque of joint {joint} is logged {1000 * coefficients[0]:.2f} ms late: its drive filters it."
+        late = 1000 * coefficients[0]
+        return f"The torque of joint {joint} is logged {late:.2f} ms late, as where its drive filters it."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the rate of the joint's torque."""

@@ -35,7 +35,7 @@ def test_rows_at_rest_explain_an_error_that_is_far_larger_with_them() -> None:
 
 
 def test_a_name_of_which_nothing_is_determined_is_no_more_than_likely() -> None:
-    """Where its gain is not sure either; not of one with a parameter that is determined, nor of what claims no cause."""
+    """Where its gain is not sure either; not of one with a parameter that is determined, nor without a name."""
 
     def finding(effect: str, *determined: bool) -> Finding:
         parameters = tuple(
