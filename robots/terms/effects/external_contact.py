@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gamma
 
 from robots.terms.base import force_unit
 from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
@@ -25,7 +26,7 @@ LONGER = (1.0, 2.0, 4.0, 8.0)
 FROM = (0.0, 0.5, 1.0)
 ALONE = 0.05  # share of what a joint feels below which others feel nothing
 NONE = 1e-6  # share of force or moment [N or N m] below which the other is none
-WRENCH = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
+WRENCH = tuple(f"mean_{what}_{k}" for what in ("force", "moment") for k in "xyz")
 # Of a force F at the place r of a body, the first along the base's axes, the second along the body's.
 PLACED = tuple(f"place_{i}_force_{k}" for i in "xyz" for k in "xyz")
 
@@ -35,8 +36,9 @@ class ExternalContact(Effect):
 
     A force anywhere on the arm: during so short a time the pose, and with it what each joint feels, stays nearly the
     same. The hardness h makes it a half sine (1), a hold (near 0), or what lies between. One that lasts while the arm
-    moves is tau = J(q)' w p(t) instead: a force and a moment on the flange, constant in the base frame; or a force F,
-    constant there, at a place r of one of the bodies, J_b(q, r)' F p(t), which is linear in F and in all r_i F_k.
+    moves is tau = J(q)' w p(t) / p_m instead: a force and a moment on the flange, constant in the base frame; or a
+    force F, constant there, at a place r of one of the bodies, J_b(q, r)' F p(t) / p_m, which is linear in F and in all
+    r_i F_k. p_m is the mean of p over d, so that F is the mean force, which no guess at its course changes.
     """
 
     name: ClassVar[str] = "external_contact"
@@ -63,7 +65,7 @@ class ExternalContact(Effect):
         if on_body(shape):
             told = [Coefficient(name, "N") for name in WRENCH[:3]] + [Coefficient(name, "N m") for name in PLACED]
         elif on_the_flange(shape):
-            told = [Coefficient(name, "N" if name.startswith("force") else "N m") for name in WRENCH]
+            told = [Coefficient(name, "N" if "force" in name else "N m") for name in WRENCH]
         else:
             told = [Coefficient(f"peak_on_joint_{j + 1}", force_unit(robot, j)) for j in range(robot.n)]
         return (*told, *(Coefficient("", "") for _ in range(_count(robot.n) - len(told))))
@@ -126,6 +128,7 @@ class ExternalContact(Effect):
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates a pulse on each joint, or the joints' torques of one on the flange or a body (N, n, k)."""
         n, during = situation.robot.n, pulse(situation.t, shape)
+        during = during / mean_of(shape[2]) if on_body(shape) or on_the_flange(shape) else during
         X = np.zeros((len(situation), n, _count(n)))
         acts = np.flatnonzero(during)
         if on_body(shape):
@@ -176,7 +179,8 @@ class ExternalContact(Effect):
             push = float(np.linalg.norm(coefficients[:3]))
             return (
                 f"Something pushed the arm {when}, as a force of {push:.3g} N at one place of body {shape[4]:.0f} does "
-                "that stays the same (along the base's axes; the signs are those of the arm's push against it)."
+                "that stays the same (its mean, along the base's axes; the signs are those of the arm's push against "
+                "it)."
             )
         if on_the_flange(shape):
             # What no joint feels of them is none, or rounding.
@@ -185,8 +189,8 @@ class ExternalContact(Effect):
             least = NONE * max(push, turn)
             told = [f"a {word} of {size:.3g} {unit}" for word, size, unit in sizes if size > least]
             return (
-                f"Something pushed the flange {when}, with {' and '.join(told)} that stayed the same (along the base's "
-                "axes; the signs are those of the arm's push against it)."
+                f"Something pushed the flange {when}, with {' and '.join(told)} that stayed the same (means, along the "
+                "base's axes; the signs are those of the arm's push against it)."
             )
         size = np.abs(coefficients)
         most, last = int(np.argmax(size)) + 1, int(np.flatnonzero(size > 0.05 * size.max())[-1]) + 1
@@ -230,6 +234,11 @@ def on_the_flange(shape: tuple[float, ...]) -> bool:
 def on_body(shape: tuple[float, ...]) -> bool:
     """Whether a push is a force at a place of a body that lasts while the arm moves."""
     return len(shape) > 4 and shape[4] > 0.5
+
+
+def mean_of(hardness: float) -> float:
+    """Gives the mean of sin(pi s)^h over s from 0 to 1."""
+    return float(gamma(0.5 * hardness + 0.5) / (np.sqrt(np.pi) * gamma(0.5 * hardness + 1.0)))
 
 
 def pulse(t: Array, shape: tuple[float, ...]) -> Array:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.signal import lfilter
 
 from robots.terms.effects import EFFECTS
+
+# Of sin(pi s)^.1 over s from 0 to 1.
+MEAN = float(quad(lambda s: np.sin(np.pi * s) ** 0.1, 0.0, 1.0)[0])
 
 
 def test_a_push_anywhere_is_felt_by_each_joint(now, twin):
@@ -51,7 +55,7 @@ def test_a_push_that_lasts_is_a_wrench_on_the_flange(now, twin):
     wrench, more = np.array([30.0, -10.0, 20.0, 2.0, -1.0, 3.0]), np.zeros(6)
     X = push.columns(now, None, (1.0, 1.5, 0.1, 1.0))
     during = np.flatnonzero((now.t > 1.1) & (now.t < 2.4))[::20]
-    strength = np.sin(np.pi * (now.t[during] - 1.0) / 1.5) ** 0.1
+    strength = np.sin(np.pi * (now.t[during] - 1.0) / 1.5) ** 0.1 / MEAN
     flange = now.sensitivity("flange")[during][:, :, 0]
     for i, p, place in zip(during, strength, flange, strict=True):
         # Of the frame in the base's directions whose origin is the flange's.
@@ -61,11 +65,22 @@ def test_a_push_that_lasts_is_a_wrench_on_the_flange(now, twin):
         moment = wrench[3:] + np.cross(lever, wrench[:3])
         np.testing.assert_allclose(X[i] @ [*wrench, *more], p * own.T @ np.concatenate([wrench[:3], moment]), atol=1e-6)
     assert [c.name for c in push.described(now.robot, None, (1.0, 1.5, 0.1, 1.0))][:3] == [
-        "force_x",
-        "force_y",
-        "force_z",
+        "mean_force_x",
+        "mean_force_y",
+        "mean_force_z",
     ]
     assert "force of 37.4 N" in push.describe(None, wrench, (1.0, 1.5, 0.1, 1.0))
+
+
+@pytest.mark.parametrize("hardness", [0.005, 0.1, 0.6, 1.0, 2.0])
+def test_a_force_that_lasts_is_told_by_its_mean(now, hardness):
+    """Whatever its course: a column's impulse over the duration is that of one newton."""
+    column = EFFECTS["external_contact"].columns(now, None, (1.0, 1.5, hardness, 1.0))[:, :, 0]
+    jacobian = now.sensitivity("jacobian")[:, 0]
+    joint = int(np.argmax(np.abs(jacobian).mean(axis=0)))
+    during = (now.t > 1.0) & (now.t < 2.5) & (np.abs(jacobian[:, joint]) > 1e-3)
+    course = column[during, joint] / jacobian[during, joint]
+    assert np.trapezoid(course, now.t[during]) / 1.5 == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_push_on_a_body_is_a_force_at_one_place_of_it(now, twin):
@@ -85,7 +100,7 @@ def test_a_push_on_a_body_is_a_force_at_one_place_of_it(now, twin):
         own = pin.getJointJacobian(model, data, body, pin.LOCAL_WORLD_ALIGNED)
         lever = data.oMi[body].rotation @ place
         wrench = np.concatenate([force, np.cross(lever, force)])
-        strength = np.sin(np.pi * (now.t[i] - 1.0) / 1.5) ** 0.1
+        strength = np.sin(np.pi * (now.t[i] - 1.0) / 1.5) ** 0.1 / MEAN
         np.testing.assert_allclose(X[i] @ coefficients, strength * own.T @ wrench, atol=1e-6)
     told = push.describe(None, coefficients, (1.0, 1.5, 0.1, 0.0, float(body)))
     assert f"force of 37.4 N at one place of body {body}" in told
