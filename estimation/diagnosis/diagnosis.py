@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.findings import Finding, listed, read_finding
 from estimation.diagnosis.limits import Limit, told_in_one
 from estimation.diagnosis.next_experiment import NextExperiment
+from estimation.diagnosis.predicting import every_row
 from estimation.diagnosis.simulation import Simulation, read_simulation
 from estimation.model import Model, load_model
 from robots.common.errors import InputError
@@ -99,8 +100,7 @@ class Diagnosis:
 
         `baseline` and `extended` leave out rows in which a joint's direction of motion is not known.
         """
-        stated = self.model.provenance.get("unseen_nrmse")
-        return np.full(self.model.robot.n, np.nan) if stated is None else np.array([number(value) for value in stated])
+        return every_row(self.model)
 
     def summary(self) -> str:
         """Says what was found, what it brings, and what stays open."""

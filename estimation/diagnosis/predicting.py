@@ -15,7 +15,7 @@ from estimation.diagnosis.problem import Problem
 from estimation.model import Model
 from estimation.prediction import Prediction, predict
 from estimation.preparation import torque_of
-from robots.common.plain import all_finite
+from robots.common.plain import all_finite, number
 from robots.signals import Log
 from robots.terms import FrictionPolynomial
 from robots.terms.effects.of_model import sign_of, velocity_scale
@@ -141,6 +141,12 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
         "unseen_nrmse": all_finite(share),
     }
     return replace(model, provenance={**model.provenance, **stated})
+
+
+def every_row(model: Model) -> Array:
+    """Gives back the errors on unseen data that `with_band` states (n,); NaN where it is not known."""
+    stated = model.provenance.get("unseen_nrmse")
+    return np.full(model.robot.n, np.nan) if stated is None else np.array([number(value) for value in stated])
 
 
 def _predicted(model: Model, log: Log, before: Sequence[Log] = ()) -> Prediction:

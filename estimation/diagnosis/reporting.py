@@ -21,7 +21,7 @@ from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.notes import farther_joints, faster_joints, notes_of, turning_joints, worse_joints
 from estimation.diagnosis.patterns import all_patterns
-from estimation.diagnosis.predicting import as_sharp, smoothed_best, with_band
+from estimation.diagnosis.predicting import as_sharp, every_row, smoothed_best, with_band
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import cut
 from estimation.diagnosis.refinement import Member
@@ -33,7 +33,6 @@ from estimation.diagnosis.windup import EFFECT as ELASTICITY
 from estimation.diagnosis.windup import Windup, measure_windups
 from estimation.diagnosis.wording import no_part, word_finding
 from estimation.provenance import describe_logs
-from robots.common.plain import number
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import Effect
@@ -121,7 +120,6 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
     # Of a joint that rests in all of them unseen data say nothing: that is no error of zero.
     shown = unseen.counts.any(axis=0)
     before, after = (np.where(shown, unseen.nrmse(model), np.nan) for model in (0, len(unseen.errors) - 1))
-    every = np.array([number(value) for value in model.provenance["unseen_nrmse"]])
     return Diagnosis(
         verdict=verdict,
         findings=findings,
@@ -137,7 +135,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
             *told.notes,
             *notes_of(problem, told.false_alarm, findings, apart, after, [m.hypothesis.name for m in timed]),
             *worse_joints(before, after),
-            *turning_joints(every, after, unseen.counts),
+            *turning_joints(every_row(model), after, unseen.counts),
             *faster_joints(problem, seen),
             *farther_joints(problem, seen, findings),
             *held.notes,
