@@ -47,7 +47,7 @@ def completed(problem: Problem, founds: Sequence[Found]) -> tuple[Found, ...]:
         own = found.member
         shape = own.hypothesis.effect.complete(problem.situation, own.hypothesis.joint, own.shape)
         if shape != own.shape:
-            form = refine(problem, own.hypothesis, shape, all_but(problem, members, i), effort=0)
+            form = refine(problem, own.hypothesis, shape, all_but(problem, members, i))
             found = replace(found, member=form) if form.worth(problem.rows) > LEAST else found
         whole.append(found)
     return tuple(whole)

@@ -222,7 +222,7 @@ class Effect(ABC):
         return self.grid(situation, joint)
 
     def complete(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[float, ...]:
-        """Gives the shape with all that the effect has where it is there; a search may go without some of that."""
+        """Gives where to search a shape with all that the effect has where it is there; it may be told without some."""
         return shape
 
     def gate(self, situation: Situation, joint: Place, measured: Array) -> NDArray[np.bool_] | None:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.base import force_unit
 from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
 
 if TYPE_CHECKING:
@@ -16,44 +15,42 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+# First moments [kg m] of what turns about an upright first axis, along the level axes where that joint is at zero.
+OWN = tuple(Shape(f"own_moment_{k}", "kg m", -np.inf, np.inf, "linear", (0.0,), default=0.0, beside=True) for k in "12")
+# They are no larger than this times the largest that the other joints show: theirs is the same arm.
+LARGEST = 1.0
+# Where a search for them begins, as a share of that.
+NEAR = 0.01
+
+
 class BaseTilt(Effect):
     """tau = (d rigid/dg) (g x e1) a + (d rigid/dg) (g x e2) b: gravity turned by small angles about two level axes.
 
     The axes are level where the robot stands as described, and turn with the base where a log's base is tilted: the
-    base is set askew on its mount. About an upright first axis a level robot has moments that no log of it shows, and
-    its base parameters lack: where `own_moments` is 1, they pull by c cos(q1) + s sin(q1) on the first joint besides.
+    base is set askew on its mount. About an upright first axis d a level robot has first moments s that no log of it
+    shows, and its base parameters lack. A tilt shows them: -d' (R(q1) s x (g x e_k)) on the first joint besides. They
+    act by the angles alone: without those, what pulls there is something else.
     """
 
     name: ClassVar[str] = "base_tilt"
     title: ClassVar[str] = "a base that is not level"
     whole_robot: ClassVar[bool] = True
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("own_moments", "", 0.0, 1.0, "linear", (0.0,), default=0.0),)
+    shapes: ClassVar[tuple[Shape, ...]] = OWN
     rivals: ClassVar[tuple[str, ...]] = ("spring", "encoder_offset", "torque_constant_error", "payload_change")
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "second_base_pose")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the base's rotations about its two level axes (x and y where gravity is along z), and the rest."""
-        tilts = Coefficient("tilt_1", "rad", -0.5, 0.5), Coefficient("tilt_2", "rad", -0.5, 0.5)
-        unit = force_unit(robot, 0)
-        own = Coefficient("moment_cosine", unit), Coefficient("moment_sine", unit)
-        return (*tilts, *own) if upright(robot) else tilts
+        """Describes the base's rotations about its two level axes (x and y where gravity is along z)."""
+        return Coefficient("tilt_1", "rad", -0.5, 0.5), Coefficient("tilt_2", "rad", -0.5, 0.5)
+
+    def unused(self, shape: tuple[float, ...]) -> frozenset[int]:
+        """Gives moments where there are none."""
+        return frozenset() if any(shape) else frozenset((0, 1))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Leaves the moments of an upright axis to `likely`."""
-        return ((0.0, 0.0),)
-
-    def likely(
-        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
-    ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the moments of an upright first axis, none and free; a log from another base has shown them."""
-        level = np.asarray(situation.robot.chain.gravity, dtype=float)
-        alike = upright(situation.robot) and bool(np.all(situation.gravity == level))
-        return ((0.0,), (1.0,)) if alike else ((0.0,),)
-
-    def complete(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[float, ...]:
-        """Gives the first axis' own moments, if they may be there: angles would take what they are."""
-        ((free,), *_) = reversed(self.likely(situation, joint, shape, np.zeros(0)))
-        return shape if free is None else (free,)
+        """Gives what an upright first axis may have; a log from another base has shown it, and no other has any."""
+        most = _largest(situation)
+        return ((-most, most), (-most, most))
 
     def joints(self, robot: Robot) -> tuple[Place, ...]:
         """Names the whole robot, if there is gravity."""
@@ -61,18 +58,21 @@ class BaseTilt(Effect):
 
     def leaves(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
         """Gives half of it for an upright first axis whose own moments are too small to be told: they show."""
-        hidden = joint == 0 and upright(robot) and not (shape and shape[0] > 0)
+        hidden = joint == 0 and upright(robot) and not any(shape)
         return 0.5 if hidden else super().leaves(robot, joint, shape)
 
+    def complete(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[float, ...]:
+        """Gives the first axis' own moments, if they may be there: angles would take what they are."""
+        most = _largest(situation)
+        return shape if any(shape) or not most else (NEAR * most, NEAR * most)
+
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of all joints per angle, and of the first joint per N m of its own moments."""
+        """Evaluates the torque of all joints per angle."""
         tilted = tilted_torque(situation)
-        if not upright(situation.robot):
-            return tilted
-        own = np.zeros_like(tilted)
-        if shape and shape[0]:
-            own[:, 0, 0], own[:, 0, 1] = np.cos(situation.q[:, 0]), np.sin(situation.q[:, 0])
-        return np.concatenate([tilted, own], axis=2)
+        if any(shape):
+            tilted = tilted.copy()
+            tilted[:, 0] += _own_torque(situation, shape)
+        return tilted
 
     def describe(
         self,
@@ -93,6 +93,29 @@ def upright(robot: Robot) -> bool:
     first, down = robot.chain.joints[0], np.asarray(robot.chain.gravity, dtype=float)
     along = float(abs(first.rotation @ first.axis @ down)) > 0.99 * float(np.linalg.norm(down))
     return first.kind == "revolute" and along
+
+
+def _own_torque(situation: Situation, moments: tuple[float, ...]) -> Array:
+    """Torque of an upright first joint per angle (N, 2), by its own first moments [kg m]."""
+    first = situation.robot.chain.joints[0]
+    axis = first.rotation @ first.axis
+    axes = level_axes(np.asarray(situation.robot.chain.gravity, dtype=float))
+    s, q = np.asarray(moments) @ axes, situation.q[:, :1]
+    turned = np.cos(q) * s + np.sin(q) * np.cross(axis, s)  # (N, 3)
+    pulls = np.cross(situation.gravity[:, None], axes)  # (N, 2, 3)
+    return np.asarray(-np.cross(turned[:, None], pulls) @ axis)
+
+
+def _largest(situation: Situation) -> float:
+    """The largest first moment that an upright first axis may have [kg m], where no log of a tilted base shows it."""
+    level = np.asarray(situation.robot.chain.gravity, dtype=float)
+    if not upright(situation.robot) or not bool(np.all(situation.gravity == level)):
+        return 0.0
+
+    def shown() -> float:
+        return float(np.linalg.norm(situation.sensitivity("gravity"), axis=2).max())
+
+    return LARGEST * situation.cached("largest first moment", shown)
 
 
 def tilted_torque(situation: Situation) -> Array:

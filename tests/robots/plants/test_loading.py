@@ -98,7 +98,7 @@ def test_effects_are_listed(write, er3a):
         (0.05, 2),
     )
     assert (tilt.effect, tilt.joint) == ("base_tilt", None)
-    assert (tilt.coefficients, tilt.shape) == ((0.0, 0.01, 0.0, 0.0), (0.0,))
+    assert (tilt.coefficients, tilt.shape) == ((0.0, 0.01), (0.0, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_effects_are_listed(write, er3a):
         ("{effect: base_tilt, joint: 1, parameters: {}}", "base_tilt on joint 1; allowed: no joint"),
         (
             "{effect: base_tilt, parameters: {tilt_3: 1}}",
-            "base_tilt has no parameter 'tilt_3'; allowed: tilt_1, tilt_2, moment_cosine, moment_sine",
+            "base_tilt has no parameter 'tilt_3'; allowed: tilt_1, tilt_2, own_moment_1, own_moment_2",
         ),
         ("{effect: base_tilt, parameters: {tilt_2: 9}}", "tilt_2 is 9.0 rad; allowed: -0.5 to 0.5"),
         ("{effect: base_tilt, parameters: {tilt_2: .nan}}", "tilt_2 is nan"),

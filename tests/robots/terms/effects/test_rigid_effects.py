@@ -11,11 +11,13 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from robots.geometry.chain import Chain
+from robots.regressor import default_model
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
 from robots.terms.effects.backlash import SLOWEST
 from robots.terms.effects.base_tilt import level_axes
 from robots.terms.effects.joint_elasticity import followed
+from robots.terms.effects.situation import situation
 
 STEP = 1e-5
 SOME = slice(100, 1400, 65)
@@ -68,7 +70,7 @@ def test_a_tilt_may_leave_more_on_an_axis_along_gravity(random_robot):
     lying = replace(robot, chain=replace(robot.chain, gravity=tuple(9.81 * across / np.linalg.norm(across))))
     tilt = EFFECTS["base_tilt"]
     assert [tilt.leaves(upright, j) for j in range(3)] == [0.5, 0.08, 0.08]
-    assert tilt.leaves(upright, 0, (1.0,)) == 0.08  # its own moments are told
+    assert tilt.leaves(upright, 0, (1.0, 0.0)) == 0.08  # its own moments are told
     assert tilt.leaves(lying, 0) == EFFECTS["spring"].leaves(upright, 0) == 0.08
 
 
@@ -91,6 +93,40 @@ def test_a_tilted_base_turns_gravity(now, twin):
             torques.append(twin(tilted).torque(now.q[SOME], now.dq[SOME], now.ddq[SOME], now.robot.inertia))
         expected = (torques[0] - torques[1]) / (2 * STEP)
         np.testing.assert_allclose(X[SOME, :, k], expected, rtol=1e-5, atol=1e-5)
+
+
+def test_an_upright_axis_has_moments_that_a_tilt_shows(random_robot, twin):
+    """A first link's moments, in no torque of a level robot, act on the first joint alone, as pinocchio has them."""
+    robot = random_robot(4, 4)
+    first = robot.chain.joints[0]
+    assert first.kind == "revolute"
+    down = first.rotation @ first.axis
+    gravity = 9.81 * down
+    bare = robot.inertia.copy()
+    bare[0] = (2.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 1.0)
+    # Moments along the level axes where the joint is at zero, in the frame of its link.
+    axes, moments = level_axes(gravity), np.array([0.7, -0.4])
+    inertia = bare.copy()
+    inertia[0, 1:4] = first.rotation.T @ (moments @ axes)
+    upright = replace(robot, chain=replace(robot.chain, gravity=tuple(gravity)))
+    rng = np.random.default_rng(1)
+    q, still = rng.uniform(-2, 2, (20, 4)), np.zeros((20, 4))
+    model = default_model(upright)
+    base = np.zeros(model.size)
+    base[[i for i, c in enumerate(model.columns) if c.term == "rigid_body"]] = bare.ravel()
+    now = situation(model, base, np.arange(20.0), q, still, still)
+    X = EFFECTS["base_tilt"].columns(now, None, tuple(moments))
+    without, level = (twin(upright).torque(q, still, still, own) for own in (bare, inertia))
+    np.testing.assert_allclose(level, without, atol=1e-9)
+    for k, axis in enumerate(axes):
+        torques = []
+        for sign in (1, -1):
+            turned = Rotation.from_rotvec(-sign * STEP * axis).apply(gravity)
+            tilted = replace(robot, chain=replace(robot.chain, gravity=tuple(turned)))
+            torques.append(twin(tilted).torque(q, still, still, inertia))
+        expected = (torques[0] - torques[1]) / (2 * STEP)
+        assert np.abs(expected[:, 0]).max() > 1.0
+        np.testing.assert_allclose(X[:, :, k], expected, rtol=1e-5, atol=1e-5)
 
 
 def test_level_axes_are_x_and_y_of_an_upright_robot():
