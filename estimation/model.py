@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.diagnosis.carried import with_body
-from estimation.diagnosis.extension import Extension, extension_torque, read_extension
+from estimation.diagnosis.extension import Extension, extension_torque, read_bearing, read_extension, write_bearing
 from estimation.known_setup import require_known
 from estimation.robot_in_file import build_robot, describe_robot, require_described
 from robots.common.errors import InputError
@@ -22,6 +22,7 @@ from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms import Column, build_term, describe_term
+from robots.terms.effects.bearing import Bearing
 from robots.terms.effects.situation import Situation, joined, situation
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ class Model:
         extensions: effects beyond the terms, as a diagnosis found them.
         felt: base parameters (b,) by which the extensions reckon load and friction, those that they were fitted beside;
             None for `values`. The two differ where an effect and the base model share a torque.
+        bearing: what of the extensions the gears bear, so that others feel it as load; None for nothing.
     """
 
     torque_model: TorqueModel
@@ -60,6 +62,7 @@ class Model:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     extensions: tuple[Extension, ...] = ()
     felt: Array | None = None
+    bearing: Bearing | None = None
 
     @property
     def gravities(self) -> tuple[tuple[float, ...], ...]:
@@ -138,7 +141,7 @@ class Model:
             return joined([*earlier, situation(model, known, *arrays)], self.torque_model)
 
         cut = any(extension.source.last for extension in self.extensions)
-        extended = extension_torque(self.extensions, state(felt), state(parameters) if cut else None)
+        extended = extension_torque(self.extensions, state(felt), state(parameters) if cut else None, self.bearing)
         return own + extended[-len(own) :]
 
     def to_frame(self) -> pd.DataFrame:
@@ -188,6 +191,7 @@ class Model:
             "provenance": dict(self.provenance),
             **({"extensions": [extension.to_dict(robot) for extension in self.extensions]} if self.extensions else {}),
             **({"felt_by_extensions": self.felt.tolist()} if self.extensions and self.felt is not None else {}),
+            **({"borne_by_gears": write_bearing(self.bearing)} if self.extensions and self.bearing is not None else {}),
         }
 
     def save(self, path: Path, *, force: bool = False) -> None:
@@ -260,6 +264,7 @@ def _from_dict(data: Mapping[str, Any]) -> Model:
         provenance=data["provenance"],
         extensions=tuple(read_extension(item, torque_model.robot) for item in data.get("extensions", [])),
         felt=felt if "felt_by_extensions" in data else None,
+        bearing=read_bearing(data["borne_by_gears"], torque_model.robot) if "borne_by_gears" in data else None,
     )
 
 

@@ -144,6 +144,8 @@ def columns_on(
     """Evaluates what members depend on in another recording, and their columns (N, n, k) there."""
     model = problem.situation.model
     now = situation_on(recording, model, unloaded(problem))
+    if problem.bearing is not None:
+        now = problem.bearing.on(now)
     states, columns = [now] * len(members), [_dense(now, member) for member in members]
     late = [k for k, member in enumerate(members) if member.hypothesis.effect.blurs]
     if problem.followed is not None and 0 < len(late) < len(members):

@@ -145,6 +145,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         provenance=provenance,
         extensions=tuple(extensions),
         felt=unloaded(problem)[list(baseline.base.independent)],
+        bearing=problem.bearing,
     )
     return Fitted(model, tuple(known), values[: base.shape[2]])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from robots.common.errors import InputError
 from robots.common.plain import all_finite, finite
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS, Effect
+from robots.terms.effects.bearing import Bearing, Borne, Weight
 from robots.terms.effects.situation import Situation
 
 Array = NDArray[np.float64]
@@ -109,6 +110,36 @@ def read_extension(data: Mapping[str, Any], robot: Robot) -> Extension:
     )
 
 
+def write_bearing(bearing: Bearing) -> dict[str, Any]:
+    """Writes what gears bear of a model's extensions as plain data for `model.json`."""
+    weights = [
+        {"effect": w.effect.name, "joint": w.joint, "shape": list(w.shape), "coefficients": w.coefficients.tolist()}
+        for w in bearing.weights
+    ]
+    return {"how": bearing.how, "weights": weights}
+
+
+def read_bearing(data: Mapping[str, Any], robot: Robot) -> Bearing:
+    """Reads what `write_bearing` wrote.
+
+    Raises:
+        InputError: an unknown way or effect, or values that do not fit it.
+    """
+    if data["how"] not in get_args(Borne):
+        raise InputError(f"borne_by_gears: how is {data['how']!r}", allowed=", ".join(get_args(Borne)))
+    weights = []
+    for item in data["weights"]:
+        effect, joint = find_effect(str(item["effect"])), item["joint"]
+        values = [np.array(item[key], dtype=float) for key in ("shape", "coefficients")]
+        if not effect.borne or joint not in effect.joints(robot):
+            raise InputError(f"borne_by_gears: {effect.name} on joint {joint}", allowed="an effect that gears bear")
+        sizes = (len(effect.shapes),), (len(effect.parameters(robot, joint)),)
+        if tuple(v.shape for v in values) != sizes or not all(np.isfinite(v).all() for v in values):
+            raise InputError(f"borne_by_gears: values of {effect.name} that do not fit it")
+        weights.append(Weight(effect, joint, tuple(values[0].tolist()), values[1]))
+    return Bearing(data["how"], weights)
+
+
 def find_effect(name: str) -> Effect:
     """Finds an effect of the catalogue, or the pattern that a text describes.
 
@@ -123,7 +154,9 @@ def find_effect(name: str) -> Effect:
     return pattern
 
 
-def extension_torque(extensions: Sequence[Extension], felt: Situation, own: Situation | None = None) -> Array:
+def extension_torque(
+    extensions: Sequence[Extension], felt: Situation, own: Situation | None = None, bearing: Bearing | None = None
+) -> Array:
     """Evaluates the extensions of a model in what its base model says of a motion (N, n) [N m or N].
 
     What acts on all of the torque comes after the others: what makes it late, then what cuts it off.
@@ -133,8 +166,10 @@ def extension_torque(extensions: Sequence[Extension], felt: Situation, own: Situ
         felt: what they depend on, by the base parameters that they were fitted beside.
         own: the same by the model's own parameters, for what cuts off the torque: it is fitted to all of it; by default
             those are the same.
+        bearing: what of them the gears bear; None for nothing.
     """
     total, own = np.zeros_like(felt.q), felt if own is None else own
+    felt = felt if bearing is None else bearing.on(felt)
     for stage in range(3):
         now = (felt, felt.beside(total), own.beside(total))[stage]
         acting = [extension for extension in extensions if _stage(extension.source) == stage]

@@ -13,6 +13,7 @@ from estimation.diagnosis.states import Recording
 from estimation.diagnosis.upper import Upper
 from estimation.diagnosis.whitening import Whitening
 from estimation.pulls import Pull
+from robots.terms.effects.bearing import Bearing
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,7 @@ def pose(
     pull: Pull | None = None,
     upper: Upper | None = None,
     followed: Array | None = None,
+    bearing: Bearing | None = None,
 ) -> Problem:
     """Fits the base model to white data and prepares the null.
 
@@ -41,6 +43,7 @@ def pose(
         pull: what holds base parameters that the data leave open; by default `pull_of`, loosened.
         upper: the frequencies above the bands.
         followed: that part (N, n) of the known effects' torque which others may make late.
+        bearing: what of the known effects the gears bear; None for nothing.
     """
     n = recording.n
     root = np.linalg.cholesky(whitening.precision)  # P = L L'
@@ -75,6 +78,7 @@ def pose(
     alone = values if extra is None else fit_values(baseline, scales, recording.unsure, recording.tau, pull)
     remainder = recording.tau - baseline.regressor @ alone
     now = baseline.situation(recording, values)
+    now = now if bearing is None else bearing.on(now)
     return Problem(
         recording=recording,
         baseline=baseline,
@@ -89,6 +93,7 @@ def pose(
         pull=pull,
         upper=upper,
         followed=None if followed is None else now.beside(followed),
+        bearing=bearing,
     )
 
 

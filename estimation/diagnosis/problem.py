@@ -18,6 +18,7 @@ from estimation.diagnosis.upper import Upper
 from estimation.diagnosis.whitening import Whitening
 from estimation.pulls import Pull
 from robots.terms.effects import Effect, Situation
+from robots.terms.effects.bearing import Bearing
 
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
@@ -51,6 +52,7 @@ class Problem:
         whole: what effects depend on that act on all of the torque, as far as that is known; None where none is seen.
         timing: how late torque is against reversals whose rows do not count; None where that is not known.
         followed: what those depend on that make all of it late, with the other effects found before; None without any.
+        bearing: what of the effects found before the gears bear, in `situation`; None for nothing.
     """
 
     recording: Recording
@@ -68,6 +70,7 @@ class Problem:
     timing: Timing | None = None
     whole: Situation | None = None
     followed: Situation | None = None
+    bearing: Bearing | None = None
 
     def sees(self, effect: Effect) -> Situation:
         """Gives what an effect depends on."""

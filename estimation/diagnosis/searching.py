@@ -73,7 +73,8 @@ def search(
         whitening = estimate_whitening(recording, settled.residual, fitted, inertia, spared=spared)
         if last is not None:
             members = [found.member for found in last.selection.found]
-            if not (calmer(last.problem, whitening) or moved(last.problem, settled.values, members)):
+            anew = settled.laden.shows or calmer(last.problem, whitening)
+            if not (anew or moved(last.problem, settled.values, members)):
                 break
             # Its columns are most of what a diagnosis keeps in memory: they go before others come.
             last = None
@@ -82,7 +83,14 @@ def search(
                 baseline = build_baseline(base, recording, known=settled.followed_motion(recording, members))
         rng = np.random.default_rng(seed)
         posed = pose(
-            recording, baseline, whitening, draws=DRAWS, rng=rng, extra=settled.extra, followed=settled.followed
+            recording,
+            baseline,
+            whitening,
+            draws=DRAWS,
+            rng=rng,
+            extra=settled.extra,
+            followed=settled.followed,
+            bearing=settled.laden.bearing,
         )
         if any(effect.fast for effect in effects):
             wide = estimate_whitening(recording, settled.residual, fitted, inertia, WIDER, spared)

@@ -12,6 +12,7 @@ from estimation.diagnosis.carried import unloaded
 from estimation.diagnosis.composed import fit, known_beside, known_without
 from estimation.diagnosis.distorted import undistorted
 from estimation.diagnosis.extending import dense
+from estimation.diagnosis.laden import NOTHING, Laden, laden
 from estimation.diagnosis.own_functions import is_short
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.refinement import Member, refine
@@ -45,6 +46,7 @@ class Settled:
         degrees: parameters of the effects.
         followed: torque (N, n) of those that others among them make late; None without such others.
         late: torque (N, n) by which all of it is late; None where it is not.
+        laden: what of the effects the gears bear.
     """
 
     residual: Array
@@ -53,6 +55,7 @@ class Settled:
     degrees: int = 0
     followed: Array | None = None
     late: Array | None = None
+    laden: Laden = NOTHING
 
     def but_late(self) -> tuple[Array, Array | None]:
         """What all effects but those leave by which all torque is late, and their torque (N, n); None without any."""
@@ -97,6 +100,7 @@ def settle(problem: Problem, members: Sequence[Member]) -> Settled:
         degrees=sum(member.degrees for member in members),
         followed=None if plain.all() else full[:, :, known:] @ (values[known:] * plain),
         late=full[:, :, known:] @ (values[known:] * late) if late.any() else None,
+        laden=laden(problem, members, values),
     )
 
 
@@ -122,7 +126,8 @@ def moved(problem: Problem, values: Array, members: Sequence[Member]) -> bool:
     torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
     if np.max(np.sqrt(np.mean(change**2, axis=0)) / np.maximum(torque, 1e-12)) > MOVED:
         return True
-    now = replace(problem, situation=problem.baseline.situation(problem.recording, values[: base.size]))
+    state = problem.baseline.situation(problem.recording, values[: base.size])
+    now = replace(problem, situation=state if problem.bearing is None else problem.bearing.on(state))
     for member in members:
         before, after = (dense(p, member.hypothesis, member.shape) @ member.coefficients for p in (problem, now))
         if np.sum((after - before) ** 2) > OTHER**2 * np.sum(before**2):

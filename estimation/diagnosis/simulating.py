@@ -16,6 +16,7 @@ from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.simulation import Curves, Simulation
 from robots.plants.closed_loop import Driven, Loop, Reference, Tangent, drive
 from robots.regressor import TorqueModel
+from robots.terms.effects.bearing import Bearing
 from robots.terms.effects.of_model import sign_of
 from robots.terms.effects.situation import Situation
 from robots.terms.effects.static import StaticJointEffect
@@ -41,6 +42,7 @@ class Plant:
         members: effects beside it; none of the base model alone.
         coefficients: of each effect.
         felt: base parameters (b,) by which effects reckon load and friction; None for `values`.
+        bearing: what of the effects the gears bear; None for nothing.
     """
 
     model: TorqueModel
@@ -49,6 +51,7 @@ class Plant:
     members: Sequence[Member] = ()
     coefficients: Sequence[Array] = ()
     felt: Array | None = None
+    bearing: Bearing | None = None
 
     def at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
         """Gives what the base model says along a motion at the times of a recording."""
@@ -56,7 +59,8 @@ class Plant:
 
     def felt_at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
         """Gives what effects depend on there."""
-        return self._by(self.values if self.felt is None else self.felt, part, motion)
+        now = self._by(self.values if self.felt is None else self.felt, part, motion)
+        return now if self.bearing is None else self.bearing.on(now)
 
     def _by(self, values: Array, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
         q, dq, ddq = motion

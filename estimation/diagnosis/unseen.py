@@ -190,6 +190,7 @@ def simulate_unseen(
         before,
         values=extended[:b],
         felt=unloaded(problem)[list(known.independent)],
+        bearing=problem.bearing,
         members=tuple(members[i] for i in there),
         coefficients=tuple(extended[edges[i] : edges[i + 1]] for i in there),
     )

@@ -57,7 +57,14 @@ class PlantEffect:
         return isinstance(EFFECTS.get(self.effect), StaticEffect)
 
     def expression(
-        self, model: TorqueModel, parameters: Array, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX
+        self,
+        model: TorqueModel,
+        parameters: Array,
+        q: casadi.SX,
+        dq: casadi.SX,
+        ddq: casadi.SX,
+        *,
+        borne: casadi.SX | None = None,
     ) -> casadi.SX:
         """Builds the torque (n,) of a static effect beside a model, symbolic.
 
@@ -67,6 +74,7 @@ class PlantEffect:
             q: positions (n,).
             dq: velocities (n,).
             ddq: accelerations (n,).
+            borne: torque of other effects (n,) that the gears bear; None for none.
 
         Raises:
             InputError: an effect that depends on the past.
@@ -83,6 +91,7 @@ class PlantEffect:
         width = np.broadcast_to(np.asarray(widths[0] if widths else 0.0, dtype=float), (model.robot.n,))
         rigid = Y @ casadi.SX(np.where(inert, pi, 0.0))
         load = rigid - ddq * casadi.SX(rotor_inertias(model, pi).sum(axis=0))
+        load = load if borne is None else load + borne
         at = [q, dq, ddq, rigid, load, Y @ casadi.SX(pi)]
         at += [casadi.tanh(dq / casadi.SX(np.where(width > 0, width, SHARP))), casadi.SX(list(self.shape))]
         return term.function(model.robot, self.joint)(*at) @ casadi.SX(list(self.coefficients))

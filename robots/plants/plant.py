@@ -18,6 +18,7 @@ from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Log, Motion
 from robots.terms.effects import Situation, situation
+from robots.terms.effects.bearing import Bearing, Weight
 
 Array = NDArray[np.float64]
 
@@ -91,7 +92,10 @@ class Plant:
         if not self.effects:
             return self.model.torque(motion.q, motion.dq, motion.ddq, self.parameters)
         now = situation(self.model, self.parameters, motion.t, motion.q, motion.dq, motion.ddq)
-        return np.sum([now.torque, *(effect.torque(now) for effect in self.effects)], axis=0)
+        own = [effect for effect in self.effects if isinstance(effect, PlantEffect) and effect.term.borne]
+        weights = [Weight(e.term, e.joint, e.shape, np.asarray(e.coefficients)) for e in own]
+        felt = Bearing("effects", weights).on(now) if own else now
+        return np.sum([now.torque, *(effect.torque(felt) for effect in self.effects)], axis=0)
 
 
 def nominal_plant(

@@ -51,9 +51,7 @@ class KnownChange(Effect):
     turn: np.ndarray
 
     name = "known change"
-
-    def load(self, ride: Ride) -> np.ndarray:
-        return self.torque(ride)
+    borne = True
 
     def torque(self, ride: Ride) -> np.ndarray:
         rows = (ride.t >= self.start) & (ride.t <= self.end)

@@ -17,8 +17,8 @@ class Ride:
     """All runs of a session, one after the other; time keeps running in the pauses between them.
 
     ``q, v, a`` are of the motors, seen at the joint; ``link_q, link_v, link_a`` of the links behind the gears: the same
-    until an elastic or loose gear parts them. ``parts`` collects what each effect adds; ``carried`` is the torque of a
-    payload or a gravity that a user changed, None for none.
+    until an elastic or loose gear parts them. ``parts`` collects what each effect adds; ``carried`` is the torque that
+    passes the gears besides the robot's own, None for none.
     """
 
     machine: Machine

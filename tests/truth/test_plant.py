@@ -18,7 +18,7 @@ from tests.truth.effects import KNOWN, STRANGERS
 from tests.truth.effects.friction import LoadDependent, LuGre, Stribeck, _bristles
 from tests.truth.effects.strangers import CrossWave
 from tests.truth.effects.surroundings import Payload
-from tests.truth.effects.transmission import Backlash, Elastic
+from tests.truth.effects.transmission import Backlash, Balancer, Elastic
 from tests.truth.experiments import KnownChange, Stage
 from tests.truth.machines import KINDS, draw_machine
 from tests.truth.oracle import ask_oracle
@@ -222,6 +222,17 @@ def test_gears_feel_what_a_user_changes() -> None:
     np.testing.assert_allclose(
         (twists[0] - twists[1])[middle], 1e-5 * change.torque(ride)[middle, 1], rtol=0.01, atol=1e-6
     )
+
+
+def test_gears_bear_a_spring() -> None:
+    """Friction that is a share of the load is one of weight, inertia and the spring behind the gear."""
+    machine = draw_machine("er3a", np.random.default_rng(14))
+    reference = draw_periodic(machine, np.random.default_rng(15), cycles=1)
+    lossy, spring = LoadDependent(joint=2, amount=0.1, back=1.0), Balancer(joint=2, amount=2e4)
+    ride = open_loop(machine, [reference], [lossy, spring], step=0.01)
+    pull = spring.torque(ride)[:, 1]
+    assert np.std(pull) > 0.1 * np.std(ride.rigid[:, 1])
+    np.testing.assert_allclose(ride.parts[0][:, 1], 0.1 * np.abs(ride.rigid[:, 1] + pull) * ride.sign[:, 1], atol=1e-12)
 
 
 def test_a_stranger_shows_beyond_the_base_model_and_its_own_column_brings_a_gain() -> None:

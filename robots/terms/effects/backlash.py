@@ -58,6 +58,7 @@ class Backlash(Effect):
 
     name: ClassVar[str] = "backlash"
     title: ClassVar[str] = "play in the gear (backlash)"
+    loaded: ClassVar[bool] = True
     kicks: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("gap_crossed", "rad", 1e-7, 0.2, "log"),

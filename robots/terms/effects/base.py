@@ -45,6 +45,9 @@ class Effect(ABC):
         unmoved: whether the arm's motion answers to it, and not it to the motion: no base model is fitted to that.
         blurs: whether it lets friction turn round later or over some time: how sharp its sign is shows beside it only.
         waves: whether it goes up and down over the joint's range, as a spot of it does once.
+        borne: whether the gears bear its torque: what grows with their load feels it.
+        preloads: whether what it pulls with throughout is in the base model's offset.
+        loaded: whether it depends on what the gears bear.
         last: whether it acts on all of the torque, that of other effects too (`Situation.beyond`).
         distorts: whether a reading of its joint's torque is wrong by it, as that torque has it: the base model follows
             such readings, and both are then fitted at once. A `StaticJointEffect`.
@@ -70,6 +73,9 @@ class Effect(ABC):
     unmoved: ClassVar[bool] = False
     blurs: ClassVar[bool] = False
     waves: ClassVar[bool] = False
+    borne: ClassVar[bool] = False
+    preloads: ClassVar[bool] = False
+    loaded: ClassVar[bool] = False
     last: ClassVar[bool] = False
     distorts: ClassVar[bool] = False
     vague: ClassVar[str] = ""

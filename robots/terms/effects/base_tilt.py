@@ -34,6 +34,7 @@ class BaseTilt(Effect):
 
     name: ClassVar[str] = "base_tilt"
     title: ClassVar[str] = "a base that is not level"
+    borne: ClassVar[bool] = True
     whole_robot: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = OWN
     rivals: ClassVar[tuple[str, ...]] = ("spring", "encoder_offset", "torque_constant_error", "payload_change")

@@ -43,6 +43,7 @@ class ExternalContact(Effect):
 
     name: ClassVar[str] = "external_contact"
     title: ClassVar[str] = "an external contact"
+    borne: ClassVar[bool] = True
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
     passing: ClassVar[bool] = True

@@ -44,6 +44,7 @@ class JointElasticity(Effect):
 
     name: ClassVar[str] = "joint_elasticity"
     title: ClassVar[str] = "a gear that winds up under load (elasticity)"
+    loaded: ClassVar[bool] = True
     kicks: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("dynamic_stiffness", "N m/rad", 1e-6, 1e12, "log", inexact=INEXACT),

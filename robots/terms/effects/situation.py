@@ -43,6 +43,7 @@ class Situation:
             situations that this one joins; `parameters` are the first's, and each has a model of its own gravity.
         measured: torque as logged (N, n) [N m or N]; None where there is no log, and in models that are evaluated.
         beyond: torque of other effects (N, n) [N m or N], for those that act on all of the torque; None for none.
+        borne: torque of other effects (N, n) that the gears bear besides the robot's own [N m or N]; None for none.
         finer: the same logs before they were thinned; None where they were not.
     """
 
@@ -60,6 +61,7 @@ class Situation:
     parts: tuple[Situation, ...] = ()
     measured: Array | None = None
     beyond: Array | None = None
+    borne: Array | None = None
     finer: Finer | None = None
     _cache: dict[object, Any] = field(default_factory=dict, repr=False)
 
@@ -94,15 +96,24 @@ class Situation:
 
     def beside(self, torque: Array | None) -> Situation:
         """The same with torque of other effects (N, n), or as much at all times (n,) [N m or N]; None for none."""
+        return self._with("beyond", torque)
+
+    def bearing(self, torque: Array | None) -> Situation:
+        """The same with torque (N, n) [N m or N] that the gears bear besides the robot's own; None for none."""
+        return self._with("borne", torque)
+
+    def _with(self, name: str, torque: Array | None) -> Situation:
+        """The same with a torque that is known, at all samples too; what is kept for callers depends on neither."""
         if torque is not None:
             torque = np.broadcast_to(torque, self.q.shape)
         if self.finer is None or torque is None:
-            return replace(self, beyond=torque)
+            return replace(self, **{name: torque})  # type: ignore[arg-type]
         other = self.finer.situation
         spread = np.empty_like(other.q)
         for own, run in zip(other.runs, self.runs, strict=True):
             spread[own] = np.column_stack([np.interp(other.t[own], self.t[run], x) for x in torque[run].T])
-        return replace(self, beyond=torque, finer=replace(self.finer, situation=other.beside(spread)))
+        finer = replace(self.finer, situation=other._with(name, spread))
+        return replace(self, **{name: torque}, finer=finer)  # type: ignore[arg-type]
 
     @cached_property
     def gravity(self) -> Array:
@@ -125,8 +136,9 @@ class Situation:
 
     @cached_property
     def load(self) -> Array:
-        """The torque that passes the gears (N, n) [N m or N]: that of the rigid body without the rotors'."""
-        return self.rigid - self.ddq * self.rotors.sum(axis=0)
+        """The torque that passes the gears (N, n) [N m or N]: the rigid body's without rotors, and what they bear."""
+        own = self.rigid - self.ddq * self.rotors.sum(axis=0)
+        return own if self.borne is None else own + self.borne
 
     def friction_at(self, dq: Array) -> Array:
         """Evaluates the base model's friction (N, n) [N m or N] at other velocities (N, n)."""

@@ -42,6 +42,8 @@ class Spring(StaticJointEffect):
 
     name: ClassVar[str] = "spring"
     title: ClassVar[str] = "a spring or cable on the joint"
+    borne: ClassVar[bool] = True
+    preloads: ClassVar[bool] = True
     vague: ClassVar[str] = (
         "A spring or cable acts on joint {joint}; how stiff it is where, these logs do not tell: gravity resembles "
         "much of it."

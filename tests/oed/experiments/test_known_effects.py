@@ -15,14 +15,16 @@ from oed.experiments import Design, Effort, InteriorPoint
 from robots.catalog import __path__ as catalog
 from robots.common.errors import InputError
 from robots.loading import load_robot
-from robots.plants import PlantEffect
+from robots.plants import Plant, PlantEffect
 from robots.regressor import default_model
 from robots.robot import Robot
+from robots.signals import Motion
 
 WIDTH = 0.02
 SPRING = PlantEffect(effect="spring", joint=2, coefficients=(40.0, 15.0, -8.0, 0.0), shape=(0.0, 0.0))
 STRIBECK = PlantEffect(effect="stribeck", joint=2, coefficients=(12.0,), shape=(0.2, 2.0))
 LOADED = PlantEffect(effect="load_dependent_friction", joint=3, coefficients=(0.1, 0.05), shape=(1.0, 0.0))
+BORNE = PlantEffect(effect="load_dependent_friction", joint=2, coefficients=(0.1, 0.05), shape=(1.0, 0.0))
 HEAT = PlantEffect(effect="thermal_friction", joint=1, coefficients=(5.0, 1.0), shape=(100.0, 0.0, 0.0))
 
 
@@ -33,18 +35,21 @@ def robot() -> Robot:
     return replace(known, limits=replace(known.limits, torque=np.array([400.0, 400.0, 200.0, 80.0, 80.0, 80.0])))
 
 
-def by_hand(robot: Robot, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
-    """The torque of description, spring and Stribeck friction (N, n), by pinocchio and their formulas."""
+def by_hand(
+    robot: Robot, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, breaks: float = 12.0, shares: tuple = (0.0, 0.0)
+) -> np.ndarray:
+    """The torque of description, spring and frictions (N, n), by pinocchio and their formulas."""
     model = pin.buildModelFromUrdf(f"{next(iter(catalog))}/ur10.urdf")
     data = model.createData()
     tau = np.array([pin.rnea(model, data, *state) for state in zip(q, dq, ddq, strict=True)])
-    f = np.asarray(robot.friction)
-    tau += f[:, 0] * np.tanh(dq / WIDTH) + f[:, 1] * dq + f[:, 2] * dq * np.abs(dq) + f[:, 3] * dq**3
-    tau += np.asarray(robot.rotor_inertia) * ddq
     middle = (robot.limits.lower[1] + robot.limits.upper[1]) / 2
     x, v = q[:, 1] - middle, dq[:, 1]
-    tau[:, 1] += 40.0 * x + 15.0 * x**2 - 8.0 * x**3 + 12.0 * np.exp(-((v / 0.2) ** 2)) * np.tanh(v / WIDTH)
-    return tau
+    tau[:, 1] += 40.0 * x + 15.0 * x**2 - 8.0 * x**3
+    tau[:, 1] += np.abs(tau[:, 1]) * (shares[0] * np.tanh(v / WIDTH) + shares[1] * v)
+    tau[:, 1] += breaks * np.exp(-((v / 0.2) ** 2)) * np.tanh(v / WIDTH)
+    f = np.asarray(robot.friction)
+    tau += f[:, 0] * np.tanh(dq / WIDTH) + f[:, 1] * dq + f[:, 2] * dq * np.abs(dq) + f[:, 3] * dq**3
+    return tau + np.asarray(robot.rotor_inertia) * ddq
 
 
 def test_the_limit_counts_effects_with_their_derivatives(robot: Robot) -> None:
@@ -68,6 +73,20 @@ def test_the_limit_counts_effects_with_their_derivatives(robot: Robot) -> None:
     rms = TorqueRms(model, model.nominal, robot.limits.torque, effects=(SPRING,))
     plain = TorqueLimit(model, model.nominal, robot.limits.torque, effects=(SPRING,)).values(q, dq, ddq)
     np.testing.assert_allclose(rms.values(q, dq, ddq), np.sqrt(np.mean(plain**2, axis=0)))
+
+
+def test_a_gear_bears_the_spring_behind_it(robot: Robot) -> None:
+    """Friction that is a share of the load is one of weight, inertia and spring, in the limit and in the plant."""
+    rng = np.random.default_rng(1)
+    q, dq, ddq = rng.uniform(-1, 1, (3, 20, 6)) * np.array([1.5, 1.0, 2.0])[:, None, None]
+    model = default_model(robot, velocity_scale=WIDTH)
+    expected = by_hand(robot, q, dq, ddq, breaks=0.0, shares=(0.1, 0.05))
+    assert np.abs(expected - by_hand(robot, q, dq, ddq, breaks=0.0)).max() > 5.0
+    limit = TorqueLimit(model, model.nominal, robot.limits.torque, margin=0.0, effects=(BORNE, SPRING))
+    np.testing.assert_allclose(limit.values(q, dq, ddq) * robot.limits.torque, expected, atol=1e-2)
+    plant = Plant(model=model, parameters=model.nominal, effects=(BORNE, SPRING))
+    motion = Motion(0.01 * np.arange(20.0), q, dq, ddq)
+    np.testing.assert_allclose(plant.torque(motion), expected, atol=1e-2)
 
 
 def test_an_effect_of_the_past_is_refused(robot: Robot) -> None:

@@ -26,6 +26,8 @@ class Effect:
     # How the visible size grows with the amount, for the search of the amount.
     power = 1.0
     lasting = True
+    # Whether its torque passes the gears: what the robot carries, what pulls or pushes its links.
+    borne = False
 
     @classmethod
     def draw(cls: type[Kind], machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Kind:
@@ -49,8 +51,8 @@ class Effect:
         return None
 
     def load(self, ride: Ride) -> np.ndarray | None:
-        """What of it gears feel as load (N, n) besides the robot's own, where that is much: what a user changes."""
-        return None
+        """What of it gears feel as load (N, n) besides the robot's own."""
+        return self.torque(ride) if self.borne else None
 
     def signal(self, ride: Ride, torque: np.ndarray) -> np.ndarray:
         """The torque as it is logged."""

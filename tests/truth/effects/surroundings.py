@@ -22,6 +22,7 @@ class Payload(Effect):
     size: tuple[float, float, float] = (0.1, 0.1, 0.1)
 
     name = "payload_change"
+    borne = True
     largest = 150.0
 
     @classmethod
@@ -56,6 +57,7 @@ class Tilt(Effect):
     heading: float = 0.0
 
     name = "base_tilt"
+    borne = True
     largest = 0.2
 
     @classmethod
@@ -93,6 +95,7 @@ class Contact(Effect):
     form: str = "half-sine"
 
     name = "external_contact"
+    borne = True
     largest = 3000.0
     lasting = False
 

@@ -159,6 +159,7 @@ class Balancer(Effect):
     gas: float = 0.0
 
     name = "spring"
+    borne = True
 
     @classmethod
     def joints(cls, machine: Machine) -> tuple[int | None, ...]:
@@ -194,6 +195,7 @@ class Cable(Effect):
     cubic: float = 0.5
 
     name = "spring"
+    borne = True
 
     @classmethod
     def joints(cls, machine: Machine) -> tuple[int | None, ...]:
