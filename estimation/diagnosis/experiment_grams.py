@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import permutations
+from itertools import product
 from typing import Protocol
 
 import numpy as np
@@ -53,11 +53,20 @@ class Cause(Protocol):
 
 
 class Grams:
-    """Gram matrices of base columns and all causes' columns, whitened: of the logs, and of any experiment."""
+    """Gram matrices of base columns and all causes' columns, whitened: of the logs, and of any experiment.
 
-    def __init__(self, problem: Problem, causes: Sequence[Cause]) -> None:
+    Args:
+        problem: the logs there are.
+        causes: what may have made them.
+        forms: other shapes that a cause may have, each with its cause's index: as a rival it is taken to have the one
+            that imitates best.
+    """
+
+    def __init__(self, problem: Problem, causes: Sequence[Cause], forms: Sequence[tuple[int, Cause]] = ()) -> None:
         self.problem = problem
         self.causes = causes
+        self.every = [*causes, *(form for _, form in forms)]
+        self.owners = [*range(len(causes)), *(owner for owner, _ in forms)]
         self.model: TorqueModel = problem.situation.model
         # A base that is tilted shows parameters that the logs do not: they take a part of what it shows of a cause.
         gravity = np.asarray(self.model.robot.chain.gravity, dtype=float)
@@ -65,19 +74,19 @@ class Grams:
         tilted = [gravity + np.linalg.norm(gravity) * axis for axis in level_axes(gravity)] if gravity.any() else []
         self.base = find_base_parameters(self.model, gravities=[*fields, *tilted])
         self.columns = self.base.independent
-        self.sizes = [len(c.coefficients) for c in causes]
+        self.sizes = [len(c.coefficients) for c in self.every]
 
     @cached_property
     def old(self) -> Array:
         """Of the logs that there are."""
         now = self.problem.situation
-        effects = [c.hypothesis.effect.columns(now, c.hypothesis.joint, c.shape) for c in self.causes]
+        effects = [c.hypothesis.effect.columns(now, c.hypothesis.joint, c.shape) for c in self.every]
         return self._gram(regressor_on(self.base, self.problem.recording), effects, self.problem.whitening)
 
     @cached_property
     def heated(self) -> bool:
         """Whether a cause depends on how warm the logs left the robot."""
-        return any(isinstance(c.hypothesis.effect, HeatEffect) for c in self.causes)
+        return any(isinstance(c.hypothesis.effect, HeatEffect) for c in self.every)
 
     def chance(self, stages: Sequence[Stage]) -> float:
         """Gives the chance that each cause, were it true, would be told from every other."""
@@ -97,9 +106,10 @@ class Grams:
         result = np.ones((len(self.causes),) * 2)
         for gram in new:
             total = self.old + times * gram
-            for true, rival in permutations(range(len(self.causes)), 2):
-                chance = chance_to_resolve(self._left(total, true, rival))
-                result[true, rival] = min(result[true, rival], chance)
+            for true, (form, rival) in product(range(len(self.causes)), enumerate(self.owners)):
+                if rival != true:
+                    chance = chance_to_resolve(self.left(total, true, form))
+                    result[true, rival] = min(result[true, rival], chance)
         return result
 
     def of(self, stages: Sequence[Stage], begin: float = 0.0, *, warm: bool = False) -> Array:
@@ -108,7 +118,7 @@ class Grams:
         Heat begins at zero, or `warm` as the logs leave it, until a payload or another base pose is changed.
         """
         bases: list[Array] = []
-        effects: list[list[Array]] = [[] for _ in self.causes]
+        effects: list[list[Array]] = [[] for _ in self.every]
         starts: list[int] = []
         t0, rows = begin, 0
         for number, part in enumerate(_joined(stages)):
@@ -117,7 +127,7 @@ class Grams:
             played, first = self._played(model, part, t0, before)
             now = joined([played], self.model)
             bases.append(model.regressor(now.q[first:], now.dq[first:], now.ddq[first:], columns=self.columns))
-            for columns, cause in zip(effects, self.causes, strict=True):
+            for columns, cause in zip(effects, self.every, strict=True):
                 values = cause.hypothesis.effect.columns(now, cause.hypothesis.joint, cause.shape)
                 columns.append(values[first:])
             starts += [rows + s for s in part.starts]
@@ -174,7 +184,8 @@ class Grams:
                     gram += part + part.T
         return gram
 
-    def _left(self, gram: Array, true: int, rival: int) -> float:
+    def left(self, gram: Array, true: int, rival: int) -> float:
+        """Gives the energy that a rival, in one of its forms, leaves of the true cause."""
         theta = self.causes[true].coefficients
         return max(float(theta @ self.remainder(gram, true, rival) @ theta), 0.0)
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.experiment_grams import ARM, Cause, Grams
+from estimation.diagnosis.imitating import imitating_forms
 from estimation.diagnosis.next_experiment_motions import MADE, MAKERS, VARIED, Room, Stage, room_of
 from estimation.diagnosis.problem import Problem
 from robots.robot import Robot
@@ -165,7 +166,7 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
     joint = next((c.hypothesis.joint for c in possible if c.hypothesis.joint is not None), None)
     index = joint - 1 if joint is not None else int(np.argmax(np.ptp(problem.recording.q, axis=0)))
     room = room_of(robot, problem.recording)
-    grams = Grams(problem, possible)
+    grams = Grams(problem, possible, imitating_forms(problem, possible))
     choices = [_made(grams, room, index, kind) for kind in MAKERS]
     if max(choice.chance for choice in choices) < ENOUGH:
         choices = [_longer(grams, choice) for choice in choices]
