@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,6 +51,7 @@ class Model:
         felt: base parameters (b,) by which the extensions reckon load and friction, those that they were fitted beside;
             None for `values`. The two differ where an effect and the base model share a torque.
         bearing: what of the extensions the gears bear, so that others feel it as load; None for nothing.
+        since: moment from which the phase of an extension that vibrates counts [s]; None for the first of a motion.
     """
 
     torque_model: TorqueModel
@@ -63,6 +64,7 @@ class Model:
     extensions: tuple[Extension, ...] = ()
     felt: Array | None = None
     bearing: Bearing | None = None
+    since: float | None = None
 
     @property
     def gravities(self) -> tuple[tuple[float, ...], ...]:
@@ -138,7 +140,7 @@ class Model:
 
         def state(known: Array) -> Situation:
             earlier = [situation(model, known, m.t, m.q, m.dq, m.ddq) for m in before]
-            return joined([*earlier, situation(model, known, *arrays)], self.torque_model)
+            return replace(joined([*earlier, situation(model, known, *arrays)], self.torque_model), since=self.since)
 
         cut = any(extension.source.last for extension in self.extensions)
         extended = extension_torque(self.extensions, state(felt), state(parameters) if cut else None, self.bearing)
@@ -191,6 +193,7 @@ class Model:
             "provenance": dict(self.provenance),
             **({"extensions": [extension.to_dict(robot) for extension in self.extensions]} if self.extensions else {}),
             **({"felt_by_extensions": self.felt.tolist()} if self.extensions and self.felt is not None else {}),
+            **({"phases_since": self.since} if self.extensions and self.since is not None else {}),
             **({"borne_by_gears": write_bearing(self.bearing)} if self.extensions and self.bearing is not None else {}),
         }
 
@@ -264,6 +267,7 @@ def _from_dict(data: Mapping[str, Any]) -> Model:
         provenance=data["provenance"],
         extensions=tuple(read_extension(item, torque_model.robot) for item in data.get("extensions", [])),
         felt=felt if "felt_by_extensions" in data else None,
+        since=None if data.get("phases_since") is None else float(data["phases_since"]),
         bearing=read_bearing(data["borne_by_gears"], torque_model.robot) if "borne_by_gears" in data else None,
     )
 

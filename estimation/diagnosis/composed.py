@@ -143,7 +143,7 @@ def columns_on(
 ) -> tuple[list[Situation], list[Array]]:
     """Evaluates what members depend on in another recording, and their columns (N, n, k) there."""
     model = problem.situation.model
-    now = situation_on(recording, model, unloaded(problem))
+    now = replace(situation_on(recording, model, unloaded(problem)), since=problem.situation.origin)
     if problem.bearing is not None:
         now = problem.bearing.on(now)
     states, columns = [now] * len(members), [_dense(now, member) for member in members]

@@ -146,6 +146,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         extensions=tuple(extensions),
         felt=unloaded(problem)[list(baseline.base.independent)],
         bearing=problem.bearing,
+        since=problem.situation.origin,
     )
     return Fitted(model, tuple(known), values[: base.shape[2]])
 

@@ -212,7 +212,7 @@ def _ringing(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> 
 
 
 def _vibration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
-    phase = 2 * np.pi * shape[0] * (s.t - s.t[0])
+    phase = 2 * np.pi * shape[0] * (s.t - s.origin)
     pull = s.sensitivity("gravity")[:, joint - 1]
     size = np.abs(pull).max(axis=0)
     # An axis along gravity feels none of it, but for rounding.
@@ -225,7 +225,7 @@ def _vibration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -
 
 
 def _sway(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
-    phase = 2 * np.pi * shape[0] * (s.t - s.t[0])
+    phase = 2 * np.pi * shape[0] * (s.t - s.origin)
     return np.column_stack([np.cos(phase), np.sin(phase)])
 
 

@@ -43,6 +43,7 @@ class Plant:
         coefficients: of each effect.
         felt: base parameters (b,) by which effects reckon load and friction; None for `values`.
         bearing: what of the effects the gears bear; None for nothing.
+        since: moment from which phases count [s]; None for the first of a motion.
     """
 
     model: TorqueModel
@@ -52,6 +53,7 @@ class Plant:
     coefficients: Sequence[Array] = ()
     felt: Array | None = None
     bearing: Bearing | None = None
+    since: float | None = None
 
     def at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
         """Gives what the base model says along a motion at the times of a recording."""
@@ -64,7 +66,8 @@ class Plant:
 
     def _by(self, values: Array, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
         q, dq, ddq = motion
-        return situation_on(replace(part, q=q, dq=dq, ddq=ddq), self.model, values, self.columns)
+        now = situation_on(replace(part, q=q, dq=dq, ddq=ddq), self.model, values, self.columns)
+        return replace(now, since=self.since)
 
     def base(self, part: Recording, motion: tuple[Array, Array, Array]) -> Array:
         """Evaluates the base model's torque (N, n) along a motion of one log, with its gravity and payload."""

@@ -191,6 +191,7 @@ def simulate_unseen(
         values=extended[:b],
         felt=unloaded(problem)[list(known.independent)],
         bearing=problem.bearing,
+        since=problem.situation.origin,
         members=tuple(members[i] for i in there),
         coefficients=tuple(extended[edges[i] : edges[i + 1]] for i in there),
     )

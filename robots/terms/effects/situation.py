@@ -45,6 +45,7 @@ class Situation:
         beyond: torque of other effects (N, n) [N m or N], for those that act on all of the torque; None for none.
         borne: torque of other effects (N, n) that the gears bear besides the robot's own [N m or N]; None for none.
         finer: the same logs before they were thinned; None where they were not.
+        since: moment from which the phase of what vibrates counts [s]; None for its own first.
     """
 
     model: TorqueModel
@@ -63,6 +64,7 @@ class Situation:
     beyond: Array | None = None
     borne: Array | None = None
     finer: Finer | None = None
+    since: float | None = None
     _cache: dict[object, Any] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
@@ -83,6 +85,11 @@ class Situation:
         """The median sample period within the logs [s]; 0 for a single sample."""
         steps = np.concatenate([np.diff(self.t[run]) for run in self.runs])
         return float(np.median(steps)) if len(steps) else 0.0
+
+    @property
+    def origin(self) -> float:
+        """The moment from which the phase of what vibrates counts [s]."""
+        return float(self.t[0]) if self.since is None else self.since
 
     @property
     def sampled(self) -> float:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from estimation.diagnosis.composed import columns_on
 from estimation.diagnosis.extending import _covariance, _narrowed, dense, fit_extended
 from estimation.diagnosis.extension import find_effect
 from estimation.diagnosis.hypotheses import Hypothesis
@@ -126,6 +127,32 @@ def test_the_model_is_what_was_fitted(
     if effect.name.startswith("pattern"):
         other = replace(fitted.model, felt=None).torque(*motion)
         assert np.abs(other - base - own).max() > 1e-3 * recording.tau.std()
+
+
+def test_a_vibration_keeps_its_phase_in_a_later_motion(
+    recording: Recording, pose_arm: Callable[..., Problem], tmp_path: Path
+) -> None:
+    """What vibrates whatever the robot does is as far on its way in a log that begins later, from the file too."""
+    effect = find_effect("pattern:vibration:0:even")
+    hypothesis, problem = Hypothesis(effect, 1), pose_arm(recording)
+    wave = 0.2 * recording.tau[:, 0].std() * np.sin(2 * np.pi * 3.3 * recording.t + 0.4)
+    posed = pose_arm(replace(recording, tau=recording.tau + wave[:, None] * [1.0, 0.0]))
+    member = refine(posed, hypothesis, (3.3,), accept(posed, ()))
+    fitted = fit_extended(posed, [member], {"gravities": []})
+    fitted.model.save(tmp_path / "model.json")
+    later = slice(1013, None)
+    motion = [x[later] for x in (recording.q, recording.dq, recording.ddq, recording.t)]
+    for model in (fitted.model, load_model(tmp_path)):
+        told = (model.torque(*motion) - model.torque(*motion[:3]))[:, 0]
+        assert np.corrcoef(told, wave[later])[0, 1] > 0.99
+    (states, *_), _ = columns_on(problem, replace(recording, **_rows(recording, later)), [member])
+    assert states.origin == recording.t[0]
+
+
+def _rows(recording: Recording, rows: slice) -> dict[str, object]:
+    """A recording's fields on some of its rows."""
+    names = ("t", "q", "dq", "ddq", "tau", "unsure", "clear")
+    return {"starts": (0,), **{name: getattr(recording, name)[rows] for name in names}}
 
 
 def test_no_log_knows_a_delay_better_than_its_formula(
