@@ -27,6 +27,7 @@ from robots.common.progress import Progress
 from robots.terms.effects import Effect
 
 DRAWS = 200
+SEARCHES = 2
 # The base model alone is fitted again while what is left of a joint's torque falls below this share of what it was.
 ROUNDS, SETTLED = 4, 0.9
 # Noise is no smaller than this share of the torque there.
@@ -65,7 +66,7 @@ def search(
     last: Search | None = None
     blurred = False
     known: dict[Hypothesis, tuple[float, ...]] = {}
-    for attempt in range(2):
+    for attempt in range(SEARCHES):
         share = 0.1 + 0.3 * attempt
         inertia = inertia_of(baseline, recording, settled.values)
         fitted = baseline.base.size + settled.degrees
@@ -110,9 +111,9 @@ def search(
             share,
             known,
         )
-        known = {found.member.hypothesis: found.member.shape for found in last.selection.found}
-        if not last.selection.found:
+        if not last.selection.found or attempt == SEARCHES - 1:
             break
+        known = {found.member.hypothesis: found.member.shape for found in last.selection.found}
         settled = settle(last.problem, [found.member for found in last.selection.found])
         # A delay made the sign of friction look less sharp than it is.
         blurred = any(found.member.hypothesis.effect.blurs for found in last.selection.found)
