@@ -17,6 +17,7 @@ from estimation.diagnosis.recording import Recording
 from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.regularisation import free, held
 from robots.terms.effects import Situation
+from robots.terms.effects.bearing import laden_with
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -143,9 +144,8 @@ def columns_on(
 ) -> tuple[list[Situation], list[Array]]:
     """Evaluates what members depend on in another recording, and their columns (N, n, k) there."""
     model = problem.situation.model
-    now = replace(situation_on(recording, model, unloaded(problem)), since=problem.situation.origin)
-    if problem.bearing is not None:
-        now = problem.bearing.on(now)
+    own = situation_on(recording, model, unloaded(problem))
+    now = laden_with(replace(own, since=problem.situation.origin), problem.bearing)
     states, columns = [now] * len(members), [_dense(now, member) for member in members]
     late = [k for k, member in enumerate(members) if member.hypothesis.effect.blurs]
     if problem.followed is not None and 0 < len(late) < len(members):

@@ -14,7 +14,7 @@ from robots.common.errors import InputError
 from robots.common.plain import all_finite, finite
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS, Effect
-from robots.terms.effects.bearing import Bearing, Borne, Weight
+from robots.terms.effects.bearing import Bearing, Borne, Weight, laden_with
 from robots.terms.effects.situation import Situation
 
 Array = NDArray[np.float64]
@@ -169,7 +169,7 @@ def extension_torque(
         bearing: what of them the gears bear; None for nothing.
     """
     total, own = np.zeros_like(felt.q), felt if own is None else own
-    felt = felt if bearing is None else bearing.on(felt)
+    felt = laden_with(felt, bearing)
     for stage in range(3):
         now = (felt, felt.beside(total), own.beside(total))[stage]
         acting = [extension for extension in extensions if _stage(extension.source) == stage]

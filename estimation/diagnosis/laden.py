@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 # A joint feels what is borne that is more than this share of its own load.
 FELT = 0.01
 # What a friction by load may explain that was named otherwise for want of the load.
-BY_LOAD = (EFFECTS["load_dependent_friction"],)
+BY_LOAD = EFFECTS["load_dependent_friction"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +90,7 @@ def _told_otherwise(problem: Problem, members: Sequence[Member], on_them: Sequen
         joint = None if out is None else out.hypothesis.joint
         new = [(m.hypothesis, m.shape) for m in feel]
         if joint is not None and not any(place.joint == joint for place, _ in new):
-            new += [
-                (Hypothesis(effect, joint), effect.grid(problem.situation, joint)[0])
-                for effect in BY_LOAD
-                if effect.grid(problem.situation, joint)
-            ]
+            new.append((Hypothesis(BY_LOAD, joint), BY_LOAD.grid(problem.situation, joint)[0]))
         if new:
             beside = accept(problem, tuple(m.group for m in rest))
             result.append([*rest, *(refine(problem, place, shape, beside) for place, shape in new)])

@@ -13,7 +13,7 @@ from estimation.diagnosis.states import Recording
 from estimation.diagnosis.upper import Upper
 from estimation.diagnosis.whitening import Whitening
 from estimation.pulls import Pull
-from robots.terms.effects.bearing import Bearing
+from robots.terms.effects.bearing import Bearing, laden_with
 
 Array = NDArray[np.float64]
 
@@ -77,8 +77,7 @@ def pose(
     values = held(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
     alone = values if extra is None else fit_values(baseline, scales, recording.unsure, recording.tau, pull)
     remainder = recording.tau - baseline.regressor @ alone
-    now = baseline.situation(recording, values)
-    now = now if bearing is None else bearing.on(now)
+    now = laden_with(baseline.situation(recording, values), bearing)
     return Problem(
         recording=recording,
         baseline=baseline,

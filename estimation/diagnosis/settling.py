@@ -20,6 +20,7 @@ from estimation.diagnosis.scoring import accept
 from estimation.diagnosis.states import Recording
 from estimation.diagnosis.thinning import earlier
 from estimation.diagnosis.whitening import Whitening
+from robots.terms.effects.bearing import laden_with
 
 Array = NDArray[np.float64]
 
@@ -127,7 +128,7 @@ def moved(problem: Problem, values: Array, members: Sequence[Member]) -> bool:
     if np.max(np.sqrt(np.mean(change**2, axis=0)) / np.maximum(torque, 1e-12)) > MOVED:
         return True
     state = problem.baseline.situation(problem.recording, values[: base.size])
-    now = replace(problem, situation=state if problem.bearing is None else problem.bearing.on(state))
+    now = replace(problem, situation=laden_with(state, problem.bearing))
     for member in members:
         before, after = (dense(p, member.hypothesis, member.shape) @ member.coefficients for p in (problem, now))
         if np.sum((after - before) ** 2) > OTHER**2 * np.sum(before**2):

@@ -16,7 +16,7 @@ from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.simulation import Curves, Simulation
 from robots.plants.closed_loop import Driven, Loop, Reference, Tangent, drive
 from robots.regressor import TorqueModel
-from robots.terms.effects.bearing import Bearing
+from robots.terms.effects.bearing import Bearing, laden_with
 from robots.terms.effects.of_model import sign_of
 from robots.terms.effects.situation import Situation
 from robots.terms.effects.static import StaticJointEffect
@@ -62,7 +62,7 @@ class Plant:
     def felt_at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
         """Gives what effects depend on there."""
         now = self._by(self.values if self.felt is None else self.felt, part, motion)
-        return now if self.bearing is None else self.bearing.on(now)
+        return laden_with(now, self.bearing)
 
     def _by(self, values: Array, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
         q, dq, ddq = motion

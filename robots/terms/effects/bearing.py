@@ -59,3 +59,8 @@ class Bearing:
             held = sorted({w.joint - 1 for w in self.weights if w.effect.preloads and w.joint is not None})
             borne[:, held] += (now.torque - now.rigid - now.friction)[:, held]
         return now.bearing(borne)
+
+
+def laden_with(now: Situation, bearing: Bearing | None) -> Situation:
+    """Gives what effects that grow with the load depend on, whether gears bear anything else or not."""
+    return now if bearing is None else bearing.on(now)
