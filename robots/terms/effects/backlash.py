@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -33,6 +34,10 @@ ASIDE = (-0.03, -0.015, 0.0, 0.015, 0.03)
 """Loads of a scan at which the link changes sides, as shares of the load's root mean square."""
 FARTHEST = 0.1
 """Largest such share: of a base model whose zero is less sure nothing follows."""
+LANDS = 0.02
+"""Time [s] in which a flank stops the link, where nothing tells it."""
+REBOUND, SETTLES = 0.2, 2.0
+"""Share of its speed with which a link comes back from the flank, and in how many times its landing it loses that."""
 LEAST, MOST = 1 / 8, 8.0
 """Shares of the gap that the time of its crossing tells: the time, whose cube that is, is true to a factor of two."""
 
@@ -40,20 +45,23 @@ HOVERS = 0.05
 """Share of its root mean square that a load must get beyond zero to have changed sides."""
 
 INEXACT = 0.2
-"""Share by which a play errs besides: a gear that winds up behind its flanks looks like more play, by a third to four
-fifths where it winds up as far as that under the loads about zero; nor does a link fly quite freely."""
+"""Share by which a play errs besides: links bounce otherwise, and drives give way to the kick, by as much."""
 SMALLEST = 5e-7
 """Half a play below which there is none [rad or m]: at a radius of a tenth of a metre, what teeth are rough by."""
 
 
 class Backlash(Effect):
-    """The link lags its encoder by (b / 2) side: the side changes from where the load changes sign, over a time T.
+    """The link lags its encoder by (b / 2) side: the side changes from where the load changes sign, in T + L.
 
     A load that grows by r per second carries the link's inertia M over the gap b in T = (6 b M / r)^(1/3), or in the
-    longest time that the motor, which goes on, leaves it. The torque follows from the lag as for an elastic gear:
-    bursts at zero crossings of the load, not of the velocity. Their size and their time tell the same gap, the time but
-    roughly: nothing flies quite freely from flank to flank. Zero is where the base model has the load's, to some per
-    cent: what of a joint's torque is offset and what its load, a log tells less well, and a slow load crosses late.
+    longest time that the motor, which goes on, leaves it: it flies by s^3, ever faster, and has most of its speed where
+    it lands. The far flank stops it with half a wave of force, over a time L that is that of half a swing of the link
+    on the gear's teeth and on what the drive gives way, and throws it back a little. So the torque lacks the load for
+    long and little, and then is hit for short and much. It follows from the lag as for an elastic gear: bursts at zero
+    crossings of the load, not of the velocity. Their size and their time tell the same gap, each but roughly: nothing
+    flies quite freely from flank to flank, or lands alike each time. Zero is where the base model has the load's, to
+    some per cent: what of a joint's torque is offset and what its load, a log tells less well, and a slow load crosses
+    late.
     """
 
     name: ClassVar[str] = "backlash"
@@ -65,6 +73,7 @@ class Backlash(Effect):
         Shape("longest", "s", 0.01, SLOWEST, "log", (SLOWEST,), default=SLOWEST),
         Shape("crossed_at", "N m", -np.inf, np.inf, "linear", (0.0,), default=0.0),
         ROTOR,
+        Shape("landing", "s", QUICKEST, 0.1, "log", (LANDS,), default=LANDS),
     )
     rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "presliding_hysteresis", "load_dependent_friction")
     fast: ClassVar[bool] = True
@@ -91,19 +100,20 @@ class Backlash(Effect):
                 continue
             gaps = [time**3 * float(np.median(quickness)) / 6.0 for time in SCANNED]
             able = [gap for gap in gaps if self.shapes[0].lower <= gap <= self.shapes[0].upper]
-            points += [(gap, SLOWEST, aside * size, rotor) for gap in able for aside in ASIDE]
+            points += [(gap, SLOWEST, aside * size, rotor, LANDS) for gap in able for aside in ASIDE]
         return tuple(points)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Keeps the load at which sides change near zero, and the rotor near what is known of it."""
         assert joint is not None
-        gap, longest, *_ = self.shapes
+        gap, longest, *_, landing = self.shapes
         most = FARTHEST * _size(situation, joint)
         return (
             (gap.lower, gap.upper),
             (longest.lower, longest.upper),
             (-most, most),
             rotor_bounds(situation, joint),
+            (landing.lower, landing.upper),
         )
 
     def likely(
@@ -114,8 +124,8 @@ class Backlash(Effect):
         # All but what was refined itself: each as it should be, or not.
         assert joint is not None
         rotors = (KNOWN,) if is_sure(situation, joint) else (KNOWN, None)
-        likely = ((g, s, z, r) for r in rotors for z in (0.0, None) for s in (SLOWEST, None) for g in (gap, None))
-        return tuple(likely)[:-1]
+        either = ((LANDS, None), rotors, (0.0, None), (SLOWEST, None), (gap, None))
+        return tuple((g, s, z, r, lands) for lands, r, z, s, g in product(*either))[:-1]
 
     def elsewhere(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
@@ -128,39 +138,36 @@ class Backlash(Effect):
         """
         assert joint is not None
         gap = float(np.clip(2.0 * coefficients[0], self.shapes[0].lower, self.shapes[0].upper))
-        _, _, quickness = _crossings(situation, joint, *shape[2:])
+        _, _, quickness = _crossings(situation, joint, *shape[2:4])
         if not len(quickness):
             return ()
-        now = float(np.median(_durations(situation, shape, quickness)))
+        now = float(np.median(_flights(situation, shape, quickness)))
         slower = ((gap, max(now, self.shapes[1].lower), *shape[2:]),) if gap > shape[0] else ()
         rotors = rotors_between(situation, joint)
-        turned = tuple((size * shape[0], SLOWEST, 0.0, rotor) for size in (1.0, 2.0) for rotor in rotors)
+        turned = tuple((size * shape[0], SLOWEST, 0.0, rotor, shape[4]) for size in (1.0, 2.0) for rotor in rotors)
         return tuple(starts for starts in (slower, turned) if starts)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per half play of one."""
         assert joint is not None
-        _, _, at, rotor = shape
+        _, _, at, rotor, landing = shape
         times, ways, quickness = _crossings(situation, joint, at, rotor)
-        durations = _durations(situation, shape, quickness)
+        flights = _flights(situation, shape, quickness)
         side, rate, curve = (np.zeros(len(situation)) for _ in range(3))
         load = load_beside(situation, joint, rotor) - at
         for run in situation.runs:
             t = situation.t[run]
             inside = (times >= t[0]) & (times <= t[-1])
-            start, jump, duration = times[inside], 2 * ways[inside], durations[inside]
-            begins, last = np.searchsorted(t, (start, start + duration))
+            start, jump, flight = times[inside], 2 * ways[inside], flights[inside]
+            begins, last = np.searchsorted(t, (start, start + flight + (1 + SETTLES) * landing))
             # The rows of all crossings, one after the other; they may overlap.
             count = last - begins
             of = np.repeat(np.arange(len(start)), count)
             rows = np.arange(len(of)) + np.repeat(begins - np.cumsum(count) + count, count)
-            s = (t[rows] - start[of]) / duration[of]
-            per, rises = jump[of] / duration[of], np.bincount(last, jump, len(t) + 1)[: len(t)]
-            curve[run] = np.bincount(rows, per / duration[of] * (60 * s - 180 * s**2 + 120 * s**3), len(t))
-            rate[run] = np.bincount(rows, per * (30 * s**2 - 60 * s**3 + 30 * s**4), len(t))
-            crossed = np.bincount(rows, jump[of] * (10 * s**3 - 15 * s**4 + 6 * s**5), len(t))
+            crossed, speed, push = (jump[of] * part for part in _course(t[rows] - start[of], flight[of], landing))
+            curve[run], rate[run], crossed = (np.bincount(rows, part, len(t)) for part in (push, speed, crossed))
             first = -ways[inside][0] if inside.any() else np.sign(np.sum(load[run]))
-            side[run] = first + np.cumsum(rises) + crossed
+            side[run] = first + np.cumsum(np.bincount(last, jump, len(t) + 1)[: len(t)]) + crossed
         return windup(situation, joint, side, rate, curve, rotor)[:, :, None]
 
     def describe(
@@ -184,8 +191,31 @@ class Backlash(Effect):
         return f"load of joint {joint} [N m]", load_beside(situation, joint, shape[3] if len(shape) > 3 else KNOWN)
 
 
-def _durations(situation: Situation, shape: tuple[float, ...], quickness: Array) -> Array:
-    """Gives the times [s] that crossings take: of free flight, or the longest."""
+def _course(since: Array, flight: Array, landing: float) -> tuple[Array, Array, Array]:
+    """Gives how far a link has crossed a gap of one, with both derivatives [1/s, 1/s2], some time [s] after its start.
+
+    It flies under a force that grows from nothing. Half a wave of force takes what speed it has then and throws it back
+    with a share of that, which it loses over some times as long.
+    """
+    lost = SETTLES * landing
+    grows = 1.0 / (flight**3 / 6 + flight**2 / 4 * ((1 - REBOUND) * landing - REBOUND * lost))  # of its acceleration
+    speed, over = grows * flight**2 / 2, grows * flight**3 / 6
+    u, k = np.pi * (since - flight) / landing, np.pi * np.clip((since - flight - landing) / lost, 0.0, 1.0)
+    mean, swing, back = speed * (1 - REBOUND) / 2, speed * (1 + REBOUND) / 2, speed * REBOUND / 2
+    when = [since < flight, since < flight + landing]
+    there = over + mean * landing - back * lost * (k + np.sin(k)) / np.pi
+    position = [grows * since**3 / 6, over + landing * (mean * u + swing * np.sin(u)) / np.pi]
+    rate = [grows * since**2 / 2, mean + swing * np.cos(u)]
+    curve = [grows * since, -swing * np.pi / landing * np.sin(u)]
+    return (
+        np.select(when, position, there),
+        np.select(when, rate, -back * (1 + np.cos(k))),
+        np.select(when, curve, back * np.pi / lost * np.sin(k)),
+    )
+
+
+def _flights(situation: Situation, shape: tuple[float, ...], quickness: Array) -> Array:
+    """Gives the times [s] that crossings take before they land: of free flight, or the longest."""
     return np.clip((6.0 * shape[0] / quickness) ** (1 / 3), max(QUICKEST, situation.period), shape[1])
 
 

@@ -12,7 +12,8 @@ from tests.truth.effects.base import Effect, log_uniform
 from tests.truth.machines import Machine
 from tests.truth.ride import Ride
 
-TRANSIT_LIMITS = (0.006, 0.05)
+SETTLES = 0.3  # time [s] in which a link that has landed comes to rest
+FINE = 2e-4  # step [s] of a floating link at most
 LOADED = 0.1  # share of a joint's torque RMS below which its load is none
 
 
@@ -78,44 +79,67 @@ class Elastic(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Backlash(Effect):
-    """Play of amount [rad]: the link changes sides when the torque through the gear changes sign.
+    """Play of amount [rad]: link and motor are two bodies with a dead zone between them, teeth on either side of it.
 
-    The crossing takes as long as the growing torque needs to carry the link's inertia over the gap.
+    The motor keeps to its motion. Where the torque through the gear changes sign, the link floats over, hits the teeth,
+    which give way as a damped spring, and may bounce: M x'' = torque - teeth(x), from rest on the flank it leaves.
+
+    ``swing`` [Hz] is what the link would swing at on the teeth, ``damping`` that swing's.
     """
+
+    swing: float = 40.0
+    damping: float = 0.3
 
     name = "backlash"
     largest = 6e-3
     power = 0.7
 
+    @classmethod
+    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Backlash:
+        return cls(joint=joint, swing=log_uniform(rng, 15.0, 60.0), damping=rng.uniform(0.2, 0.7))
+
     def part(self, ride: Ride) -> None:
-        machine = ride.machine
-        through = ride.borne(rigid_torque(machine.model, ride.q, ride.v, ride.a))[:, self.j]
-        rate = ride.derivative(through)
-        data = machine.model.createData()
-        side, side1, side2 = (np.zeros(len(through)) for _ in range(3))
+        through = ride.borne(rigid_torque(ride.machine.model, ride.q, ride.v, ride.a))[:, self.j]
+        behind = np.zeros((3, len(through)))  # where the motor is ahead of the link, and two derivatives
         for run in ride.runs:
-            side[run] = np.sign(through[run.start]) or 1.0
-            crossings = run.start + 1 + np.flatnonzero(np.diff(np.sign(through[run])) != 0)
-            for k in crossings:
-                new = float(np.sign(through[min(k + 1, run.stop - 1)])) or 1.0
-                if side[k] == new:
-                    continue
-                pin.crba(machine.model, data, ride.q[k])
-                inertia = data.M[self.j, self.j]
-                seconds = (6 * self.amount * inertia / max(abs(rate[k]), 1e-3)) ** (1 / 3)
-                seconds = float(np.clip(seconds, *TRANSIT_LIMITS))
-                last = min(run.stop, k + max(round(seconds / ride.step), 2))
-                s = (ride.t[k:last] - ride.t[k]) / seconds
-                jump = new - side[k]
-                start = side[k]
-                side[k : run.stop] = new
-                side[k:last] = start + jump * (10 * s**3 - 15 * s**4 + 6 * s**5)
-                side1[k : run.stop], side2[k : run.stop] = 0.0, 0.0
-                side1[k:last] = jump * (30 * s**2 - 60 * s**3 + 30 * s**4) / seconds
-                side2[k:last] = jump * (60 * s - 180 * s**2 + 120 * s**3) / seconds**2
-        half = self.amount / 2
-        for name, change in (("link_q", side), ("link_v", side1), ("link_a", side2)):
-            setattr(ride, name, getattr(ride, name) - self.on_joint(ride, half * change))
+            behind[:, run] = self._floating(ride, run, through[run])
+        for name, change in zip(("link_q", "link_v", "link_a"), behind, strict=True):
+            setattr(ride, name, getattr(ride, name) - self.on_joint(ride, change))
+
+    def _floating(self, ride: Ride, run: slice, through: np.ndarray) -> np.ndarray:
+        """Where the motor is ahead of the link in a run, with two derivatives, (3, N)."""
+        half, settles = self.amount / 2, round(SETTLES / ride.step)
+        signs = np.where(through >= 0, 1.0, -1.0)
+        behind = np.zeros((3, len(through)))
+        behind[0] = half * signs
+        crossings = np.flatnonzero(np.diff(signs) != 0)
+        starts = crossings[np.diff(crossings, prepend=-settles) >= settles]
+        if not len(starts):
+            return behind
+        # A link that has not settled where the load crosses again floats on: as long as the longest of such.
+        last = [crossings[crossings < end][-1] for end in (*starts[1:], len(through))]
+        length = int(np.max(np.subtract(last, starts))) + settles
+        data, model = ride.machine.model.createData(), ride.machine.model
+        inertia = np.array([pin.crba(model, data, ride.q[run.start + k])[self.j, self.j] for k in starts])
+        stiff, damp = inertia * (2 * np.pi * self.swing) ** 2, 2 * self.damping * inertia * 2 * np.pi * self.swing
+        x, v, times = half * signs[starts], np.zeros(len(starts)), max(1, round(ride.step / FINE))
+        step = ride.step / times
+        for k in range(min(length, len(through))):
+            at = np.minimum(starts + k, len(through) - 1)
+            force = through[at]
+            grows = (through[np.minimum(at + 1, len(through) - 1)] - force) / times
+            for fine in range(times):
+                deep = np.sign(x) * np.maximum(np.abs(x) - half, 0.0)
+                push = np.where(deep != 0, stiff * deep + damp * v, 0.0)
+                # Teeth push, and do not pull.
+                push = np.where(push * deep > 0, push, 0.0)
+                a = (force + fine * grows - push) / inertia
+                if fine == 0:
+                    own = (starts + k < len(through)) & (starts + k < np.append(starts[1:], len(through)))
+                    behind[:, at[own]] = x[own], v[own], a[own]
+                v = v + step * a
+                x = x + step * v
+        return behind
 
     def truths(self) -> dict[str, float]:
         return {"play": self.amount}
