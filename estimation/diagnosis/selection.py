@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from estimation.diagnosis.refinement import Member, all_but, refine
 from estimation.diagnosis.scan import Entry, Scan, measure, scan
 from estimation.diagnosis.scoring import Accepted, accept
 from estimation.diagnosis.together import together
-from estimation.diagnosis.worthwhile import SURE, beyond, is_sure, is_told, lasts
+from estimation.diagnosis.worthwhile import SURE, beyond, is_sure, is_told, lasts, told_aside
 
 MOST = 4  # effects at once
 FAR_MORE = 1.5  # times the gain
@@ -116,6 +117,10 @@ def select(
             members, p_values = polished(problem, entries, members, p_values, seen, won, rng, false_alarm)
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
+        # What was found before kicks were known may have been the drives' answers to those.
+        held = [told_aside(problem, m, [*members[:i], *members[i + 1 :]]) for i, m in enumerate(members)]
+        spurned |= {m.hypothesis for m, own in zip(members, held, strict=True) if not own}
+        members, p_values = list(compress(members, held)), list(compress(p_values, held))
         now = {member.hypothesis for member in members}
         if told[0].hypothesis not in now:
             spurned.add(told[0].hypothesis)

@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
-from estimation.diagnosis.agreement import joint_by_joint
+from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.quiet_logs import profile_gain
-from estimation.diagnosis.refinement import Member
-from estimation.diagnosis.scoring import Accepted, accept
+from estimation.diagnosis.refinement import ACTS, Member
+from estimation.diagnosis.scoring import Accepted, accept, score
 from estimation.diagnosis.shocks import beside_a_shock
 
 # What is reported must be worth its parameters by so much (Schwarz): strong evidence, beside a small p-value.
 LEAST = 10.0
+# Time [s] before and after a kick of another effect, such as a link that lands, in which drives answer to it; what
+# kicks in more than this share of the rows is none. Rows aside must tell this share of a delay.
+ANSWERS, MOSTLY, ASIDE = 0.2, 0.8, 0.5
 # But where no other effect acts, below this share of the false-alarm chance: no other formula leaves it there.
 SURE = 0.2
 
@@ -73,8 +77,44 @@ def beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bo
     return not members or candidate.bic(problem.rows) - lost > LEAST
 
 
+def told_aside(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
+    """Whether a delay that all joints have alike is told by more than the answers of drives to another effect's kicks.
+
+    A link that lands throws its motor back, which the log has for motion of motor and link alike: the torque, which
+    answers to it, then seems to be ahead of that, on all joints that feel it.
+    """
+    if not candidate.hypothesis.effect.alike:
+        return True
+    reach = round(ANSWERS / (problem.recording.step * problem.whitening.stride))
+    beside = np.zeros(problem.rows, dtype=bool)
+    for member in members:
+        if member.hypothesis.effect.kicks:
+            torques = [np.abs(part @ member.coefficients) for part in member.group.columns]
+            acts = np.max([torque > ACTS * torque.max(initial=0.0) for torque in torques], axis=0)
+            near = maximum_filter1d(acts, 2 * reach + 1)
+            beside |= near & (near.mean() < MOSTLY)
+    if not beside.any():
+        return True
+    accepted = accept(problem, tuple(m.group for m in members))
+    told = []
+    for j, X in zip(*problem.columns_of(candidate.hypothesis, candidate.shape), strict=True):
+        group = problem.group((j,), (X,), effect=candidate.hypothesis.effect)
+        parts = score(problem, problem.split(group, np.ones(1), beside), accepted)
+        if parts.gram[1, 1] > 0:
+            told.append((parts.gram[1, 1], parts.cross[1]))
+    if not told:
+        return False
+    gram, cross = np.array(told).T
+    whole = float(candidate.coefficients[0])
+    share = float(cross.sum() / gram.sum()) / whole if whole else 0.0
+    paid = candidate.degrees * float(np.log(problem.rows * len(gram)))
+    return share > ASIDE and agreed_gain(gram, cross) - paid > LEAST
+
+
 def _agreed(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
     """Whether joints on which no effect of theirs explains more tell a common coefficient by themselves."""
+    if not told_aside(problem, candidate, members):
+        return False
     beside = accept(problem, tuple(m.group for m in members))
     told = joint_by_joint(problem, candidate.hypothesis, candidate.shape, beside)
     others = [
