@@ -183,7 +183,8 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
     why = f"{_and(names)} explain the logs about equally well; {EXPERIMENTS[best.kind]}{often} would tell "
     if len(possible) > 2 and chance < HOPELESS:
         alike = np.unravel_index(int(np.argmin(best.chances)), best.chances.shape)
-        why += f"most of them apart, but hardly {_and([names[k] for k in sorted(alike)])}: no experiment tried does"
+        close = _and([names[k] for k in sorted(alike)])
+        why += f"most of them apart, but {close} with a chance of {100 * chance:.0f} %: no experiment tried does better"
     else:
         why += f"them apart with a chance of {100 * chance:.0f} %"
     why += _by_hand(robot, best.stages)

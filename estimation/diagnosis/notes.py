@@ -12,6 +12,7 @@ from estimation.diagnosis.hidden_springs import hidden_springs
 from estimation.diagnosis.limits import STILL
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.recording import cut
+from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.unseen import Measured
 from robots.terms.effects import EFFECTS
 from robots.terms.effects.current_clipping import CERTAIN, CurrentClipping
@@ -216,4 +217,27 @@ _FARTHER = (
 _FASTER = (
     "Joint{} {}: up to {:.1f} times as fast on the unseen data as in the logs of the fit. What a polynomial fitted to "
     "slower motion says of friction there may be far off, and with it error and gain; coulomb-viscous errs less."
+)
+
+
+def beside_larger(slight: Member | None, members: Sequence[Member]) -> tuple[str, ...]:
+    """Says what stood out beside what was found, but is as small as formulas may leave of that."""
+    if slight is None:
+        return ()
+    told = [(slight.gain_on([j]) / m.gain_on([j]), m, j) for m in members for j in slight.group.joints if _acts(m, j)]
+    if not told:
+        return ()
+    share, member, j = min(told, key=lambda each: each[0])
+    if share >= 1.0:
+        return ()
+    return (_SLIGHT.format(slight.hypothesis.label, member.hypothesis.label, 100 * share, j + 1),)
+
+
+def _acts(member: Member, joint: int) -> bool:
+    return joint in member.group.joints and member.gain_on([joint]) > 0
+
+
+_SLIGHT = (
+    "{0} stands out of the noise, too, but explains {2:.1f} % of what {1} does on joint {3}, as much as the formula of "
+    "that may leave: it is not told as a finding. A log in which {1} acts less would show whether it is one."
 )

@@ -19,7 +19,14 @@ from estimation.diagnosis.gain import Unseen
 from estimation.diagnosis.hypotheses import all_hypotheses
 from estimation.diagnosis.limits import Limit
 from estimation.diagnosis.next_experiment import NextExperiment, plan_next
-from estimation.diagnosis.notes import farther_joints, faster_joints, notes_of, turning_joints, worse_joints
+from estimation.diagnosis.notes import (
+    beside_larger,
+    farther_joints,
+    faster_joints,
+    notes_of,
+    turning_joints,
+    worse_joints,
+)
 from estimation.diagnosis.patterns import all_patterns
 from estimation.diagnosis.predicting import as_sharp, every_row, smoothed_best, with_band
 from estimation.diagnosis.problem import Problem
@@ -139,6 +146,7 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
             *faster_joints(problem, seen),
             *farther_joints(problem, seen, findings),
             *held.notes,
+            *beside_larger(told.selection.slight, members),
             *lost,
         ),
         trace=_trace(unseen, [seen.coordinates[i] for i in order], twisted),

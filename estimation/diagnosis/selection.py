@@ -51,6 +51,7 @@ class Selection:
         first: the scan before any was found.
         last: the scan beside all that were found.
         accepted: all found, joined.
+        slight: what stood out of the noise next, but no more than formulas of what was found may leave; None for none.
     """
 
     found: tuple[Found, ...]
@@ -58,6 +59,7 @@ class Selection:
     first: Scan
     last: Scan
     accepted: Accepted
+    slight: Member | None = None
 
 
 def select(
@@ -81,6 +83,7 @@ def select(
     visited = [seen]
     won: dict[Hypothesis, float] = {}
     first: Scan | None = None
+    slight: Member | None = None
     while True:
         accepted = accept(problem, tuple(member.group for member in members))
         result = scan(problem, entries, accepted, rng)
@@ -102,6 +105,7 @@ def select(
         sure_alone = is_sure(problem, told[0], chance[told[0].hypothesis], members, false_alarm)
         if not (sure_alone or beyond(problem, told[0], members)):
             if (formed := _formed_anew(problem, told[0], members)) is None:
+                slight = told[0]
                 break
             *members, told[0] = formed
             accepted = accept(problem, tuple(member.group for member in members))
@@ -140,7 +144,8 @@ def select(
     ]
     order = sorted(kept, key=lambda f: -f.member.gain)
     last = result if members else first
-    return Selection(tuple(order), frozenset(seen), first, last, accept(problem, tuple(f.member.group for f in order)))
+    joined = accept(problem, tuple(f.member.group for f in order))
+    return Selection(tuple(order), frozenset(seen), first, last, joined, slight)
 
 
 def with_rivals(

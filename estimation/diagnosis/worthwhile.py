@@ -83,16 +83,16 @@ def told_aside(problem: Problem, candidate: Member, members: Sequence[Member]) -
     A link that lands throws its motor back, which the log has for motion of motor and link alike: the torque, which
     answers to it, then seems to be ahead of that, on all joints that feel it.
     """
-    if not candidate.hypothesis.effect.alike:
+    kicks = [member for member in members if member.hypothesis.effect.kicks]
+    if not kicks or not candidate.hypothesis.effect.alike:
         return True
     reach = round(ANSWERS / (problem.recording.step * problem.whitening.stride))
     beside = np.zeros(problem.rows, dtype=bool)
-    for member in members:
-        if member.hypothesis.effect.kicks:
-            torques = [np.abs(part @ member.coefficients) for part in member.group.columns]
-            acts = np.max([torque > ACTS * torque.max(initial=0.0) for torque in torques], axis=0)
-            near = maximum_filter1d(acts, 2 * reach + 1)
-            beside |= near & (near.mean() < MOSTLY)
+    for member in kicks:
+        torques = [np.abs(part @ member.coefficients) for part in member.group.columns]
+        acts = np.max([torque > ACTS * torque.max(initial=0.0) for torque in torques], axis=0)
+        near = maximum_filter1d(acts, 2 * reach + 1)
+        beside |= near & (near.mean() < MOSTLY)
     if not beside.any():
         return True
     accepted = accept(problem, tuple(m.group for m in members))
@@ -100,11 +100,13 @@ def told_aside(problem: Problem, candidate: Member, members: Sequence[Member]) -
     for j, X in zip(*problem.columns_of(candidate.hypothesis, candidate.shape), strict=True):
         group = problem.group((j,), (X,), effect=candidate.hypothesis.effect)
         parts = score(problem, problem.split(group, np.ones(1), beside), accepted)
-        if parts.gram[1, 1] > 0:
-            told.append((parts.gram[1, 1], parts.cross[1]))
-    if not told:
+        if parts.gram[0, 0] > 0:
+            # Whatever it is beside the kicks.
+            onto = parts.gram[1, 0] / parts.gram[0, 0]
+            told.append((parts.gram[1, 1] - onto * parts.gram[0, 1], parts.cross[1] - onto * parts.cross[0]))
+    gram, cross = np.array([each for each in told if each[0] > 0]).reshape(-1, 2).T
+    if not len(gram):
         return False
-    gram, cross = np.array(told).T
     whole = float(candidate.coefficients[0])
     share = float(cross.sum() / gram.sum()) / whole if whole else 0.0
     paid = candidate.degrees * float(np.log(problem.rows * len(gram)))

@@ -110,7 +110,7 @@ def test_a_tilt_is_told_beside_the_first_axis_own_moments() -> None:
     (told,) = completed(posed, [Found(plain, 1e-9, ())])  # type: ignore[arg-type]
     assert plain.shape == (0.0, 0.0)
     # With the moments free the angles are known as those beside four columns of them are.
-    errors = np.sqrt(np.diag(np.linalg.pinv(posed.gram)))[:2]
+    errors = np.sqrt(np.diag(np.linalg.pinv(posed.gram, rcond=1e-10, hermitian=True))[:2])
     assert np.all(np.abs(told.member.coefficients - angles) < 3 * errors)
     assert np.any(np.abs(plain.coefficients - angles) > 3 * errors)
     # The search for the moments has come as far as the true ones are.

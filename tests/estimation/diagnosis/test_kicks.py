@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.hypotheses import Hypothesis
 from estimation.diagnosis.kicks import reversals
@@ -16,6 +17,7 @@ from estimation.diagnosis.refinement import Member, _borne_out
 from estimation.diagnosis.scoring import accept, score
 from estimation.diagnosis.states import record
 from estimation.diagnosis.upper import WIDER
+from estimation.diagnosis.worthwhile import ANSWERS, MOSTLY, told_aside
 from robots.plants import simulate
 from robots.robot import Robot
 from robots.signals import Log, Motion
@@ -44,9 +46,14 @@ def _elastic(problem: Problem) -> Member:
 
 def _with(problem: Problem, member: Member, calm: float, beside: float) -> Problem:
     """The same data with so many times an effect's torque in calm rows and beside reversals, and nothing else."""
+    return _sized(problem, member, np.where(problem.calm, calm, beside))
+
+
+def _sized(problem: Problem, member: Member, sizes: np.ndarray) -> Problem:
+    """The same data with so many times an effect's torque in each white row (N,), and nothing else."""
     white = np.zeros_like(problem.white)
     for j, part in zip(member.group.joints, member.group.columns, strict=True):
-        white[:, j] = np.where(problem.calm, calm, beside) * (part @ member.coefficients)
+        white[:, j] = sizes * (part @ member.coefficients)
     own = white @ problem.whitening.precision
     base = sum(problem.mixed[j].T @ white[:, j] for j in range(problem.n))
     # Less what the base model takes of it: <Q, r> is zero for a residual.
@@ -110,6 +117,26 @@ def test_kicks_without_the_rest_are_no_effect(problem: Problem) -> None:
     assert parts.gram.sum(axis=1)[0] ** 2 / parts.gram[0, 0] > 20, "calm rows tell too little for this test"
     assert _borne_out(_with(problem, member, -0.2, 1.0), member, nothing) == np.inf
     assert 1.0 < _borne_out(_with(problem, member, 0.55, 2.0), member, nothing) < np.inf
+
+
+@pytest.mark.parametrize(("aside", "told"), [(1.0, True), (0.0, False), (0.3, False)])
+def test_a_delay_must_be_told_aside_from_the_kicks_of_a_play(problem: Problem, aside: float, told: bool) -> None:
+    """What is late only where a link lands is the drives' answer to that, however much it explains."""
+    shape = PLAY.effect.grid(problem.situation, 2)[0]
+    play = Member(PLAY, shape, problem.measured(PLAY, shape), 1e3, np.array([1e-3]), 4, 1.0)
+    torque = np.max([np.abs(part @ play.coefficients) for part in play.group.columns], axis=0)
+    reach = round(ANSWERS / (problem.recording.step * problem.whitening.stride))
+    near = maximum_filter1d(torque > 0.02 * torque.max(), 2 * reach + 1)
+    assert 0.05 < near.mean() < MOSTLY
+    lag = Hypothesis(EFFECTS["time_delay"], None)
+    at = lag.effect.grid(problem.sees(lag.effect), None)[0]
+    group = problem.measured(lag, at)
+    late = Member(lag, at, group, 1e4, np.array([50.0 / np.sqrt(group.gram[0, 0])]), 1, 1.0)
+    noise = np.zeros((problem.n, problem.rows, 1), np.float32), np.zeros((problem.mixed.shape[2], 1))
+    data = replace(_sized(problem, late, np.where(near, 1.0, aside)), nulls=noise)
+    assert told_aside(data, late, [play]) is told
+    # Beside nothing that kicks nothing is asked.
+    assert told_aside(data, late, [])
 
 
 def test_above_the_bands_play_counts_in_calm_rows(problem: Problem) -> None:

@@ -196,7 +196,7 @@ def test_where_two_causes_stay_alike_the_others_are_told_apart(problem):
     plan = plan_next(problem, [error, other, error])
     assert plan is not None
     assert plan.resolves < 1e-6
-    assert "hardly torque constant error of joint 2 and torque constant error of joint 2" in plan.why
+    assert "but torque constant error of joint 2 and torque constant error of joint 2 with a chance of 0 %" in plan.why
     grams = Grams(problem, [error, other])
     first, last = (
         MAKERS[choice.kind](room_of(problem.situation.robot, problem.recording), 1, 0)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from estimation.diagnosis.findings import Finding, Gain, Parameter
-from estimation.diagnosis.notes import LITTLE, WORSE, turning_joints, unsure_gain, worse_joints
+from estimation.diagnosis.notes import LITTLE, WORSE, beside_larger, turning_joints, unsure_gain, worse_joints
 
 
 def test_joints_that_the_extension_makes_worse_are_told() -> None:
@@ -51,3 +53,19 @@ def test_a_name_of_which_nothing_is_determined_is_no_more_than_likely() -> None:
     assert open_.endswith("the name is no more than the likeliest for it.")
     for other in (finding("stribeck", False, True), finding("unexplained", False), finding("stribeck")):
         assert unsure_gain(other).endswith("its interval begins below zero.")
+
+
+def test_what_is_as_small_as_formulas_leave_is_told_all_the_same() -> None:
+    """Beside the name that does most there, with the share; nothing where there is none, or nothing beside it."""
+    step, friction, spring = (
+        SimpleNamespace(
+            hypothesis=SimpleNamespace(label=label),
+            group=SimpleNamespace(joints=tuple(gains)),
+            gain_on=lambda joints, gains=gains: sum(gains.get(j, 0.0) for j in joints),
+        )
+        for label, gains in (("a step", {2: 300.0}), ("a friction", {2: 5000.0}), ("a spring", {1: 9000.0, 2: 600.0}))
+    )
+    (note,) = beside_larger(step, [spring, friction])
+    assert note.startswith("a step stands out of the noise, too, but explains 6.0 % of what a friction does on joint 3")
+    assert beside_larger(None, [friction]) == ()
+    assert beside_larger(step, []) == ()

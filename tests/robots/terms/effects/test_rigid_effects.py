@@ -14,7 +14,7 @@ from robots.geometry.chain import Chain
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
-from robots.terms.effects.backlash import SLOWEST
+from robots.terms.effects.backlash import LANDS, SLOWEST
 from robots.terms.effects.base_tilt import level_axes
 from robots.terms.effects.joint_elasticity import followed
 from robots.terms.effects.situation import situation
@@ -184,12 +184,12 @@ def test_size_of_an_effect_tells_its_time(seen):
     """What follows from a coefficient is offered: the gap that is crossed, a delay's own reversals, a resonance."""
     now = seen(5, seed=1)
     bare = seen(5, seed=1, robot=replace(now.robot, rotor_inertia=np.zeros(5)))
-    for known, at, count in ((True, now, 7), (False, bare, 15)):
-        crossings = EFFECTS["backlash"].likely(at, 2, (1e-3, 0.07, 0.2, 0.0), np.array([2e-4]))
-        assert crossings[0] == (4e-4, SLOWEST, 0.0, 0.0)
+    for known, at, count in ((True, now, 15), (False, bare, 31)):
+        crossings = EFFECTS["backlash"].likely(at, 2, (1e-3, 0.07, 0.2, 0.0, 0.03), np.array([2e-4]))
+        assert crossings[0] == (4e-4, SLOWEST, 0.0, 0.0, LANDS)
         assert len(set(crossings)) == count
-        assert (None,) * 4 not in crossings
-        assert ((None, None, None, 0.0) in crossings) is not known
+        assert (None,) * 5 not in crossings
+        assert ((None, None, None, 0.0, None) in crossings) is not known
     for name, joint in (("time_delay", None), ("current_lag", 2)):
         assert EFFECTS[name].likely(now, joint, (1e-3,), np.array([-3e-3])) == ((-3e-3,),)
         assert EFFECTS[name].likely(now, joint, (1e-3,), np.array([0.04])) == ((0.02,),)

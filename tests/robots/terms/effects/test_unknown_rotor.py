@@ -47,7 +47,8 @@ def test_a_rotor_is_as_sure_as_what_tells_it(seen):
         assert rotor_grid(at, 1) == pytest.approx(grid)
         assert is_sure(at, 1) is (bounds[0] == bounds[1])
         for name in ("backlash", "joint_elasticity", "load_dependent_friction"):
-            assert EFFECTS[name].bounds(at, 1)[-1] == rotor_bounds(at, 1)
+            own = [shape.name for shape in EFFECTS[name].shapes].index("rotor_inertia")
+            assert EFFECTS[name].bounds(at, 1)[own] == rotor_bounds(at, 1)
         along = rotors_between(at, 1)
         assert (along[0], along[-1]) == rotor_bounds(at, 1) if along else is_sure(at, 1)
         np.testing.assert_allclose(np.diff(along, 2), 0.0, atol=1e-9)
@@ -66,8 +67,8 @@ def test_a_rotor_that_is_told_is_as_one_that_is_described(effect, seen):
     heavier[0, 4:] += rotor * np.outer(axis, axis)[np.triu_indices(3)]
     lumped = seen(5, robot=replace(robot, inertia=heavier, rotor_inertia=robot.rotor_inertia * (np.arange(5) > 0)))
     np.testing.assert_allclose(lumped.torque, described.torque, atol=1e-9 * np.abs(lumped.torque).max())
-    shape = {"backlash": (1e-3, 0.05, 0.0), "joint_elasticity": (1e4,)}[effect]
-    known, told = (EFFECTS[effect].columns(now, 1, (*shape, b)) for now, b in ((described, 0.0), (lumped, rotor)))
-    taken = EFFECTS[effect].columns(lumped, 1, (*shape, 0.0))
+    shape, after = {"backlash": ((1e-3, 0.05, 0.0), (0.02,)), "joint_elasticity": ((1e4,), ())}[effect]
+    cases = ((described, 0.0), (lumped, rotor), (lumped, 0.0))
+    known, told, taken = (EFFECTS[effect].columns(now, 1, (*shape, b, *after)) for now, b in cases)
     np.testing.assert_allclose(told, known, atol=1e-6 * np.abs(known).max())
     assert np.abs(taken - known).max() > 0.1 * np.abs(known).max()
