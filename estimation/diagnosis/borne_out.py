@@ -81,6 +81,7 @@ def bear_out(
     notes: list[str] = []
     refuted: list[tuple[Member, float, Gain]] = []
     gone: set[Hypothesis] = set()
+    cooled: set[Hypothesis] = set()
 
     def look(members: Sequence[Member]) -> Measured:
         return measure(members, frozenset(i for i, member in enumerate(members) if member.hypothesis in gone))
@@ -93,7 +94,7 @@ def bear_out(
             items.pop(idle[0])
         seen = look(members)
     while harmful := (
-        [i for i, member in enumerate(members) if _harms(seen, i, member, beyond)]
+        [i for i, m in enumerate(members) if m.hypothesis not in cooled and _harms(seen, i, m, beyond)]
         or _together(seen, members, len(founds))
     ):
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
@@ -116,6 +117,9 @@ def bear_out(
             members[worst] = founds[worst].member
             if members[worst].hypothesis.label != label:
                 notes.append(_REPLACED.format(label, members[worst].hypothesis.label))
+            continue
+        elif _may_have_cooled(seen, worst, members[worst]):
+            cooled.add(members[worst].hypothesis)
             continue
         else:
             founds.pop(worst)
@@ -245,8 +249,6 @@ def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bo
         return True
     if joint is not None and seen.unseen.astray(joint - 1):
         return True
-    # Heat that was stored before the unseen data, and what a pause left of it, are told by neither.
-    stored = any(shape.name == "time_constant" for shape in effect.shapes)
     # A free function claims no cause: what it brings elsewhere is all that it is good for.
     least = gain.ci95[1] if len(seen.gains) == 1 or is_of_time(effect) else gain.nrmse_before - gain.nrmse_after
     idle = effect.name.startswith(PREFIX) and least < 0
@@ -254,4 +256,19 @@ def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bo
     against = seen.worse[i] and speaks < -AGAINST
     # Base parameters that it moves may err elsewhere by more than it is, whatever those rows say of it.
     risen = seen.rises[i] > HARM if speaks < LEFT else seen.rises[i] > RUINS and gain.ci95[0] <= 0
-    return (against and not stored) or idle or risen
+    return (against and not _stores(effect)) or idle or risen
+
+
+def _stores(effect: Effect) -> bool:
+    """Whether it keeps heat: what was stored before unseen data, and what a pause left of it, neither log tells."""
+    return any(shape.name == "time_constant" for shape in effect.shapes)
+
+
+def _may_have_cooled(seen: Measured, i: int, member: Member) -> bool:
+    """Whether what unseen data have against a member may be but the heat that a pause left of what they do not show.
+
+    One mass stands for gear and housing: how warm a joint is when it moves again it tells worse than how it warmed.
+    """
+    joint = member.hypothesis.joint
+    known = seen.kept[i] >= LEFT and not (joint is not None and seen.unseen.astray(joint - 1))
+    return _stores(member.hypothesis.effect) and known and seen.rises[i] <= RUINS

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from estimation.diagnosis.borne_out import AGAINST, HARM, LEFT, PLAIN, SLIGHT
+from estimation.diagnosis.borne_out import AGAINST, HARM, LEFT, PLAIN, RUINS, SLIGHT
 from estimation.diagnosis.selection import Found
 from estimation.diagnosis.verdict import CLOSE
 from tests.estimation.diagnosis.borne_out_bench import (
@@ -29,13 +29,23 @@ from tests.estimation.diagnosis.borne_out_bench import (
 )
 
 
-@pytest.mark.parametrize(("rise", "stays"), [(HARM - 0.03, True), (HARM + 0.01, False)])
-def test_heat_before_the_unseen_data_is_not_held_against_a_cause(rise: float, stays: bool) -> None:
-    """What a pause left of the heat is not known: sure errors leave a thermal cause alone unless they are large."""
+@pytest.mark.parametrize(
+    ("rise", "kept", "stays"),
+    [(HARM - 0.03, 1.0, True), (HARM + 0.01, 1.0, True), (RUINS + 0.01, 1.0, False), (HARM + 0.01, 0.1, False)],
+)
+def test_heat_before_the_unseen_data_is_not_held_against_a_cause(rise: float, kept: float, stays: bool) -> None:
+    """What a pause left of the heat is not known: sure errors leave a thermal cause alone unless they are large.
+
+    Where a rival is borne out, and it is not, that takes its place all the same.
+    """
     warm = member_of("thermal_friction", 2)
     bench = bench_with()
-    bench.shows[warm.hypothesis.label] = Shown(-0.004, -0.001, rise)
-    assert (borne(bench, Found(warm, 1e-9, ())).members == (warm,)) is stays
+    bench.shows[warm.hypothesis.label] = Shown(-0.004, -0.001, rise, kept=kept)
+    result = borne(bench, Found(warm, 1e-9, ()))
+    assert (result.members == (warm,)) is stays
+    assert bool(result.notes) is not stays
+    rival = borne(bench, Found(warm, 1e-9, ((STRIBECK, 1.0),))).members
+    assert rival == ((warm,) if rise < HARM else (STRIBECK,))
 
 
 def test_another_form_of_a_cause_goes_before_a_rival() -> None:
