@@ -150,6 +150,42 @@ def test_elastic_gear_obeys_both_inertias() -> None:
     assert np.abs(solved.y[0] - ride.link_q[rows, 5][::50]).max() < 0.03 * twist
 
 
+def test_a_loose_link_flies_lands_and_settles() -> None:
+    """The link of a joint with play, its whole equation of motion integrated from where it leaves its flank.
+
+    Teeth push as a damped spring where it has gone beyond half the play, and not at all between.
+    """
+    machine = draw_machine("heavy", np.random.default_rng(9))
+    reference = draw_periodic(machine, np.random.default_rng(10))
+    effect = Backlash(joint=5, amount=1e-3, swing=30.0, damping=0.4)
+    ride = open_loop(machine, [reference], [effect], step=0.001)
+    behind = ride.q[:, 4] - ride.link_q[:, 4]
+    leaves = np.flatnonzero(np.diff(np.abs(behind) < 0.5e-3 * (1 - 1e-9)) > 0) + 1
+    first = int(leaves[0]) - 1
+    rows = slice(first, first + 250)
+    t, data = ride.t[rows], machine.model.createData()
+    inertia = pin.crba(machine.model, data, ride.q[first])[4, 4]
+    stiff, damp = inertia * (2 * np.pi * 30.0) ** 2, 2 * 0.4 * inertia * 2 * np.pi * 30.0
+
+    def link(time: float, state: np.ndarray) -> list[float]:
+        q, v, a = (np.array([np.interp(time, t, x[rows, j]) for j in range(6)]) for x in (ride.q, ride.v, ride.a))
+        motor, rate = q[4], v[4]
+        q[4], v[4], a[4] = state[0], state[1], 0.0
+        ahead = motor - state[0]
+        deep = np.sign(ahead) * max(abs(ahead) - 0.5e-3, 0.0)
+        push = stiff * deep + damp * (rate - state[1]) if deep else 0.0
+        through = push if push * deep > 0 else 0.0
+        still = pin.rnea(machine.model, data, q, v, a)[4]
+        return [state[1], (through - still) / pin.crba(machine.model, data, q)[4, 4]]
+
+    start = [ride.q[first, 4] - behind[first], ride.v[first, 4]]
+    solved = solve_ivp(link, (t[0], t[-1]), start, max_step=5e-4, t_eval=t)
+    off = solved.y[0] - ride.link_q[rows, 4]
+    assert np.ptp(behind[rows]) > 0.9e-3, "the link does not cross"
+    # The plant takes the arm's pose of the moment at which the link leaves.
+    assert np.abs(off).max() < 0.05 * 1e-3
+
+
 def test_two_effects_that_part_links_act_once() -> None:
     """A gear with play and a spring: the motor gives what its link takes, and what each brings adds up to that."""
     machine = draw_machine("heavy", np.random.default_rng(9))
