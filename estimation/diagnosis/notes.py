@@ -228,6 +228,8 @@ def beside_larger(slight: Member | None, members: Sequence[Member]) -> tuple[str
     if not told:
         return ()
     share, member, j = min(told, key=lambda each: each[0])
+    if slight.hypothesis.effect.alike:
+        return (_NOT_ALIKE.format(slight.hypothesis.label, member.hypothesis.label),)
     if share >= 1.0:
         return ()
     return (_SLIGHT.format(slight.hypothesis.label, member.hypothesis.label, 100 * share, j + 1),)
@@ -240,4 +242,8 @@ def _acts(member: Member, joint: int) -> bool:
 _SLIGHT = (
     "{0} stands out of the noise, too, but explains {2:.1f} % of what {1} does on joint {3}, as much as the formula of "
     "that may leave: it is not told as a finding. A log in which {1} acts less would show whether it is one."
+)
+_NOT_ALIKE = (
+    "{0} stands out of the noise, too, but not beyond what {1} may leave, or make drives answer, on the joints that "
+    "tell it: it is not told as a finding."
 )

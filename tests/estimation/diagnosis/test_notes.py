@@ -57,15 +57,22 @@ def test_a_name_of_which_nothing_is_determined_is_no_more_than_likely() -> None:
 
 def test_what_is_as_small_as_formulas_leave_is_told_all_the_same() -> None:
     """Beside the name that does most there, with the share; nothing where there is none, or nothing beside it."""
-    step, friction, spring = (
+    step, delay, friction, spring = (
         SimpleNamespace(
-            hypothesis=SimpleNamespace(label=label),
+            hypothesis=SimpleNamespace(label=label, effect=SimpleNamespace(alike=label == "a delay")),
             group=SimpleNamespace(joints=tuple(gains)),
             gain_on=lambda joints, gains=gains: sum(gains.get(j, 0.0) for j in joints),
         )
-        for label, gains in (("a step", {2: 300.0}), ("a friction", {2: 5000.0}), ("a spring", {1: 9000.0, 2: 600.0}))
+        for label, gains in (
+            ("a step", {2: 300.0}),
+            ("a delay", {1: 900.0, 2: 900.0}),
+            ("a friction", {2: 5000.0}),
+            ("a spring", {1: 9000.0, 2: 600.0}),
+        )
     )
     (note,) = beside_larger(step, [spring, friction])
     assert note.startswith("a step stands out of the noise, too, but explains 6.0 % of what a friction does on joint 3")
+    (note,) = beside_larger(delay, [friction])
+    assert note.startswith("a delay stands out of the noise, too, but not beyond what a friction may leave")
     assert beside_larger(None, [friction]) == ()
     assert beside_larger(step, []) == ()
