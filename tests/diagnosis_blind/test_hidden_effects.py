@@ -79,7 +79,7 @@ MORE = (
     # 0.43 ms: all of it is in the rows beside reversals, whose direction encoders of the motors tell.
     Hide(seed=7054, effects=(actuator.Delay,), size=0.01, kind="panda", ratio=0.6),
     # When the load changes sign only one knows who knows the rotor, told roughly or not at all.
-    # And a blow of two samples that a model has one sample too early takes as much as it brings.
+    # And a blow that a model has a sample too early takes as much as it brings.
     Hide(seed=7062, effects=(transmission.Backlash,), size=0.015, kind="panda", joint=1, ratio=0.05),
     Hide(seed=7060, effects=(transmission.Backlash,), size=0.015, kind="panda", joint=1, drives=False),
     Hide(seed=7003, effects=(transmission.Ripple,), joint=1, kind="ur10"),

@@ -34,8 +34,9 @@ ASIDE = (-0.03, -0.015, 0.0, 0.015, 0.03)
 """Loads of a scan at which the link changes sides, as shares of the load's root mean square."""
 FARTHEST = 0.1
 """Largest such share: of a base model whose zero is less sure nothing follows."""
-LANDS = 0.02
-"""Time [s] in which a flank stops the link, where nothing tells it."""
+BRIEFEST, LANDS = 0.012, 0.02
+"""Times [s] in which a flank stops the link: at least, and where nothing tells it. When a blow falls is known to some
+milliseconds, as the load's zero is: one briefer than that would err by more than it is where it is predicted."""
 REBOUND, SETTLES = 0.2, 2.0
 """Share of its speed with which a link comes back from the flank, and in how many times its landing it loses that."""
 LEAST, MOST = 1 / 8, 8.0
@@ -73,7 +74,7 @@ class Backlash(Effect):
         Shape("longest", "s", 0.01, SLOWEST, "log", (SLOWEST,), default=SLOWEST),
         Shape("crossed_at", "N m", -np.inf, np.inf, "linear", (0.0,), default=0.0),
         ROTOR,
-        Shape("landing", "s", QUICKEST, 0.1, "log", (LANDS,), default=LANDS),
+        Shape("landing", "s", BRIEFEST, 0.1, "log", (LANDS,), default=LANDS),
     )
     rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "presliding_hysteresis", "load_dependent_friction")
     fast: ClassVar[bool] = True
