@@ -256,12 +256,8 @@ def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bo
     against = seen.worse[i] and speaks < -AGAINST
     # Base parameters that it moves may err elsewhere by more than it is, whatever those rows say of it.
     risen = seen.rises[i] > HARM if speaks < LEFT else seen.rises[i] > RUINS and gain.ci95[0] <= 0
-    return (against and not _stores(effect)) or idle or risen
-
-
-def _stores(effect: Effect) -> bool:
-    """Whether it keeps heat: what was stored before unseen data, and what a pause left of it, neither log tells."""
-    return any(shape.name == "time_constant" for shape in effect.shapes)
+    # Heat that was stored before the unseen data, and what a pause left of it, are told by neither.
+    return (against and not effect.keeps) or idle or risen
 
 
 def _may_have_cooled(seen: Measured, i: int, member: Member) -> bool:
@@ -271,4 +267,4 @@ def _may_have_cooled(seen: Measured, i: int, member: Member) -> bool:
     """
     joint = member.hypothesis.joint
     known = seen.kept[i] >= LEFT and not (joint is not None and seen.unseen.astray(joint - 1))
-    return _stores(member.hypothesis.effect) and known and seen.rises[i] <= RUINS
+    return member.hypothesis.effect.keeps and known and seen.rises[i] <= RUINS

@@ -97,6 +97,11 @@ class Member:
         there = sum(e for j, e in zip(self.group.joints, energies, strict=True) if j in joints)
         return self.gain * there / max(sum(energies), 1e-300)
 
+    def acts(self) -> NDArray[np.bool_]:
+        """Marks the white rows (N,) in which its torque is more than next to nothing on a joint."""
+        torques = [np.abs(part @ self.coefficients) for part in self.group.columns]
+        return np.asarray(np.max([torque > ACTS * torque.max(initial=0.0) for torque in torques], axis=0))
+
     def share_beside(self, other: Member, joint: int) -> float:
         """Share of this torque's energy on a joint, from 0, in the rows in which another's acts there."""
         if joint not in self.group.joints or joint not in other.group.joints:

@@ -11,7 +11,7 @@ from scipy.signal import correlate
 
 from estimation.diagnosis.groups import Group
 from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.refinement import ACTS, Member
+from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.scoring import Accepted, accept, score
 
 Array = NDArray[np.float64]
@@ -34,8 +34,7 @@ def beside_a_shock(problem: Problem, member: Member, accepted: Accepted) -> Memb
     else in the log comes near, it is a shock only of one joint that it explains nearly wholly.
     """
     joints, stride = member.group.joints, problem.whitening.stride
-    torques = [np.abs(part @ member.coefficients) for part in member.group.columns]
-    acts = np.max([torque > ACTS * torque.max(initial=0.0) for torque in torques], axis=0)
+    acts = member.acts()
     left = problem.white - accepted.torque(problem.white)
     offsets = np.linspace(-0.5, 0.5, BETWEEN) * stride
     sizes = np.array([_sizes(problem, left, joints, float(offset)) for offset in offsets])  # (offsets, N, joints)

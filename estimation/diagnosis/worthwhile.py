@@ -10,7 +10,7 @@ from scipy.ndimage import maximum_filter1d
 from estimation.diagnosis.agreement import agreed_gain, joint_by_joint
 from estimation.diagnosis.problem import Problem
 from estimation.diagnosis.quiet_logs import profile_gain
-from estimation.diagnosis.refinement import ACTS, Member
+from estimation.diagnosis.refinement import Member
 from estimation.diagnosis.scoring import Accepted, accept, score
 from estimation.diagnosis.shocks import beside_a_shock
 
@@ -89,9 +89,7 @@ def told_aside(problem: Problem, candidate: Member, members: Sequence[Member]) -
     reach = round(ANSWERS / (problem.recording.step * problem.whitening.stride))
     beside = np.zeros(problem.rows, dtype=bool)
     for member in kicks:
-        torques = [np.abs(part @ member.coefficients) for part in member.group.columns]
-        acts = np.max([torque > ACTS * torque.max(initial=0.0) for torque in torques], axis=0)
-        near = maximum_filter1d(acts, 2 * reach + 1)
+        near = maximum_filter1d(member.acts(), 2 * reach + 1)
         beside |= near & (near.mean() < MOSTLY)
     if not beside.any():
         return True
