@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).resolve().parents[1]
 MEDIAN, NINTH_DECILE = 18, 30  # the targets of CONTRIBUTING's style: words in a sentence
 
 INCLUDE = re.compile(r"^```\{include\} (\S+)\n```", re.MULTILINE)
@@ -97,7 +97,7 @@ def pages() -> list[Path]:
 
 def main() -> None:
     """Prints sentences, median and 90th percentile of each page and of all."""
-    chosen = [Path(name) for name in sys.argv[1:]] or pages()
+    chosen = [Path(name).resolve() for name in sys.argv[1:]] or pages()
     lengths = {path: [count(sentence) for sentence in sentences(page(path))] for path in chosen}
     print(f"{'page':32} sentences  median  90 %   (targets: median {MEDIAN}, 90 % {NINTH_DECILE} words)")
     rows = [(path.name if path.parent == ROOT else f"{path.parent.name}/{path.name}", lengths[path]) for path in chosen]
