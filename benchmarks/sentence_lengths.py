@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-MEDIAN, NINTH_DECILE = 18, 30  # the targets of CONTRIBUTING's style: words in a sentence
+MEDIAN, NINTH_DECILE = 18, 30  # the targets: words in a sentence
 
 INCLUDE = re.compile(r"^```\{include\} (\S+)\n```", re.MULTILINE)
 FENCE = re.compile(r"^ *(`{3,}|:{3,}).*?^ *\1 *$", re.MULTILINE | re.DOTALL)
