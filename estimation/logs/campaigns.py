@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
-from estimation.clocks import are_apart
+from estimation.logs.clocks import are_apart
 from estimation.logs.formats import SUFFIXES, is_bag_folder
 from robots.common.errors import InputError
 from robots.signals import Log

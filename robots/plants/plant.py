@@ -18,7 +18,7 @@ from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Log, Motion
 from robots.terms.effects import Situation, situation
-from robots.terms.effects.bearing import Bearing, Weight
+from robots.terms.situations.bearing import Bearing, Weight
 
 Array = NDArray[np.float64]
 

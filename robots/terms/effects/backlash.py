@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import length_unit
-from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effects.joint_elasticity import link_inertia, windup
-from robots.terms.effects.unknown_rotor import (
+from robots.terms.situations.unknown_rotor import (
     KNOWN,
     ROTOR,
     is_sure,

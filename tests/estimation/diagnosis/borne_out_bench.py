@@ -9,15 +9,15 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from estimation.diagnosis.borne_out import BorneOut, bear_out
 from estimation.diagnosis.findings import Gain
-from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.patterns import build_pattern
-from estimation.diagnosis.refinement import Member
-from estimation.diagnosis.selection import Found
-from estimation.diagnosis.verdict import Judgement
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.refinement import Member
+from estimation.diagnosis.searches.selection import Found
+from estimation.diagnosis.validations.held_out_validation import BorneOut, bear_out
+from estimation.diagnosis.validations.verdict import Judgement
+from robots.terms.discrepancies.patterns import build_pattern
+from robots.terms.effect_bases.base import Effect
 from robots.terms.effects import EFFECTS
-from robots.terms.effects.base import Effect
 
 
 @dataclass(frozen=True)

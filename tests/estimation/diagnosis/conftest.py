@@ -7,14 +7,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from estimation.diagnosis.baseline import base_parameters, build_baseline, inertia_of
-from estimation.diagnosis.noise import estimate_whitening
-from estimation.diagnosis.own_functions import own_functions
-from estimation.diagnosis.posing import fit_values, pose
-from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.recording import Recording
-from estimation.diagnosis.regularisation import pull_of
-from estimation.diagnosis.upper import pose_upper
+from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline, inertia_of
+from estimation.diagnosis.base_models.priors import pull_of
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.problem_setup import fit_values, pose
+from estimation.diagnosis.noise_models.high_frequency_band import pose_upper
+from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening
+from estimation.diagnosis.noise_models.noise_nuisance_basis import own_functions
+from estimation.diagnosis.recordings.recording import Recording
 from robots import load_robot
 from robots.regressor import default_model
 from robots.robot import Robot

@@ -12,10 +12,10 @@ import pytest
 
 from estimation import load_model, predict
 from estimation.diagnosis import Diagnosis, diagnose
-from estimation.diagnosis.baseline import base_parameters, build_baseline
-from estimation.diagnosis.carried import lightened, point_mass, situation_on
-from estimation.diagnosis.simulating import Plant
-from estimation.diagnosis.states import record
+from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
+from estimation.diagnosis.base_models.payload_and_gravity import lightened, point_mass, situation_on
+from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.validations.forward_simulation import Plant
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log, Motion

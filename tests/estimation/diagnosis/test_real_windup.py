@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from estimation.diagnosis.baseline import base_parameters, build_baseline
-from estimation.diagnosis.posing import fit_values
-from estimation.diagnosis.regularisation import pull_of
-from estimation.diagnosis.states import record
-from estimation.diagnosis.windup import measure_windups
+from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
+from estimation.diagnosis.base_models.priors import pull_of
+from estimation.diagnosis.hypothesis_tests.problem_setup import fit_values
+from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.validations.gear_compliance import measure_windups
 from tests.kr300 import kr300
 
 

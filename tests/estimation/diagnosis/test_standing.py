@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis import diagnose
-from estimation.diagnosis.diagnosis import Diagnosis
-from estimation.diagnosis.states import record
+from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.results.diagnosis import Diagnosis
 from estimation.gate import check_log
 from robots.plants import simulate
 from robots.robot import Robot

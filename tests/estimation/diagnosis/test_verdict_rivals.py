@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.diagnosis import verdict
-from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.refinement import RARE, Member
-from estimation.diagnosis.selection import Found
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.refinement import RARE, Member
+from estimation.diagnosis.searches.selection import Found
+from estimation.diagnosis.validations import verdict
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
 from robots.terms.effects.time_delay import near

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.diagnosis import comparing, verdict
-from estimation.diagnosis.groups import Group
-from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.refinement import Member
+from estimation.diagnosis.hypothesis_tests.groups import Group
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.refinement import Member
+from estimation.diagnosis.validations import comparison, verdict
 from robots.terms.effects import EFFECTS
 
 ROWS = 5000
@@ -21,7 +21,7 @@ PRICE = float(np.log(ROWS))
 
 def accepting(monkeypatch: pytest.MonkeyPatch, accept: Callable[..., Any]) -> None:
     """Has members fitted together by a function of the test."""
-    for module in (comparing, verdict):
+    for module in (comparison, verdict):
         monkeypatch.setattr(module, "accept", accept)
 
 

@@ -1,0 +1,73 @@
+"""Forms of one effect that fit alike: first the one beside which the base model stays nearest to what is known of it.
+
+Over the angles of a log a spring's torque is a polynomial's as well as any lever's; beyond those angles they part, and
+so do the gravity terms that each leaves to the base model. The robot's description then says which is likelier.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.diagnosis.base_models.priors import explained, row_weight
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.refinement import Member, all_but, refine
+from estimation.diagnosis.hypothesis_tests.scoring import accept
+from estimation.diagnosis.joint_fits.extended_fit import dense
+from estimation.diagnosis.joint_fits.shrinkage import pull_on
+from estimation.diagnosis.searches.acceptance import LEAST
+from estimation.diagnosis.searches.selection import Found
+from estimation.regressions.parameter_priors import Pull
+
+# Forms whose fits differ by less than this, twice a log-likelihood, are alike to the log.
+ALIKE = 3.0
+
+
+def alike_forms(problem: Problem, members: Sequence[Member], i: int) -> list[Member]:
+    """Lists the other forms of a member that fit about as well beside the rest, the likeliest first."""
+    own, others = members[i], [m for k, m in enumerate(members) if k != i]
+    shapes = own.hypothesis.effect.forms(problem.situation, own.hypothesis.joint)
+    beside = accept(problem, tuple(m.group for m in others))
+    forms = [refine(problem, own.hypothesis, shape, beside, effort=0) for shape in shapes if shape != own.shape]
+    forms = [form for form in forms if form.gain > own.gain - ALIKE]
+    return sorted(forms, key=_evidence(problem, others), reverse=True) if forms else []
+
+
+def completed(problem: Problem, founds: Sequence[Found]) -> tuple[Found, ...]:
+    """Gives what was found with all that its effect has once it is there, where it is worth that.
+
+    A search pays for each coefficient, and goes without those that are hardly told; values without them are told as
+    surer than they are, and off by what those would have been.
+    """
+    members = [found.member for found in founds]
+    whole = []
+    for i, found in enumerate(founds):
+        own = found.member
+        shape = own.hypothesis.effect.complete(problem.situation, own.hypothesis.joint, own.shape)
+        if shape != own.shape:
+            form = refine(problem, own.hypothesis, shape, all_but(problem, members, i))
+            found = replace(found, member=form) if form.worth(problem.rows) > LEAST else found
+        whole.append(found)
+    return tuple(whole)
+
+
+def _evidence(problem: Problem, others: Sequence[Member]) -> Callable[[Member], float]:
+    """Builds the function that gives twice the log-evidence of a form, up to what all forms have alike."""
+    baseline, white = problem.baseline, problem.whitening
+    blocks = [baseline.regressor, baseline.nuisance, *(dense(problem, m.hypothesis, m.shape) for m in others)]
+    known, tau = white.independent(np.concatenate(blocks, axis=2)), white.independent(problem.recording.tau)
+
+    def evidence(form: Member) -> float:
+        flat = np.hstack([known, white.independent(dense(problem, form.hypothesis, form.shape))])
+        pull = pull_on(problem, [*others, form])
+        precision = pull.precision / row_weight(white)
+        gram = flat.T @ flat
+        both = gram + precision
+        scale = np.sqrt(np.maximum(np.diag(both), 1e-300))
+        volume = np.linalg.slogdet(both / scale[:, None] / scale)[1] + 2.0 * float(np.sum(np.log(scale)))
+        prior = float(np.sum(np.log(np.maximum(np.diag(precision)[known.shape[1] :], 1e-300))))
+        return explained(gram, flat.T @ tau, Pull(precision, pull.target)) - float(volume) + prior
+
+    return evidence
