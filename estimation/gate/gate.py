@@ -38,7 +38,7 @@ from estimation.gate.quick_fits.joint_fit import Rows
 from estimation.gate.quick_fits.joint_physics import joint_physics, mean_inertias
 from estimation.gate.quick_fits.whole_fit import fit_all
 from estimation.gate.report import FEWEST, GateReport, pick_rows, worst_first
-from estimation.models.known_setup import set_up
+from estimation.logs.known_setup import set_up
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log

@@ -14,9 +14,9 @@ from estimation.gate import GateReport, check_log
 from estimation.identifications.choices import VELOCITY_SCALES, Candidates, Choice, choose
 from estimation.identifications.estimate import Estimate, JointFit, colour_of
 from estimation.identifications.fit import Fit, fit
-from estimation.models.known_setup import gravities_of, require_plain
+from estimation.logs.known_setup import gravities_of, require_plain
+from estimation.logs.provenance import describe_logs
 from estimation.models.model import Model
-from estimation.models.provenance import describe_logs
 from estimation.preprocessing import Harmonics
 from estimation.regressions.preparation import Prepared, prepare_all
 from estimation.uncertainty import fast_noise, period_noise

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from estimation.estimators.drive_gains import CurrentRun, DriveGains, fit_drive_gains
 from estimation.estimators.payload import Payload, fit_payload
-from estimation.models.known_setup import require_plain
+from estimation.logs.known_setup import require_plain
 from estimation.models.model import Model
 from estimation.regressions.preparation import prepare
 from robots.base_parameters import find_base_parameters

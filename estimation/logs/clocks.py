@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from estimation.models.provenance import are_one, describe_logs
+from estimation.logs.provenance import are_one, describe_logs
 from robots.common.errors import InputError
 from robots.signals import UNKNOWN_PAUSE, Log
 

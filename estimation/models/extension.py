@@ -13,8 +13,8 @@ from robots.common.errors import InputError
 from robots.common.plain import all_finite, finite
 from robots.robot import Robot
 from robots.terms.discrepancies.patterns import build_pattern
+from robots.terms.effect_bases.gear_load import Bearing, Borne, Weight, laden_with
 from robots.terms.effects import EFFECTS, Effect
-from robots.terms.situations.bearing import Bearing, Borne, Weight, laden_with
 from robots.terms.situations.situation import Situation
 
 Array = NDArray[np.float64]

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.diagnosis.base_models.payload_and_gravity import with_body
+from estimation.logs.known_setup import require_known
 from estimation.models.extension import Extension, extension_torque, read_bearing, read_extension, write_bearing
-from estimation.models.known_setup import require_known
 from estimation.models.robot_in_file import build_robot, describe_robot, require_described
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
@@ -22,7 +21,8 @@ from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms import Column, build_term, describe_term
-from robots.terms.situations.bearing import Bearing
+from robots.terms.effect_bases.gear_load import Bearing
+from robots.terms.situations.flange_body import with_body
 from robots.terms.situations.situation import Situation, joined, situation
 
 if TYPE_CHECKING:

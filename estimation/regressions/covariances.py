@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.estimators.base import Array
+from estimation.regressions.moments import Array
 from estimation.uncertainty import Part, covariance
 from robots.base_parameters import BaseParameters
 from robots.signals import Motion

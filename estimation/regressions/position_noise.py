@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.estimators.base import Array
 from estimation.preprocessing import resample
 from estimation.preprocessing.base import Smoother
 from estimation.preprocessing.resampling import Resampled
+from estimation.regressions.moments import Array
 from estimation.regressions.regression_data import RegressionData
 
 # Differences of this order leave nothing of a motion that is sampled well, and of white noise a known multiple.

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.models.known_setup import Load, load_of
+from estimation.logs.known_setup import Load, load_of
 from estimation.preprocessing import LowPass, Resampled, Smoother, period_of, resample, smooth
 from robots.common.errors import InputError
 from robots.common.parallel import threaded

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimation.estimators.base import Array
-from estimation.regressions.moments import Moments
+from estimation.regressions.moments import Array, Moments
 
 
 def regularisation(moments: Moments, weights: Array, gram: Array, ridge: float) -> tuple[Array, Array]:

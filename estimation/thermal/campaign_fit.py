@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from estimation.identifications.identification import identify
-from estimation.models.known_setup import HEAT, require_plain
+from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
 from estimation.thermal.band import error_band
 from estimation.thermal.results.campaign_estimate import CampaignEstimate

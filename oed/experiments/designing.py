@@ -18,7 +18,8 @@ from oed.experiments.problems.criterion_weighting import choose_weighting
 from oed.experiments.problems.essential import essential_part
 from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.quality import design_model, measure
-from oed.experiments.results.result import Design, Outcome
+from oed.experiments.results.outcome import Outcome
+from oed.experiments.results.result import Design
 from oed.experiments.safety_checks.margins import measured_margins
 from oed.experiments.safety_checks.safety import choose_safety, collision_data
 from oed.experiments.searches.islands import search_islands

@@ -17,8 +17,8 @@ from robots.plants.sensors import Sensors
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Log, Motion
+from robots.terms.effect_bases.gear_load import Bearing, Weight
 from robots.terms.effects import Situation, situation
-from robots.terms.situations.bearing import Bearing, Weight
 
 Array = NDArray[np.float64]
 

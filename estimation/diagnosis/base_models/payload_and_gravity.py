@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import groupby
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +11,12 @@ from numpy.typing import NDArray
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.recordings.thinning import at_all_samples, thinned
 from robots.base_parameters import BaseParameters
-from robots.common.errors import InputError
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.terms.effects import Situation
+from robots.terms.situations.flange_body import with_body
 from robots.terms.situations.of_model import sign_of, velocity_scale
-from robots.terms.situations.sensitivities import moved_body
 from robots.terms.situations.situation import Finer, joined, situation, with_finer
-
-if TYPE_CHECKING:
-    from estimation.diagnosis.hypothesis_tests.problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -114,32 +109,4 @@ def _situation(recording: Recording, model: TorqueModel, full: Array) -> Situati
     return joined(parts, model)
 
 
-def with_body(model: TorqueModel, parameters: Array, body: Array) -> Array:
-    """Adds a body at the flange (10,), in its frame, to a model's standard parameters (p,).
-
-    Raises:
-        InputError: a body of another shape, or a model without links.
-    """
-    result = np.array(parameters)
-    if body.any():
-        last = [i for i, column in enumerate(model.columns) if column.term == "rigid_body"][-10:]
-        if body.shape != (10,) or not last:
-            raise InputError(f"a body of shape {body.shape}", allowed="(10,), on a model with rigid links")
-        result[last] += moved_body(model.robot.chain.tip) @ body
-    return result
-
-
-def unloaded(problem: Problem) -> Array:
-    """Parameters (p,) without the payload that the first log may carry."""
-    now, recording = problem.situation, problem.recording
-    return with_body(now.model, now.parameters, -recording.bodies[0])
-
-
-def point_mass(mass: float, centre: tuple[float, float, float]) -> Array:
-    """Gives the ten inertial parameters of a point mass [kg] at a place [m] in the flange's frame."""
-    x, y, z = centre
-    inertia = (y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y)
-    return mass * np.array([1.0, x, y, z, *inertia])
-
-
-__all__ = ["lightened", "point_mass", "regressor_on", "situation_on", "unloaded", "with_body"]
+__all__ = ["lightened", "regressor_on", "situation_on"]

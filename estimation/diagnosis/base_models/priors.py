@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from estimation.diagnosis.base_models.baseline import Baseline
-from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.regressions.parameter_priors import OWN, SILENT, Pull, description_pull, friction_levels
 
@@ -34,7 +33,7 @@ def pull_of(baseline: Baseline, recording: Recording, strength: float = 1.0) -> 
     Args:
         baseline: the base model on the data.
         recording: the data.
-        strength: rows of the noise that tell as much of a slow torque as one of white noise (`row_weight`).
+        strength: rows of the noise that tell as much of a slow torque as one of white noise (`Whitening.row_weight`).
 
     Returns:
         Of base parameters and the baseline's nuisance (b + m), in units of rows over the noise's scale.
@@ -85,14 +84,6 @@ def loosened(pull: Pull, gram: Array, cross: Array, strength: float = 1.0) -> Pu
         weights = 1.0 / np.maximum(1.0, (off / WELL_OFF) ** 2)
     turned = root @ ways
     return Pull(strength * (turned * weights) @ turned.T, pull.target)
-
-
-def row_weight(whitening: Whitening) -> float:
-    """Gives the power density of the noise at rest, over that of white noise of its innovations, a row of the log each.
-
-    So many plain rows, weighed by the innovations' scale, tell as much of a slow torque as one that is white.
-    """
-    return whitening.stride * float(np.mean(np.square(whitening.at_rest / whitening.scale)))
 
 
 def held(gram: Array, cross: Array, pull: Pull) -> Array:

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.payload_and_gravity import point_mass, regressor_on, unloaded, with_body
+from estimation.diagnosis.base_models.payload_and_gravity import regressor_on
 from estimation.diagnosis.experiment_plans.experiment_motions import Stage
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.power import chance_to_resolve
@@ -24,6 +24,7 @@ from robots.signals import Motion
 from robots.terms.effect_bases.heat import HeatEffect
 from robots.terms.effects import situation
 from robots.terms.effects.base_tilt import level_axes
+from robots.terms.situations.flange_body import point_mass, with_body
 from robots.terms.situations.situation import Situation, joined
 
 Array = NDArray[np.float64]
@@ -169,7 +170,7 @@ class Grams:
         return situation(model, parameters, t, motion.q, motion.dq, motion.ddq, starts=starts), first
 
     def _parameters(self, payload: float) -> Array:
-        return with_body(self.model, unloaded(self.problem), point_mass(payload, (0.0, 0.0, ARM)))
+        return with_body(self.model, self.problem.parameters_without_payload, point_mass(payload, (0.0, 0.0, ARM)))
 
     def _gram(self, base: Array, effects: Sequence[Array], whitening: Whitening) -> Array:
         joined = np.concatenate([base, *effects], axis=2)

@@ -17,8 +17,9 @@ from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.reversals.reversal_timing import Timing
 from estimation.regressions.parameter_priors import Pull
+from robots.terms.effect_bases.gear_load import Bearing
 from robots.terms.effects import Effect, Situation
-from robots.terms.situations.bearing import Bearing
+from robots.terms.situations.flange_body import with_body
 
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
@@ -87,6 +88,11 @@ class Problem:
     def rms(self) -> Array:
         """Root mean square torque (n,) [N m or N]."""
         return np.asarray(np.sqrt(np.mean(self.recording.tau**2, axis=0)))
+
+    @property
+    def parameters_without_payload(self) -> Array:
+        """The base model's parameters (p,) without the payload that the first log may carry."""
+        return with_body(self.situation.model, self.situation.parameters, -self.recording.bodies[0])
 
     @cached_property
     def rows(self) -> int:

@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import FAINT, Baseline
-from estimation.diagnosis.base_models.priors import held, loosened, pull_of, row_weight
+from estimation.diagnosis.base_models.priors import held, loosened, pull_of
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.noise_models.high_frequency_band import Upper
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.linear_algebra.orthonormal import orthonormal
 from estimation.regressions.parameter_priors import Pull
-from robots.terms.situations.bearing import Bearing, laden_with
+from robots.terms.effect_bases.gear_load import Bearing, laden_with
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def pose(
     own = recording.tau if extra is None else recording.tau - extra
     gram, cross = moments(baseline, ~recording.unsure / scales, own)
     if pull is None:
-        strength = row_weight(whitening)
+        strength = whitening.row_weight
         pull = loosened(pull_of(baseline, recording, strength), gram.sum(axis=0), cross.sum(axis=0), strength)
     values = held(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
     alone = values if extra is None else fit_values(baseline, scales, recording.unsure, recording.tau, pull)

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import Member, refine
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
 from estimation.diagnosis.hypothesis_tests.time_windows import best_window
-from estimation.diagnosis.searches.acceptance import LEAST
 from robots.common.parallel import threaded
 
 # A window that is told to some hundredths of a second leaves less than this share of the gain to a finer search.
@@ -48,7 +48,7 @@ def as_it_lasts(problem: Problem, member: Member, beside: Accepted) -> Member:
     if near.bic(problem.rows) + NEAR * near.gain < member.bic(problem.rows):
         return member
     best = refine(problem, hypothesis, near.shape, beside)
-    return best if best.bic(problem.rows) > member.bic(problem.rows) + LEAST else member
+    return best if best.bic(problem.rows) > member.bic(problem.rows) + MIN_BIC_GAIN else member
 
 
 def _open(problem: Problem, member: Member, beside: Accepted) -> set[int]:
@@ -58,4 +58,4 @@ def _open(problem: Problem, member: Member, beside: Accepted) -> set[int]:
         return set()
     rest = accept(problem, (member.group, *beside.groups))
     more = ((k, refine(problem, member.hypothesis, shape, rest, effort=0)) for k, shape in further)
-    return {k for k, form in more if form.worth(problem.rows) > LEAST}
+    return {k for k, form in more if form.worth(problem.rows) > MIN_BIC_GAIN}

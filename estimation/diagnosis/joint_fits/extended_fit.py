@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.payload_and_gravity import unloaded
-from estimation.diagnosis.base_models.priors import held, row_weight
+from estimation.diagnosis.base_models.priors import held
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import Member
@@ -87,7 +86,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
     free = flat[:, linear]
     pull = pull_on(problem, members)
     # White rows tell what they are, not what coloured ones of their number would.
-    pull = Pull(pull.precision / row_weight(white), pull.target)
+    pull = Pull(pull.precision / white.row_weight, pull.target)
     values[linear] = held(free.T @ free, free.T @ tau, pull)
     by_reversals = timed(members, [start for start, *_ in slices], (problem.n, flat.shape[1]))
     covariance, unseen = _covariance(np.concatenate([flat, by_reversals]))
@@ -144,7 +143,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         formulas=baseline.base.formulas(),
         provenance=provenance,
         extensions=tuple(extensions),
-        felt=unloaded(problem)[list(baseline.base.independent)],
+        felt=problem.parameters_without_payload[list(baseline.base.independent)],
         bearing=problem.bearing,
         since=problem.situation.origin,
     )

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import Member, refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from estimation.diagnosis.searches.acceptance import LEAST
+from robots.terms.effect_bases.gear_load import Bearing, Borne, Weight
 from robots.terms.effects import EFFECTS
-from robots.terms.situations.bearing import Bearing, Borne, Weight
 
 Array = NDArray[np.float64]
 
@@ -76,7 +76,7 @@ def laden(problem: Problem, members: Sequence[Member], values: Array) -> Laden:
         now = replace(problem, situation=bearing.on(state), bearing=bearing)
         for told in _told_otherwise(now, members, on_them):
             worth = _worth(now, told)
-            if worth > most + (0.0 if best.shows else LEAST):
+            if worth > most + (0.0 if best.shows else MIN_BIC_GAIN):
                 best, most = Laden(bearing, shows=True), worth
     return best
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from estimation.diagnosis.base_models.priors import row_weight
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import Member
 from estimation.diagnosis.hypothesis_tests.scoring import Score, accept, score
@@ -61,7 +60,7 @@ def pull_on(problem: Problem, members: Sequence[Member]) -> Pull:
             timed = np.sum(member.group.timed**2, axis=0)
             target = member.group.timed.T @ problem.timing.residual / (timed + precision)
             precision = precision + timed
-        own.append(row_weight(problem.whitening) * precision)
+        own.append(problem.whitening.row_weight * precision)
         targets.append(target)
     added = np.concatenate([np.zeros(0), *own])
     known = len(pull.target)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.payload_and_gravity import situation_on, unloaded
+from estimation.diagnosis.base_models.payload_and_gravity import situation_on
 from estimation.diagnosis.base_models.priors import free, held
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
@@ -16,8 +16,8 @@ from estimation.diagnosis.hypothesis_tests.refinement import Member
 from estimation.diagnosis.joint_fits.extended_fit import dense, timed
 from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short
 from estimation.diagnosis.recordings.recording import Recording
+from robots.terms.effect_bases.gear_load import laden_with
 from robots.terms.effects import Situation
-from robots.terms.situations.bearing import laden_with
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -144,7 +144,7 @@ def columns_on(
 ) -> tuple[list[Situation], list[Array]]:
     """Evaluates what members depend on in another recording, and their columns (N, n, k) there."""
     model = problem.situation.model
-    own = situation_on(recording, model, unloaded(problem))
+    own = situation_on(recording, model, problem.parameters_without_payload)
     now = laden_with(replace(own, since=problem.situation.origin), problem.bearing)
     states, columns = [now] * len(members), [_dense(now, member) for member in members]
     late = [k for k, member in enumerate(members) if member.hypothesis.effect.blurs]
@@ -154,7 +154,7 @@ def columns_on(
         for k in late:
             states[k], columns[k] = followed, _dense(followed, members[k])
     if problem.whole is not None:
-        whole = situation_on(recording, model, unloaded(replace(problem, situation=problem.whole)))
+        whole = situation_on(recording, model, replace(problem, situation=problem.whole).parameters_without_payload)
         parts = [X @ m.coefficients for X, m in zip(columns, members, strict=True) if not m.hypothesis.effect.last]
         whole = whole.beside(np.sum(parts, axis=0) if parts else None)
         for k, member in enumerate(members):

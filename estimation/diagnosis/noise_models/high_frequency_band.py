@@ -13,10 +13,10 @@ from scipy.signal import firwin
 
 from estimation.diagnosis.base_models.baseline import FAINT, Baseline
 from estimation.diagnosis.noise_models.frequency_bands import TRANSITION, Band, low_pass
-from estimation.diagnosis.noise_models.masked_rows import find_gaps, long_gap
+from estimation.diagnosis.noise_models.masked_rows import find_gaps
 from estimation.diagnosis.noise_models.spectral_lines import without_lines
 from estimation.diagnosis.noise_models.whitening import Whitening
-from estimation.diagnosis.recordings.recording import Recording
+from estimation.diagnosis.recordings.recording import Recording, long_gap
 from estimation.linear_algebra.orthonormal import orthonormal
 
 Array = NDArray[np.float64]

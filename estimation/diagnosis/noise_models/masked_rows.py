@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
-from estimation.linear_algebra.free_torque import FreeTorque, Real, span_of
+from estimation.linear_algebra.free_torque import FreeTorque, Real
 from robots.common.stretches import spans
 
-if TYPE_CHECKING:
-    from estimation.diagnosis.noise_models.whitening import Whitening
-
 Array = NDArray[np.float64]
-
-# A joint that has not moved on for so long [s] is at rest.
-LONG_GAP = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,60 +93,6 @@ def find_gaps(unsure: NDArray[np.bool_], starts: tuple[int, ...], longest: int =
             rows, before, after, weight = empty, empty, empty, np.zeros(0)
         bridges.append((rows, before, after, weight))
     return Gaps(tuple(bridges), ())
-
-
-def long_gap(step: float) -> int:
-    """Number of rows of `step` [s] beyond which a joint whose direction is not known is at rest."""
-    return max(8, round(LONG_GAP / step))
-
-
-def free_columns(
-    unsure: NDArray[np.bool_], longest: int, whitening: Whitening, widths: Sequence[float]
-) -> tuple[FreeTorque, ...]:
-    """Builds the white columns of the short gaps: polynomials over each, one for every `widths[j]` rows and one more.
-
-    Each is whitened where it is not zero only, so that a long log costs no more a gap than a short one.
-    """
-    result = []
-    for j, (column, width) in enumerate(zip(unsure.T, widths, strict=True)):
-        beside = int(np.ceil(1.5 * width)) + 2
-        pieces: list[tuple[int, Array]] = []
-        first_row = 0
-        for run, (run_start, run_stop) in enumerate(pairwise((*whitening.starts, len(column)))):
-            for gap in spans(column[run_start:run_stop]):
-                for start, stop in _short(*gap, longest, beside, run_stop - run_start):
-                    x = np.linspace(-1, 1, stop - start) if stop - start > 1 else np.zeros(1)
-                    number = min(stop - start, int(np.ceil((stop - start) / width)) + 1)
-                    shapes = np.asarray(np.polynomial.legendre.legvander(x, number - 1), dtype=np.float64)
-                    row, white = _white_gap(whitening, j, start, shapes, run_stop - run_start)
-                    pieces.append((first_row + row, white / whitening.level(run, j)))
-            first_row += -(-(run_stop - run_start) // whitening.stride)
-        result.append(span_of(pieces, first_row))
-    return tuple(result)
-
-
-def _white_gap(whitening: Whitening, joint: int, start: int, shapes: Array, rows: int) -> tuple[int, Array]:
-    """Whitens functions of a gap (m, k) that begins at a row of a log: the first white row, and the white rows."""
-    band = whitening.bands[joint]
-    half, stride = len(band.taps) // 2, band.stride
-    taps = whitening.taps(joint)
-    low = max(0, start - half - stride) // stride * stride
-    high = min(rows, start + len(shapes) + half + (len(taps) + 1) * stride)
-    segment = np.zeros((high - low, shapes.shape[1]))
-    segment[start - low : start - low + len(shapes)] = shapes
-    white = band.passed(segment, taps)
-    first = low // stride
-    lead = max(0, min(len(taps) - 1 - first, len(white)))
-    white[:lead] *= np.linspace(0, 1, len(taps))[1 + first : 1 + first + lead, None]
-    return first, white
-
-
-def _short(start: int, stop: int, longest: int, beside: int, rows: int) -> list[tuple[int, int]]:
-    """A short gap as it is; of a long one both ends, where the joint came to rest or broke loose with a kick."""
-    if stop - start <= longest:
-        return [(start, stop)]
-    ends = [(max(edge - beside, 0), min(edge + beside, rows)) for edge in (start, stop) if 0 < edge < rows]
-    return ends
 
 
 def no_gaps(joints: int) -> Gaps:

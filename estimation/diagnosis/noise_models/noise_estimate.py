@@ -11,12 +11,13 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from estimation.diagnosis.noise_models.bursts import bursts
 from estimation.diagnosis.noise_models.frequency_bands import SHARE, find_bands, unbiased
-from estimation.diagnosis.noise_models.masked_rows import find_gaps, free_columns, long_gap
+from estimation.diagnosis.noise_models.masked_rows import find_gaps
 from estimation.diagnosis.noise_models.noise_nuisance_basis import Beside
 from estimation.diagnosis.noise_models.noise_spectrum import PLAIN, SPARING, fit_process
 from estimation.diagnosis.noise_models.spectral_lines import without_lines
-from estimation.diagnosis.noise_models.whitening import Whitening
+from estimation.diagnosis.noise_models.whitening import Whitening, free_columns
 from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.recording import long_gap
 
 Array = NDArray[np.float64]
 

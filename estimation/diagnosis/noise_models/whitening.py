@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal, overload
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.noise_models.frequency_bands import Band
 from estimation.diagnosis.noise_models.masked_rows import Gaps
-from estimation.linear_algebra.free_torque import Real
+from estimation.linear_algebra.free_torque import FreeTorque, Real, span_of
+from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
@@ -64,6 +66,15 @@ class Whitening:
         """The noise's density at rest, as the standard deviation of white noise that has as much there (n,)."""
         gains = [max(abs(1.0 - float(np.sum(a))), LEAST_AT_REST) for a in self.coefficients]
         return self.scale / np.array(gains)
+
+    @property
+    def row_weight(self) -> float:
+        """Power density of the noise at rest over that of white noise of its innovations, per row of the log.
+
+        So many plain rows, weighted by the innovations' scale, hold as much information on a slow torque as one row of
+        white noise.
+        """
+        return self.stride * float(np.mean(np.square(self.at_rest / self.scale)))
 
     def scales(self, rows: int) -> Array:
         """Gives the standard deviation of the innovations of each of a recording's rows (N, n) [N m or N]."""
@@ -142,3 +153,52 @@ class Whitening:
         for j in range(source.shape[1]):
             result[:, j] = source[at, j]
         return result
+
+
+def free_columns(
+    unsure: NDArray[np.bool_], longest: int, whitening: Whitening, widths: Sequence[float]
+) -> tuple[FreeTorque, ...]:
+    """Builds the white columns of the short gaps: polynomials over each, one for every `widths[j]` rows and one more.
+
+    Each is whitened where it is not zero only, so that a long log costs no more a gap than a short one.
+    """
+    result = []
+    for j, (column, width) in enumerate(zip(unsure.T, widths, strict=True)):
+        beside = int(np.ceil(1.5 * width)) + 2
+        pieces: list[tuple[int, Array]] = []
+        first_row = 0
+        for run, (run_start, run_stop) in enumerate(pairwise((*whitening.starts, len(column)))):
+            for gap in spans(column[run_start:run_stop]):
+                for start, stop in _short(*gap, longest, beside, run_stop - run_start):
+                    x = np.linspace(-1, 1, stop - start) if stop - start > 1 else np.zeros(1)
+                    number = min(stop - start, int(np.ceil((stop - start) / width)) + 1)
+                    shapes = np.asarray(np.polynomial.legendre.legvander(x, number - 1), dtype=np.float64)
+                    row, white = _white_gap(whitening, j, start, shapes, run_stop - run_start)
+                    pieces.append((first_row + row, white / whitening.level(run, j)))
+            first_row += -(-(run_stop - run_start) // whitening.stride)
+        result.append(span_of(pieces, first_row))
+    return tuple(result)
+
+
+def _white_gap(whitening: Whitening, joint: int, start: int, shapes: Array, rows: int) -> tuple[int, Array]:
+    """Whitens functions of a gap (m, k) that begins at a row of a log: the first white row, and the white rows."""
+    band = whitening.bands[joint]
+    half, stride = len(band.taps) // 2, band.stride
+    taps = whitening.taps(joint)
+    low = max(0, start - half - stride) // stride * stride
+    high = min(rows, start + len(shapes) + half + (len(taps) + 1) * stride)
+    segment = np.zeros((high - low, shapes.shape[1]))
+    segment[start - low : start - low + len(shapes)] = shapes
+    white = band.passed(segment, taps)
+    first = low // stride
+    lead = max(0, min(len(taps) - 1 - first, len(white)))
+    white[:lead] *= np.linspace(0, 1, len(taps))[1 + first : 1 + first + lead, None]
+    return first, white
+
+
+def _short(start: int, stop: int, longest: int, beside: int, rows: int) -> list[tuple[int, int]]:
+    """A short gap as it is; of a long one both ends, where the joint came to rest or broke loose with a kick."""
+    if stop - start <= longest:
+        return [(start, stop)]
+    ends = [(max(edge - beside, 0), min(edge + beside, rows)) for edge in (start, stop) if 0 < edge < rows]
+    return ends

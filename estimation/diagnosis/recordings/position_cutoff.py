@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.payload_and_gravity import with_body
 from estimation.diagnosis.recordings.smoothed_motion import smoothed
 from estimation.regressions.preparation import Prepared
 from robots.regressor import default_model
 from robots.robot import Robot
+from robots.terms.situations.flange_body import with_body
 
 Array = NDArray[np.float64]
 

@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from estimation.diagnosis.noise_models.masked_rows import long_gap
 from estimation.diagnosis.recordings.periods import Cycle
 from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
+
+# A joint that has not moved on for so long [s] is at rest.
+LONG_GAP = 0.3
 
 BESIDE = 0.05
 """Time [s] about a row of unknown direction in which accelerations are not known to all of their kicks."""
@@ -208,3 +210,8 @@ def following(first: Recording, second: Recording) -> Recording:
         payloads=(*first.bodies, *second.bodies) if first.payloads or second.payloads else (),
         fields=(*first.gravities, *second.gravities) if first.fields or second.fields else (),
     )
+
+
+def long_gap(step: float) -> int:
+    """Number of rows of `step` [s] beyond which a joint whose direction is not known is at rest."""
+    return max(8, round(LONG_GAP / step))

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.payload_and_gravity import situation_on, unloaded
+from estimation.diagnosis.base_models.payload_and_gravity import situation_on
 from estimation.diagnosis.experiment_plans.detection_limits import Limit
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
@@ -38,7 +38,7 @@ from estimation.diagnosis.validations.held_out_errors import Measured, measure_u
 from estimation.diagnosis.validations.held_out_validation import bear_out
 from estimation.diagnosis.validations.prediction_settings import as_sharp, every_row, smoothed_best, with_band
 from estimation.diagnosis.validations.verdict import CLOSE, Judgement, is_open
-from estimation.models.provenance import describe_logs
+from estimation.logs.provenance import describe_logs
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.discrepancies.patterns import all_patterns
@@ -190,7 +190,7 @@ def _windups(told: Told, seen: Measured) -> tuple[Windup, ...]:
     now, unseen = told.problem.situation, None
     if any(log.qlink is not None for log in told.held_out):
         other = cut(seen.whole, slice(seen.first, len(seen.whole)))
-        there = situation_on(other, now.model, unloaded(told.problem))
+        there = situation_on(other, now.model, told.problem.parameters_without_payload)
         unseen = (there, other, told.held_out)
     return measure_windups(now, told.problem.recording, told.logs, false_alarm=told.false_alarm, unseen=unseen)
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
+from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.joint_agreement import agreed_gain, joint_by_joint
 from estimation.diagnosis.hypothesis_tests.log_noise_levels import profile_gain
 from estimation.diagnosis.hypothesis_tests.problem import Problem
@@ -14,8 +15,6 @@ from estimation.diagnosis.hypothesis_tests.refinement import Member
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
 from estimation.diagnosis.hypothesis_tests.shocks import beside_a_shock
 
-# What is reported must be worth its parameters by so much (Schwarz): strong evidence, beside a small p-value.
-LEAST = 10.0
 # Time [s] before and after a kick of another effect, such as a link that lands, in which drives answer to it; what
 # kicks in more than this share of the rows is none. Rows aside must tell this share of a delay.
 ANSWERS, MOSTLY, ASIDE = 0.2, 0.8, 0.5
@@ -26,9 +25,9 @@ SURE = 0.2
 def worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
     """Whether a candidate is worth its parameters beside members; the first one may have another size in each log."""
     worth = candidate.bic(problem.rows) - candidate.doubt if members else candidate.worth(problem.rows)
-    if worth <= LEAST and not members and len(problem.recording.runs) > 1:
+    if worth <= MIN_BIC_GAIN and not members and len(problem.recording.runs) > 1:
         worth += profile_gain(problem, candidate) - candidate.gain
-    return worth > LEAST
+    return worth > MIN_BIC_GAIN
 
 
 def is_told(problem: Problem, candidate: Member, p_value: float, others: Sequence[Member], false_alarm: float) -> bool:
@@ -45,7 +44,7 @@ def is_sure(problem: Problem, candidate: Member, p_value: float, others: Sequenc
 
 def lasts(problem: Problem, candidate: Member, accepted: Accepted) -> bool:
     """Whether what acts for a moment is more than one shock of the noise."""
-    return beside_a_shock(problem, candidate, accepted).worth(problem.rows) > LEAST
+    return beside_a_shock(problem, candidate, accepted).worth(problem.rows) > MIN_BIC_GAIN
 
 
 def beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
@@ -74,7 +73,7 @@ def beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bo
         )
     ]
     lost = candidate.gain - candidate.gain_on(able)
-    return not members or candidate.bic(problem.rows) - lost > LEAST
+    return not members or candidate.bic(problem.rows) - lost > MIN_BIC_GAIN
 
 
 def told_aside(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
@@ -108,7 +107,7 @@ def told_aside(problem: Problem, candidate: Member, members: Sequence[Member]) -
     whole = float(candidate.coefficients[0])
     share = float(cross.sum() / gram.sum()) / whole if whole else 0.0
     paid = candidate.degrees * float(np.log(problem.rows * len(gram)))
-    return share > ASIDE and agreed_gain(gram, cross) - paid > LEAST
+    return share > ASIDE and agreed_gain(gram, cross) - paid > MIN_BIC_GAIN
 
 
 def _agreed(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
@@ -124,4 +123,4 @@ def _agreed(problem: Problem, candidate: Member, members: Sequence[Member]) -> b
     told = told.some((told.gram > 0) & (told.sure * told.cross**2 >= told.gram * others))
     if not len(told.gram):
         return False
-    return told.gain(surely=True) - candidate.degrees * float(np.log(problem.rows * len(told.gram))) > LEAST
+    return told.gain(surely=True) - candidate.degrees * float(np.log(problem.rows * len(told.gram))) > MIN_BIC_GAIN

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.payload_and_gravity import unloaded
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import Member, refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
@@ -20,7 +19,7 @@ from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.diagnosis.recordings.thinning import earlier
-from robots.terms.situations.bearing import laden_with
+from robots.terms.effect_bases.gear_load import laden_with
 
 Array = NDArray[np.float64]
 
@@ -123,7 +122,7 @@ def moved(problem: Problem, values: Array, members: Sequence[Member]) -> bool:
     base = problem.baseline.base
     full = np.zeros(base.model.size)
     full[list(base.independent)] = values
-    change = problem.baseline.regressor @ (full - unloaded(problem))[list(base.independent)]
+    change = problem.baseline.regressor @ (full - problem.parameters_without_payload)[list(base.independent)]
     torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
     if np.max(np.sqrt(np.mean(change**2, axis=0)) / np.maximum(torque, 1e-12)) > MOVED:
         return True

@@ -8,13 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import Member, all_but, refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry, Outcome, scan
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
 from estimation.diagnosis.joint_fits.total_torque import composed
-from estimation.diagnosis.searches.acceptance import LEAST, is_sure
+from estimation.diagnosis.searches.acceptance import is_sure
 from estimation.diagnosis.searches.candidate_screening import contenders
 from robots.common.parallel import threaded
 
@@ -75,7 +76,7 @@ def polished(
         i
         for i, m in enumerate(members)
         if m.hypothesis in seen
-        or _again(problem, members, i).worth(problem.rows) > LEAST
+        or _again(problem, members, i).worth(problem.rows) > MIN_BIC_GAIN
         or is_sure(problem, m, p_values[i], [*members[:i], *members[i + 1 :]], false_alarm)
     ]
     return [members[i] for i in keep], [p_values[i] for i in keep]
@@ -87,7 +88,7 @@ def _again(problem: Problem, members: Sequence[Member], i: int) -> Member:
     Joints on which they had not found their forms yet may have seemed at odds.
     """
     m = members[i]
-    if m.worth(problem.rows) > LEAST:
+    if m.worth(problem.rows) > MIN_BIC_GAIN:
         return m
     now = refine(problem, m.hypothesis, m.shape, all_but(problem, members, i), effort=0)
     return replace(m, gain=now.gain, scatter=now.scatter, doubt=now.doubt)

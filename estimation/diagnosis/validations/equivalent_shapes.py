@@ -11,13 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.diagnosis.base_models.priors import explained, row_weight
+from estimation.diagnosis.base_models.priors import explained
+from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import Member, all_but, refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.shrinkage import pull_on
-from estimation.diagnosis.searches.acceptance import LEAST
 from estimation.diagnosis.searches.selection import Found
 from estimation.regressions.parameter_priors import Pull
 
@@ -48,7 +48,7 @@ def completed(problem: Problem, founds: Sequence[Found]) -> tuple[Found, ...]:
         shape = own.hypothesis.effect.complete(problem.situation, own.hypothesis.joint, own.shape)
         if shape != own.shape:
             form = refine(problem, own.hypothesis, shape, all_but(problem, members, i))
-            found = replace(found, member=form) if form.worth(problem.rows) > LEAST else found
+            found = replace(found, member=form) if form.worth(problem.rows) > MIN_BIC_GAIN else found
         whole.append(found)
     return tuple(whole)
 
@@ -62,7 +62,7 @@ def _evidence(problem: Problem, others: Sequence[Member]) -> Callable[[Member], 
     def evidence(form: Member) -> float:
         flat = np.hstack([known, white.independent(dense(problem, form.hypothesis, form.shape))])
         pull = pull_on(problem, [*others, form])
-        precision = pull.precision / row_weight(white)
+        precision = pull.precision / white.row_weight
         gram = flat.T @ flat
         both = gram + precision
         scale = np.sqrt(np.maximum(np.diag(both), 1e-300))

@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from estimation.diagnosis.base_models.payload_and_gravity import situation_on, with_body
+from estimation.diagnosis.base_models.payload_and_gravity import situation_on
 from estimation.diagnosis.hypothesis_tests.refinement import Member
 from estimation.diagnosis.recordings.recording import Recording, cut
 from estimation.diagnosis.validations.simulation_result import Curves, Simulation
 from robots.plants.closed_loop import Driven, Loop, Reference, Tangent, drive
 from robots.regressor import TorqueModel
 from robots.terms.discrepancies.patterns import PREFIX
+from robots.terms.effect_bases.gear_load import Bearing, laden_with
 from robots.terms.effect_bases.static import StaticJointEffect
-from robots.terms.situations.bearing import Bearing, laden_with
+from robots.terms.situations.flange_body import with_body
 from robots.terms.situations.of_model import sign_of
 from robots.terms.situations.situation import Situation
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.priors import explained, held, row_weight
+from estimation.diagnosis.base_models.priors import explained, held
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.regressions.parameter_priors import Pull
@@ -233,7 +233,7 @@ def _growth(
         own, place = pull.columns(chosen), np.ix_(chosen, chosen)
         both = fit[0][place] + more[0][place], fit[1][chosen] + more[1][chosen]
         told.append(explained(*both, own) - explained(fit[0][place], fit[1][chosen], own))
-    noise = row_weight(problem.whitening) * max(1.0, (square - told[-1]) / max(int(counts.sum()), 1))
+    noise = problem.whitening.row_weight * max(1.0, (square - told[-1]) / max(int(counts.sum()), 1))
     return (told[-1] - np.array(told)) / noise
 
 

@@ -16,9 +16,9 @@ from estimation.diagnosis.validations.jackknife import blocks_of, gain_by_blocks
 from estimation.models.extension import Extension
 from robots.signals import Log
 from robots.terms.base import force_unit, length_unit
+from robots.terms.effect_bases.unknown_rotor import KNOWN
 from robots.terms.effects import EFFECTS
 from robots.terms.situations.situation import Situation
-from robots.terms.situations.unknown_rotor import KNOWN
 
 Array = NDArray[np.float64]
 

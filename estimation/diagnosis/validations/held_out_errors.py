@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.payload_and_gravity import lightened, regressor_on, unloaded
+from estimation.diagnosis.base_models.payload_and_gravity import lightened, regressor_on
 from estimation.diagnosis.base_models.priors import held
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.problem import Problem
@@ -189,7 +189,7 @@ def simulate_unseen(
     after = replace(
         before,
         values=extended[:b],
-        felt=unloaded(problem)[list(known.independent)],
+        felt=problem.parameters_without_payload[list(known.independent)],
         bearing=problem.bearing,
         since=problem.situation.origin,
         members=tuple(members[i] for i in there),

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.refinement import Member
-from estimation.diagnosis.searches.acceptance import LEAST
 from estimation.diagnosis.searches.selection import Found
 from estimation.diagnosis.validations.free_functions import SURE
 from estimation.diagnosis.validations.held_out_errors import Measured
@@ -230,7 +230,7 @@ def _idle(
     if beyond(member.hypothesis.effect):
         return False
     slight = worth(member) < min(SLIGHT * strongest, PLAIN) and seen.speaks[i] < LEFT and gain.ci95[0] <= 0
-    return slight or (worth(member) <= LEAST and gain.nrmse_after >= gain.nrmse_before)
+    return slight or (worth(member) <= MIN_BIC_GAIN and gain.nrmse_after >= gain.nrmse_before)
 
 
 def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bool]) -> bool:

@@ -13,7 +13,7 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.validations.gain_intervals import PARTS, Unseen
 from estimation.identifications.comparison import band_of
 from estimation.models.model import Model
-from estimation.models.prediction import Prediction, predict
+from estimation.predictions.prediction import Prediction, predict
 from estimation.regressions.preparation import torque_of
 from robots.common.plain import all_finite, number
 from robots.signals import Log

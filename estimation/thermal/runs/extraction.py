@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.models.known_setup import HEAT, require_plain
+from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
 from estimation.preprocessing import resample, smooth
 from estimation.regressions.preparation import SLOW, torque_of

@@ -60,7 +60,7 @@ def identify(
         from estimation import read_logs
         from estimation.exports import c_code as c_text
         from estimation.exports import urdf_text
-        from estimation.identifications.method_table import compare_methods
+        from estimation.predictions.method_table import compare_methods
         from oed.reports import save_estimate_report
         from robots.common.files import ResultFolder, open_atomic
 

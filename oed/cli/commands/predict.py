@@ -49,7 +49,7 @@ def predict(
     with console.working() as progress:
         from estimation import load_model, read_log
         from estimation import predict as run
-        from estimation.models.prediction import clock_of
+        from estimation.predictions.prediction import clock_of
 
         identified = load_model(model)
         robot = identified.robot
@@ -85,7 +85,7 @@ def _heat(
     import json as codec
 
     from estimation import read_logs
-    from estimation.models.prediction import warmed
+    from estimation.predictions.prediction import warmed
     from estimation.thermal import start_temperatures, thermal_from_dict
     from robots.common.errors import InputError
 

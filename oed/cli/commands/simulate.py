@@ -102,7 +102,7 @@ def simulate(
             described = given or (robot_from(named, tip, joints, lock) if named else None)
             if model is not None:
                 from estimation import load_model
-                from estimation.models.virtual_robot import virtual_robot
+                from estimation.predictions.virtual_robot import virtual_robot
 
                 obeyed = load_model(model)
                 virtual, described = virtual_robot(obeyed, described), described or obeyed.robot

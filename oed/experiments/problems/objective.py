@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.experiments.problems.problem import FourierProblem
-from oed.experiments.solvers.trap import Trap
+from oed.experiments.problems.trap import Trap
 
 Array = NDArray[np.float64]
 

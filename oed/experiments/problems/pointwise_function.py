@@ -10,7 +10,7 @@ import casadi
 import numpy as np
 
 from oed.experiments.problems.pointwise_rows import PointwiseRows
-from oed.experiments.solvers.trap import Trap
+from oed.experiments.problems.trap import Trap
 
 
 class PointwiseFunction(casadi.Callback):

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 from oed.criteria import Criterion
 from oed.experiments.quality import Quality
-from oed.experiments.results.design_file import DESIGN, TRAJECTORY, design_data, load_design
+from oed.experiments.results.design_file import DESIGN, TRAJECTORY, read_design
+from oed.experiments.results.outcome import Outcome
 from oed.experiments.results.views import motion_frame, plot_velocities
-from oed.experiments.safety_checks.margins import measured_margins
+from oed.experiments.safety_checks.margins import margin_data, measured_margins, missing_limits
 from oed.experiments.safety_checks.spatial_check import SpatialMargin
 from oed.experiments.searches.search import INTERRUPTED
 from oed.exports import write_trajectory
 from robots.base_parameters import BaseParameters
 from robots.common.files import write_atomic
-from robots.common.plain import all_finite, number
 from robots.limits import Margin
 from robots.plants import PlantEffect
 from robots.robot import Robot
@@ -33,42 +33,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Outcome:
-    """How one independent search ended.
-
-    Attributes:
-        island: its number, counted from 1.
-        initial: the criterion at its first feasible point.
-        final: the criterion of its best design.
-        iterations: of the local solver.
-        evaluations: of criterion and gradient.
-        status: ``finished``, or what stopped it early.
-        starts: of each random start, pulled within the limits, the criterion there and after the first solution.
-    """
-
-    island: int
-    initial: float
-    final: float
-    iterations: int
-    evaluations: int
-    status: str
-    starts: tuple[tuple[float, float], ...] = ()
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes plain data; null where a point did not excite all parameters."""
-        data = {name: None if value != value else value for name, value in asdict(self).items()}
-        return data | {"starts": [all_finite(pair) for pair in self.starts]}
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Outcome:
-        """Reads what `to_dict` wrote."""
-        values: dict[str, Any] = {name: np.nan if value is None else value for name, value in data.items()}
-        pairs = (map(number, pair) for pair in data.get("starts", ()))
-        values["starts"] = tuple((before, after) for before, after in pairs)
-        return cls(**values)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,7 +195,46 @@ class Design:
 
     def to_dict(self) -> dict[str, Any]:
         """Writes everything but the samples as plain data for `design.json`."""
-        return design_data(self)
+        model = self.base.model
+        return {
+            "format": "robot-oed design",
+            "format_version": 1,
+            "tool_version": VERSION,
+            "robot": {"name": self.robot.name, "origin": self.robot.origin, "sha256": self.robot.digest},
+            "assumed": [*self.robot.assumed, *(f"limits.{name}" for name in missing_limits(self.robot.limits))],
+            "model": {
+                "columns": list(self.base.names),
+                "units": [column.unit for column in self.base.columns],
+                "stands_for": list(self.base.formulas()),
+                "terms": [term.name for term in model.terms],
+                "scaling": self.settings.get("scaling", "none"),
+                "coulomb": f"tanh(dq / {self.settings['velocity_scale']:g})",
+            },
+            "criterion": self.criterion.name,
+            "criterion_label": self.criterion.label,
+            "quality": [quality.to_dict() for quality in self.qualities],
+            "fourier": {
+                "base_frequency_hz": self.settings["base_frequency"],
+                "harmonics": self.settings["harmonics"],
+                "periods": self.settings["periods"],
+                "coefficients": self.coefficients.tolist(),
+            },
+            "segments": [dict(segment) for segment in self.segments],
+            "duration": self.motion.duration,
+            "period": self.robot.period,
+            "home": self.home.tolist(),
+            "home_moved": self.home_moved,
+            "limits_in_space": [asdict(margin) for margin in self.space],
+            "collision": None if self.freedom is None else dict(self.freedom),
+            "strokes_left_out": list(self.strokes_left_out),
+            "smallest_margins": [margin_data(margin) for margin in self.margins],
+            "solver": {
+                "name": self.settings["solver"]["name"],
+                "islands": [island.to_dict() for island in self.islands],
+            },
+            "seed": self.settings["seed"],
+            "settings": dict(self.settings),
+        }
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Writes `trajectory.csv` and `design.json` into a folder that is there.
@@ -255,7 +258,7 @@ class Design:
         Raises:
             InputError: a missing or damaged file, or another robot than the design's.
         """
-        return load_design(folder, robot, criterion)
+        return cls(**read_design(folder, robot, criterion))
 
     def metadata(self) -> dict[str, Any]:
         """What the trajectory file says of itself."""

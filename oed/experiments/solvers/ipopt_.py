@@ -14,9 +14,9 @@ from oed.experiments.problems.objective import Objective, Watch
 from oed.experiments.problems.pointwise_function import PointwiseFunction
 from oed.experiments.problems.pointwise_rows import PointwiseRows
 from oed.experiments.problems.problem import FourierProblem
+from oed.experiments.problems.trap import Trap
 from oed.experiments.problems.working_set import WorkingSet
 from oed.experiments.solvers.base import PASSED, Solved, Solver, Stage
-from oed.experiments.solvers.trap import Trap
 
 Array = NDArray[np.float64]
 

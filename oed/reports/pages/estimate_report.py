@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.identifications.estimate import Estimate
-from estimation.identifications.method_table import MethodTable
+from estimation.predictions.method_table import MethodTable
 from oed.reports.pictures.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
 from oed.reports.pictures.torque_pictures import residual_picture, torque_picture
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table

@@ -10,7 +10,7 @@ from scipy.linalg import solve_banded
 
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
-from robots.terms.situations.unknown_rotor import KNOWN, ROTOR, is_sure, load_beside, rotor_bounds, rotor_grid
+from robots.terms.effect_bases.unknown_rotor import KNOWN, ROTOR, is_sure, load_beside, rotor_bounds, rotor_grid
 
 if TYPE_CHECKING:
     from robots.robot import Robot

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from robots.terms.base import length_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
 from robots.terms.effect_bases.static import Instant, StaticJointEffect
-from robots.terms.situations.unknown_rotor import KNOWN, ROTOR, load_beside, rotor_bounds, rotor_grid
+from robots.terms.effect_bases.unknown_rotor import KNOWN, ROTOR, load_beside, rotor_bounds, rotor_grid
 
 if TYPE_CHECKING:
     from robots.robot import Robot

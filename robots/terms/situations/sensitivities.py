@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import casadi
 import numpy as np
@@ -14,32 +13,40 @@ from robots.batch import BatchFunction, batch_function, builds_expressions
 from robots.common.errors import InputError
 from robots.geometry.chain import Chain
 from robots.geometry.symbolic import cleaned, symbolic_placement
-
-if TYPE_CHECKING:
-    from robots.terms.situations.situation import Situation
+from robots.regressor import TorqueModel
 
 Array = NDArray[np.float64]
 CHUNK = 4096
 
 
-def evaluate(kind: str, situation: Situation) -> Array:
+def evaluate(kind: str, model: TorqueModel, parameters: Array, q: Array, dq: Array, ddq: Array) -> Array:
     """Evaluates one kind of `Situation.sensitivity`.
+
+    Args:
+        kind: a key of `KINDS`.
+        model: the torque model.
+        parameters: its standard parameters (p,).
+        q: positions (N, n).
+        dq: velocities (N, n).
+        ddq: accelerations (N, n).
+
+    Returns:
+        The sensitivity (N, r, c).
 
     Raises:
         InputError: an unknown kind.
     """
     if kind not in KINDS:
         raise InputError(f"sensitivity {kind!r}", allowed=", ".join(KINDS))
-    s, n = situation, situation.robot.n
-    evaluator = _evaluator(s.robot.chain, kind)
-    rigid = [i for i, column in enumerate(s.model.columns) if column.term == "rigid_body"]
-    pi = s.parameters[rigid] if rigid else np.zeros(10 * n)
-    result = np.empty((len(s), *evaluator.output_shapes[0]))
+    evaluator = _evaluator(model.robot.chain, kind)
+    rigid = [i for i, column in enumerate(model.columns) if column.term == "rigid_body"]
+    pi = parameters[rigid] if rigid else np.zeros(10 * model.robot.n)
+    result = np.empty((len(q), *evaluator.output_shapes[0]))
     # In chunks: the parameters, repeated for every sample of a long log, would not fit into memory.
-    for start in range(0, len(s), CHUNK):
-        rows = slice(start, min(start + CHUNK, len(s)))
+    for start in range(0, len(q), CHUNK):
+        rows = slice(start, min(start + CHUNK, len(q)))
         repeated = np.broadcast_to(pi, (rows.stop - rows.start, len(pi)))
-        evaluator(s.q[rows], s.dq[rows], s.ddq[rows], repeated, out=(result[rows],))
+        evaluator(q[rows], dq[rows], ddq[rows], repeated, out=(result[rows],))
     return result
 
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.terms.situations.of_model import rotor_inertias, sign_of, velocity_scale
+from robots.terms.situations.sensitivities import evaluate
 
 if TYPE_CHECKING:
     from robots.regressor import TorqueModel
@@ -186,12 +187,13 @@ class Situation:
                 of the links' masses there [kg m] (N, 3, 1), ``links`` of each link's frame there the rotation matrix,
                 row by row, and the origin [m] (N, 12, n).
         """
-        from robots.terms.situations.sensitivities import evaluate
-
         if kind not in self._cache:
             parts = [part.sensitivity(kind) for part in self.parts]
-            self._cache[kind] = np.concatenate(parts) if parts else evaluate(kind, self)
+            self._cache[kind] = np.concatenate(parts) if parts else self._evaluated(kind)
         return self._cache[kind]
+
+    def _evaluated(self, kind: str) -> Array:
+        return evaluate(kind, self.model, self.parameters, self.q, self.dq, self.ddq)
 
     def cached(self, key: object, compute: Callable[[], Kept]) -> Kept:
         """Gives `compute()`, computed once per key: a state that several columns share."""

@@ -13,12 +13,13 @@ import pytest
 from estimation import load_model, predict
 from estimation.diagnosis import Diagnosis, diagnose
 from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
-from estimation.diagnosis.base_models.payload_and_gravity import lightened, point_mass, situation_on
+from estimation.diagnosis.base_models.payload_and_gravity import lightened, situation_on
 from estimation.diagnosis.recordings.log_reading import record
 from estimation.diagnosis.validations.forward_simulation import Plant
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log, Motion
+from robots.terms.situations.flange_body import point_mass
 
 ANGLE = np.radians(15.0)
 TILTED = 9.81 * np.array([0.0, -np.sin(ANGLE), -np.cos(ANGLE)])

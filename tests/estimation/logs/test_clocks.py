@@ -10,7 +10,7 @@ import pytest
 
 from estimation import on_one_clock, read_log, write_log
 from estimation.logs.clocks import UNKNOWN_PAUSE, clocked, later_by
-from estimation.models.provenance import describe_logs
+from estimation.logs.provenance import describe_logs
 from robots.common.errors import InputError
 from robots.signals import Log
 

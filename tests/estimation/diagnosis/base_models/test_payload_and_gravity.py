@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.diagnosis.base_models.payload_and_gravity import lightened, situation_on, with_body
+from estimation.diagnosis.base_models.payload_and_gravity import lightened, situation_on
 from estimation.diagnosis.recordings.log_reading import record
 from robots.common.errors import InputError
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log
+from robots.terms.situations.flange_body import with_body
 from tests.estimation.diagnosis.pinocchio_chains import torque_of_mass
 
 MASS, CENTRE = 1.5, np.array([0.02, -0.03, 0.1])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from estimation.diagnosis.base_models.payload_and_gravity import point_mass, situation_on
+from estimation.diagnosis.base_models.payload_and_gravity import situation_on
 from estimation.diagnosis.experiment_plans.experiment_grams import Grams
 from estimation.diagnosis.experiment_plans.experiment_motions import MADE, MAKERS, Stage, room_of
 from estimation.diagnosis.experiment_plans.next_experiment import ENOUGH, LONGEST, _Choice, plan_next, repeated
@@ -18,6 +18,7 @@ from robots.plants import Sensors
 from robots.regressor import default_model
 from robots.signals import Motion
 from robots.terms.effects import EFFECTS, EXPERIMENTS
+from robots.terms.situations.flange_body import point_mass
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests import refinement
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
@@ -16,7 +17,7 @@ from estimation.diagnosis.hypothesis_tests.joint_agreement import Told
 from estimation.diagnosis.hypothesis_tests.refinement import RARE, Member
 from estimation.diagnosis.hypothesis_tests.scan import Outcome
 from estimation.diagnosis.searches import acceptance
-from estimation.diagnosis.searches.acceptance import LEAST, SURE, beyond, is_sure, worth_it
+from estimation.diagnosis.searches.acceptance import SURE, beyond, is_sure, worth_it
 from estimation.diagnosis.searches.candidate_screening import contenders
 from robots.terms.effects import EFFECTS, Shape
 from robots.terms.effects.stribeck import Stribeck
@@ -170,7 +171,7 @@ def test_what_is_far_from_chance_is_sure_on_a_joint_of_its_own(
         return replace(member, group=replace(member.group, joints=(0, 1) if joint is None else (joint - 1,)))
 
     own = replace(on(1), gain=gain, degrees=2)
-    assert own.bic(ROWS) < LEAST
+    assert own.bic(ROWS) < MIN_BIC_GAIN
     problem: Any = SimpleNamespace(rows=ROWS)
     assert is_sure(problem, own, chance * SURE * 0.01, [on(joint) for joint in beside], 0.01) is sure
 

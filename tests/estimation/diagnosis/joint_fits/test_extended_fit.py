@@ -19,7 +19,7 @@ from estimation.diagnosis.recordings.log_reading import record
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.models.extension import find_effect
 from estimation.models.model import load_model
-from estimation.models.virtual_robot import virtual_robot
+from estimation.predictions.virtual_robot import virtual_robot
 from robots.robot import Robot
 from robots.signals import Log, Motion
 from robots.terms.effects import EFFECTS

@@ -21,12 +21,12 @@ from estimation.diagnosis.joint_fits.gear_load import NOTHING, laden
 from estimation.diagnosis.joint_fits.total_torque import fit
 from estimation.diagnosis.recordings.log_reading import record
 from estimation.diagnosis.recordings.recording import Recording
-from estimation.models.virtual_robot import virtual_robot
+from estimation.predictions.virtual_robot import virtual_robot
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log, Motion
+from robots.terms.effect_bases.gear_load import Bearing, Weight
 from robots.terms.effects import EFFECTS
-from robots.terms.situations.bearing import Bearing, Weight
 
 SPRING, BY_LOAD, BY_PLACE = (
     Hypothesis(EFFECTS[name], 1) for name in ("spring", "load_dependent_friction", "position_dependent_friction")

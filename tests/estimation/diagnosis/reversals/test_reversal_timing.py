@@ -11,7 +11,6 @@ import pytest
 
 from estimation import diagnose
 from estimation.diagnosis.base_models.baseline import base_parameters
-from estimation.diagnosis.base_models.priors import row_weight
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.joint_agreement import joint_by_joint
 from estimation.diagnosis.hypothesis_tests.problem import Problem
@@ -186,7 +185,7 @@ def test_what_reversals_tell_counts_as_one_row_for_each_joint(
     both = float((rows.cross + 2e-3 * 4e6)[0] / (rows.gram[0, 0] + 4e6))
     assert member.coefficients[0] == pytest.approx(both, rel=1e-6)
     pull = pull_on(problem, [member])
-    assert pull.precision[-1, -1] * pull.target[-1] == pytest.approx(row_weight(problem.whitening) * 2e-3 * 4e6)
+    assert pull.precision[-1, -1] * pull.target[-1] == pytest.approx(problem.whitening.row_weight * 2e-3 * 4e6)
     assert 0.0 < pull.target[-1] <= 2e-3
 
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.diagnosis.base_models.payload_and_gravity import unloaded
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
@@ -71,7 +70,7 @@ def test_little_is_searched_anew_where_it_changes_what_was_found(
     values = settle(problem, [member]).values
     assert not moved(problem, values, [])
     assert moved(problem, values, [member])
-    assert not moved(problem, unloaded(problem)[list(problem.baseline.base.independent)], [member])
+    assert not moved(problem, problem.parameters_without_payload[list(problem.baseline.base.independent)], [member])
 
 
 def test_a_search_is_done_again_where_the_slow_part_of_the_noise_is_smaller(

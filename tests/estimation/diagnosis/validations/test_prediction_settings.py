@@ -13,7 +13,7 @@ from estimation.diagnosis.recordings.log_reading import record
 from estimation.diagnosis.validations.gain_intervals import Unseen
 from estimation.diagnosis.validations.prediction_settings import as_sharp, smoothed_best, with_band
 from estimation.models.extension import Extension
-from estimation.models.prediction import predict
+from estimation.predictions.prediction import predict
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms import FrictionPolynomial

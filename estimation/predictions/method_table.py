@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from estimation.estimators import ESTIMATORS
 from estimation.identifications.identification import identify
-from estimation.models.prediction import predict
+from estimation.predictions.prediction import predict
 from robots.common.errors import InputError, OedError
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from estimation.identifications.method_table import compare_methods
+from estimation.predictions.method_table import compare_methods
 from robots.common.errors import InputError
 
 
@@ -25,7 +25,7 @@ def test_one_log_is_cut_in_two(arm, arm_log):
 
 def test_an_estimator_that_fails_says_why(arm, arm_log, monkeypatch):
     """A failure is a row with its reason, not the end of the comparison."""
-    from estimation.identifications import method_table
+    from estimation.predictions import method_table
 
     def fail(robot, logs, *, method, **options):
         raise InputError(f"{method} needs something else")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.logs.clocks import before_it, later_by
-from estimation.models.known_setup import HEAT, require_plain
+from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
 from estimation.preprocessing import LowPass, Smoother, SmoothingSpline, resample, smooth
 from estimation.preprocessing.smoothing import low_pass

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from robots.terms.effect_bases.unknown_rotor import is_sure, rotor_bounds, rotor_grid, rotors_between
 from robots.terms.effects import EFFECTS, situation
-from robots.terms.situations.unknown_rotor import is_sure, rotor_bounds, rotor_grid, rotors_between
 
 
 def _held(now):

@@ -5,7 +5,7 @@ import pytest
 
 from estimation import identify, predict, read_log
 from estimation.identifications.choices import Candidates
-from estimation.models.prediction import Prediction
+from estimation.predictions.prediction import Prediction
 from estimation.preprocessing import LowPass, SmoothingSpline, resample, smooth
 from robots.common.errors import InputError
 from robots.signals import Log, Motion

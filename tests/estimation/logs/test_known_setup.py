@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from estimation import check_log, identify, load_model, predict
-from estimation.diagnosis.base_models.payload_and_gravity import point_mass
 from estimation.estimators import RegressionData, WeightedLeastSquares
 from estimation.exports import urdf_text
 from estimation.identifications.fit import sum_moments
@@ -23,6 +22,7 @@ from robots.common.errors import InputError
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log, Motion
+from robots.terms.situations.flange_body import point_mass
 
 LEVEL = np.array([0.0, 0.0, -9.81])
 WALL = np.array([-9.81, 0.0, 0.0])
