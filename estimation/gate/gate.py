@@ -38,7 +38,7 @@ from estimation.gate.quick_fits.joint_fit import Rows
 from estimation.gate.quick_fits.joint_physics import joint_physics, mean_inertias
 from estimation.gate.quick_fits.whole_fit import fit_all
 from estimation.gate.report import FEWEST, GateReport, pick_rows, worst_first
-from estimation.logs.known_setup import set_up
+from estimation.logs.known_setup import robot_for_log
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log
@@ -75,7 +75,7 @@ def check_log(robot: Robot, log: Log) -> GateReport:
     file = str(log.metadata.get("file", log.name))
     if log.n != robot.n:
         raise InputError(f"{log.n} joints", file=file or None, allowed=f"{robot.n}, as {robot.name} has")
-    robot = set_up(robot, log)
+    robot = robot_for_log(robot, log)
     samples, duration = len(log), log.duration
     stalls = check_stalls(log)
     if stalls.findings:

@@ -12,7 +12,7 @@ from estimation.estimators import Estimator
 from estimation.identifications.comparison import VELOCITY_SCALES, Comparison
 from estimation.identifications.trials import Candidates
 from estimation.preprocessing import Smoother
-from estimation.regressions.parameter_priors import Pull
+from estimation.regressions.parameter_priors import GaussianPrior
 from estimation.regressions.preparation import Prepared
 from robots.base_parameters import BaseParameters
 
@@ -42,7 +42,7 @@ class Choice:
     smoother: Smoother
     ridge: float
     velocity_scales: tuple[float, ...]
-    pull: Pull | None
+    pull: GaussianPrior | None
     held_out: Array
     spread: Array
     band: Array

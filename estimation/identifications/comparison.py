@@ -14,7 +14,7 @@ from estimation.identifications.trials import Candidates, Trial, smallest, stron
 from estimation.preprocessing import Harmonics, LowPass, Smoother, SmoothingSpline
 from estimation.regressions.blocks import Blocks, Sides, side_products
 from estimation.regressions.joint_regressor import JointRegressor, summed
-from estimation.regressions.parameter_priors import Pull, description_pull, friction_levels
+from estimation.regressions.parameter_priors import GaussianPrior, friction_levels, prior_from_description
 from estimation.regressions.preparation import Prepared, Rows, rows_of
 from robots.base_parameters import BaseParameters
 
@@ -188,7 +188,7 @@ class Comparison:
         settings = [(ridges[0], None), (middle, None), (middle, self._description(blocks))]
         return min(self._try(blocks, *setting).cost for setting in settings)
 
-    def _try(self, blocks: Sides, ridge: float, pull: Pull | None) -> Trial:
+    def _try(self, blocks: Sides, ridge: float, pull: GaussianPrior | None) -> Trial:
         trial = Trial(ridge, pull, tuple(self._scales(blocks, ridge, pull)), np.zeros(0))
         return replace(trial, logs=np.log(np.maximum(self.left_out(blocks, trial) / self.spread, EXACT)))
 
@@ -258,7 +258,7 @@ class Comparison:
         bounds = np.linspace(0, len(part.motion), pieces + 1).astype(int).tolist()
         return [slice(first, stop) for first, stop in pairwise(bounds)]
 
-    def _scales(self, blocks: Sides, ridge: float, pull: Pull | None) -> list[int]:
+    def _scales(self, blocks: Sides, ridge: float, pull: GaussianPrior | None) -> list[int]:
         """Per joint the index of its velocity scale: the widest saving, if it is worth it."""
         total = blocks.fitted.total
         choices = np.array([self._columns([k] * len(total.count)) for k in range(len(VELOCITY_SCALES))])
@@ -275,7 +275,7 @@ class Comparison:
                 chosen[position] = self.base.size + (column.joint - 1) * extra + scale - 1
         return chosen
 
-    def _description(self, blocks: Sides) -> Pull | None:
+    def _description(self, blocks: Sides) -> GaussianPrior | None:
         if not self.candidates.pull:
             return None
         total = blocks.fitted.total
@@ -283,7 +283,7 @@ class Comparison:
         own = [column.joint - 1 for column in self.base.columns]
         squares = np.array([total.gram[joint, i, i] / count[joint] for i, joint in enumerate(own)])
         level = friction_levels(self.base, np.sqrt(squares), self.fastest)
-        return description_pull(self.base, np.sqrt(total.square / count), level)
+        return prior_from_description(self.base, np.sqrt(total.square / count), level)
 
 
 def band_of(errors: Array) -> Array:

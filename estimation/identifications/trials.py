@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.regressions.parameter_priors import Pull
+from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class Trial:
     """One setting: its ridge and pull, each joint's index into the velocity scales, and its left-out errors."""
 
     ridge: float
-    pull: Pull | None
+    pull: GaussianPrior | None
     scales: tuple[int, ...]
     logs: Array  # of the errors (n,) relative to a constant
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from estimation.logs.provenance import are_one, describe_logs
+from estimation.logs.provenance import are_same_log, describe_logs
 from robots.common.errors import InputError
 from robots.signals import UNKNOWN_PAUSE, Log
 
@@ -41,14 +41,14 @@ def on_one_clock(logs: Sequence[Log], pause: float = UNKNOWN_PAUSE) -> list[Log]
     return result
 
 
-def are_apart(logs: Sequence[Log]) -> bool:
+def do_not_overlap(logs: Sequence[Log]) -> bool:
     """Whether logs can be on one clock: none begins before another has ended."""
     ordered = sorted(logs, key=lambda log: float(log.t[0]))
     return all(before.t[-1] < after.t[0] for before, after in pairwise(ordered))
 
 
 @dataclass(frozen=True, eq=False)
-class Clocked:
+class ClockedLogs:
     """Logs on one clock.
 
     Attributes:
@@ -64,7 +64,7 @@ class Clocked:
     notes: tuple[str, ...] = ()
 
 
-def clocked(logs: Sequence[Log], held_out: Sequence[Log]) -> Clocked:
+def put_on_clock(logs: Sequence[Log], held_out: Sequence[Log]) -> ClockedLogs:
     """Puts logs on one clock where their own times say that they are on none.
 
     Two recordings of one robot cannot overlap: where they do, each began its clock anew. Held-out logs that overlap the
@@ -79,15 +79,15 @@ def clocked(logs: Sequence[Log], held_out: Sequence[Log]) -> Clocked:
     """
     _refuse_copies(logs, held_out)
     notes = []
-    if not are_apart(logs):
+    if not do_not_overlap(logs):
         logs = on_one_clock(logs)
         notes.append(_OVERLAP.format(UNKNOWN_PAUSE))
-    dated = not held_out or are_apart([*logs, *held_out])
+    dated = not held_out or do_not_overlap([*logs, *held_out])
     if not dated:
         latest = max(logs, key=lambda log: float(log.t[-1]))
         held_out = on_one_clock([latest, *held_out])[1:]
         notes.append(_UNDATED.format(UNKNOWN_PAUSE))
-    return Clocked(tuple(logs), tuple(held_out), dated, tuple(notes))
+    return ClockedLogs(tuple(logs), tuple(held_out), dated, tuple(notes))
 
 
 _OVERLAP = (
@@ -113,7 +113,7 @@ def later_by(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
         return 0.0, ""
     (own,) = describe_logs([log])
     for known in logs:
-        if are_one(own, known):
+        if are_same_log(own, known):
             # Some of its rows may have been left out of the fit, and it may be a part of it.
             late = float(known["start"] - log.t[0])
             within = -late > -OWN and log.t[-1] < known["start"] + known["duration"] + OWN
@@ -134,7 +134,7 @@ def before_it(logs: Sequence[Log], motion: Log, start: float, shifts: Sequence[f
         shifts: how much later [s] than their clocks say the logs count, by what is known of them.
     """
     placed = [replace(log, t=log.t + shift) for log, shift in zip(logs, shifts, strict=True)]
-    if are_apart([*placed, begun := replace(motion, t=motion.t - motion.t[0] + start)]):
+    if do_not_overlap([*placed, begun := replace(motion, t=motion.t - motion.t[0] + start)]):
         late = [log for log in placed if log.t[0] > begun.t[0]]
         if late:
             raise InputError(

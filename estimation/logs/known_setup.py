@@ -53,16 +53,16 @@ def _rigid_body(robot: Robot) -> TorqueModel:
     return TorqueModel(robot, (RigidBody(),))
 
 
-def set_up(robot: Robot, log: Log) -> Robot:
+def robot_for_log(robot: Robot, log: Log) -> Robot:
     """Gives the robot as it was for a log: on its base, the payload a part of the last link."""
     standing = robot.under(log.gravity)
     if log.payload is None or not log.payload.any():
         return standing
-    return _laden(standing, tuple(log.payload.tolist()))
+    return _with_payload(standing, tuple(log.payload.tolist()))
 
 
 @lru_cache(maxsize=16)
-def _laden(robot: Robot, body: tuple[float, ...]) -> Robot:
+def _with_payload(robot: Robot, body: tuple[float, ...]) -> Robot:
     inertia = np.array(robot.inertia)
     inertia[-1] += moved_body(robot.chain.tip) @ np.array(body)
     return replace(robot, inertia=inertia)

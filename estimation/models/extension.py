@@ -13,7 +13,7 @@ from robots.common.errors import InputError
 from robots.common.plain import all_finite, finite
 from robots.robot import Robot
 from robots.terms.discrepancies.patterns import build_pattern
-from robots.terms.effect_bases.gear_load import Bearing, Borne, Weight, laden_with
+from robots.terms.effect_bases.gear_load import ExtraGearLoad, LoadPath, LoadSource, with_gear_load
 from robots.terms.effects import EFFECTS, Effect
 from robots.terms.situations.situation import Situation
 
@@ -110,7 +110,7 @@ def read_extension(data: Mapping[str, Any], robot: Robot) -> Extension:
     )
 
 
-def write_bearing(bearing: Bearing) -> dict[str, Any]:
+def write_gear_load(bearing: ExtraGearLoad) -> dict[str, Any]:
     """Writes what gears bear of a model's extensions as plain data for `model.json`."""
     weights = [
         {"effect": w.effect.name, "joint": w.joint, "shape": list(w.shape), "coefficients": w.coefficients.tolist()}
@@ -119,14 +119,14 @@ def write_bearing(bearing: Bearing) -> dict[str, Any]:
     return {"how": bearing.how, "weights": weights}
 
 
-def read_bearing(data: Mapping[str, Any], robot: Robot) -> Bearing:
-    """Reads what `write_bearing` wrote.
+def read_gear_load(data: Mapping[str, Any], robot: Robot) -> ExtraGearLoad:
+    """Reads what `write_gear_load` wrote.
 
     Raises:
         InputError: an unknown way or effect, or values that do not fit it.
     """
-    if data["how"] not in get_args(Borne):
-        raise InputError(f"borne_by_gears: how is {data['how']!r}", allowed=", ".join(get_args(Borne)))
+    if data["how"] not in get_args(LoadPath):
+        raise InputError(f"borne_by_gears: how is {data['how']!r}", allowed=", ".join(get_args(LoadPath)))
     weights = []
     for item in data["weights"]:
         effect, joint = find_effect(str(item["effect"])), item["joint"]
@@ -136,8 +136,8 @@ def read_bearing(data: Mapping[str, Any], robot: Robot) -> Bearing:
         sizes = (len(effect.shapes),), (len(effect.parameters(robot, joint)),)
         if tuple(v.shape for v in values) != sizes or not all(np.isfinite(v).all() for v in values):
             raise InputError(f"borne_by_gears: values of {effect.name} that do not fit it")
-        weights.append(Weight(effect, joint, tuple(values[0].tolist()), values[1]))
-    return Bearing(data["how"], weights)
+        weights.append(LoadSource(effect, joint, tuple(values[0].tolist()), values[1]))
+    return ExtraGearLoad(data["how"], weights)
 
 
 def find_effect(name: str) -> Effect:
@@ -155,7 +155,7 @@ def find_effect(name: str) -> Effect:
 
 
 def extension_torque(
-    extensions: Sequence[Extension], felt: Situation, own: Situation | None = None, bearing: Bearing | None = None
+    extensions: Sequence[Extension], felt: Situation, own: Situation | None = None, bearing: ExtraGearLoad | None = None
 ) -> Array:
     """Evaluates the extensions of a model in what its base model says of a motion (N, n) [N m or N].
 
@@ -169,7 +169,7 @@ def extension_torque(
         bearing: what of them the gears bear; None for nothing.
     """
     total, own = np.zeros_like(felt.q), felt if own is None else own
-    felt = laden_with(felt, bearing)
+    felt = with_gear_load(felt, bearing)
     for stage in range(3):
         now = (felt, felt.beside(total), own.beside(total))[stage]
         acting = [extension for extension in extensions if _stage(extension.source) == stage]

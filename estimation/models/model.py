@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.logs.known_setup import require_known
-from estimation.models.extension import Extension, extension_torque, read_bearing, read_extension, write_bearing
+from estimation.models.extension import Extension, extension_torque, read_extension, read_gear_load, write_gear_load
 from estimation.models.robot_in_file import build_robot, describe_robot, require_described
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
@@ -21,7 +21,7 @@ from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms import Column, build_term, describe_term
-from robots.terms.effect_bases.gear_load import Bearing
+from robots.terms.effect_bases.gear_load import ExtraGearLoad
 from robots.terms.situations.flange_body import with_body
 from robots.terms.situations.situation import Situation, joined, situation
 
@@ -63,7 +63,7 @@ class Model:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     extensions: tuple[Extension, ...] = ()
     felt: Array | None = None
-    bearing: Bearing | None = None
+    bearing: ExtraGearLoad | None = None
     since: float | None = None
 
     @property
@@ -194,7 +194,11 @@ class Model:
             **({"extensions": [extension.to_dict(robot) for extension in self.extensions]} if self.extensions else {}),
             **({"felt_by_extensions": self.felt.tolist()} if self.extensions and self.felt is not None else {}),
             **({"phases_since": self.since} if self.extensions and self.since is not None else {}),
-            **({"borne_by_gears": write_bearing(self.bearing)} if self.extensions and self.bearing is not None else {}),
+            **(
+                {"borne_by_gears": write_gear_load(self.bearing)}
+                if self.extensions and self.bearing is not None
+                else {}
+            ),
         }
 
     def save(self, path: Path, *, force: bool = False) -> None:
@@ -268,7 +272,7 @@ def _from_dict(data: Mapping[str, Any]) -> Model:
         extensions=tuple(read_extension(item, torque_model.robot) for item in data.get("extensions", [])),
         felt=felt if "felt_by_extensions" in data else None,
         since=None if data.get("phases_since") is None else float(data["phases_since"]),
-        bearing=read_bearing(data["borne_by_gears"], torque_model.robot) if "borne_by_gears" in data else None,
+        bearing=read_gear_load(data["borne_by_gears"], torque_model.robot) if "borne_by_gears" in data else None,
     )
 
 

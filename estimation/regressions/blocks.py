@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.regressions.moments import Moments, solve_all
-from estimation.regressions.parameter_priors import Pull
+from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ class Blocks:
         """The normal equations of all blocks together."""
         return Moments(*(array.sum(axis=1) for array in (self.gram, self.cross, self.square, self.count)))
 
-    def fitted(self, choices: NDArray[np.intp], ridge: float, pull: Pull | None) -> Array:
+    def fitted(self, choices: NDArray[np.intp], ridge: float, pull: GaussianPrior | None) -> Array:
         """Fits several choices of as many columns each, every joint's rows counting alike.
 
         Args:
@@ -89,7 +89,7 @@ class Blocks:
     def _chosen(self) -> dict[tuple[int, ...], Blocks]:
         return {}
 
-    def without(self, weights: Array, ridge: float, pull: Pull | None) -> Array:
+    def without(self, weights: Array, ridge: float, pull: GaussianPrior | None) -> Array:
         """Fits all blocks but one, for each of them.
 
         Args:

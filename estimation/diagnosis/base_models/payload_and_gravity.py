@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.recordings.recording import Recording
-from estimation.diagnosis.recordings.thinning import at_all_samples, thinned
+from estimation.diagnosis.recordings.thinning import decimate, evaluate_at_full_rate
 from robots.base_parameters import BaseParameters
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
@@ -21,7 +21,7 @@ from robots.terms.situations.situation import Finer, joined, situation, with_fin
 Array = NDArray[np.float64]
 
 
-def lightened(robot: Robot, recording: Recording) -> Recording:
+def subtract_known_payload(robot: Robot, recording: Recording) -> Recording:
     """Takes the torque of the logs' known payloads off the measured one."""
     if not recording.payloads:
         return recording
@@ -32,10 +32,12 @@ def lightened(robot: Robot, recording: Recording) -> Recording:
             parameters = with_body(model, np.zeros(model.size), body)
             motion = (recording.q[run], recording.dq[run], recording.ddq[run])
             tau[run] -= model.under(gravity).torque(*motion, parameters)
-    return replace(recording, tau=tau, finer=None if recording.finer is None else lightened(robot, recording.finer))
+    return replace(
+        recording, tau=tau, finer=None if recording.finer is None else subtract_known_payload(robot, recording.finer)
+    )
 
 
-def regressor_on(base: BaseParameters, recording: Recording) -> Array:
+def base_regressor(base: BaseParameters, recording: Recording) -> Array:
     """Evaluates the base model's columns (N, n, b) on a recording, each log under its own gravity.
 
     Signs are low-passed as the torque was, where logs are thinned.
@@ -47,13 +49,13 @@ def regressor_on(base: BaseParameters, recording: Recording) -> Array:
     for i, column in enumerate(base.columns):
         if column.symbol == "f1":
             joint = column.joint - 1
-            Y[:, joint, i] = signs_on(recording, joint, scales[[joint]])[:, 0]
+            Y[:, joint, i] = friction_signs(recording, joint, scales[[joint]])[:, 0]
     return Y
 
 
-def signs_on(recording: Recording, joint: int, scales: Array) -> Array:
+def friction_signs(recording: Recording, joint: int, scales: Array) -> Array:
     """Evaluates a joint's signs (N, k), from 0, as smooth as `scales` (k,) say, 0 for the sharp one."""
-    return at_all_samples(recording, lambda samples: sign_of(samples.dq[:, joint, None], scales))
+    return evaluate_at_full_rate(recording, lambda samples: sign_of(samples.dq[:, joint, None], scales))
 
 
 def _regressor(base: BaseParameters, recording: Recording) -> Array:
@@ -66,7 +68,7 @@ def _regressor(base: BaseParameters, recording: Recording) -> Array:
     return Y
 
 
-def torque_on(base: BaseParameters, recording: Recording, values: Array) -> Array:
+def base_torque(base: BaseParameters, recording: Recording, values: Array) -> Array:
     """Evaluates the base model's torque (N, n) on a recording with base parameters (b,), each log under its gravity."""
     parts = []
     for run, gravity in zip(recording.runs, recording.gravities, strict=True):
@@ -75,7 +77,7 @@ def torque_on(base: BaseParameters, recording: Recording, values: Array) -> Arra
     return np.concatenate(parts)
 
 
-def situation_on(
+def build_situation(
     recording: Recording, model: TorqueModel, parameters: Array, columns: tuple[int, ...] | None = None
 ) -> Situation:
     """Gives what effects may depend on in a recording, payloads and bases that stand otherwise included.
@@ -93,7 +95,7 @@ def situation_on(
         return coarse
     starts, stride = recording.finer.starts, recording.stride
     whole = _situation(recording.finer, model, full)
-    return with_finer(coarse, Finer(whole, lambda rows: thinned(rows, starts, stride)))
+    return with_finer(coarse, Finer(whole, lambda rows: decimate(rows, starts, stride)))
 
 
 def _situation(recording: Recording, model: TorqueModel, full: Array) -> Situation:
@@ -109,4 +111,4 @@ def _situation(recording: Recording, model: TorqueModel, full: Array) -> Situati
     return joined(parts, model)
 
 
-__all__ = ["lightened", "regressor_on", "situation_on"]
+__all__ = ["subtract_known_payload", "base_regressor", "build_situation"]

@@ -11,12 +11,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.payload_and_gravity import regressor_on
+from estimation.diagnosis.base_models.payload_and_gravity import base_regressor
 from estimation.diagnosis.experiment_plans.experiment_motions import Stage
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.power import chance_to_resolve
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.noise_models.masked_rows import no_gaps
+from estimation.diagnosis.noise_models.masked_rows import no_masked_rows
 from estimation.diagnosis.noise_models.whitening import Whitening
 from robots.base_parameters import find_base_parameters
 from robots.regressor import TorqueModel
@@ -82,7 +82,7 @@ class Grams:
         """Of the logs that there are."""
         now = self.problem.situation
         effects = [c.hypothesis.effect.columns(now, c.hypothesis.joint, c.shape) for c in self.every]
-        return self._gram(regressor_on(self.base, self.problem.recording), effects, self.problem.whitening)
+        return self._gram(base_regressor(self.base, self.problem.recording), effects, self.problem.whitening)
 
     @cached_property
     def heated(self) -> bool:
@@ -135,7 +135,7 @@ class Grams:
             rows += len(part.motion)
             t0 = float(now.t[-1]) + 60.0
         base = np.concatenate(bases)
-        plain = replace(self.problem.whitening, gaps=no_gaps(base.shape[1]), weights=None, levels=None)
+        plain = replace(self.problem.whitening, gaps=no_masked_rows(base.shape[1]), weights=None, levels=None)
         whitening = replace(plain, starts=tuple(starts))
         return self._gram(base, [np.concatenate(parts) for parts in effects], whitening)
 

@@ -21,7 +21,7 @@ POINTS = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class RivalShape:
     """A cause with another shape than the one that was fitted."""
 
     hypothesis: Hypothesis
@@ -29,14 +29,14 @@ class Form:
     coefficients: Array
 
 
-def imitating_forms(problem: Problem, causes: Sequence[Cause]) -> list[tuple[int, Form]]:
+def find_rival_shapes(problem: Problem, causes: Sequence[Cause]) -> list[tuple[int, RivalShape]]:
     """Finds for each cause the forms of the others that leave the least of it on the logs there are.
 
     Returns:
         Index and form of the causes that imitate another better so than as they were fitted.
     """
     forms = [
-        (k, Form(cause.hypothesis, shape, np.zeros(len(cause.coefficients))))
+        (k, RivalShape(cause.hypothesis, shape, np.zeros(len(cause.coefficients))))
         for k, cause in enumerate(causes)
         for shape in _shapes(problem, cause)
     ]

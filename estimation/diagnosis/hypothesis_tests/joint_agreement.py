@@ -20,7 +20,7 @@ ASIDE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class PerJointEvidence:
     """What each of the joints on which an effect of one column acts tells of its coefficient.
 
     Attributes:
@@ -35,17 +35,19 @@ class Told:
     sure: Array
     apart: Array
 
-    def some(self, joints: NDArray[np.bool_]) -> Told:
+    def some(self, joints: NDArray[np.bool_]) -> PerJointEvidence:
         """Gives what some of the joints (m,) tell."""
-        return Told(self.gram[joints], self.cross[joints], self.sure[joints], self.apart[joints])
+        return PerJointEvidence(self.gram[joints], self.cross[joints], self.sure[joints], self.apart[joints])
 
     def gain(self, *, surely: bool = False) -> float:
         """What one coefficient of all joints explains, over their Birge ratio; of what is sure of that, where asked."""
         share = self.sure if surely else 1.0
-        return agreed_gain(share * self.gram, share * self.cross, self.apart)
+        return shared_coefficient_gain(share * self.gram, share * self.cross, self.apart)
 
 
-def joint_by_joint(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...], accepted: Accepted) -> Told:
+def per_joint_evidence(
+    problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...], accepted: Accepted
+) -> PerJointEvidence:
     """Measures an effect of one column, a torque per time, on each of its joints, beside others.
 
     A log with reversals tells a delay by them, as often as they come; but when a joint turns round is known only as
@@ -70,10 +72,10 @@ def joint_by_joint(problem: Problem, hypothesis: Hypothesis, shape: tuple[float,
                 usual = np.sum(squares * late**2) / max(float(np.sum(squares)), 1e-300)
                 sure[k] = (told[0] / (1.0 + usual * told[0]) + told[1] + timed) / (told.sum() + timed)
     apart = ASIDE**2 * explained[list(joints)] / np.where(gram > 0, gram, np.inf)
-    return Told(gram, cross, sure, apart)
+    return PerJointEvidence(gram, cross, sure, apart)
 
 
-def agreed_gain(gram: Array, cross: Array, apart: Array | None = None) -> float:
+def shared_coefficient_gain(gram: Array, cross: Array, apart: Array | None = None) -> float:
     """What one coefficient of all joints explains, over their Birge ratio.
 
     One joint may be at odds with the rest, where something else is left on it: it then counts for nothing.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 
 Array = NDArray[np.float64]
 
@@ -16,10 +16,10 @@ Array = NDArray[np.float64]
 PASSED = 0.64
 
 
-def profile_gain(problem: Problem, member: Member) -> float:
+def profile_gain(problem: Problem, member: FittedEffect) -> float:
     """Gives twice the logarithm of an effect's likelihood ratio, the noise of each log free.
 
-    The gain of a `Member` counts in units of a noise that all logs share and that was estimated before the effect was
+    The gain of a `FittedEffect` counts in units of a noise that all logs share and that was estimated before the effect was
     known. In a log that the effect rules (a hand moves the arm, its motors only carry it), that is no noise but the
     effect. With the level of each log profiled out, the ratio is sum_r N_r log(E_r / E_r'), E the squared residual of
     log r without the effect and with it, N_r its white rows less what was fitted to them. Where effects are small

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from estimation.diagnosis.base_models.baseline import Baseline
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis, acting
-from estimation.diagnosis.noise_models.high_frequency_band import Upper
+from estimation.diagnosis.noise_models.high_frequency_band import HighBand
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.recording import Recording
-from estimation.diagnosis.reversals.reversal_timing import Timing
-from estimation.regressions.parameter_priors import Pull
-from robots.terms.effect_bases.gear_load import Bearing
+from estimation.diagnosis.reversals.reversal_timing import ReversalTiming
+from estimation.regressions.parameter_priors import GaussianPrior
+from robots.terms.effect_bases.gear_load import ExtraGearLoad
 from robots.terms.effects import Effect, Situation
 from robots.terms.situations.flange_body import with_body
 
@@ -66,12 +66,12 @@ class Problem:
     energy: float
     nulls: tuple[Small, Array]
     remainder: Array
-    pull: Pull
-    upper: Upper | None = None
-    timing: Timing | None = None
+    pull: GaussianPrior
+    upper: HighBand | None = None
+    timing: ReversalTiming | None = None
     whole: Situation | None = None
     followed: Situation | None = None
-    bearing: Bearing | None = None
+    bearing: ExtraGearLoad | None = None
 
     def sees(self, effect: Effect) -> Situation:
         """Gives what an effect depends on."""

@@ -11,9 +11,9 @@ from scipy.optimize import minimize
 
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.joint_agreement import joint_by_joint
+from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.reversal_errors import owed_to_moments
+from estimation.diagnosis.hypothesis_tests.reversal_errors import gain_from_reversal_errors
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
 
 Array = NDArray[np.float64]
@@ -34,13 +34,13 @@ ACTS = 0.02
 # is none: one that is there has this in 2 % of logs at most.
 FORMULA, AGREES, ABSENT = 0.35, 2.0, 4.0
 # Friction that would turn round over a shorter way than any, by this factor, turns round at once: late, if anything.
-NO_WAY = 1.05
+SHORT_TRAVEL_FACTOR = 1.05
 # Twice the log of the odds against an effect that robots seldom have.
 RARE = 6.0
 
 
 @dataclass(frozen=True, eq=False)
-class Member:
+class FittedEffect:
     """A hypothesis with its best shape, measured beside the base model and others.
 
     Attributes:
@@ -102,7 +102,7 @@ class Member:
         torques = [np.abs(part @ self.coefficients) for part in self.group.columns]
         return np.asarray(np.max([torque > ACTS * torque.max(initial=0.0) for torque in torques], axis=0))
 
-    def share_beside(self, other: Member, joint: int) -> float:
+    def share_beside(self, other: FittedEffect, joint: int) -> float:
         """Share of this torque's energy on a joint, from 0, in the rows in which another's acts there."""
         if joint not in self.group.joints or joint not in other.group.joints:
             return 0.0
@@ -111,14 +111,14 @@ class Member:
         return float(np.sum(own[acts] ** 2) / max(np.sum(own**2), 1e-300))
 
 
-def all_but(problem: Problem, members: Sequence[Member], i: int) -> Accepted:
+def accept_all_but(problem: Problem, members: Sequence[FittedEffect], i: int) -> Accepted:
     """Accepts all members but one."""
     return accept(problem, tuple(m.group for k, m in enumerate(members) if k != i))
 
 
 def refine(
     problem: Problem, hypothesis: Hypothesis, start: tuple[float, ...], accepted: Accepted, *, effort: int = EFFORT
-) -> Member:
+) -> FittedEffect:
     """Searches the shape that explains most for its number of parameters, from a point of the grid.
 
     The linear coefficients and the base model are projected out at every step (variable projection, Golub and Pereyra
@@ -130,7 +130,7 @@ def refine(
     scales = [shape.scale for shape in hypothesis.effect.shapes]
     loose = [k for k, (low, high) in enumerate(bounds) if high > low]
     moments = [shape.moment for shape in hypothesis.effect.shapes]
-    best: list[Member] = []
+    best: list[FittedEffect] = []
 
     def evaluate(shape: tuple[float, ...], fitted: int | None = None) -> float:
         if fitted is None:
@@ -138,7 +138,7 @@ def refine(
         group = problem.measured(hypothesis, shape)
         result = score(problem, group, accepted)
         gain, coefficients = result.bounded(*hypothesis.coefficient_bounds(situation.robot, shape))
-        member = Member(hypothesis, shape, group, gain, coefficients, result.degrees + fitted, result.visible)
+        member = FittedEffect(hypothesis, shape, group, gain, coefficients, result.degrees + fitted, result.visible)
         worth = member.bic(problem.rows)
         if not best or worth > best[0].bic(problem.rows):
             best[:] = [member]
@@ -172,7 +172,7 @@ def refine(
 
     if hypothesis.effect.last or hypothesis.effect.distorts:
         # What is known now may have been free, or another, where the search comes from.
-        start = within(start, bounds)
+        start = clip_shape(start, bounds)
     evaluate(start)
     if loose and effort:
         # What the effect is whole without comes last, from where the rest led.
@@ -187,23 +187,23 @@ def refine(
             evaluate(shape, sum(known[k] is None for k in loose))
     found = best[0]
     if hypothesis.effect.lags:
-        return _agreed(problem, found, accepted)
+        return _with_scatter(problem, found, accepted)
     if hypothesis.effect.turns and hypothesis.joint is not None:
-        if found.shape[0] < NO_WAY * bounds[0][0]:
+        if found.shape[0] < SHORT_TRAVEL_FACTOR * bounds[0][0]:
             return replace(found, scatter=np.inf)
-        owed = owed_to_moments(problem, hypothesis.joint, found.group, found.gain, accepted)
+        owed = gain_from_reversal_errors(problem, hypothesis.joint, found.group, found.gain, accepted)
         return replace(found, doubt=owed)
-    return replace(found, scatter=_borne_out(problem, found, accepted)) if hypothesis.effect.kicks else found
+    return replace(found, scatter=_reversal_scatter(problem, found, accepted)) if hypothesis.effect.kicks else found
 
 
-def within(shape: Sequence[float], bounds: Sequence[tuple[float, float]]) -> tuple[float, ...]:
+def clip_shape(shape: Sequence[float], bounds: Sequence[tuple[float, float]]) -> tuple[float, ...]:
     """Brings each value of a shape into its bounds."""
     return tuple(min(max(value, low), high) for value, (low, high) in zip(shape, bounds, strict=True))
 
 
-def _agreed(problem: Problem, member: Member, accepted: Accepted) -> Member:
+def _with_scatter(problem: Problem, member: FittedEffect, accepted: Accepted) -> FittedEffect:
     """Says how much less its gain counts where joints differ in what they share (Birge 1932), or tell by reversals."""
-    told = joint_by_joint(problem, member.hypothesis, member.shape, accepted)
+    told = per_joint_evidence(problem, member.hypothesis, member.shape, accepted)
     if not (acts := told.gram > 0).any():
         return member
     told = told.some(acts)
@@ -212,7 +212,7 @@ def _agreed(problem: Problem, member: Member, accepted: Accepted) -> Member:
     return replace(member, scatter=scatter, doubt=max(0.0, agreed - told.gain(surely=True)))
 
 
-def _borne_out(problem: Problem, member: Member, accepted: Accepted) -> float:
+def _reversal_scatter(problem: Problem, member: FittedEffect, accepted: Accepted) -> float:
     """How much more what an effect is beside reversals and elsewhere differ than they may by chance.
 
     Beside reversals accelerations are not known to all of their kicks. What is missing of them looks like an effect of

@@ -232,7 +232,7 @@ def _outcome(problem: Problem, entry: Entry, accepted: Accepted, draws: int) -> 
             continue
         # Within physical bounds: a gear of negative stiffness is no alarm.
         gain = result.bounded(*entry.hypothesis.coefficient_bounds(robot, shape))[0]
-        evidence = float(surprise(np.array(gain), result.degrees))
+        evidence = float(neg_log_p(np.array(gain), result.degrees))
         if draws and not entry.charged:
             cross = entry.nulls[at] - result.onto.T @ accepted.nulls
             stats = ((result.root @ cross) ** 2).sum(axis=0)
@@ -241,7 +241,7 @@ def _outcome(problem: Problem, entry: Entry, accepted: Accepted, draws: int) -> 
             best = (evidence, gain, shape, result.visible, result.degrees)
     worst = np.zeros(draws)
     for degrees, stats in highest.items():
-        np.maximum(worst, surprise(stats, degrees), out=worst)
+        np.maximum(worst, neg_log_p(stats, degrees), out=worst)
     if best[4] == 0:
         return Outcome(entry.hypothesis, entry.shapes[0], 0.0, 0.0, 0.0, 0), worst
     correction = np.log(entry.tries) if entry.charged else _tries(worst)
@@ -250,7 +250,7 @@ def _outcome(problem: Problem, entry: Entry, accepted: Accepted, draws: int) -> 
     return Outcome(entry.hypothesis, best[2], best[1], best[3], evidence, best[4]), null
 
 
-def surprise(statistic: Array, degrees: int) -> Array:
+def neg_log_p(statistic: Array, degrees: int) -> Array:
     """Gives -log of the chance that a chi-square variable of these degrees of freedom is as large."""
     half = np.asarray(statistic, dtype=float) / 2
     p = gammaincc(degrees / 2, half)

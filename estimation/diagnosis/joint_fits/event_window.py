@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member, refine
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
 from estimation.diagnosis.hypothesis_tests.time_windows import best_window
 from robots.common.parallel import threaded
@@ -17,7 +17,9 @@ from robots.common.parallel import threaded
 NEAR = 0.1
 
 
-def going_on(problem: Problem, member: Member, others: Sequence[Member], errors: Sequence[float]) -> list[float]:
+def open_event_edges(
+    problem: Problem, member: FittedEffect, others: Sequence[FittedEffect], errors: Sequence[float]
+) -> list[float]:
     """Makes errors of shape parameters infinite where the data say that the effect goes on beyond them.
 
     A push on an elbow while the arm moves is no pulse of constant torques: such a pulse is told where it is largest,
@@ -33,7 +35,7 @@ def going_on(problem: Problem, member: Member, others: Sequence[Member], errors:
     return [np.inf if k in open_ else error for k, error in enumerate(errors)]
 
 
-def as_it_lasts(problem: Problem, member: Member, beside: Accepted) -> Member:
+def refit_event_window(problem: Problem, member: FittedEffect, beside: Accepted) -> FittedEffect:
     """Gives an effect of a moment by the formula that stays true while it lasts, where that is worth its parameters."""
     hypothesis = member.hypothesis
     if not hypothesis.effect.passing:
@@ -51,7 +53,7 @@ def as_it_lasts(problem: Problem, member: Member, beside: Accepted) -> Member:
     return best if best.bic(problem.rows) > member.bic(problem.rows) + MIN_BIC_GAIN else member
 
 
-def _open(problem: Problem, member: Member, beside: Accepted) -> set[int]:
+def _open(problem: Problem, member: FittedEffect, beside: Accepted) -> set[int]:
     """Which shape parameters of a member, beside what is accepted, the data say are not where the effect ends."""
     further = member.hypothesis.effect.further(member.shape)
     if not further:

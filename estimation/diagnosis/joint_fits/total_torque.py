@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.payload_and_gravity import situation_on
-from estimation.diagnosis.base_models.priors import free, held
+from estimation.diagnosis.base_models.payload_and_gravity import build_situation
+from estimation.diagnosis.base_models.priors import solve_least_squares, solve_map
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member
-from estimation.diagnosis.joint_fits.extended_fit import dense, timed
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.joint_fits.extended_fit import dense, reversal_columns
 from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short
 from estimation.diagnosis.recordings.recording import Recording
-from robots.terms.effect_bases.gear_load import laden_with
+from robots.terms.effect_bases.gear_load import with_gear_load
 from robots.terms.effects import Situation
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ STEP = 1e-3
 """Change of the torque, as a share of its root mean square, by which it is told what passes."""
 
 
-def composed(problem: Problem, members: Sequence[Member], hypotheses: Sequence[Hypothesis]) -> Problem:
+def with_total_torque(problem: Problem, members: Sequence[FittedEffect], hypotheses: Sequence[Hypothesis]) -> Problem:
     """Lets effects that act on all of the torque know what it is: base model and other members, fitted together.
 
     What makes all of the torque late knows that of the other members as they are. Where no log shows by itself that
@@ -48,17 +48,21 @@ def composed(problem: Problem, members: Sequence[Member], hypotheses: Sequence[H
         if hypothesis.effect.last:
             flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
             useless |= False if flags is None else flags
-    return known_beside(known_without(problem, members, useless), members) if useless.any() else problem
+    return (
+        fit_clipped_torque(total_torque_from_unclipped(problem, members, useless), members)
+        if useless.any()
+        else problem
+    )
 
 
-def known_without(problem: Problem, members: Sequence[Member], useless: Flags) -> Problem:
+def total_torque_from_unclipped(problem: Problem, members: Sequence[FittedEffect], useless: Flags) -> Problem:
     """Tells all of the torque by the rows (N, n) that are of use, and members that do not act on all of it."""
     before = [member for member in members if not member.hypothesis.effect.last]
     known = JointFit(problem, before, ~useless)
     return known.told(known.values(problem.recording.tau))
 
 
-def known_beside(problem: Problem, members: Sequence[Member]) -> Problem:
+def fit_clipped_torque(problem: Problem, members: Sequence[FittedEffect]) -> Problem:
     """Tells all of the torque by all rows, where what acts on it is among the members.
 
     Without the useless rows alone, those that noise has kept from being so would make it too small. So the torque as it
@@ -80,7 +84,7 @@ def known_beside(problem: Problem, members: Sequence[Member]) -> Problem:
     return known.told(values)
 
 
-def _lost(problem: Problem, members: Sequence[Member]) -> Array:
+def _lost(problem: Problem, members: Sequence[FittedEffect]) -> Array:
     return np.sum([dense(problem, member.hypothesis, member.shape).sum(axis=2) for member in members], axis=0)
 
 
@@ -93,18 +97,18 @@ def _with_more(problem: Problem, torque: Array) -> Problem:
 class JointFit:
     """Base model, nuisance and members fitted together to the rows (N, n) that count."""
 
-    def __init__(self, problem: Problem, members: Sequence[Member], counted: Flags) -> None:
+    def __init__(self, problem: Problem, members: Sequence[FittedEffect], counted: Flags) -> None:
         baseline, recording = problem.baseline, problem.recording
         blocks = [dense(problem, member.hypothesis, member.shape) for member in members]
         self.problem = problem
         self.full = np.concatenate([baseline.regressor, baseline.nuisance, *blocks], axis=2)
         edges = np.cumsum([baseline.regressor.shape[2] + baseline.nuisance.shape[2], *(b.shape[2] for b in blocks)])
-        self.timed = timed(members, edges[:-1].tolist(), (recording.n, self.full.shape[2]))
+        self.timed = reversal_columns(members, edges[:-1].tolist(), (recording.n, self.full.shape[2]))
         self.weights = (counted & ~recording.unsure) / problem.whitening.scales(len(recording))
 
     def values(self, tau: Array, passes: Array | None = None) -> Array:
         """Fits torque (N, n), of whose changes a share passes (N, n)."""
-        return held(*self.moments(tau, passes), self.problem.pull)
+        return solve_map(*self.moments(tau, passes), self.problem.pull)
 
     def moments(self, tau: Array, passes: Array | None = None) -> tuple[Array, Array]:
         """Gives the normal equations (b, b), (b,) of such a fit."""
@@ -127,7 +131,7 @@ class JointFit:
         return replace(problem, whole=now.beside(beyond))
 
 
-def fit(problem: Problem, members: Sequence[Member]) -> tuple[Array, Array, Array]:
+def fit_jointly(problem: Problem, members: Sequence[FittedEffect]) -> tuple[Array, Array, Array]:
     """Fits base model, nuisance and members together.
 
     Returns:
@@ -135,17 +139,21 @@ def fit(problem: Problem, members: Sequence[Member]) -> tuple[Array, Array, Arra
     """
     both, tau = JointFit(problem, members, np.ones_like(problem.recording.unsure)), problem.recording.tau
     gram, cross = both.moments(tau)
-    values = held(gram, cross, problem.pull)
-    return values, tau - both.full @ (values if is_short(problem.recording) else free(gram, cross)), both.full
+    values = solve_map(gram, cross, problem.pull)
+    return (
+        values,
+        tau - both.full @ (values if is_short(problem.recording) else solve_least_squares(gram, cross)),
+        both.full,
+    )
 
 
-def columns_on(
-    problem: Problem, recording: Recording, members: Sequence[Member]
+def effect_columns(
+    problem: Problem, recording: Recording, members: Sequence[FittedEffect]
 ) -> tuple[list[Situation], list[Array]]:
     """Evaluates what members depend on in another recording, and their columns (N, n, k) there."""
     model = problem.situation.model
-    own = situation_on(recording, model, problem.parameters_without_payload)
-    now = laden_with(replace(own, since=problem.situation.origin), problem.bearing)
+    own = build_situation(recording, model, problem.parameters_without_payload)
+    now = with_gear_load(replace(own, since=problem.situation.origin), problem.bearing)
     states, columns = [now] * len(members), [_dense(now, member) for member in members]
     late = [k for k, member in enumerate(members) if member.hypothesis.effect.blurs]
     if problem.followed is not None and 0 < len(late) < len(members):
@@ -154,7 +162,7 @@ def columns_on(
         for k in late:
             states[k], columns[k] = followed, _dense(followed, members[k])
     if problem.whole is not None:
-        whole = situation_on(recording, model, replace(problem, situation=problem.whole).parameters_without_payload)
+        whole = build_situation(recording, model, replace(problem, situation=problem.whole).parameters_without_payload)
         parts = [X @ m.coefficients for X, m in zip(columns, members, strict=True) if not m.hypothesis.effect.last]
         whole = whole.beside(np.sum(parts, axis=0) if parts else None)
         for k, member in enumerate(members):
@@ -163,7 +171,7 @@ def columns_on(
     return states, columns
 
 
-def _dense(state: Situation, member: Member) -> Array:
+def _dense(state: Situation, member: FittedEffect) -> Array:
     X = np.zeros((*state.q.shape, len(member.coefficients)))
     for j, part in zip(*member.hypothesis.columns(state, member.shape), strict=True):
         X[:, j] = part

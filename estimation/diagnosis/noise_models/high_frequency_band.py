@@ -13,10 +13,10 @@ from scipy.signal import firwin
 
 from estimation.diagnosis.base_models.baseline import FAINT, Baseline
 from estimation.diagnosis.noise_models.frequency_bands import TRANSITION, Band, low_pass
-from estimation.diagnosis.noise_models.masked_rows import find_gaps
-from estimation.diagnosis.noise_models.spectral_lines import without_lines
+from estimation.diagnosis.noise_models.masked_rows import find_masked_rows
+from estimation.diagnosis.noise_models.spectral_lines import remove_lines
 from estimation.diagnosis.noise_models.whitening import Whitening
-from estimation.diagnosis.recordings.recording import Recording, long_gap
+from estimation.diagnosis.recordings.recording import Recording, rest_rows
 from estimation.linear_algebra.orthonormal import orthonormal
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ PARTS, FEWEST = 8, 10
 
 
 @dataclass(frozen=True, eq=False)
-class Above:
+class JointHighBand:
     """What one joint's torque is above its band.
 
     Attributes:
@@ -52,7 +52,7 @@ class Above:
 
 
 @dataclass(frozen=True, eq=False)
-class Upper:
+class HighBand:
     """A second regression, in the frequencies above each joint's band, for effects that are `fast`.
 
     The noise is the residual's own there, with what unknown accelerations add to it. Each joint's columns of the base
@@ -66,7 +66,7 @@ class Upper:
     """
 
     whitening: Whitening
-    joints: tuple[Above | None, ...]
+    joints: tuple[JointHighBand | None, ...]
     calm: NDArray[np.bool_]
 
     def columns(self, series: Array, joint: int, *, calm: bool = False, bare: bool = False) -> Array:
@@ -115,9 +115,9 @@ class Upper:
         return np.concatenate(rows), np.concatenate(torque)
 
 
-def pose_upper(
+def build_high_band(
     recording: Recording, baseline: Baseline, remainder: Array, noise: Array, bands: Sequence[Band], wide: Whitening
-) -> Upper:
+) -> HighBand:
     """Prepares the regression above the bands.
 
     Args:
@@ -129,8 +129,8 @@ def pose_upper(
         wide: whitens the noise in wider bands.
     """
     # Rows beside reversals are left out after the filters: a ripple goes on through them, and need not be bridged.
-    wide = replace(wide, gaps=find_gaps(recording.unsure, recording.starts, long_gap(recording.step)))
-    joints: list[Above | None] = []
+    wide = replace(wide, gaps=find_masked_rows(recording.unsure, recording.starts, rest_rows(recording.step)))
+    joints: list[JointHighBand | None] = []
     for j, (band, wider) in enumerate(zip(bands, wide.bands, strict=True)):
         if band.cutoff > NEARLY * wider.cutoff:
             joints.append(None)
@@ -143,8 +143,8 @@ def pose_upper(
         own = np.concatenate([baseline.regressor[:, j], baseline.nuisance[:, j]], axis=1)
         base = orthonormal(_passed(wide, own[:, own.any(axis=0)], j, passing) * counts[:, None], FAINT)
         white = _passed(wide, remainder[:, j, None], j, passing)[:, 0] * counts
-        joints.append(Above(passing, counts, base, white - base @ (base.T @ white), white))
-    return Upper(wide, tuple(joints), recording.calm(wide.stride))
+        joints.append(JointHighBand(passing, counts, base, white - base @ (base.T @ white), white))
+    return HighBand(wide, tuple(joints), recording.calm(wide.stride))
 
 
 def _levelling(
@@ -173,7 +173,7 @@ def _levelling(
         counted = int(np.count_nonzero(values))
         power = np.abs(np.fft.rfft(values)) ** 2 / max(counted, 1)
         f = np.fft.rfftfreq(len(values), 1 / rate)
-        power = without_lines(power[:, None], f[1], period if count > 1 else None)[:, 0]
+        power = remove_lines(power[:, None], f[1], period if count > 1 else None)[:, 0]
         lines = np.arange(len(f)) % count == 0
         known += counted
         for part, (below, above) in enumerate(pairwise(edges)):

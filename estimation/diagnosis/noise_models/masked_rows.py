@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Gaps:
+class MaskedRows:
     """Rows in which a joint's direction of motion is not known, nor then the sign of its friction.
 
     They are bridged by straight lines in torque and hypotheses alike, so that filters pass over them: a friction that
@@ -66,7 +66,7 @@ class Gaps:
         return np.column_stack(columns)
 
 
-def find_gaps(unsure: NDArray[np.bool_], starts: tuple[int, ...], longest: int = 0) -> Gaps:
+def find_masked_rows(unsure: NDArray[np.bool_], starts: tuple[int, ...], longest: int = 0) -> MaskedRows:
     """Makes bridges over stretches of rows (N, n) longer than `longest`, none from one log to another."""
     bridges = []
     for column in unsure.T:
@@ -92,10 +92,10 @@ def find_gaps(unsure: NDArray[np.bool_], starts: tuple[int, ...], longest: int =
         else:
             rows, before, after, weight = empty, empty, empty, np.zeros(0)
         bridges.append((rows, before, after, weight))
-    return Gaps(tuple(bridges), ())
+    return MaskedRows(tuple(bridges), ())
 
 
-def no_gaps(joints: int) -> Gaps:
+def no_masked_rows(joints: int) -> MaskedRows:
     """Builds the gaps of a motion whose direction is known throughout."""
     none = np.zeros(0, dtype=np.intp)
-    return Gaps(((none, none, none, np.zeros(0)),) * joints, ())
+    return MaskedRows(((none, none, none, np.zeros(0)),) * joints, ())

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.noise_models.frequency_bands import Band
-from estimation.diagnosis.noise_models.masked_rows import Gaps
+from estimation.diagnosis.noise_models.masked_rows import MaskedRows
 from estimation.linear_algebra.free_torque import FreeTorque, Real, span_of
 from robots.common.stretches import spans
 
@@ -43,7 +43,7 @@ class Whitening:
     precision: Array
     starts: tuple[int, ...]
     innovations: Array
-    gaps: Gaps
+    gaps: MaskedRows
     bands: tuple[Band, ...]
     weights: Array | None = None
     levels: Array | None = None

@@ -76,7 +76,7 @@ class Directions:
         return replace(self, unsure=unsure, clear=self.clear & ~(unsure & ~self.unsure))
 
 
-def directions(
+def find_directions(
     dq: Array, ddq: Array, cutoffs: Array, floor: Array, ends: Array, step: float, rest: Array | None
 ) -> Directions:
     """Tells in which rows (N, n) of a log the direction of a joint's motion is known.
@@ -114,10 +114,10 @@ def directions(
         usual = float(np.sqrt(np.average(error**2, weights=np.where(turned, change, 0.0) + 1e-300)))
         # It may be as large as the noise hides where it has most power, and as what is seen beside the reversals.
         hidden = KICK * largest / (2 * np.pi * cutoff) * (LOOP / cutoff) ** 2
-        usual = max(usual, hidden if rest is None else min(hidden, _shaken(rest[:, j], turned, step)))
+        usual = max(usual, hidden if rest is None else min(hidden, _bound_reversal_velocity(rest[:, j], turned, step)))
         jolts[j] = 2 * np.pi * max(cutoff, LOOP) * usual
         error = CLEAR * np.maximum(error, usual)
-        least = np.maximum(error, np.maximum(ALIKE * change, SURELY * sharpest(v)))
+        least = np.maximum(error, np.maximum(ALIKE * change, SURELY * sharpest_sign_velocity(v)))
         clear[:, j] = sampled & (error < change) & (np.abs(v) > least)
         if (turned & (error < change)).any():
             # Reversals at which it is more do not count.
@@ -128,7 +128,7 @@ def directions(
     return Directions(unsure, unsure & clear, jolts, late)
 
 
-def _shaken(rest: Array, turned: Flags, step: float) -> float:
+def _bound_reversal_velocity(rest: Array, turned: Flags, step: float) -> float:
     """Bounds what kicks do to a joint's velocity at its reversals by what its position (N,) has there besides.
 
     They move it by as much as that is larger than elsewhere, or would not be told to be; a position loop undoes them
@@ -143,7 +143,7 @@ def _shaken(rest: Array, turned: Flags, step: float) -> float:
     return float(2 * np.pi * LOOP * np.sqrt(max(here - usual, 0.0) + error))
 
 
-def sharpest(dq: Array) -> float:
+def sharpest_sign_velocity(dq: Array) -> float:
     """Gives the velocity over which a joint's sign is tried at its sharpest, by its velocities (N,)."""
     return SHARP * min(1.0, float(np.abs(dq).max(initial=0.0)))
 

@@ -15,7 +15,7 @@ from robots.common.stretches import spans
 Array = NDArray[np.float64]
 
 # A joint that has not moved on for so long [s] is at rest.
-LONG_GAP = 0.3
+REST_TIME = 0.3
 
 BESIDE = 0.05
 """Time [s] about a row of unknown direction in which accelerations are not known to all of their kicks."""
@@ -121,7 +121,7 @@ class Recording:
         for run in self.runs:
             for column in self.unsure[run].T:
                 for start, stop in spans(column):
-                    at_rest = stop - start > long_gap(self.step)
+                    at_rest = stop - start > rest_rows(self.step)
                     rows = [start, stop - 1] if at_rest else slice(start, stop)
                     turns[run][rows] = True
         away = self.away(turns)[:, 0]
@@ -149,7 +149,7 @@ class Recording:
         return replace(self, unsure=self.unsure & ~(self.clear & joints), trusted=joints)
 
 
-def cut(whole: Recording, rows: slice) -> Recording:
+def cut_recording(whole: Recording, rows: slice) -> Recording:
     """Takes rows of a recording, and the logs that begin in them."""
     begins = (0, *(start - rows.start for start in whole.starts if rows.start < start < rows.stop))
     first = sum(start <= rows.start for start in whole.starts) - 1
@@ -167,7 +167,7 @@ def cut(whole: Recording, rows: slice) -> Recording:
         late=None if whole.late is None else whole.late[rows],
         rest=None,
         cutoffs=None,
-        finer=None if whole.finer is None else cut(whole.finer, _at_all_samples(whole, rows)),
+        finer=None if whole.finer is None else cut_recording(whole.finer, _at_all_samples(whole, rows)),
         cycles=(None,) * len(begins),
         names=whole.names[logs],
         payloads=whole.payloads[logs],
@@ -184,7 +184,7 @@ def _at_all_samples(thinned: Recording, rows: slice) -> slice:
     return slice(int(first), int(last) + 1)
 
 
-def following(first: Recording, second: Recording) -> Recording:
+def join_recordings(first: Recording, second: Recording) -> Recording:
     """Joins two recordings of one sample period on one clock, the first before the second."""
     starts = (*first.starts, *(len(first) + start for start in second.starts))
 
@@ -203,7 +203,7 @@ def following(first: Recording, second: Recording) -> Recording:
         late=None if first.late is None or second.late is None else both("late"),
         rest=None,
         cutoffs=None,
-        finer=None if first.finer is None or second.finer is None else following(first.finer, second.finer),
+        finer=None if first.finer is None or second.finer is None else join_recordings(first.finer, second.finer),
         starts=starts,
         cycles=(*first.cycles, *second.cycles),
         names=(*first.names, *second.names),
@@ -212,6 +212,6 @@ def following(first: Recording, second: Recording) -> Recording:
     )
 
 
-def long_gap(step: float) -> int:
+def rest_rows(step: float) -> int:
     """Number of rows of `step` [s] beyond which a joint whose direction is not known is at rest."""
-    return max(8, round(LONG_GAP / step))
+    return max(8, round(REST_TIME / step))

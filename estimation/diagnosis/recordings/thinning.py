@@ -25,13 +25,13 @@ REACH, WINDOW = 2, 3.4
 FLAT = 1e-6
 
 
-def thinned(series: Array, starts: Sequence[int], stride: int) -> Array:
+def decimate(series: Array, starts: Sequence[int], stride: int) -> Array:
     """Low-passes rows (N, ...) of logs that begin at `starts`, without delay, and keeps every `stride`-th of each."""
     runs = [series[start:stop] for start, stop in pairwise((*starts, len(series)))]
-    return np.concatenate([low_passed(run, stride, stride) for run in runs])
+    return np.concatenate([low_pass_rows(run, stride, stride) for run in runs])
 
 
-def thin(finer: Recording, stride: int) -> Recording:
+def decimate_recording(finer: Recording, stride: int) -> Recording:
     """Thins a recording, which is kept beside."""
     rows = np.concatenate([np.arange(run.start, run.stop, stride) for run in finer.runs])
     width = 2 * stride + 1
@@ -41,7 +41,9 @@ def thin(finer: Recording, stride: int) -> Recording:
         return np.concatenate(spread)[rows]
 
     unsure = near(finer.unsure) > 0
-    passed = under_its_top(finer.tau, np.concatenate([low_passed(finer.tau[run], stride) for run in finer.runs]))
+    passed = keep_clipped_level(
+        finer.tau, np.concatenate([low_pass_rows(finer.tau[run], stride) for run in finer.runs])
+    )
     lengths = [-(-(run.stop - run.start) // stride) for run in finer.runs]
     return replace(
         finer,
@@ -62,7 +64,7 @@ def thin(finer: Recording, stride: int) -> Recording:
     )
 
 
-def earlier(recording: Recording, by: float) -> Recording:
+def shift_motion(recording: Recording, by: float) -> Recording:
     """Gives a recording with the motion of a moment [s] before: what torque that is logged so late was needed for."""
     if by == 0.0:
         return recording
@@ -74,18 +76,18 @@ def earlier(recording: Recording, by: float) -> Recording:
             t = recording.t[run]
             at = np.clip(t - by, t[0], t[-1])
             moved[name][run] = np.column_stack([np.interp(at, t, x) for x in values[run].T])
-    finer = None if recording.finer is None else earlier(recording.finer, by)
+    finer = None if recording.finer is None else shift_motion(recording.finer, by)
     return replace(recording, **moved, finer=finer)  # type: ignore[arg-type]
 
 
-def at_all_samples(recording: Recording, evaluate: Callable[[Recording], Array]) -> Array:
+def evaluate_at_full_rate(recording: Recording, evaluate: Callable[[Recording], Array]) -> Array:
     """Evaluates rows (N, ...) on a recording: of one that is thinned, on all samples, and thinned as its torque was."""
     if recording.finer is None:
         return evaluate(recording)
-    return thinned(evaluate(recording.finer), recording.finer.starts, recording.stride)
+    return decimate(evaluate(recording.finer), recording.finer.starts, recording.stride)
 
 
-def low_passed(series: Array, ratio: float, kept: int = 1) -> Array:
+def low_pass_rows(series: Array, ratio: float, kept: int = 1) -> Array:
     """Low-passes rows (N, ...) of one log without delay, to be `ratio` times as far apart; every `kept`-th of them."""
     half = int(np.ceil(REACH * ratio))
     taps = firwin(2 * half + 1, min(1.0 / ratio, 0.99), window=("kaiser", WINDOW))
@@ -95,7 +97,7 @@ def low_passed(series: Array, ratio: float, kept: int = 1) -> Array:
     return np.asarray(upfirdn(taps, beyond, down=kept, axis=0))[first : first + -(-len(series) // kept)]
 
 
-def under_its_top(tau: Array, passed: Array) -> Array:
+def keep_clipped_level(tau: Array, passed: Array) -> Array:
     """Keeps the flat tops of torque (N, n) that a filter has passed: a drive at its limit gives no more than that."""
     result = passed.copy()
     for own, column in zip(result.T, tau.T, strict=True):

@@ -13,7 +13,7 @@ LEFT = 0.5
 ROWS, ENOUGH = 2000, 3
 
 
-def hopeless_logs(base: BaseParameters, recording: Recording) -> dict[int, float]:
+def find_unusable_logs(base: BaseParameters, recording: Recording) -> dict[int, float]:
     """Finds logs of which the base model explains next to nothing, whatever its parameters.
 
     Friction of all kinds, masses and offsets are fitted to the log alone: a drive that rings in saturation, a torque

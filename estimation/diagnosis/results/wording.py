@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.findings import Finding, Gain, Parameter
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member
-from estimation.diagnosis.joint_fits.extended_fit import Fitted
-from estimation.diagnosis.searches.selection import Found
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.joint_fits.extended_fit import ExtendedFit
+from estimation.diagnosis.searches.selection import SelectedEffect
 from robots.robot import Robot
 from robots.terms.base import force_unit, length_unit
 from robots.terms.discrepancies.patterns import PREFIX
@@ -29,11 +29,11 @@ NOTHING = 1e-6
 def word_finding(
     robot: Robot,
     problem: Problem,
-    member: Member,
-    fitted: Fitted,
+    member: FittedEffect,
+    fitted: ExtendedFit,
     i: int,
     p_value: float,
-    found: Found | None,
+    found: SelectedEffect | None,
     gain: Gain,
 ) -> Finding:
     """Puts one effect of the extended model into words and numbers.
@@ -110,7 +110,7 @@ _DENIED = (
 
 
 def _parameters(
-    robot: Robot, member: Member, fitted: Fitted, i: int, known: NDArray[np.bool_]
+    robot: Robot, member: FittedEffect, fitted: ExtendedFit, i: int, known: NDArray[np.bool_]
 ) -> tuple[Parameter, ...]:
     extension = fitted.model.extensions[i]
     effect = member.hypothesis.effect

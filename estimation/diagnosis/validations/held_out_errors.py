@@ -9,20 +9,26 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.payload_and_gravity import lightened, regressor_on
-from estimation.diagnosis.base_models.priors import held
+from estimation.diagnosis.base_models.payload_and_gravity import base_regressor, subtract_known_payload
+from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.joint_fits.extended_fit import dense
-from estimation.diagnosis.joint_fits.shrinkage import pull_on
-from estimation.diagnosis.joint_fits.total_torque import columns_on
-from estimation.diagnosis.recordings.log_reading import record
-from estimation.diagnosis.recordings.recording import Recording, following
-from estimation.diagnosis.validations.forward_simulation import Plant, compare
-from estimation.diagnosis.validations.gain_intervals import PARTS, Unseen, cross_validated, models, on_held_out
+from estimation.diagnosis.joint_fits.shrinkage import effects_prior
+from estimation.diagnosis.joint_fits.total_torque import effect_columns
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.recordings.recording import Recording, join_recordings
+from estimation.diagnosis.validations.forward_simulation import FittedRobot, simulate_both
+from estimation.diagnosis.validations.gain_intervals import (
+    PARTS,
+    HeldOutErrors,
+    cross_validation_errors,
+    held_out_errors,
+    model_columns,
+)
 from estimation.diagnosis.validations.simulation_result import Simulation
-from estimation.regressions.parameter_priors import Pull
+from estimation.regressions.parameter_priors import GaussianPrior
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import Situation
@@ -40,7 +46,7 @@ ALONE = 0.9
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class HeldOutResult:
     """Errors on unseen data.
 
     Attributes:
@@ -59,7 +65,7 @@ class Measured:
         gone: members that came with a change, and that the unseen data are taken to be without.
     """
 
-    unseen: Unseen
+    unseen: HeldOutErrors
     gains: tuple[Gain, ...]
     rises: tuple[float, ...]
     worse: tuple[bool, ...]
@@ -70,18 +76,18 @@ class Measured:
     first: int
     effects: tuple[Array, ...]
     torque: Array
-    pull: Pull
+    pull: GaussianPrior
     gone: frozenset[int] = frozenset()
 
 
-def measure_unseen(
+def measure_held_out(
     robot: Robot,
     problem: Problem,
-    members: Sequence[Member],
+    members: Sequence[FittedEffect],
     held_out: Sequence[Log],
     seed: int,
     gone: frozenset[int] = frozenset(),
-) -> Measured:
+) -> HeldOutResult:
     """Measures on held-out logs, or on each part of the logs by a fit to the others.
 
     Args:
@@ -94,7 +100,7 @@ def measure_unseen(
     """
     effects = tuple(dense(problem, member.hypothesis, member.shape) for member in members)
     rng = np.random.default_rng(seed)
-    pull = pull_on(problem, members)
+    pull = effects_prior(problem, members)
     if held_out:
         unseen, states, whole, first, columns = _on_logs(robot, problem, members, effects, held_out, pull, gone)
     else:
@@ -105,7 +111,7 @@ def measure_unseen(
     torque = np.zeros_like(whole.tau[there])
     for X, member in zip(columns, members, strict=True):
         torque += X @ member.coefficients
-    return Measured(
+    return HeldOutResult(
         unseen=unseen,
         gains=tuple(_gain(unseen, i, member, rng) for i, member in enumerate(members)),
         rises=tuple(_rise(unseen, i, member) for i, member in enumerate(members)),
@@ -125,14 +131,14 @@ def measure_unseen(
     )
 
 
-def _left_out(problem: Problem, effects: Sequence[Array], pull: Pull) -> Unseen:
+def _left_out(problem: Problem, effects: Sequence[Array], pull: GaussianPrior) -> HeldOutErrors:
     """Leaves out logs in turn; parts of logs where an effect lives in one log alone, which no other log could tell."""
     recording = problem.recording
     why = _only_once(recording, effects)
     if len(recording.runs) == 1 or not why:
-        return cross_validated(problem, effects, pull)
+        return cross_validation_errors(problem, effects, pull)
     apart = replace(recording, starts=tuple(part.start for part in _parts(recording)))
-    unseen = cross_validated(replace(problem, recording=apart), effects, pull)
+    unseen = cross_validation_errors(replace(problem, recording=apart), effects, pull)
     return replace(unseen, how=_WITHIN.format(PARTS, len(recording.runs), why))
 
 
@@ -160,8 +166,8 @@ def _parts(recording: Recording) -> list[slice]:
     return parts
 
 
-def simulate_unseen(
-    problem: Problem, members: Sequence[Member], measured: Measured, held_out: bool
+def simulate_held_out(
+    problem: Problem, members: Sequence[FittedEffect], measured: HeldOutResult, held_out: bool
 ) -> Simulation | None:
     """Simulates the stretch of unseen data in which the extension acts most, without and with it.
 
@@ -183,7 +189,7 @@ def simulate_unseen(
     base, extended = _fits(problem, measured, None if held_out else part)
     known = problem.baseline.base
     b = known.size
-    before = Plant(model=known.model, columns=known.independent, values=base[:b])
+    before = FittedRobot(model=known.model, columns=known.independent, values=base[:b])
     edges = np.cumsum([b + problem.baseline.nuisance.shape[2], *(X.shape[2] for X in measured.effects)])
     there = [i for i in range(len(members)) if i not in measured.gone]
     after = replace(
@@ -195,7 +201,7 @@ def simulate_unseen(
         members=tuple(members[i] for i in there),
         coefficients=tuple(extended[edges[i] : edges[i + 1]] for i in there),
     )
-    return compare(before, after, whole, rows)
+    return simulate_both(before, after, whole, rows)
 
 
 def _strongest(parts: Sequence[slice], strength: Array, length: int) -> tuple[slice, slice]:
@@ -213,7 +219,7 @@ def _strongest(parts: Sequence[slice], strength: Array, length: int) -> tuple[sl
     return chosen
 
 
-def _fits(problem: Problem, measured: Measured, left_out: slice | None) -> tuple[Array, Array]:
+def _fits(problem: Problem, measured: HeldOutResult, left_out: slice | None) -> tuple[Array, Array]:
     """Fits base model and nuisance alone, and with the effects, to all rows but those left out."""
     recording, effects = problem.recording, measured.effects
     kept = np.ones(len(recording), dtype=bool)
@@ -229,15 +235,15 @@ def _fits(problem: Problem, measured: Measured, left_out: slice | None) -> tuple
     gram, cross = flat.T @ flat, flat.T @ (recording.tau[rows] * weights).reshape(-1)
     # Thinned rows count for all.
     factor = kept.sum() / max(len(rows), 1)
-    alone, *_, everything = models(full.shape[2] - sum(X.shape[2] for X in effects), effects)
+    alone, *_, everything = model_columns(full.shape[2] - sum(X.shape[2] for X in effects), effects)
     first, last = (
-        held(factor * gram[np.ix_(chosen, chosen)], factor * cross[chosen], measured.pull.columns(chosen))
+        solve_map(factor * gram[np.ix_(chosen, chosen)], factor * cross[chosen], measured.pull.columns(chosen))
         for chosen in (alone, everything)
     )
     return first, last
 
 
-def _gain(unseen: Unseen, i: int, member: Member, rng: np.random.Generator) -> Gain:
+def _gain(unseen: HeldOutErrors, i: int, member: FittedEffect, rng: np.random.Generator) -> Gain:
     """The fall of the error by one member, over the joints on which it is told."""
     joints = _joints(member)
     last = len(unseen.errors) - 1
@@ -250,7 +256,7 @@ def _gain(unseen: Unseen, i: int, member: Member, rng: np.random.Generator) -> G
     )
 
 
-def _joints(member: Member) -> list[int]:
+def _joints(member: FittedEffect) -> list[int]:
     """The joints, counted from 0, on which a member's gain is told.
 
     What is wrong with one joint may show on others above all: an encoder's zero on those that gravity pulls beyond it.
@@ -262,7 +268,7 @@ def _joints(member: Member) -> list[int]:
     return told or [member.hypothesis.joint - 1]
 
 
-def _rise(unseen: Unseen, i: int, member: Member) -> float:
+def _rise(unseen: HeldOutErrors, i: int, member: FittedEffect) -> float:
     joints = list(member.group.joints)
     before, after = (float(np.sum(unseen.nrmse(model)[joints] ** 2)) for model in (i + 1, len(unseen.errors) - 1))
     return float(np.sqrt(after / max(before, 1e-300)))
@@ -271,24 +277,26 @@ def _rise(unseen: Unseen, i: int, member: Member) -> float:
 def _on_logs(
     robot: Robot,
     problem: Problem,
-    members: Sequence[Member],
+    members: Sequence[FittedEffect],
     effects: Sequence[Array],
     held_out: Sequence[Log],
-    pull: Pull,
+    pull: GaussianPrior,
     gone: frozenset[int],
-) -> tuple[Unseen, list[Situation], Recording, int, list[Array]]:
+) -> tuple[HeldOutErrors, list[Situation], Recording, int, list[Array]]:
     recording = problem.recording
     travel = np.max([np.ptp(recording.q[run], axis=0) for run in recording.runs], axis=0)
-    other = lightened(robot, record(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN, travel=travel))
+    other = subtract_known_payload(
+        robot, build_recording(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN, travel=travel)
+    )
     other = other.trusting(recording.trusted)
     # One clock: where the unseen logs come later, the heat of the ones before is still there.
     later = bool(other.t[0] > recording.t[-1])
-    whole = following(recording, other) if later else other
+    whole = join_recordings(recording, other) if later else other
     first = len(recording) if later else 0
-    states, columns = columns_on(problem, whole, members)
+    states, columns = effect_columns(problem, whole, members)
     columns = [X[first:] * (i not in gone) for i, X in enumerate(columns)]
     baseline = problem.baseline
-    base = regressor_on(baseline.base, other)
+    base = base_regressor(baseline.base, other)
     nuisance = np.zeros((len(other), robot.n, baseline.nuisance.shape[2]))
-    unseen = on_held_out(problem, effects, other, np.concatenate([base, nuisance], axis=2), columns, pull)
+    unseen = held_out_errors(problem, effects, other, np.concatenate([base, nuisance], axis=2), columns, pull)
     return unseen, states, whole, first, columns

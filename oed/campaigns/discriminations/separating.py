@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
-from estimation.diagnosis.experiment_plans.experiment_motions import Room
+from estimation.diagnosis.experiment_plans.experiment_motions import MotionRange
 from estimation.diagnosis.experiment_plans.experiment_motions import Stage as Part
 from oed.experiments.assembly import rest_pose
 from oed.experiments.safety_checks.margins import measured_margins
@@ -115,7 +115,7 @@ class Workshop:
         lower, upper = self._range()
         self.series = self._reference(lower, upper, np.random.default_rng(seed))
         step = self.period * max(round(KNOTS / self.period), 1)
-        self.room = Room(
+        self.room = MotionRange(
             robot=self.robot,
             lower=lower,
             upper=upper,

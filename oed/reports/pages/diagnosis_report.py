@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.experiment_plans.detection_limits import told_in_one
+from estimation.diagnosis.experiment_plans.detection_limits import summarise_limits
 from estimation.diagnosis.results.diagnosis import Diagnosis
 from estimation.diagnosis.validations.verdict import CLOSE
 from oed.reports.pages.diagnosis_limits import limits_section
@@ -58,7 +58,7 @@ def diagnosis_page(view: DiagnosisView) -> Page:
 
 def _verdict(view: DiagnosisView) -> str:
     if view.verdict == "none":
-        seen = told_in_one(view.limits)
+        seen = summarise_limits(view.limits)
         return f"Nothing that the model leaves out was found.{f' {seen}.' if seen else ''}"
     if not view.findings:
         return "The model leaves something out that no effect of the catalogue explains."

@@ -14,7 +14,7 @@ from robots.terms.effects.base_tilt import level_axes, tilted_torque, upright
 Array = NDArray[np.float64]
 
 
-class Leaning(Effect):
+class BaseCompliance(Effect):
     """(d rigid/dg) (g x t), t = C m + R(q1) o: the base turns about its level axes by C per moment of the weight.
 
     m_k = e_k' (S x g) is the moment about the level axis e_k, S the first moment of the links' masses about the base, C

@@ -21,7 +21,7 @@ RANGE = (0.02, 0.98)
 
 
 @dataclass(frozen=True)
-class Stop(Placed):
+class EndStop(Placed):
     """tau = (k + d dq) x beyond a place c, x = (q - c) there; or short of it, x = (c - q).
 
     What is met gives way in proportion (k), and takes energy by how deep it is (d), as a buffer of rubber does.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from robots.common.stretches import spans
-from robots.terms.discrepancies.gain_drift import of_logs, waves
+from robots.terms.discrepancies.gain_drift import half_waves, log_time
 from robots.terms.discrepancies.resonance import resonance
 from robots.terms.effect_bases.states import bristle
 from robots.terms.effects import Situation
@@ -181,12 +181,12 @@ def _followers(s: Situation, source: Array, memories: tuple[float, ...]) -> Arra
 
 
 def _time(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
-    return waves(of_logs(s), KNOTS)
+    return half_waves(log_time(s), KNOTS)
 
 
 def _ageing(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     q = s.q[:, joint - 1]
-    slow = waves(of_logs(s), AGEING)
+    slow = half_waves(log_time(s), AGEING)
     return np.hstack([slow * wave[:, None] for wave in (np.cos(q), np.sin(q))])
 
 

@@ -17,7 +17,7 @@ FREQUENCIES = tuple(float(f) for f in np.geomspace(0.4, 5.0, 24))
 _WAYS = ("level", "upright")
 
 
-class Swinging(Effect):
+class FlangeOscillator(Effect):
     """-J(q)' f, f the force of masses that hang on weak springs at the flange and are driven by its acceleration.
 
     x'' + 2 d w x' + w^2 x = -p'' along the level and the upright directions; f = m_1 w^2 x + m_2 w x', so that the

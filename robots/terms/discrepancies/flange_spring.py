@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 _WAYS = ("x", "y", "z")
 
 
-class Pulling(Effect):
+class FlangeSpring(Effect):
     """-J(q)' f(p), f a force on the flange that is linear in the flange's place p: f = f0 + S p.
 
     A steady pull downwards is a payload, which the base model has.

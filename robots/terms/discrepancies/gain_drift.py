@@ -27,7 +27,7 @@ class OverTime(Effect):
         return (None,) if robot.n >= FEWEST else ()
 
 
-class Fading(OverTime):
+class GainDrift(OverTime):
     """tau_j g(t) on every joint j, g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
 
     What heat makes of a motor's constant differs from joint to joint, and is `torque_constant_heat`.
@@ -42,7 +42,7 @@ class Fading(OverTime):
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the base model's torque times each wave (N, n, KNOTS)."""
-        return np.asarray(situation.torque[:, :, None] * waves(of_logs(situation))[:, None])
+        return np.asarray(situation.torque[:, :, None] * half_waves(log_time(situation))[:, None])
 
     def describe(
         self,
@@ -54,18 +54,18 @@ class Fading(OverTime):
         length: str = "rad",
     ) -> str:
         """Says what is seen."""
-        share = waves(np.linspace(0.0, 1.0, 201)) @ coefficients
+        share = half_waves(np.linspace(0.0, 1.0, 201)) @ coefficients
         return (
             "The torque of all joints changes slowly with time, by the same share of each: over the logs it differs by "
             f"{100 * float(np.ptp(share)):.2g} %. A supply, or what all amplifiers are measured by, does that."
         )
 
 
-def waves(x: Array, count: int = KNOTS) -> Array:
+def half_waves(x: Array, count: int = KNOTS) -> Array:
     """Gives half waves (N, count) of time x (N,), which goes from 0 to 1."""
     return np.column_stack([np.cos(np.pi * k * x) for k in range(1, count + 1)])
 
 
-def of_logs(situation: Situation) -> Array:
+def log_time(situation: Situation) -> Array:
     """Gives time (N,) from 0 at the first row to 1 at the last."""
     return (situation.t - situation.t[0]) / max(float(situation.t[-1] - situation.t[0]), 1e-9)

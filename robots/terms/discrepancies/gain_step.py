@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 MOST = 0.5
 
 
-class Switch(Sudden, JointEffect):
+class GainStep(Sudden, JointEffect):
     """tau = e tau_j from the time t_c on.
 
     What heat makes of a motor's constant comes little by little, and is `torque_constant_heat`.

@@ -32,7 +32,7 @@ LIKE_MOTION, HIGHEST = 0.9, 5.0
 """With a period whose harmonics have this share of the motion, up to a frequency [Hz], the motion repeats as well."""
 
 
-class Spell(JointEffect):
+class IntermittentTorque(JointEffect):
     """tau = c sign(dq) p(t), p a pulse: friction that is there for a while."""
 
     name: ClassVar[str] = "pattern:spell:0:odd"
@@ -95,7 +95,7 @@ class Spell(JointEffect):
         )
 
 
-class Recurring(OverTime):
+class PeriodicTorque(OverTime):
     """J(q)' f p(t - k T - t_0) for all k: a force on the flange, constant in the base frame, that comes every T s.
 
     It is told from the motion by its period: one with which the motion repeats as well is none.
@@ -157,7 +157,7 @@ class Recurring(OverTime):
     def _periods(self, situation: Situation, share: float) -> tuple[float, ...]:
         def find() -> tuple[float, ...]:
             duration = max(float(situation.t[-1] - situation.t[0]), 1.0)
-            if lie_apart(situation):
+            if has_long_pauses(situation):
                 return ()
             shortest, longest = max(SHORTEST, BRIEFEST / share), duration / TIMES
             # From one to the next the last push moves by as much as it lasts.
@@ -190,7 +190,7 @@ class Recurring(OverTime):
         )
 
 
-def lie_apart(situation: Situation) -> bool:
+def has_long_pauses(situation: Situation) -> bool:
     """Whether logs have longer pauses between them than they are: over those nothing keeps its time."""
     return float(situation.t[-1] - situation.t[0]) > PAUSED * len(situation) * situation.period
 

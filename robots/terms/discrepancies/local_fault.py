@@ -41,7 +41,7 @@ class Placed(JointEffect):
 
 
 @dataclass(frozen=True)
-class Spot(Placed):
+class LocalFault(Placed):
     """tau = c exp(-((q - centre) / width)^2 / 2), times the direction of motion where it rubs.
 
     Attributes:

@@ -25,7 +25,7 @@ LEAST = 0.02
 """Share of its torque's energy below which a change is taken to have that much."""
 
 
-class Shift(Sudden):
+class Step(Sudden):
     """What acts on all joints from a time t_c on, and did not before."""
 
     moments: ClassVar[int] = CHANGES
@@ -52,7 +52,7 @@ def _after(columns: Array, situation: Situation, shape: tuple[float, ...]) -> Ar
     return np.where((situation.t >= shape[0])[:, None, None], columns, 0.0)
 
 
-class BaseShift(Shift):
+class BaseStep(Step):
     """(d rigid/dg) (g x e_k) a_k from t_c on, e_1 and e_2 level: `base_tilt` that begins while the robot moves."""
 
     name: ClassVar[str] = "pattern:base_shift:0:even"
@@ -88,7 +88,7 @@ class BaseShift(Shift):
         )
 
 
-class ZeroShift(Shift):
+class ZeroStep(Step):
     """(d rigid/dq_j) o from t_c on: `encoder_offset` that begins while the robot moves."""
 
     name: ClassVar[str] = "pattern:zero_shift:0:even"

@@ -8,19 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.robot import Robot
-from robots.terms.discrepancies.base_compliance import Leaning
-from robots.terms.discrepancies.clock_drift import Parting
-from robots.terms.discrepancies.end_stop import Stop
+from robots.terms.discrepancies.base_compliance import BaseCompliance
+from robots.terms.discrepancies.clock_drift import ClockDrift
+from robots.terms.discrepancies.end_stop import EndStop
 from robots.terms.discrepancies.families import FAMILIES
-from robots.terms.discrepancies.flange_oscillator import Swinging
-from robots.terms.discrepancies.flange_spring import Pulling
-from robots.terms.discrepancies.gain_drift import Fading, OverTime
-from robots.terms.discrepancies.gain_step import Switch
-from robots.terms.discrepancies.intermittent_torque import Recurring, Spell, lie_apart
-from robots.terms.discrepancies.local_fault import Spot
-from robots.terms.discrepancies.offset_step import BaseShift, Shift, ZeroShift
-from robots.terms.discrepancies.payload_drift import Draining
-from robots.terms.discrepancies.session_friction import Daily
+from robots.terms.discrepancies.flange_oscillator import FlangeOscillator
+from robots.terms.discrepancies.flange_spring import FlangeSpring
+from robots.terms.discrepancies.gain_drift import GainDrift, OverTime
+from robots.terms.discrepancies.gain_step import GainStep
+from robots.terms.discrepancies.intermittent_torque import IntermittentTorque, PeriodicTorque, has_long_pauses
+from robots.terms.discrepancies.local_fault import LocalFault
+from robots.terms.discrepancies.offset_step import BaseStep, Step, ZeroStep
+from robots.terms.discrepancies.payload_drift import PayloadDrift
+from robots.terms.discrepancies.session_friction import SessionFriction
 from robots.terms.effects import Coefficient, Effect, JointEffect, Shape, Situation
 
 Array = NDArray[np.float64]
@@ -35,18 +35,26 @@ SWINGS = 5.0
 SWAYING = ("vibration", "sway")
 # What acts on all joints at once.
 WHOLE: tuple[Effect, ...] = (
-    Swinging(),
-    Pulling(),
-    Leaning(),
-    Fading(),
-    Draining(),
-    Parting(),
-    BaseShift(),
-    Recurring(),
-    Daily(),
+    FlangeOscillator(),
+    FlangeSpring(),
+    BaseCompliance(),
+    GainDrift(),
+    PayloadDrift(),
+    ClockDrift(),
+    BaseStep(),
+    PeriodicTorque(),
+    SessionFriction(),
 )
 # What is at a place of a joint's range, or comes at a moment.
-SINGLE: tuple[Effect, ...] = (Spot(), Spot(odd=True), Stop(), Stop(below=True), Switch(), ZeroShift(), Spell())
+SINGLE: tuple[Effect, ...] = (
+    LocalFault(),
+    LocalFault(odd=True),
+    EndStop(),
+    EndStop(below=True),
+    GainStep(),
+    ZeroStep(),
+    IntermittentTorque(),
+)
 
 
 @dataclass(frozen=True)
@@ -222,19 +230,19 @@ def all_patterns(robot: Robot) -> tuple[Effect, ...]:
 
 def is_of_time(effect: object) -> bool:
     """Whether a pattern's function goes by time: of the motion it knows what it acts on, or the direction."""
-    return isinstance(effect, (OverTime, Switch, Shift, Spell)) or (
+    return isinstance(effect, (OverTime, GainStep, Step, IntermittentTorque)) or (
         isinstance(effect, Pattern) and effect.kind in ("time", "ageing")
     )
 
 
 def is_plain(effect: object) -> bool:
     """Whether a pattern's few functions resemble a cause that is no other: a name that explains less is none."""
-    return isinstance(effect, (Stop, Switch, Shift, Draining)) or (
+    return isinstance(effect, (EndStop, GainStep, Step, PayloadDrift)) or (
         isinstance(effect, Pattern) and effect.kind == "ageing"
     )
 
 
-def swings_by_itself(effect: object) -> bool:
+def is_oscillation(effect: object) -> bool:
     """Whether a pattern goes to and fro in time, not with the motion: where in its swing it is elsewhere is open."""
     return isinstance(effect, Pattern) and effect.kind in SWAYING
 
@@ -251,4 +259,4 @@ def _top(f: Array, power: Array, near: float) -> float:
 def _duration(situation: Situation) -> float:
     """The time from first to last [s]; where logs are days apart what was recorded, for no phase lasts so long."""
     span, recorded = float(situation.t[-1] - situation.t[0]), len(situation) * situation.period
-    return max(recorded if lie_apart(situation) else span, 1.0)
+    return max(recorded if has_long_pauses(situation) else span, 1.0)

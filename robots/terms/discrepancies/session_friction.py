@@ -19,7 +19,7 @@ SESSIONS = 6
 """Sessions that are told apart; more of them are bunched, in order."""
 
 
-class Daily(OverTime):
+class SessionFriction(OverTime):
     """tau_j = s_jk f_j in the session k, f_j the friction of the base model, which is that of the first one.
 
     What one joint has from one moment on is `friction_step`; here each has its own share, in each session.

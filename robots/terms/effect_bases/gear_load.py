@@ -14,12 +14,12 @@ from robots.terms.situations.situation import Situation
 
 Array = NDArray[np.float64]
 
-Borne = Literal["effects", "preloads"]
+LoadPath = Literal["effects", "preloads"]
 """The torque of effects that are `borne` alone, or with the base model's offset on joints of those it `preloads`."""
 
 
 @dataclass(frozen=True, eq=False)
-class Weight:
+class LoadSource:
     """An effect whose torque gears bear.
 
     Attributes:
@@ -36,7 +36,7 @@ class Weight:
 
 
 @dataclass(frozen=True, eq=False)
-class Bearing:
+class ExtraGearLoad:
     """What effects add to the load of gears, beside the base parameters that they were fitted with.
 
     What of a spring resembles gravity the base model may have taken, and the load with it: both together are what the
@@ -47,8 +47,8 @@ class Bearing:
         weights: the effects.
     """
 
-    how: Borne
-    weights: Sequence[Weight]
+    how: LoadPath
+    weights: Sequence[LoadSource]
 
     def on(self, now: Situation) -> Situation:
         """Gives what effects that grow with the load depend on."""
@@ -61,6 +61,6 @@ class Bearing:
         return now.bearing(borne)
 
 
-def laden_with(now: Situation, bearing: Bearing | None) -> Situation:
+def with_gear_load(now: Situation, bearing: ExtraGearLoad | None) -> Situation:
     """Gives what effects that grow with the load depend on, whether gears bear anything else or not."""
     return now if bearing is None else bearing.on(now)

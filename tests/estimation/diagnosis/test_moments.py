@@ -15,7 +15,7 @@ from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
 from estimation.diagnosis.joint_fits import shape_errors as errors
 from estimation.diagnosis.joint_fits.extended_fit import fit_extended
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording
 from robots.robot import Robot
 from robots.signals import Log
@@ -31,7 +31,7 @@ TRUE = 7.31
 @pytest.fixture(scope="module")
 def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
     """A log of the arm without effects."""
-    return record(arm, [arm_log(torque_noise=0.02)])
+    return build_recording(arm, [arm_log(torque_noise=0.02)])
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimation import on_one_clock, read_log, write_log
-from estimation.logs.clocks import UNKNOWN_PAUSE, clocked, later_by
+from estimation.logs.clocks import UNKNOWN_PAUSE, later_by, put_on_clock
 from estimation.logs.provenance import describe_logs
 from robots.common.errors import InputError
 from robots.signals import Log
@@ -38,15 +38,15 @@ def test_no_pause_is_refused() -> None:
 def test_only_logs_that_overlap_are_moved() -> None:
     """Pauses that are known stay; held-out logs that overlap others come after the last of these, and are undated."""
     early, late, unseen = _log(0.0, 11), _log(70.0, 21), _log(0.0, 31)
-    both = clocked([late, early], [replace(unseen, t=unseen.t + 100.0)])
+    both = put_on_clock([late, early], [replace(unseen, t=unseen.t + 100.0)])
     assert both.dated
     assert not both.notes
     assert [log.t[0] for log in (*both.logs, *both.held_out)] == [70.0, 0.0, 100.0]
-    both = clocked([late, early], [unseen])
+    both = put_on_clock([late, early], [unseen])
     assert not both.dated
     assert [log.t[0] for log in (*both.logs, *both.held_out)] == [70.0, 0.0, pytest.approx(132.0)]
     assert "held-out" in both.notes[0]
-    both = clocked([early, unseen], [])
+    both = put_on_clock([early, unseen], [])
     assert both.dated
     assert [log.t[0] for log in both.logs] == [0.0, pytest.approx(61.0)]
     assert "in the order given" in both.notes[0]
@@ -56,14 +56,14 @@ def test_a_copy_is_refused() -> None:
     """A log counts once, whenever it says it was; what repeats a motion alone is no copy."""
     log = replace(_log(0.0, 11), name="first")
     with pytest.raises(InputError, match="given twice"):
-        clocked([log, replace(log, t=log.t + 20.0)], [])
+        put_on_clock([log, replace(log, t=log.t + 20.0)], [])
     with pytest.raises(InputError, match="fitted to"):
-        clocked([log], [log])
+        put_on_clock([log], [log])
     assert log.tau is not None
     again = replace(log, tau=log.tau + 1.0)
-    assert clocked([log, again], []).notes
+    assert put_on_clock([log, again], []).notes
     with pytest.raises(InputError, match="given twice"):
-        clocked([log], [again, again])
+        put_on_clock([log], [again, again])
 
 
 def test_a_log_of_the_fit_keeps_its_place_and_another_comes_after() -> None:

@@ -10,9 +10,9 @@ from scipy.stats import chi2
 
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.scan import measure, scan, surprise
+from estimation.diagnosis.hypothesis_tests.scan import measure, neg_log_p, scan
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.recordings.log_reading import build_recording
 from robots.plants import Plant
 from robots.robot import Robot
 from robots.signals import Log
@@ -22,7 +22,7 @@ from robots.terms.effects import EFFECTS
 @pytest.fixture(scope="module")
 def problem(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]) -> Problem:
     """A log of the arm without effects, white."""
-    return pose_arm(record(arm, [arm_log(torque_noise=0.02)]), draws=300)
+    return pose_arm(build_recording(arm, [arm_log(torque_noise=0.02)]), draws=300)
 
 
 def _written_out(problem: Problem, extra: np.ndarray) -> tuple[float, float]:
@@ -121,8 +121,8 @@ def test_surprise_is_the_logarithm_of_the_chi_square_tail() -> None:
     """It equals scipy's where that has digits, and follows the tail where it has none."""
     for degrees in (1, 2, 6, 16):
         x = np.array([0.0, 1.0, 20.0, 300.0, 1200.0])
-        assert surprise(x, degrees) == pytest.approx(-chi2.logsf(x, degrees), rel=0.02, abs=1e-9)
-        assert 1400 < surprise(np.array(3000.0), degrees) < 1510
+        assert neg_log_p(x, degrees) == pytest.approx(-chi2.logsf(x, degrees), rel=0.02, abs=1e-9)
+        assert 1400 < neg_log_p(np.array(3000.0), degrees) < 1510
 
 
 def test_base_parameters_come_back(arm_plant: Callable[..., Plant], problem: Problem) -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve, firwin
 
-from estimation.diagnosis.noise_models.frequency_bands import BIAS, Band, unbiased
+from estimation.diagnosis.noise_models.frequency_bands import BIAS, Band, unbiased_frequencies
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening, quiet_joints
-from estimation.diagnosis.recordings.recording import Recording, cut
+from estimation.diagnosis.recordings.recording import Recording, cut_recording
 from tests.estimation.diagnosis.noisy_logs import STEP, noise_of, recording_of
 
 ROWS = 250_000
@@ -64,7 +64,7 @@ def test_inertia_is_fitted_without_a_bias_that_shows(counted: tuple[Recording, n
     The frequencies are an eighth of a hertz apart, and what is left grows with their tenth power: by a factor of two.
     """
     recording, true, noise = counted
-    (frequency,) = unbiased(recording, np.eye(1), noise)
+    (frequency,) = unbiased_frequencies(recording, np.eye(1), noise)
     assert 5.0 < frequency < 60.0
     assert 0.4 * BIAS < _left(recording, true, frequency) < 2.5 * BIAS
     assert _left(recording, true, 2 * frequency) > 100 * BIAS
@@ -73,25 +73,25 @@ def test_inertia_is_fitted_without_a_bias_that_shows(counted: tuple[Recording, n
 def test_a_larger_inertia_is_known_further(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
     """With the torque, the error grows, and its share of it does not: what it leaves grows with the square."""
     recording, _, noise = counted
-    assert unbiased(recording, 3 * np.eye(1), noise) < unbiased(recording, np.eye(1), noise)
+    assert unbiased_frequencies(recording, 3 * np.eye(1), noise) < unbiased_frequencies(recording, np.eye(1), noise)
 
 
 def test_without_encoder_noise_nothing_is_biased(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
     """Accelerations without error are known at all frequencies; so are those of a joint that has no torque of them."""
     recording, _, noise = counted
-    assert unbiased(replace(recording, floor=np.zeros(1)), np.eye(1), noise) == np.inf
-    assert unbiased(recording, np.zeros((1, 1)), noise) == np.inf
-    assert unbiased(replace(recording, ddq=np.zeros((ROWS, 1))), np.eye(1), np.zeros((ROWS, 1))) == np.inf
+    assert unbiased_frequencies(replace(recording, floor=np.zeros(1)), np.eye(1), noise) == np.inf
+    assert unbiased_frequencies(recording, np.zeros((1, 1)), noise) == np.inf
+    assert unbiased_frequencies(replace(recording, ddq=np.zeros((ROWS, 1))), np.eye(1), np.zeros((ROWS, 1))) == np.inf
 
 
 def test_logs_of_any_length_count(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
     """Cut into two halves and a few rows, a log says the same; a few rows alone say nothing."""
     recording, _, noise = counted
-    whole = unbiased(recording, np.eye(1), noise)
+    whole = unbiased_frequencies(recording, np.eye(1), noise)
     pieces = replace(recording, starts=(0, ROWS // 2, ROWS - 10))
-    assert unbiased(pieces, np.eye(1), noise) == pytest.approx(whole, rel=0.05)
-    few = cut(recording, slice(0, 10))
-    assert unbiased(few, np.eye(1), noise[:10]) == np.inf
+    assert unbiased_frequencies(pieces, np.eye(1), noise) == pytest.approx(whole, rel=0.05)
+    few = cut_recording(recording, slice(0, 10))
+    assert unbiased_frequencies(few, np.eye(1), noise[:10]) == np.inf
 
 
 def test_rows_at_rest_are_told_apart(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
@@ -104,8 +104,8 @@ def test_rows_at_rest_are_told_apart(counted: tuple[Recording, np.ndarray, np.nd
         t=recording.t[0] + STEP * np.arange(2 * ROWS),
         unsure=np.concatenate([recording.unsure, still == 0.0]),
     )
-    whole = unbiased(recording, np.eye(1), noise)
-    rested = unbiased(longer, np.eye(1), np.concatenate([noise, still]), np.array([0.5]))
+    whole = unbiased_frequencies(recording, np.eye(1), noise)
+    rested = unbiased_frequencies(longer, np.eye(1), np.concatenate([noise, still]), np.array([0.5]))
     assert rested == pytest.approx(whole, abs=0.3)
 
 

@@ -16,9 +16,9 @@ from estimation.diagnosis.hypothesis_tests.scoring import accept, score
 from estimation.diagnosis.joint_fits.extended_fit import fit_extended
 from estimation.diagnosis.noise_models.frequency_bands import TRANSITION
 from estimation.diagnosis.noise_models.high_frequency_band import WIDER
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.periods import Cycle
-from estimation.diagnosis.recordings.recording import Recording, cut, following
+from estimation.diagnosis.recordings.recording import Recording, cut_recording, join_recordings
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log
@@ -35,7 +35,7 @@ SHAKEN = 17.3  # [Hz]
 @pytest.fixture(scope="module")
 def clean(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
     """A log of the arm without torque noise that passes as one of a coarse encoder."""
-    return replace(record(arm, [arm_log(torque_noise=0.0)]), floor=np.full(2, 1e-11), cycles=(None,))
+    return replace(build_recording(arm, [arm_log(torque_noise=0.0)]), floor=np.full(2, 1e-11), cycles=(None,))
 
 
 @pytest.fixture(scope="module")
@@ -169,7 +169,7 @@ def test_noise_that_repeats_with_the_motion_tells_less(
     cycle = Cycle(0, rows.stop, period * clean.step, 5)
     told = []
     for repeated in (np.tile(noise[:period], (5, 1)), noise) if same else (noise, noise[::-1]):
-        log = cut(clean, rows)
+        log = cut_recording(clean, rows)
         problem = pose_arm(replace(log, tau=log.tau + NOISE * repeated[rows], cycles=(cycle,)), wider=WIDER)
         assert problem.upper is not None
         told.append(float(np.sum(problem.upper.columns(np.cos(SHAPE[0] * log.q[:, :1]), 0) ** 2)))
@@ -216,7 +216,7 @@ def test_a_log_in_which_a_joint_stands_levels_no_noise(clean: Recording, pose_ar
             tau=clean.tau + [3.0, 0.0] + NOISE * rng.standard_normal(clean.tau.shape),
             unsure=clean.unsure | np.array([True, False]),
         )
-        whole = following(whole, stands)
+        whole = join_recordings(whole, stands)
     upper = pose_arm(whole, wider=WIDER).upper
     assert upper is not None
     above = upper.joints[0]

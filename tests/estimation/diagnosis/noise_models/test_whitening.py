@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from estimation.diagnosis.hypothesis_tests.residual_shares import period_differences, period_mean, residual_shares
-from estimation.diagnosis.noise_models.masked_rows import find_gaps
+from estimation.diagnosis.noise_models.masked_rows import find_masked_rows
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.periods import Cycle
@@ -107,7 +107,7 @@ def test_rows_of_unknown_direction_do_not_count() -> None:
     whitening = replace(estimate_whitening(recording, noise_of(10_000), 0, np.eye(2)), weights=None)
     kick = np.zeros(10_000)
     kick[3001:3005] = 1000.0
-    plain = replace(whitening, gaps=find_gaps(np.zeros_like(unsure), (0,)))
+    plain = replace(whitening, gaps=find_masked_rows(np.zeros_like(unsure), (0,)))
     assert np.linalg.norm(whitening.apply(kick, 0)) < 1e-9 * np.linalg.norm(plain.apply(kick, 0))
     assert np.linalg.norm(whitening.apply(kick, 1)) == pytest.approx(np.linalg.norm(plain.apply(kick, 1)))
 
@@ -152,7 +152,7 @@ def test_a_long_gap_is_bridged_within_its_log() -> None:
     """A joint at rest is bridged by a straight line; at the end of a log the last known value stands."""
     unsure = np.zeros((100, 1), dtype=bool)
     unsure[20:30], unsure[45:50] = True, True
-    gaps = find_gaps(unsure, (0, 50), 3)
+    gaps = find_masked_rows(unsure, (0, 50), 3)
     series = np.arange(100.0)
     bent = series.copy()
     bent[20:30], bent[45:50] = 7.0, 7.0

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from estimation.diagnosis.recordings.directions import ALIKE, CLEAR
-from estimation.diagnosis.recordings.log_reading import record
-from estimation.diagnosis.recordings.recording import Recording, cut
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.recordings.recording import Recording, cut_recording
 from robots.common.stretches import spans
 from robots.robot import Robot
 from robots.signals import Log, Motion
@@ -50,7 +50,7 @@ def _kicked(motion: Motion, friction: float = KICK, loop: float = 1.0) -> tuple[
 
 def _trusting(arm: Robot, log: Log) -> Recording:
     """A recording of which all rows count that are clear."""
-    return record(arm, [log]).trusting(np.ones(2, dtype=bool))
+    return build_recording(arm, [log]).trusting(np.ones(2, dtype=bool))
 
 
 def _beside(log: Log, arm: Robot) -> float:
@@ -116,7 +116,7 @@ def test_rows_that_count_beside_a_reversal_have_a_velocity_that_is_known(
 def test_rows_beside_a_reversal_count_of_joints_that_are_trusted_alone(arm: Robot, fourier_motion: Callable) -> None:
     """Before that is said of a joint, and of the others, no row beside a reversal counts."""
     motion = _aperiodic(fourier_motion, arm)
-    plain = record(arm, [_counted(motion, motion.q, 2**40)])
+    plain = build_recording(arm, [_counted(motion, motion.q, 2**40)])
     turned = np.zeros(plain.dq.shape, dtype=bool)
     turned[1:] = plain.dq[1:] * plain.dq[:-1] < 0
     assert plain.unsure[turned].all()
@@ -124,7 +124,7 @@ def test_rows_beside_a_reversal_count_of_joints_that_are_trusted_alone(arm: Robo
     trusting = plain.trusting(np.array([True, False]))
     assert not trusting.unsure[turned[:, 0], 0].all()
     assert trusting.unsure[:, 1] == pytest.approx(plain.unsure[:, 1])
-    assert cut(trusting, slice(100, 200)).clear == pytest.approx(plain.clear[100:200])
+    assert cut_recording(trusting, slice(100, 200)).clear == pytest.approx(plain.clear[100:200])
 
 
 @pytest.mark.parametrize(
@@ -146,14 +146,14 @@ def test_a_jolt_is_what_a_kick_may_leave_of_the_acceleration(
     """
     motion = _aperiodic(fourier_motion, arm)
     q, _, ddq = _kicked(motion, loop=loop)
-    recording = record(arm, [_counted(motion, q, counts)])
+    recording = build_recording(arm, [_counted(motion, q, counts)])
     first = int(np.argmin(np.abs(motion.t - recording.t[0])))
     true = ddq[first : first + len(recording), 0]
     turns = np.flatnonzero(recording.dq[1:, 0] * recording.dq[:-1, 0] < 0)
     near = np.unique(np.clip(turns[:, None] + np.arange(-2, 4), 0, len(true) - 1))
     error = float(np.sqrt(np.mean((recording.ddq[near, 0] - true[near]) ** 2)))
     assert error / 2 < recording.jolts[0] < most * error
-    smooth = record(arm, [_counted(motion, motion.q, 2**26)])
+    smooth = build_recording(arm, [_counted(motion, motion.q, 2**26)])
     assert smooth.jolts[0] < recording.jolts[0] / 30
 
 
@@ -162,7 +162,7 @@ def test_moments_of_reversals_are_as_wrong_as_is_said(arm: Robot, fourier_motion
     """Where kicks make a velocity change its sign late, by how much is told within a factor of three."""
     motion = _aperiodic(fourier_motion, arm)
     q, dq, _ = _kicked(motion)
-    recording = record(arm, [_counted(motion, q, counts)])
+    recording = build_recording(arm, [_counted(motion, q, counts)])
     first = int(np.argmin(np.abs(motion.t - recording.t[0])))
     turns = _crossings(recording.dq[:, 0])
     errors = turns - _crossings(dq[first : first + len(recording), 0])

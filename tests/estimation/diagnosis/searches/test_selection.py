@@ -115,14 +115,14 @@ def _rivals(
         return SimpleNamespace(hypothesis=hypothesis, bic=lambda rows: bic, worth=lambda rows: worth, **values)
 
     monkeypatch.setattr(selection, "accept", lambda problem, groups: groups)
-    monkeypatch.setattr(selection, "all_but", _all_but)
+    monkeypatch.setattr(selection, "accept_all_but", _all_but)
     monkeypatch.setattr(selection, "scan", lambda *args, **options: SimpleNamespace(outcomes=[]))
-    monkeypatch.setattr(selection, "contenders", lambda *args: [SimpleNamespace(hypothesis=B)])
+    monkeypatch.setattr(selection, "screen_candidates", lambda *args: [SimpleNamespace(hypothesis=B)])
     monkeypatch.setattr(
-        selection, "best", lambda problem, rest, beside: [member(o.hypothesis, -7.0, -7.0) for o in rest]
+        selection, "refine_candidates", lambda problem, rest, beside: [member(o.hypothesis, -7.0, -7.0) for o in rest]
     )
     chosen = selection.Selection(
-        found=(selection.Found(member(A, bic, worth), 1e-30),),  # type: ignore[arg-type]
+        found=(selection.SelectedEffect(member(A, bic, worth), 1e-30),),  # type: ignore[arg-type]
         seen=frozenset(seen),
         first=None,  # type: ignore[arg-type]
         last=None,  # type: ignore[arg-type]

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.diagnosis.validations.gain_intervals import Unseen, models, on_held_out
-from estimation.regressions.parameter_priors import Pull
+from estimation.diagnosis.validations.gain_intervals import HeldOutErrors, held_out_errors, model_columns
+from estimation.regressions.parameter_priors import GaussianPrior
 
 
-def _unseen(fall: float, seed: int) -> Unseen:
+def _unseen(fall: float, seed: int) -> HeldOutErrors:
     rng = np.random.default_rng(seed)
     noise = lfilter([np.sqrt(1 - 0.95**2)], [1, -0.95], rng.standard_normal((6000, 1)), axis=0)
     extra = np.sqrt(2 * fall) * np.sin(np.arange(6000) / 37.0)[:, None]
-    return Unseen(
+    return HeldOutErrors(
         "a log",
         0.004 * np.arange(6000),
         0.004,
@@ -31,7 +31,7 @@ def test_nrmse_counts_only_rows_that_count() -> None:
     counts = np.ones((4, 1), dtype=bool)
     counts[3] = False
     errors = np.array([[1.0], [-1.0], [1.0], [100.0]])
-    unseen = Unseen("a log", np.arange(4.0), 1.0, np.array([[2.0], [2.0], [2.0], [9.0]]), (errors,), counts)
+    unseen = HeldOutErrors("a log", np.arange(4.0), 1.0, np.array([[2.0], [2.0], [2.0], [9.0]]), (errors,), counts)
     assert unseen.nrmse(0) == pytest.approx([0.5])
 
 
@@ -54,16 +54,16 @@ def test_no_fall_has_an_interval_about_zero() -> None:
 
 def test_each_effect_is_left_out_once() -> None:
     """Models compared: the base alone, the whole less each effect, the whole."""
-    chosen = models(3, [np.zeros((1, 1, 2)), np.zeros((1, 1, 1))])
+    chosen = model_columns(3, [np.zeros((1, 1, 2)), np.zeros((1, 1, 1))])
     assert [c.tolist() for c in chosen] == [[0, 1, 2], [0, 1, 2, 5], [0, 1, 2, 3, 4], [0, 1, 2, 3, 4, 5]]
 
 
-def _of_sizes(errors: list[float], fitted: list[float] | None) -> Unseen:
+def _of_sizes(errors: list[float], fitted: list[float] | None) -> HeldOutErrors:
     """Errors of given RMS on one joint whose torque has an RMS of one."""
     wave = np.sqrt(2) * np.sin(2 * np.pi * np.arange(1000) / 100)[:, None]
     seen = None if fitted is None else tuple(size * wave for size in fitted)
     counts = np.ones((1000, 1), dtype=bool)
-    return Unseen("", 0.01 * np.arange(1000), 0.01, wave, tuple(size * wave for size in errors), counts, seen)
+    return HeldOutErrors("", 0.01 * np.arange(1000), 0.01, wave, tuple(size * wave for size in errors), counts, seen)
 
 
 def test_what_is_kept_of_a_gain_is_its_share_of_the_fit_s() -> None:
@@ -90,7 +90,7 @@ class Rows(SimpleNamespace):
         return len(self.tau)
 
 
-def _other_motion(seed: int, effect: float, there: float) -> Unseen:
+def _other_motion(seed: int, effect: float, there: float) -> HeldOutErrors:
     """A log whose two base columns differ by 3 % only, and another that shows each by itself; noise of size one.
 
     The effect looks a little like their difference, and acts `there` times as much in the second log.
@@ -117,7 +117,7 @@ def _other_motion(seed: int, effect: float, there: float) -> Unseen:
         ),
     )
     other = Rows(unsure=moving, tau=unseen, t=t, step=0.01, runs=[slice(0, rows)], names=("other",))
-    return on_held_out(problem, [X], other, Z, [W], Pull(np.zeros((3, 3)), np.zeros(3)))  # type: ignore[arg-type]
+    return held_out_errors(problem, [X], other, Z, [W], GaussianPrior(np.zeros((3, 3)), np.zeros(3)))  # type: ignore[arg-type]
 
 
 def test_a_true_effect_is_seldom_called_harmful_by_a_log_that_leaves_the_base_open() -> None:
