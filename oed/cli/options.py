@@ -43,8 +43,18 @@ WorkersOption = Annotated[
 ]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
 FrictionOption = Annotated[str, typer.Option("--friction", help="The model to fit: polynomial or coulomb-viscous.")]
-HarmonicsOption = Annotated[int, typer.Option("--harmonics", help="Harmonics of the Fourier series.")]
-BaseFrequencyOption = Annotated[float, typer.Option("--base-frequency", help="Frequency of the first harmonic [Hz].")]
+FamilyOption = Annotated[
+    str, typer.Option("--family", help="Of the optimised part: fourier, bspline or fourier-polynomial.")
+]
+HarmonicsOption = Annotated[
+    int,
+    typer.Option(
+        "--harmonics", help="Harmonics N of the optimised part; another family gets about as many coefficients."
+    ),
+]
+BaseFrequencyOption = Annotated[
+    float, typer.Option("--base-frequency", help="One over the duration of one repetition [Hz].")
+]
 CollisionOption = Annotated[
     bool, typer.Option("--collision", help="Keep clear of the arm itself and of the obstacles in its file.")
 ]
