@@ -79,7 +79,7 @@ class Registry(Mapping[str, Member], Generic[Member]):
         if name in self:
             return self[name]
         self.refuse_failed(name)
-        raise InputError(f"{self.what} {name!r}", allowed=", ".join(self))
+        raise InputError(f"unknown {self.what} {name!r}", allowed=", ".join(self))
 
     def refuse_failed(self, name: str) -> None:
         """Refuses a name whose entry point could not be loaded.

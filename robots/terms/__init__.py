@@ -32,7 +32,7 @@ def build_term(description: Mapping[str, Any]) -> Term:
     """
     settings = dict(description)
     name = settings.pop("name", None)
-    kind = TERMS.get_or_raise(str(name))
+    kind = TERMS.get_or_raise(name)
     try:
         values = {key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()}
         return kind(**values)
