@@ -20,10 +20,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Slsqp(Solver):
-    """Settings of sequential least squares programming (Kraft 1988); see `Solver` for what all solvers share."""
+    """Settings of sequential least squares programming (Kraft 1988); see `Solver` for what all solvers share.
+
+    Attributes:
+        rounds: how often rows that a solution passes are added and the stage is solved again.
+    """
 
     name: ClassVar[str] = "slsqp"
     barriers: ClassVar[tuple[float, float, float]] = (0.0, 0.0, 0.0)  # it has none
+
+    rounds: int = 2
 
     def minimise(
         self,
