@@ -72,7 +72,9 @@ class _Descent:
         self._problem, self._tolerance, self._tell = problem, tolerance, tell
         self._linear = LinearSlacks(problem)
         self.z = start
-        self._hessian: Array | None = None
+        # A unit of z brings a joint to its limits, and the criteria are logarithms: curvatures are of the order of one.
+        # The usual first scaling takes the largest curvature for all directions. Its short steps end in worse optima.
+        self._hessian: Array = np.eye(problem.size)
         self.iterations = self.evaluations = 0
         self.stopped = False
         self.status = "no iteration"
@@ -131,8 +133,6 @@ class _Descent:
 
     def _direction(self, slacks: Slacks, weights: Array, gradient: Array) -> Array:
         size = len(gradient)
-        if self._hessian is None:
-            self._hessian = np.eye(size)
         while True:
             matrix = self._hessian.copy()
             slacks.add_normal(matrix, weights)
@@ -172,10 +172,7 @@ class _Descent:
 
     def _learn(self, moved: Array, y: Array) -> None:
         """Updates the Hessian by Powell's damped BFGS, which keeps it positive definite."""
-        assert self._hessian is not None
         sy = float(moved @ y)
-        if not self.iterations and sy > 0:
-            self._hessian = np.eye(len(moved)) * (y @ y / sy)
         image = self._hessian @ moved
         quadratic = float(moved @ image)
         if quadratic <= 0 or not np.isfinite(sy):
