@@ -51,7 +51,7 @@ class Slsqp(Solver):
                 raise StopIteration
 
         for stage in stages:
-            max_iter = stage.max_iter
+            max_iter, before = stage.max_iter, z
             for _ in range(self.rounds):
                 result = minimize(
                     problem.surrogate,
@@ -70,7 +70,8 @@ class Slsqp(Solver):
                 if not going or not any(passed):
                     break
                 max_iter = max(10, max_iter // 2)
-            z = problem.shrunk(z)
+            # Pulled within the limits, what was better may be worse than the stage's start.
+            z = min(problem.shrunk(z), before, key=lambda point: problem.surrogate(point, stage.sharpness)[0])
             if not going:
                 break
         return Solved(z=z, iterations=iterations, evaluations=evaluations, status=status)
