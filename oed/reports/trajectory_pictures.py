@@ -94,8 +94,8 @@ def trajectory_picture(
         columns=3,
         shared_x=True,
         panel_height=130,
-        caption="Dashed lines are limits; a limit far outside is named in the corner instead."
-        + (" Shading marks the segments of the experiment." if spans else ""),
+        caption="Dashed lines are limits. Limits far outside the range are written in the corner."
+        + (" Shaded areas are the segments of the experiment." if spans else ""),
     )
 
 
@@ -145,11 +145,13 @@ def spectrum_picture(parts: Mapping[str, ArrayLike], *, name: str = "spectrum") 
         y_log=True,
     )
     return Picture(
-        title="How well each direction of the parameters is excited",
+        title="Excitation of the parameter directions",
         name=name,
         panels=(panel,),
         panel_height=300,
-        caption="The flatter a curve, the better conditioned the experiment; the last point is the one known least.",
+        caption=(
+            "A flatter curve means a better conditioned experiment. The last point is the worst-determined direction."
+        ),
     )
 
 
@@ -206,11 +208,11 @@ def margins_picture(
         y_range=(0.0, 1.12 * largest),
     )
     return Picture(
-        title="How much of each limit the motion uses",
+        title="Use of the limits",
         name=name,
         panels=(panel,),
         panel_height=280,
-        caption="100 % is on the limit. Of a position, 0 % is the middle of its range.",
+        caption="100 % is on the limit. For positions, 0 % is the middle of the range.",
     )
 
 

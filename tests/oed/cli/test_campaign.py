@@ -33,8 +33,8 @@ def test_a_campaign_is_written_whole(run: Callable[..., Any], robot: Path, exper
         "warm_up_100.csv",
     }
     page = (planned / "report.html").read_text()
-    assert "What runs when" in page
-    assert "keeps all limits" in page
+    assert "Schedule" in page
+    assert "respects all limits" in page
     again = run("campaign", "--robot", robot, "--design", experiment, "--out", planned, *SHORT)
     assert again.code == 2
     assert "the file exists" in again.err

@@ -79,7 +79,7 @@ def test_its_files_are_of_use(done: Path) -> None:
     page = (done / "report.html").read_text()
     assert "friction that changed at one moment" in page
     assert "Simulated motion" in page
-    assert "Smallest size that would be found" in page
+    assert "smallest effect size" in page
 
 
 def test_limits_before_any_experiment(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
@@ -157,8 +157,8 @@ def test_a_model_knows_its_robot(run, done: Path, experiment: Path, tmp_path: Pa
     ("arguments", "message"),
     [
         ((), "give --log"),
-        (("--limits",), "--limits takes --trajectory"),
-        (("--limits", "--log", "a.csv", "--trajectory", "b.csv"), "--limits takes --trajectory"),
+        (("--limits",), "--limits needs --trajectory"),
+        (("--limits", "--log", "a.csv", "--trajectory", "b.csv"), "--limits needs --trajectory"),
         (("--log", "a.csv", "--trajectory", "b.csv"), "give --log"),
         (("--log", "nowhere.csv"), "nowhere.csv"),
         (("--limits", "--trajectory", "nowhere.csv"), "nowhere.csv"),

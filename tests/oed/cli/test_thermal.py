@@ -94,7 +94,7 @@ def test_predictions_follow_the_heat(run: Callable[..., Any], done: Path, logs: 
     """The last log, 14 minutes in, is predicted better after the logs before it than as a cold start; both are said."""
     errors = []
     for options, told in (
-        ((), "begin cold"),
+        ((), "assumed cold"),
         (("--before", logs / "0.parquet", "--before", logs / "1.parquet"), "2 logs"),
     ):
         ended = run(
@@ -126,7 +126,7 @@ def test_the_page_shows_time_powers_and_curves(done: Path) -> None:
     page = (done / "report.html").read_text()
     for name in ("friction_time", "friction_duty", "time_constants", "friction_curves"):
         assert name in page
-    assert "Not determined by these logs" in page
+    assert "These logs determine time constants and friction ratios, but not" in page
 
 
 def test_results_are_not_overwritten(run: Callable[..., Any], done: Path, robot: Path, logs: Path) -> None:
