@@ -109,7 +109,7 @@ def campaign(
                 executor=executor,
                 progress=progress,
             )
-            notes.append("The excitation was designed on the spot, with a quick search; --design takes a better one.")
+            notes.append("The excitation comes from a quick search. For a better one, run oed design and use --design.")
         excitation, remarks = excitation_stage(robot, design)
         notes += remarks
         home = excitation.motion.q[0]
@@ -119,7 +119,9 @@ def campaign(
         clearing = Clearing(bodies, home) if bodies is not None else None
         if clearing is not None and not clearing.possible:
             if bodies is not None and bodies.pairs:
-                notes.append("Home touches by the shapes of the collision model: stages were not kept clear of bodies.")
+                notes.append(
+                    "The home pose collides in the collision model, so collisions of the stages could not be avoided."
+                )
             clearing = None
         planner = Planner(robot=robot, limits=limits, home=home, torque=torque, clearing=clearing)
         stages = [_power_on_stage(plan, home, robot.period)] if plan.power_on else []

@@ -110,7 +110,9 @@ def discriminate(
     finally:
         progress.finish()
     if not runs:
-        raise InfeasibleError(f"no kind of experiment keeps the limits of {robot.name}: {judged['repeat'].note}")
+        raise InfeasibleError(
+            f"no kind of experiment is possible within the limits of {robot.name}: {judged['repeat'].note}"
+        )
     require_separable(pair, list(judged.values()))
     kind = max(runs, key=lambda name: judged[name].merit)
     for variant in range(1, VARIANTS if kind in VARIED else 1):

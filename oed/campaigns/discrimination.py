@@ -127,41 +127,44 @@ class Discrimination:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The causes for people."""
+        """The causes in words."""
         return tuple(
             name.replace("_", " ") + ("" if joint is None else f" of joint {joint}") for name, joint in self.rivals
         )
 
     @property
     def why(self) -> str:
-        """One sentence for people."""
+        """The result in two sentences, without the last full stop."""
         first, second = self.labels
         return (
-            f"A {self.kind.replace('_', ' ')} experiment ({self.what}) tells {first} from {second} with a chance of "
-            f"{100 * self.resolves:.0f} %, were either to show {100 * self.size:.2g} % of the torque beyond the base "
-            f"model; the reference motion alone with {100 * self.alone:.0f} %"
+            f"A {self.kind.replace('_', ' ')} experiment ({self.what}) distinguishes {first} from {second} with "
+            f"probability "
+            f"{100 * self.resolves:.0f} %, for an effect size of {100 * self.size:.2g} % of the torque. "
+            f"The reference motion alone reaches {100 * self.alone:.0f} %"
         )
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader must know."""
+        """Conditions and limitations of the experiment."""
         notes = []
         if self.resolves < 0.5:
             notes.append(
-                "None of the experiments is likely to tell them apart at this size and noise: repeat the best one, "
-                "or accept that both stay possible."
+                "No experiment is likely to distinguish them at this effect size and noise. Repeat the best one, or "
+                "accept that both remain possible."
             )
         if any(run.payload for run in self.runs):
             mass = max(run.payload for run in self.runs)
             notes.append(
-                f"Needs a payload of {mass:.3g} kg, of known mass and centre (0.1 m ahead of the flange here), mounted "
-                "before the run that names it."
+                f"A payload of {mass:.3g} kg with known mass and centre (here 0.1 m in front of the flange) must be "
+                f"mounted before the marked run."
             )
         if any(run.gravity is not None for run in self.runs):
-            notes.append("Needs the base tilted by 15 degrees, known, before the run that names its gravity.")
+            notes.append("The base must be tilted by a known angle of 15 degrees before the marked run.")
         lacking = missing_limits(self.robot.limits)
         if lacking:
-            notes.append(f"Cautious limits were assumed where the robot states none: {', '.join(lacking)}.")
+            notes.append(
+                f"Conservative limits were assumed where the robot's description states none: {', '.join(lacking)}."
+            )
         notes.append("Collisions are not checked.")
         return tuple(notes)
 
@@ -213,8 +216,8 @@ class Discrimination:
         write_atomic(target / DESIGN, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n")
 
     def summary(self) -> str:
-        """Says the answer in a few lines."""
-        lines = [self.why, "  kind                chance [%]   95 % from [%]   duration [s]"]
+        """Describes the experiment and its alternatives in a few lines."""
+        lines = [self.why, "  kind           probability [%]   size for 95 %   duration [s]"]
         for judged in self.ranking:
             least = judged.smallest(self.size)
             least_text = "-" if least is None else f"{100 * least:.2g}"

@@ -67,9 +67,9 @@ def fit_stages(planner: Planner, programme: Programme, excitation: Stage | None)
                 high = middle
         wanted = (cycle - budget + len(longest.motion)) * period
         notes.append(
-            f"Excitation, friction at {programme.plateau:g} s a speed and warm-up take {wanted:.1f} s, more than the "
-            f"cycle of {programme.cycle_time:g} s: the friction stage was shortened from {longest.duration:.1f} s to "
-            f"{chosen.duration:.1f} s, with at most {low:.2f} s at each speed."
+            f"The stages take {wanted:.1f} s, more than the cycle of {programme.cycle_time:g} s. The friction stage "
+            f"was shortened from {longest.duration:.1f} s to {chosen.duration:.1f} s, with {low:.2f} s instead of "
+            f"{programme.plateau:g} s per speed."
         )
     left = budget - len(chosen.motion)
     if left < 0:
@@ -82,8 +82,7 @@ def fit_stages(planner: Planner, programme: Programme, excitation: Stage | None)
             )
             raise _too_short(programme.cycle_time, told, needed)
         notes.append(
-            f"That was not enough: the warm-up was shortened from {programme.warm_up:g} s to "
-            f"{warm_up_time * period:.1f} s."
+            f"The warm-up was shortened from {programme.warm_up:g} s to {warm_up_time * period:.1f} s as well."
         )
     if 0 < left * period <= FILL:
         warm_up_time += left

@@ -218,10 +218,10 @@ class Planner:
         assert worst is not None
         usable = (1.0 - self.torque.margin) * worst.limit
         raise InfeasibleError(
-            f"the {name} stage takes {abs(worst.value):.4g} of torque even with soft accelerations",
+            f"the {name} stage needs {abs(worst.value):.3g} N m (prismatic: N) even with low accelerations",
             joint=worst.joint,
-            allowed=f"{usable:.4g}, the torque limit less {100 * self.torque.margin:g} %",
-            remedy="lower the velocity fraction",
+            allowed=f"{usable:.3g}, the torque limit minus {100 * self.torque.margin:g} % reserve",
+            remedy="reduce --velocity-fraction or --torque-margin",
         )
 
     def _joined(self, limits: Limits, parts: list[Segment]) -> Sequence:

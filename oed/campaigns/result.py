@@ -142,10 +142,10 @@ class Campaign:
         if programme.cycles:
             heating = next(slot.cycle for slot in self.slots if slot.phase == "heating")
             joules = ", ".join(f"{value / 1e3:.1f}" for value in self.cycle_heat[heating - 1])
-            lines.append(f"  friction heat of the first heating cycle, kJ a joint: {joules}")
+            lines.append(f"  friction heat of the first heating cycle, kJ per joint: {joules}")
         if self.temperatures is not None:
             peaks = ", ".join(f"{value:.0f}" for value in self.temperatures.T1.max(axis=0))
-            lines.append(f"  highest expected temperature, degC a joint: {peaks}")
+            lines.append(f"  highest expected temperature, degC per joint: {peaks}")
         lines += [f"  note: {note}" for note in self.notes]
         return "\n".join(lines)
 
@@ -253,7 +253,9 @@ class Campaign:
             for entry in data["stages"]:
                 path = Path(folder) / entry["file"]
                 if sha256(path) != entry["sha256"]:
-                    raise InputError("is not the file that the campaign wrote", file=path, remedy="write it anew")
+                    raise InputError(
+                        "was changed after the campaign wrote it", file=path, remedy="run oed campaign again"
+                    )
                 stages.append(Stage.from_dict(entry, read_trajectory(path, n=known.n)[0]))
             expected = data["temperatures"]
             thermal = None
@@ -273,7 +275,9 @@ class Campaign:
                 notes=tuple(data["notes"]),
             )
         except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
-            raise InputError(f"is no campaign file: {type(error).__name__} {error}", file=file) from error
+            raise InputError(
+                f"is not a campaign file, or is damaged ({type(error).__name__}: {error})", file=file
+            ) from error
 
     def _last_slots(self) -> list[Slot]:
         return list({slot.cycle: slot for slot in self.slots}.values())

@@ -269,8 +269,8 @@ class Workshop:
             scale = scale / SLOWER
             middle = self.home + (middle - self.home) / SLOWER
         raise InfeasibleError(
-            "no reference motion about the home pose keeps the torque limits by the nominal dynamics",
-            remedy="another --home, or correct limits or dynamics",
+            "no reference motion around the home pose respects the torque limits of the nominal dynamics",
+            remedy="choose another home pose (--home), or correct the robot's torque limits or dynamics",
         )
 
     def _divides(self, step: float) -> bool:

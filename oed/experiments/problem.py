@@ -109,8 +109,11 @@ class FourierProblem:
             labels += [label for limit in self.averaged for label in limit.labels]
             broken = [labels[row] for row in np.flatnonzero(np.concatenate(excess) >= -ROOM)]
         raise InfeasibleError(
-            f"at rest in the home pose and in the middle of the ranges: {', '.join(broken[:3])} passes its limit",
-            remedy="state another home pose or other limits",
+            (
+                f"even at rest, in the home pose and in the middle of the ranges, {', '.join(broken[:3])} exceeds its "
+                f"limit"
+            ),
+            remedy="choose another home pose, or correct the limits",
         )
 
     @property

@@ -96,7 +96,7 @@ class RetimedExperiment:
         return not any(margin.violated for margin in self.margins)
 
     def summary(self) -> str:
-        """Says what changed."""
+        """Compares the experiment before and after retiming."""
         label = CRITERIA[self.criterion]().label
         before, after = (_value(quality, self.criterion) for quality in (self.before, self.after))
         lines = [self.retimed.summary(), f"  {label}: {before} before, {after} after"]
@@ -107,7 +107,8 @@ class RetimedExperiment:
         for margin in self.margins:
             if margin.violated:
                 lines.append(
-                    f"  PASSED: {margin.quantity} of joint {margin.joint}: {margin.value:.4g} of {margin.limit:.4g} "
+                    f"  LIMIT EXCEEDED: {margin.quantity} of joint {margin.joint}: {margin.value:.4g} of "
+                    f"{margin.limit:.4g} "
                     f"at {margin.time:.3f} s"
                 )
         return "\n".join(lines)
@@ -226,7 +227,9 @@ class RetimedExperiment:
                 settings=data["settings"],
             )
         except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
-            raise InputError(f"is no retimed experiment: {type(error).__name__} {error}", file=file) from error
+            raise InputError(
+                f"is not a file of a retimed experiment, or is damaged ({type(error).__name__}: {error})", file=file
+            ) from error
 
 
 def torque_use(base: BaseParameters, motion: Motion) -> TorqueUse | None:

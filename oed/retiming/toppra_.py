@@ -100,7 +100,7 @@ def retime(
     else:
         chosen = [_by_toppra(path, task)]
     if not any(len(timing.motion) > 1 for timing in chosen):
-        raise InfeasibleError("the path does not move: there is nothing to retime")
+        raise InfeasibleError("the path contains no motion to retime")
     motion = _join([timing.motion for timing in chosen], period)
     return Retimed(
         motion=motion,
@@ -175,7 +175,7 @@ def _by_toppra(path: Motion | ArrayLike, task: _Task) -> _Timing:
     limits = task.limits
     pieces = split_path(path, limits.velocity)
     if not pieces:
-        raise InfeasibleError("the path does not move: there is nothing to retime")
+        raise InfeasibleError("the path contains no motion to retime")
     timed = []
     for piece in pieces:
         require_inside(piece.spline(np.linspace(0.0, piece.length, 2001)), limits, tolerance=1e-6)
@@ -223,7 +223,7 @@ def _too_weak(piece: PathPiece, limits: Limits, torque: Torque) -> InfeasibleErr
         weak = too_weak_to_hold(held, limits.torque, "gravity alone needs")
         if weak is not None:
             return weak
-    return InfeasibleError("no slower timing of this path keeps the limits", remedy="check the torque limits")
+    return InfeasibleError("no slower timing of this path respects the limits", remedy="check the torque limits")
 
 
 def _stretched(

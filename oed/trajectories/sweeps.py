@@ -87,7 +87,7 @@ class Sweep(Trajectory):
         object.__setattr__(self, "pose", frozen(self.pose, "pose", 1))
         object.__setattr__(self, "plateaus", tuple(self.plateaus))
         if not 1 <= self.joint <= self.pose.size:
-            raise InputError("no such joint", joint=self.joint, allowed=f"1 to {self.pose.size}")
+            raise InputError("the joint does not exist", joint=self.joint, allowed=f"1 to {self.pose.size}")
         if self.path.n != 1:
             raise InputError(f"found a path of {self.path.n} joints", allowed="that of one joint")
 

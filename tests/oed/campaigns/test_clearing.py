@@ -83,7 +83,7 @@ def test_planned_stages_are_proved_free(thesis_campaign: Campaign) -> None:
         if stage.kind != "excitation":
             assert check_motion(model, stage.motion, confirm=False).certified, stage.name
             assert CoalChecker(model).clearance(stage.motion.q[::SPARSE]).min() > 0.0
-    assert any("To stay clear of bodies" in note for note in thesis_campaign.notes)
+    assert any("To avoid collisions" in note for note in thesis_campaign.notes)
 
 
 def test_without_clearing_the_warm_up_drives_what_was_asked_and_says_that_it_collides(

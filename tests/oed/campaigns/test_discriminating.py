@@ -126,7 +126,7 @@ def test_a_joint_left_out_is_that_of_the_rival(two: Robot) -> None:
         ("base_tilt:1,spring:1", "whole robot"),
         ("stribeck:2", "two"),
         ("stribeck:2,backlash:2,spring:2", "two"),
-        ("stribeck:2,stribeck:2", "one and the same"),
+        ("stribeck:2,stribeck:2", "the same effect on the same joint"),
     ],
 )
 def test_wrong_rivals_are_named(rivals: str, part: str, two: Robot) -> None:

@@ -124,7 +124,7 @@ def test_an_extended_model_is_a_model_like_any_other(
     assert np.sqrt(np.mean((log.tau - expected) ** 2)) < 0.03 * np.sqrt(np.mean(expected**2))
     planned = run("design", "--robot", robot, "--after", model, "--effort", "quick", "--out", tmp_path / "next")
     assert planned.code == 0, planned.err
-    assert "NOT counted within the torque limits" in planned.out
+    assert "NOT included in the torque limits" in planned.out
     assert "friction_step of joint 2" in planned.out
     line = ("diagnose", "--limits", "--robot", robot, "--trajectory", motion, "--model", model)
     limits = run(*line, "--out", tmp_path / "limits", "--json")

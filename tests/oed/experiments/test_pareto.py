@@ -86,7 +86,7 @@ def test_weights_cover_all_mixtures() -> None:
         ({"criteria": ("cond",)}, "two or three"),
         ({"criteria": ("cond", "cond")}, "two or three"),
         ({"criteria": ("cond", "d", "a", "e")}, "two or three"),
-        ({"criteria": ("cond", "i")}, "design for it alone"),
+        ({"criteria": ("cond", "i")}, "use oed design"),
         ({"points": 1}, "at least 2"),
         ({"criteria": ("cond", "beauty")}, "criterion"),
     ],
