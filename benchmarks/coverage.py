@@ -26,9 +26,9 @@ from scipy.stats import norm
 
 from estimation import Estimate, identify
 from estimation.estimators import WeightedLeastSquares
-from estimation.fitting import sum_moments
-from estimation.preparation import prepare
-from estimation.regression import JointRegressor
+from estimation.identifications.fit import sum_moments
+from estimation.regressions.joint_regressor import JointRegressor
+from estimation.regressions.preparation import prepare
 from robots import load_robot, nominal_plant, simulate
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import AssumedValueWarning

@@ -34,9 +34,9 @@ from scipy.optimize import LinearConstraint, differential_evolution, minimize
 
 from oed.criteria import criterion
 from oed.experiments import EFFORTS, InteriorPoint, usable_limits
-from oed.experiments.problem import FourierProblem
-from oed.experiments.search import Island
-from oed.experiments.working_set import WorkingSet
+from oed.experiments.problems.problem import FourierProblem
+from oed.experiments.problems.working_set import WorkingSet
+from oed.experiments.searches.search import Island
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import AssumedValueWarning
 from robots.common.parallel import available_cores, parallel_map

@@ -22,10 +22,10 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks.diagnosis import executor, read_rows  # noqa: E402  (limits the threads of BLAS, too)
-from benchmarks.diagnosis_parts.running import described, logs_of  # noqa: E402
-from benchmarks.diagnosis_parts.strata import STRATA, Task, draw  # noqa: E402
-from benchmarks.diagnosis_real import SETS  # noqa: E402
+from benchmarks.diagnosis import executor, read_rows
+from benchmarks.diagnosis_parts.running import described, logs_of
+from benchmarks.diagnosis_parts.strata import STRATA, Task, draw
+from benchmarks.diagnosis_real import SETS
 
 # Seeds of logs of 60 s (most) and 120 s; no threshold was tuned on them. Singles cover every effect of the catalogue.
 FIRST = 9600

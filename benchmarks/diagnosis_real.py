@@ -21,7 +21,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 from estimation import diagnose, read_log  # noqa: E402
-from estimation.clocks import on_one_clock  # noqa: E402
+from estimation.logs.clocks import on_one_clock  # noqa: E402
 from robots import load_robot  # noqa: E402
 from robots.common.errors import AssumedValueWarning, OedError  # noqa: E402
 from robots.robot import Robot  # noqa: E402

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from estimation import identify
 from estimation.estimators import ESTIMATORS, PhysicallyConsistent, RegressionData
-from estimation.moments import Moments
-from estimation.preparation import Rows
+from estimation.regressions.moments import Moments
+from estimation.regressions.preparation import Rows
 from robots import load_robot, nominal_plant, simulate
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import AssumedValueWarning, OedError

@@ -29,7 +29,7 @@ from design import OverError, ours, processor, reached
 from oed.constraints import TorqueLimit
 from oed.criteria import criterion
 from oed.experiments import usable_limits
-from oed.experiments.problem import FourierProblem
+from oed.experiments.problems.problem import FourierProblem
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import AssumedValueWarning
 from robots.loading import load_robot

@@ -105,7 +105,7 @@ def figaroh(urdf: str, known: Path, unseen: Path | None, cutoff: float) -> dict[
 def ours(urdf: str, known: Path, unseen: Path | None, cutoff: float) -> dict[str, Any]:
     """Runs ours: with the gate and all choices, or with a given cut-off [Hz] and neither."""
     from estimation import identify
-    from estimation.choices import Candidates
+    from estimation.identifications.choices import Candidates
     from robots import load_robot
     from robots.signals import Log
 

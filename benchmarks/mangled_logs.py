@@ -35,7 +35,7 @@ from mangled_parts.formats import FORMATS, write
 from mangled_parts.values import VALUES
 
 from estimation import identify, read_log
-from estimation.choices import Candidates
+from estimation.identifications.choices import Candidates
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import OedError
 from robots.geometry.chain import Chain, Joint

@@ -16,7 +16,7 @@ import numpy as np
 
 from oed.criteria import criterion
 from oed.experiments import InteriorPoint, usable_limits
-from oed.experiments.problem import FourierProblem
+from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.solvers import Stage
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import AssumedValueWarning

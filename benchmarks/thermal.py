@@ -20,7 +20,7 @@ from scipy.linalg import expm
 from scipy.optimize import differential_evolution
 
 from estimation.thermal import ThermalEstimate, ThermalRun, choose_thermal, fit_thermal, predict_run
-from robots.common.tables import read_table
+from robots.common.tables.table_files import read_table
 from robots.thermal import Fractional
 
 Array = NDArray[np.float64]

@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 import oed
 from estimation import identify
-from estimation.model import Model
-from estimation.preparation import SLOW
+from estimation.models.model import Model
 from estimation.preprocessing import resample, smooth
+from estimation.regressions.preparation import SLOW
 from estimation.thermal import fit_campaign, start_temperatures
 from oed.campaigns import Programme, play
 from robots.common.errors import AssumedValueWarning

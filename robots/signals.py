@@ -25,6 +25,9 @@ FloatArray = NDArray[np.float64]
 JITTER = 1e-6
 """Relative deviation of a time step from the mean step up to which a signal counts as uniform."""
 
+UNKNOWN_PAUSE = 60.0
+"""Pause [s] assumed between two logs where it was not recorded."""
+
 
 @dataclass(frozen=True, eq=False)
 class _Samples:

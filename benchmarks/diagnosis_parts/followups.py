@@ -13,7 +13,7 @@ from tests.truth.experiments import Stage, follow_up
 def follow(case: Case, robot: Robot, diagnosis: Any) -> dict[str, Any]:
     """Does the recommended experiment and diagnoses again, with the new logs beside the old."""
     from estimation import diagnose
-    from estimation.diagnosis.carried import point_mass
+    from robots.terms.situations.flange_body import point_mass
 
     plan = diagnosis.next_experiment
     if plan is None:

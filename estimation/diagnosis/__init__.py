@@ -5,9 +5,9 @@ from __future__ import annotations
 from robots.common.lazy import lazy_exports
 
 _EXPORTS = {
-    "Diagnosis": "estimation.diagnosis.diagnosis",
-    "Finding": "estimation.diagnosis.diagnosis",
-    "diagnose": "estimation.diagnosis.diagnosing",
+    "Diagnosis": "estimation.diagnosis.results.diagnosis",
+    "Finding": "estimation.diagnosis.results.diagnosis",
+    "diagnose": "estimation.diagnosis.pipeline",
 }
 __all__ = list(_EXPORTS)
 __getattr__ = lazy_exports(__name__, _EXPORTS)

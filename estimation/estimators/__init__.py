@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+from estimation.closed_loops.closed_loop import Controller
 from estimation.estimators.base import Estimator, Solution
-from estimation.estimators.closed_loop import Controller
 from estimation.estimators.consistent import PhysicallyConsistent
 from estimation.estimators.constrained import ConstrainedLeastSquares
-from estimation.estimators.data import RegressionData
 from estimation.estimators.didim import DirectAndInverse
 from estimation.estimators.irls import Huber, Tukey
 from estimation.estimators.iv import InstrumentalVariables
@@ -16,6 +15,7 @@ from estimation.estimators.recursive import RecursiveLeastSquares, Stream
 from estimation.estimators.simulated import Loop
 from estimation.estimators.tls import TotalLeastSquares
 from estimation.estimators.wls import WeightedLeastSquares
+from estimation.regressions.regression_data import RegressionData
 from robots.common.errors import InputError
 
 ESTIMATORS: dict[str, type[Estimator]] = {

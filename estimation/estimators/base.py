@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.estimators.data import RegressionData
-from estimation.moments import Moments
+from estimation.regressions.moments import Moments
+from estimation.regressions.regression_data import RegressionData
 
 Array = NDArray[np.float64]
 

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.estimators.base import Solution
-from estimation.estimators.conic import ConicProgram
-from estimation.estimators.data import RegressionData
-from estimation.estimators.regularisation import regularisation
-from estimation.estimators.standard import (
+from estimation.estimators.wls import WeightedLeastSquares
+from estimation.linear_algebra.conic import ConicProgram
+from estimation.regressions.moments import Moments
+from estimation.regressions.regression_data import RegressionData
+from estimation.regressions.regularisation import regularisation
+from estimation.regressions.standard_parameters import (
     Scaling,
     body_columns,
     box_rows,
@@ -20,11 +22,9 @@ from estimation.estimators.standard import (
     nonnegative_rows,
     scaling,
 )
-from estimation.estimators.wls import WeightedLeastSquares
-from estimation.moments import Moments
+from robots.collision.link_boxes import link_boxes
 from robots.common.errors import InputError, SolverError
 from robots.consistency import BASIS, normalised_eigenvalues
-from robots.geometry.link_boxes import link_boxes
 
 Array = NDArray[np.float64]
 

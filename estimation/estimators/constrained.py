@@ -10,12 +10,12 @@ import numpy as np
 from scipy.linalg import null_space
 
 from estimation.estimators.base import Array, Solution
-from estimation.estimators.data import RegressionData
-from estimation.estimators.regularisation import regularisation
-from estimation.estimators.spread import FAINT as OPEN
-from estimation.estimators.spread import Equations, honest_covariance, regressor_rows
-from estimation.estimators.standard import body_columns, largest_speed, nonnegative_rows, scaling
 from estimation.estimators.wls import WeightedLeastSquares
+from estimation.regressions.covariances import FAINT as OPEN
+from estimation.regressions.covariances import Equations, honest_covariance, regressor_rows
+from estimation.regressions.regression_data import RegressionData
+from estimation.regressions.regularisation import regularisation
+from estimation.regressions.standard_parameters import body_columns, largest_speed, nonnegative_rows, scaling
 from robots.common.errors import InfeasibleError, InputError, SolverError
 from robots.regressor import TorqueModel
 

@@ -6,9 +6,9 @@ from functools import reduce
 from operator import add
 
 from estimation.estimators.base import Array, Solution
-from estimation.estimators.data import RegressionData
-from estimation.estimators.regularisation import torque_change
 from estimation.estimators.simulated import SETTLED, Instruments, SimulatingEstimator, simulated_moments
+from estimation.regressions.regression_data import RegressionData
+from estimation.regressions.regularisation import torque_change
 from robots.signals import Motion
 
 ROUNDS = 12

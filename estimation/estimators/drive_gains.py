@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.estimators.base import Array
-from estimation.estimators.data import CHUNK
+from estimation.regressions.regression_data import CHUNK
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.geometry.inertia import SIZE

@@ -9,11 +9,11 @@ from functools import partial
 import numpy as np
 
 from estimation.estimators.base import Array, Solution
-from estimation.estimators.data import RegressionData
-from estimation.estimators.regularisation import torque_change
-from estimation.estimators.spread import Equations, honest_covariance, regressor_rows
 from estimation.estimators.wls import WeightedLeastSquares
-from estimation.moments import Moments
+from estimation.regressions.covariances import Equations, honest_covariance, regressor_rows
+from estimation.regressions.moments import Moments
+from estimation.regressions.regression_data import RegressionData
+from estimation.regressions.regularisation import torque_change
 from robots.common.errors import InputError
 
 # Median absolute deviation of a normal variable of unit variance.

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from estimation.estimators.base import Array, Solution
-from estimation.estimators.data import RegressionData
-from estimation.estimators.regularisation import regularisation, solve_scaled, torque_change
 from estimation.estimators.simulated import SETTLED, Instruments, SimulatingEstimator, instrumented_moments
+from estimation.regressions.regression_data import RegressionData
+from estimation.regressions.regularisation import regularisation, solve_scaled, torque_change
 from robots.common.errors import SolverError
 from robots.signals import Motion
 

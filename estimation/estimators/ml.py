@@ -7,10 +7,10 @@ from functools import partial
 import numpy as np
 
 from estimation.estimators.base import Array, Solution
-from estimation.estimators.data import CHUNK, FittedRows, RegressionData
-from estimation.estimators.regularisation import regularisation, solve_scaled
-from estimation.estimators.spread import Equations, honest_covariance, regressor_rows
 from estimation.estimators.wls import WeightedLeastSquares
+from estimation.regressions.covariances import Equations, honest_covariance, regressor_rows
+from estimation.regressions.regression_data import CHUNK, FittedRows, RegressionData
+from estimation.regressions.regularisation import regularisation, solve_scaled
 
 ROUNDS = 20
 # The likelihood has settled when no standardised residual level moves by more.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from estimation.estimators.base import Array, Estimator
-from estimation.moments import Moments
+from estimation.regressions.moments import Moments
 
 
 class OrdinaryLeastSquares(Estimator):

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.estimators.base import Array
-from estimation.estimators.conic import ConicProgram
-from estimation.estimators.data import CHUNK, FittedRows
-from estimation.moments import Moments
+from estimation.linear_algebra.conic import ConicProgram
+from estimation.regressions.moments import Moments
+from estimation.regressions.regression_data import CHUNK, FittedRows
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.consistency import BASIS, normalised_eigenvalues
 from robots.geometry.inertia import SIZE

@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 from scipy.linalg import cho_factor, cho_solve
 
 from estimation.estimators.base import Array, Solution
-from estimation.estimators.data import RegressionData
-from estimation.estimators.regularisation import regularisation
 from estimation.estimators.wls import WeightedLeastSquares
+from estimation.regressions.regression_data import RegressionData
+from estimation.regressions.regularisation import regularisation
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.signals import Motion

@@ -9,14 +9,14 @@ from functools import cached_property, partial
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from estimation.closed_loops.closed_loop import ClosedLoop, Controller, inertia_matrices, stiff_controller
 from estimation.estimators.base import Array
-from estimation.estimators.closed_loop import ClosedLoop, Controller, inertia_matrices, stiff_controller
 from estimation.estimators.consistent import PhysicallyConsistent
-from estimation.estimators.data import FittedRows, RegressionData
-from estimation.estimators.position_noise import smoothed_noise
-from estimation.estimators.spread import Equations, honest_covariance, regressor_rows
 from estimation.estimators.wls import WeightedLeastSquares
-from estimation.moments import Moments
+from estimation.regressions.covariances import Equations, honest_covariance, regressor_rows
+from estimation.regressions.moments import Moments
+from estimation.regressions.position_noise import smoothed_noise
+from estimation.regressions.regression_data import FittedRows, RegressionData
 from robots.common.errors import InputError
 from robots.signals import Motion
 

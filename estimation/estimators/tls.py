@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from estimation.estimators.base import Array, Solution
-from estimation.estimators.data import CHUNK, RegressionData
-from estimation.estimators.position_noise import smoothed_noise
-from estimation.estimators.regularisation import regularisation
 from estimation.estimators.wls import WeightedLeastSquares
-from estimation.moments import Moments
+from estimation.regressions.moments import Moments
+from estimation.regressions.position_noise import smoothed_noise
+from estimation.regressions.regression_data import CHUNK, RegressionData
+from estimation.regressions.regularisation import regularisation
 from robots.common.errors import InputError, SolverError
 
 # Rows on which the regressor's noise is worked out: more don't know its mean square better.

@@ -8,7 +8,7 @@ from typing import Any
 import casadi
 import numpy as np
 
-from estimation.model import Model
+from estimation.models.model import Model
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.version import VERSION

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.estimators.conic import ConicProgram
-from estimation.model import Model
-from estimation.pulls import link_spreads
+from estimation.linear_algebra.conic import ConicProgram
+from estimation.models.model import Model
+from estimation.regressions.parameter_priors import link_spreads
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InfeasibleError, InputError
 from robots.consistency import BASIS, normalised_eigenvalues

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.exports.standard import REMEDY, standard_parameters
-from estimation.model import Model
+from estimation.models.model import Model
 from robots.common.errors import InfeasibleError, InputError
 from robots.common.files import write_atomic
 from robots.geometry.chain import Joint

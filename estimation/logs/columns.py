@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from robots.common.errors import InputError
-from robots.common.table import Table
+from robots.common.tables.table import Table
 
 _DEGREE = float(np.pi / 180.0)
 _TURN = float(2.0 * np.pi)

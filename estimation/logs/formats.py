@@ -9,11 +9,11 @@ from pathlib import Path
 from estimation.logs.matlab_files import read_matlab
 from estimation.logs.numpy_files import read_npz
 from estimation.logs.ros_bags import read_bag
-from robots.common.csv_tables import read_csv
 from robots.common.errors import InputError
 from robots.common.files import existing_file
-from robots.common.table import Table
-from robots.common.tables import read_table
+from robots.common.tables.csv_tables import read_csv
+from robots.common.tables.table import Table
+from robots.common.tables.table_files import read_table
 
 CSV = (".csv", ".txt", ".tsv", ".dat")
 BAGS = (".bag", ".mcap", ".db3")

@@ -9,7 +9,7 @@ import numpy as np
 from estimation.logs.columns import BY_FIELD, Quantity, column_name, refuse_text, unit_factor
 from estimation.logs.mapping import LogMapping, PerJoint, Single
 from robots.common.errors import InputError
-from robots.common.table import Column, Table
+from robots.common.tables.table import Column, Table
 
 _FIELDS = {
     "time": "t",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
-from robots.common.table import Column, Table
+from robots.common.tables.table import Column, Table
 
 # Version 7.3 is HDF5 behind a block of 512 bytes.
 _HDF5 = b"\x89HDF\r\n\x1a\n"

@@ -11,7 +11,7 @@ import numpy as np
 
 from estimation.logs.matlab_files import columns_of
 from robots.common.errors import InputError
-from robots.common.table import Table
+from robots.common.tables.table import Table
 
 # What numpy and zipfile raise on damaged archives.
 _DAMAGED = (

@@ -19,7 +19,7 @@ from estimation.logs.mapped_tables import count_joints, map_table
 from estimation.logs.mapping import LogMapping, read_mapping
 from estimation.logs.repairs import drop_repeated_rows
 from robots.common.errors import InputError
-from robots.common.table import Table
+from robots.common.tables.table import Table
 from robots.signals import FloatArray, Log
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from robots.common.table import Table
+from robots.common.tables.table import Table
 
 
 def drop_repeated_rows(table: Table) -> tuple[Table, np.ndarray, list[dict[str, object]]]:

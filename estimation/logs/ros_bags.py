@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from robots.common.errors import InputError
-from robots.common.table import Column, Table
+from robots.common.tables.table import Column, Table
 
 _TYPE = "sensor_msgs/msg/JointState"
 

@@ -7,8 +7,8 @@ from os import PathLike
 import numpy as np
 
 from estimation.logs.columns import QUANTITIES, column_name
-from robots.common.table import Column
-from robots.common.tables import write_table
+from robots.common.tables.table import Column
+from robots.common.tables.table_files import write_table
 from robots.signals import Log
 
 _OF_THE_FILE = ("file", "ignored_columns", "units")

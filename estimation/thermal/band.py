@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.preparation import torque_of
 from estimation.preprocessing import resample, smooth
-from estimation.thermal.condensed import Condensed
+from estimation.regressions.preparation import torque_of
+from estimation.thermal.runs.condensed import Condensed
 from estimation.thermal.torque import ThermalTorqueModel
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.known_setup import HEAT, require_plain
+from estimation.logs.known_setup import HEAT, require_plain
 from estimation.preprocessing import resample, smooth
 from estimation.thermal.torque import ThermalTorqueModel
 from robots.common.errors import InputError

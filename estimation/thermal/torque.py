@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.model import Model
+from estimation.models.model import Model
 from robots.common.errors import InputError
 from robots.signals import Motion
 from robots.thermal import ThermalModel, ThermalPath, build_thermal_model, simulate_motion

@@ -7,8 +7,8 @@ from os import PathLike
 from pathlib import Path
 
 from oed.campaigns.stages import Stage
-from oed.experiments.design_file import DESIGN, TRAJECTORY
-from oed.experiments.result import Design
+from oed.experiments.results.design_file import DESIGN, TRAJECTORY
+from oed.experiments.results.result import Design
 from oed.exports import read_trajectory
 from robots.common.errors import InputError
 from robots.common.files import existing_file

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.experiments.margins import margin_data
+from oed.experiments.safety_checks.margins import margin_data
 from robots.common.errors import InputError
 from robots.limits import Margin
 from robots.signals import Motion

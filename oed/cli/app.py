@@ -6,17 +6,17 @@ from typing import Annotated
 
 import typer
 
-from oed.cli.campaign import campaign
 from oed.cli.command import Command
-from oed.cli.design import design
-from oed.cli.diagnose import diagnose
-from oed.cli.export import export
-from oed.cli.identify import identify
-from oed.cli.pareto import pareto
-from oed.cli.predict import predict
-from oed.cli.retime import retime
-from oed.cli.simulate import simulate
-from oed.cli.thermal import thermal
+from oed.cli.commands.campaign import campaign
+from oed.cli.commands.design import design
+from oed.cli.commands.diagnose import diagnose
+from oed.cli.commands.export import export
+from oed.cli.commands.identify import identify
+from oed.cli.commands.pareto import pareto
+from oed.cli.commands.predict import predict
+from oed.cli.commands.retime import retime
+from oed.cli.commands.simulate import simulate
+from oed.cli.commands.thermal import thermal
 
 app = typer.Typer(
     name="oed",

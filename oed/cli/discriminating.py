@@ -69,8 +69,8 @@ def discriminating(
     progress: Progress,
 ) -> tuple[str, dict[str, Any]]:
     """Writes trajectory.csv, design.json and report.html; returns the summary and the data."""
-    from oed.campaigns.discriminating import discriminate
-    from oed.reports.discrimination_report import save_discrimination_report
+    from oed.campaigns.discriminations.discriminating import discriminate
+    from oed.reports.pages.discrimination_report import save_discrimination_report
     from robots.common.files import ResultFolder
 
     with ResultFolder(out, force, names=["trajectory.csv", "design.json", "report.html"]) as folder:

@@ -92,7 +92,7 @@ _EXAMPLES = {
 
 def _payload(values: str) -> NDArray[np.float64]:
     """Reads KG,X,Y,Z: the ten inertial parameters of a point mass."""
-    from estimation.diagnosis.carried import point_mass
+    from robots.terms.situations.flange_body import point_mass
 
     mass, x, y, z = map(float, values.split(","))
     return point_mass(mass, (x, y, z))

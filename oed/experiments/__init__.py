@@ -4,10 +4,11 @@ from oed.experiments.checks import usable_limits
 from oed.experiments.designing import design
 from oed.experiments.pareto import ParetoFront, pareto
 from oed.experiments.quality import Quality
-from oed.experiments.result import Design, Outcome
-from oed.experiments.retimed import RetimedExperiment, TorqueUse
+from oed.experiments.results.outcome import Outcome
+from oed.experiments.results.result import Design
+from oed.experiments.results.retimed import RetimedExperiment, TorqueUse
 from oed.experiments.retiming import METHODS, retime
-from oed.experiments.search import EFFORTS, Effort
+from oed.experiments.searches.search import EFFORTS, Effort
 from oed.experiments.solvers import InteriorPoint, Ipopt, Solver
 
 __all__ = [

@@ -14,15 +14,16 @@ from oed.criteria import Criterion, Prior
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.assembly import assemble, rest_pose
 from oed.experiments.checks import check_options, check_period, usable_limits
-from oed.experiments.essential import essential_part
-from oed.experiments.islands import search_islands
-from oed.experiments.judging import choose_weighting
-from oed.experiments.margins import measured_margins
-from oed.experiments.problem import FourierProblem
+from oed.experiments.problems.criterion_weighting import choose_weighting
+from oed.experiments.problems.essential import essential_part
+from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.quality import design_model, measure
-from oed.experiments.result import Design, Outcome
-from oed.experiments.safety import choose_safety, collision_data
-from oed.experiments.search import EFFORTS, Effort, Found
+from oed.experiments.results.outcome import Outcome
+from oed.experiments.results.result import Design
+from oed.experiments.safety_checks.margins import measured_margins
+from oed.experiments.safety_checks.safety import choose_safety, collision_data
+from oed.experiments.searches.islands import search_islands
+from oed.experiments.searches.search import EFFORTS, Effort, Found
 from oed.experiments.solvers import InteriorPoint, Solver
 from oed.trajectories import FourierSeries, count_periods
 from robots.base_parameters import find_base_parameters

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from oed.criteria import Blend, Criterion
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.designing import design
-from oed.experiments.result import Design
+from oed.experiments.results.result import Design
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.robot import Robot

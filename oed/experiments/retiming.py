@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.checks import usable_limits
-from oed.experiments.margins import measured_margins
 from oed.experiments.quality import design_model, measure
-from oed.experiments.retimed import RetimedExperiment, torque_use
+from oed.experiments.results.retimed import RetimedExperiment, torque_use
+from oed.experiments.safety_checks.margins import measured_margins
 from oed.retiming import retime as retime_by_toppra
 from oed.retiming import retime_with_stops
 from robots.base_parameters import find_base_parameters

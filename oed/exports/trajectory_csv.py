@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
-from robots.common.tables import Table, read_table, write_table
+from robots.common.tables.table_files import Table, read_table, write_table
 from robots.signals import Motion
 
 Array = NDArray[np.float64]

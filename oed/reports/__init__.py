@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from oed.reports.campaign_report import campaign_page, save_campaign_report
-from oed.reports.design_report import design_page, save_design_report
-from oed.reports.diagnosis_limits import limits_page, save_limits_report
-from oed.reports.diagnosis_report import diagnosis_page, save_diagnosis_report
-from oed.reports.estimate_report import estimate_page, save_estimate_report
-from oed.reports.matplotlib_ import save_png, to_matplotlib
-from oed.reports.page import Fact, Footer, Page, Section, Table, render
-from oed.reports.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
-from oed.reports.pareto_report import pareto_page, save_pareto_report
-from oed.reports.pictures import Band, Line, Panel, Picture, Series, Span
-from oed.reports.plotly_ import to_plotly
-from oed.reports.retime_report import retime_page, save_retime_report
-from oed.reports.significant import percent, significant, significant_error, with_error
-from oed.reports.torque_pictures import residual_picture, torque_picture
-from oed.reports.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
+from oed.reports.pages.campaign_report import campaign_page, save_campaign_report
+from oed.reports.pages.design_report import design_page, save_design_report
+from oed.reports.pages.diagnosis_limits import limits_page, save_limits_report
+from oed.reports.pages.diagnosis_report import diagnosis_page, save_diagnosis_report
+from oed.reports.pages.estimate_report import estimate_page, save_estimate_report
+from oed.reports.pages.pareto_report import pareto_page, save_pareto_report
+from oed.reports.pages.retime_report import retime_page, save_retime_report
+from oed.reports.pictures.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
+from oed.reports.pictures.torque_pictures import residual_picture, torque_picture
+from oed.reports.pictures.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
+from oed.reports.rendering.matplotlib_ import save_png, to_matplotlib
+from oed.reports.rendering.page import Fact, Footer, Page, Section, Table, render
+from oed.reports.rendering.picture import Band, Line, Panel, Picture, Series, Span
+from oed.reports.rendering.plotly_ import to_plotly
+from oed.reports.rendering.significant import percent, significant, significant_error, with_error
 
 __all__ = [
     "Band",

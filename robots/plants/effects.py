@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS, Effect, Situation, StaticEffect
-from robots.terms.effects.of_model import rotor_inertias
+from robots.terms.situations.of_model import rotor_inertias
 
 if TYPE_CHECKING:
     from robots.regressor import TorqueModel

@@ -17,8 +17,8 @@ from robots.plants.sensors import Sensors
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Log, Motion
+from robots.terms.effect_bases.gear_load import ExtraGearLoad, LoadSource
 from robots.terms.effects import Situation, situation
-from robots.terms.effects.bearing import Bearing, Weight
 
 Array = NDArray[np.float64]
 
@@ -93,8 +93,8 @@ class Plant:
             return self.model.torque(motion.q, motion.dq, motion.ddq, self.parameters)
         now = situation(self.model, self.parameters, motion.t, motion.q, motion.dq, motion.ddq)
         own = [effect for effect in self.effects if isinstance(effect, PlantEffect) and effect.term.borne]
-        weights = [Weight(e.term, e.joint, e.shape, np.asarray(e.coefficients)) for e in own]
-        felt = Bearing("effects", weights).on(now) if own else now
+        weights = [LoadSource(e.term, e.joint, e.shape, np.asarray(e.coefficients)) for e in own]
+        felt = ExtraGearLoad("effects", weights).on(now) if own else now
         return np.sum([now.torque, *(effect.torque(felt) for effect in self.effects)], axis=0)
 
 

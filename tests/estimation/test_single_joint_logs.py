@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimation import identify, predict
-from estimation.preparation import prepare_all, still_joints
+from estimation.regressions.preparation import prepare_all, still_joints
 from robots.plants import simulate
 from robots.robot import Robot
 from robots.signals import Log, Motion

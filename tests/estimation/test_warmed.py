@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from estimation import predict
-from estimation.clocks import PAUSE
-from estimation.diagnosis.extension import Extension
-from estimation.model import Model
-from estimation.prediction import COLD, warmed
+from estimation.logs.clocks import UNKNOWN_PAUSE
+from estimation.models.extension import Extension
+from estimation.models.model import Model
+from estimation.predictions.prediction import COLD, warmed
 from robots.common.errors import InputError
 from robots.regressor import default_model
 from robots.signals import Log
@@ -76,7 +76,7 @@ def test_friction_is_less_by_the_heat_that_is_left(warming: Model, motion: Log, 
 
 def test_clocks_that_began_anew_count_a_pause_apart(warming: Model, motion: Log) -> None:
     """Two files that both begin at zero: the first counts as recorded a minute before the second, which is said."""
-    apart = replace(motion, t=motion.t - motion.t[-1] - PAUSE + motion.t[0])
+    apart = replace(motion, t=motion.t - motion.t[-1] - UNKNOWN_PAUSE + motion.t[0])
     np.testing.assert_allclose(
         predict(warming, motion, before=[motion]).predicted, predict(warming, motion, before=[apart]).predicted
     )

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.experiments.problem import FourierProblem
+from oed.experiments.problems.problem import FourierProblem
 
 Array = NDArray[np.float64]
 

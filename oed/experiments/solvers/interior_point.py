@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv
 
-from oed.experiments.pointwise_rows import PointwiseRows
-from oed.experiments.problem import FourierProblem
+from oed.experiments.problems.pointwise_rows import PointwiseRows
+from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.solvers.base import PASSED, Solved, Solver, Stage
 from oed.experiments.solvers.slacks import LinearSlacks, Slacks
 

@@ -10,13 +10,13 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.experiments.objective import Objective, Watch
-from oed.experiments.pointwise_function import PointwiseFunction
-from oed.experiments.pointwise_rows import PointwiseRows
-from oed.experiments.problem import FourierProblem
+from oed.experiments.problems.objective import Objective, Watch
+from oed.experiments.problems.pointwise_function import PointwiseFunction
+from oed.experiments.problems.pointwise_rows import PointwiseRows
+from oed.experiments.problems.problem import FourierProblem
+from oed.experiments.problems.trap import Trap
+from oed.experiments.problems.working_set import WorkingSet
 from oed.experiments.solvers.base import PASSED, Solved, Solver, Stage
-from oed.experiments.trap import Trap
-from oed.experiments.working_set import WorkingSet
 
 Array = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.experiments.pointwise_rows import BETWEEN, PointwiseRows
-from oed.experiments.problem import FourierProblem
+from oed.experiments.problems.pointwise_rows import BETWEEN, PointwiseRows
+from oed.experiments.problems.problem import FourierProblem
 
 Array = NDArray[np.float64]
 

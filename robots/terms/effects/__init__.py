@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from robots.terms.effect_bases.base import Coefficient, Effect, JointEffect, Shape, Situation
+from robots.terms.effect_bases.experiments import EXPERIMENTS
+from robots.terms.effect_bases.static import StaticEffect
 from robots.terms.effects.asymmetric_friction import AsymmetricFriction
 from robots.terms.effects.backlash import Backlash
-from robots.terms.effects.base import Coefficient, Effect, JointEffect, Shape, Situation
 from robots.terms.effects.base_tilt import BaseTilt
 from robots.terms.effects.current_clipping import CurrentClipping
 from robots.terms.effects.current_lag import CurrentLag
 from robots.terms.effects.encoder_eccentricity import EncoderEccentricity
 from robots.terms.effects.encoder_offset import EncoderOffset
-from robots.terms.effects.experiments import EXPERIMENTS
 from robots.terms.effects.external_contact import ExternalContact
 from robots.terms.effects.friction_step import FrictionStep
 from robots.terms.effects.hand_guiding import HandGuiding
@@ -23,9 +24,7 @@ from robots.terms.effects.payload_change import PayloadChange
 from robots.terms.effects.position_dependent_friction import PositionDependentFriction
 from robots.terms.effects.presliding_hysteresis import PreslidingHysteresis
 from robots.terms.effects.shear_thinning import ShearThinning
-from robots.terms.effects.situation import situation
 from robots.terms.effects.spring import Spring
-from robots.terms.effects.static import StaticEffect
 from robots.terms.effects.stribeck import Stribeck
 from robots.terms.effects.thermal_friction import ThermalFriction
 from robots.terms.effects.time_delay import TimeDelay
@@ -35,6 +34,7 @@ from robots.terms.effects.torque_constant_saturation import TorqueConstantSatura
 from robots.terms.effects.torque_crosstalk import TorqueCrosstalk
 from robots.terms.effects.torque_ripple import TorqueRipple
 from robots.terms.effects.torque_sensor_drift import TorqueSensorDrift
+from robots.terms.situations.situation import situation
 
 # Adding an effect is one file, and one line here.
 _ALL: tuple[Effect, ...] = (

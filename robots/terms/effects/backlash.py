@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import length_unit
-from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
-from robots.terms.effects.joint_elasticity import link_inertia, windup
-from robots.terms.effects.unknown_rotor import (
+from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.unknown_rotor import (
     KNOWN,
     ROTOR,
     is_sure,
@@ -20,6 +19,7 @@ from robots.terms.effects.unknown_rotor import (
     rotor_grid,
     rotors_between,
 )
+from robots.terms.effects.joint_elasticity import link_inertia, windup
 
 if TYPE_CHECKING:
     from robots.robot import Robot

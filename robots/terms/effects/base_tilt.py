@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 
 if TYPE_CHECKING:
     from robots.robot import Robot

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from robots.common.stretches import spans
-from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
+from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Shape, Situation
 
 if TYPE_CHECKING:
     from robots.robot import Robot

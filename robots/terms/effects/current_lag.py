@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
+from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Shape, Situation
 from robots.terms.effects.time_delay import INEXACT, SHIFT, SHORTEST, SMALL, Late, lateness, near
 
 if TYPE_CHECKING:

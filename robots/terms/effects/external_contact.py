@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.special import gamma
 
 from robots.terms.base import force_unit
-from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
-from robots.terms.effects.states import spells
+from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.states import spells
 
 if TYPE_CHECKING:
     from robots.robot import Robot

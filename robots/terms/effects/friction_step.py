@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.base import Coefficient, JointEffect, Place, Situation
-from robots.terms.effects.sudden import Sudden
+from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Situation
+from robots.terms.effect_bases.sudden import Sudden
 
 if TYPE_CHECKING:
     from robots.robot import Robot

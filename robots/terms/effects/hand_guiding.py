@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 
 if TYPE_CHECKING:
     from robots.robot import Robot

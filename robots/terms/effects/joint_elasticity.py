@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
-from robots.terms.effects.unknown_rotor import KNOWN, ROTOR, is_sure, load_beside, rotor_bounds, rotor_grid
+from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.unknown_rotor import KNOWN, ROTOR, is_sure, load_beside, rotor_bounds, rotor_grid
 
 if TYPE_CHECKING:
     from robots.robot import Robot

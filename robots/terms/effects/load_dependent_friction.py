@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import length_unit
-from robots.terms.effects.base import Coefficient, Place, Shape, Situation
-from robots.terms.effects.static import Instant, StaticJointEffect
-from robots.terms.effects.unknown_rotor import KNOWN, ROTOR, load_beside, rotor_bounds, rotor_grid
+from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
+from robots.terms.effect_bases.static import Instant, StaticJointEffect
+from robots.terms.effect_bases.unknown_rotor import KNOWN, ROTOR, load_beside, rotor_bounds, rotor_grid
 
 if TYPE_CHECKING:
     from robots.robot import Robot

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
-from robots.terms.effects.states import change_times
+from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.states import change_times
 
 if TYPE_CHECKING:
     from robots.robot import Robot

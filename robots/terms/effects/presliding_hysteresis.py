@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit
-from robots.terms.effects.base import Coefficient, JointEffect, Place, Shape, Situation
-from robots.terms.effects.states import bristle
+from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Shape, Situation
+from robots.terms.effect_bases.states import bristle
 
 if TYPE_CHECKING:
     from robots.robot import Robot

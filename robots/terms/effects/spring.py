@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.base import Coefficient, Place, Shape, Situation
-from robots.terms.effects.static import Instant, StaticJointEffect
+from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
+from robots.terms.effect_bases.static import Instant, StaticJointEffect
 
 if TYPE_CHECKING:
     from robots.robot import Robot

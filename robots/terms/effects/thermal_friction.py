@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.base import Coefficient, Place, Shape, Situation
-from robots.terms.effects.heat import HeatEffect
-from robots.terms.effects.states import relaxation
+from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
+from robots.terms.effect_bases.heat import HeatEffect
+from robots.terms.effect_bases.states import relaxation
 
 if TYPE_CHECKING:
     from robots.robot import Robot

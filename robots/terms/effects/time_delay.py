@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator, make_interp_spline
 
-from robots.terms.effects.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 
 if TYPE_CHECKING:
     from robots.robot import Robot

@@ -8,8 +8,8 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.effects.base import Coefficient, Place, Situation
-from robots.terms.effects.static import Instant, StaticJointEffect
+from robots.terms.effect_bases.base import Coefficient, Place, Situation
+from robots.terms.effect_bases.static import Instant, StaticJointEffect
 
 if TYPE_CHECKING:
     from robots.robot import Robot

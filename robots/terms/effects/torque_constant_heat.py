@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit
-from robots.terms.effects.base import Coefficient, Place, Shape, Situation
-from robots.terms.effects.heat import HeatEffect
+from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
+from robots.terms.effect_bases.heat import HeatEffect
 from robots.terms.effects.load_heat import copper_heat
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effects.base import Coefficient, Place, Shape, Situation
-from robots.terms.effects.states import best_apart
-from robots.terms.effects.static import Instant, StaticJointEffect
+from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
+from robots.terms.effect_bases.states import best_apart
+from robots.terms.effect_bases.static import Instant, StaticJointEffect
 
 if TYPE_CHECKING:
     from robots.robot import Robot

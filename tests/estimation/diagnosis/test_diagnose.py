@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from estimation import load_model, predict
-from estimation.clocks import PAUSE
 from estimation.diagnosis import Diagnosis, diagnose
-from estimation.prediction import clock_of
-from oed.reports.diagnosis_view import view_of
+from estimation.logs.clocks import UNKNOWN_PAUSE
+from estimation.predictions.prediction import clock_of
+from oed.reports.pages.diagnosis_view import view_of
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.plants import simulate
 from robots.plants.effects import plant_effect
@@ -103,7 +103,7 @@ def test_a_log_that_began_its_clock_anew_is_predicted_as_after_the_change(
     model = load_model(tmp_path)
     anew = replace(unseen, t=unseen.t - unseen.t[0] + 0.5)
     later, word = clock_of(model, anew)
-    assert later == pytest.approx(model.provenance["logs"][0]["duration"] + PAUSE - 0.5)
+    assert later == pytest.approx(model.provenance["logs"][0]["duration"] + UNKNOWN_PAUSE - 0.5)
     assert "counts as recorded 60 s after" in word
     np.testing.assert_allclose(predict(model, anew).predicted, predict(model, unseen).predicted, rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(predict(model, anew).motion.t, predict(model, unseen).motion.t - 99.5, atol=1e-6)

@@ -9,18 +9,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from estimation.diagnosis import shape_errors as errors
-from estimation.diagnosis.extending import fit_extended
-from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.problem import Problem
-from estimation.diagnosis.recording import Recording
-from estimation.diagnosis.refinement import refine
-from estimation.diagnosis.scoring import accept, score
-from estimation.diagnosis.states import record
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.refinement import refine
+from estimation.diagnosis.hypothesis_tests.scoring import accept, score
+from estimation.diagnosis.joint_fits import shape_errors as errors
+from estimation.diagnosis.joint_fits.extended_fit import fit_extended
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.recordings.recording import Recording
 from robots.robot import Robot
 from robots.signals import Log
+from robots.terms.effect_bases.states import bristle
 from robots.terms.effects import EFFECTS
-from robots.terms.effects.states import bristle
 from robots.terms.effects.time_delay import lateness
 
 STEP = Hypothesis(EFFECTS["friction_step"], 2)
@@ -31,7 +31,7 @@ TRUE = 7.31
 @pytest.fixture(scope="module")
 def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
     """A log of the arm without effects."""
-    return record(arm, [arm_log(torque_noise=0.02)])
+    return build_recording(arm, [arm_log(torque_noise=0.02)])
 
 
 @pytest.fixture(scope="module")

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.diagnosis import comparing, verdict
-from estimation.diagnosis.groups import Group
-from estimation.diagnosis.hypotheses import Hypothesis
-from estimation.diagnosis.refinement import Member
+from estimation.diagnosis.hypothesis_tests.groups import Group
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.validations import comparison, verdict
 from robots.terms.effects import EFFECTS
 
 ROWS = 5000
@@ -21,11 +21,11 @@ PRICE = float(np.log(ROWS))
 
 def accepting(monkeypatch: pytest.MonkeyPatch, accept: Callable[..., Any]) -> None:
     """Has members fitted together by a function of the test."""
-    for module in (comparing, verdict):
+    for module in (comparison, verdict):
         monkeypatch.setattr(module, "accept", accept)
 
 
-def member_of(name: str, joint: int | None, gain: float, degrees: int) -> Member:
+def member_of(name: str, joint: int | None, gain: float, degrees: int) -> FittedEffect:
     """A member of a gain and a number of parameters."""
     group = Group((0,), (np.ones((ROWS, 1), np.float32),), np.zeros((1, 1)), np.eye(1), np.ones(1), np.ones(1))
-    return replace(Member(Hypothesis(EFFECTS[name], joint), (), group, gain, np.ones(1), degrees, 1.0))
+    return replace(FittedEffect(Hypothesis(EFFECTS[name], joint), (), group, gain, np.ones(1), degrees, 1.0))

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from estimation.estimators import RegressionData
-from estimation.moments import Moments
-from estimation.preparation import Rows
+from estimation.regressions.moments import Moments
+from estimation.regressions.preparation import Rows
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits

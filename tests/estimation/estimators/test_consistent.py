@@ -8,9 +8,9 @@ import pytest
 
 from estimation import identify, predict, read_log
 from estimation.estimators import ESTIMATORS, PhysicallyConsistent, WeightedLeastSquares
-from estimation.estimators.conic import ConicProgram
 from estimation.estimators.consistent import EPSILON
-from estimation.estimators.standard import body_columns, reference_bodies, scaling
+from estimation.linear_algebra.conic import ConicProgram
+from estimation.regressions.standard_parameters import body_columns, reference_bodies, scaling
 from robots.common.errors import InfeasibleError, InputError
 from robots.consistency import BASIS, inertial_from_pseudo, pseudo_inertia
 from robots.loading import load_robot
@@ -104,7 +104,7 @@ def test_the_centre_of_mass_stays_in_its_box(problem_named, assemble):
 
 def test_a_polynomial_friction_brakes_at_every_speed(arm, fourier_motion, assemble):
     """Friction of a polynomial is never below zero at a speed that was seen, though its cubic term may be."""
-    from estimation.preparation import Rows
+    from estimation.regressions.preparation import Rows
     from robots.base_parameters import find_base_parameters
     from robots.regressor import default_model
 

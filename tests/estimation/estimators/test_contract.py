@@ -11,8 +11,8 @@ from estimation.estimators import (
     WeightedLeastSquares,
     estimator,
 )
-from estimation.moments import Moments
-from estimation.preparation import Rows
+from estimation.regressions.moments import Moments
+from estimation.regressions.preparation import Rows
 from robots.common.errors import InputError
 from robots.signals import Motion
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.estimators import Huber, Tukey, WeightedLeastSquares
-from estimation.preparation import Rows
+from estimation.regressions.preparation import Rows
 
 
 def solved(member, data):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.estimators.payload import fit_payload
-from estimation.preparation import Rows
+from estimation.regressions.preparation import Rows
 from robots.common.errors import InputError
 from robots.geometry.inertia import inertial_parameters
 from robots.regressor import TorqueModel

@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
+from estimation.closed_loops.closed_loop import ClosedLoop, inertia_matrices, stiff_controller
 from estimation.estimators import (
     Controller,
     DirectAndInverse,
@@ -14,10 +15,9 @@ from estimation.estimators import (
     RegressionData,
     TotalLeastSquares,
 )
-from estimation.estimators.closed_loop import ClosedLoop, inertia_matrices, stiff_controller
-from estimation.moments import Moments
-from estimation.preparation import Rows
 from estimation.preprocessing import LowPass, resample
+from estimation.regressions.moments import Moments
+from estimation.regressions.preparation import Rows
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError
 from robots.regressor import default_model

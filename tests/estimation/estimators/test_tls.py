@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from estimation.estimators import OrdinaryLeastSquares, TotalLeastSquares
-from estimation.estimators.position_noise import passed_noise, smoothed_noise, white_position_noise
-from estimation.moments import Moments
-from estimation.preparation import Rows
 from estimation.preprocessing import LowPass, resample
+from estimation.regressions.moments import Moments
+from estimation.regressions.position_noise import passed_noise, smoothed_noise, white_position_noise
+from estimation.regressions.preparation import Rows
 from robots.common.errors import InputError
 from robots.signals import Log, Motion
 

@@ -7,7 +7,7 @@ from hypothesis.extra.numpy import arrays
 
 from estimation.logs import read_log, write_log
 from robots.common.errors import InputError
-from robots.common.tables import read_table
+from robots.common.tables.table_files import read_table
 from robots.signals import Log
 
 SUFFIXES = ("csv", "parquet")

@@ -264,5 +264,5 @@ def test_a_full_disk_leaves_nothing(run, robot: Path, out: Path, monkeypatch: py
     def full(path: Path, *_: object) -> None:
         raise InputError("cannot be written (no space left on device)", file=path)
 
-    monkeypatch.setattr("oed.reports.saving.write_atomic", full)
+    monkeypatch.setattr("oed.reports.rendering.saving.write_atomic", full)
     refused(run(*DESIGN, out, "--robot", robot), out, "report.html", "no space left")

@@ -99,7 +99,7 @@ def test_interrupted(command: str, run, arguments, tmp_path: Path, monkeypatch: 
         "export": "oed.exports.write_trajectory",
         "simulate": "estimation.logs.write_log",
         "identify": "oed.reports.save_estimate_report",
-        "predict": "estimation.prediction.Prediction.save",
+        "predict": "estimation.predictions.prediction.Prediction.save",
     }
     monkeypatch.setattr(places[command], interrupt)
     done = run(*arguments(command))

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.diagnosis.carried import point_mass
 from oed.cli.set_up import with_known_setup
 from robots.common.errors import InputError
 from robots.signals import Log
+from robots.terms.situations.flange_body import point_mass
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from oed.reports import (
     torque_picture,
     trajectory_picture,
 )
-from oed.reports.torque_pictures import autocorrelation
+from oed.reports.pictures.torque_pictures import autocorrelation
 from robots.common.errors import InputError
 from robots.limits import Limits, Margin
 

@@ -9,7 +9,8 @@ import pytest
 
 from robots.batch import builds_expressions
 from robots.regressor import TorqueModel
-from robots.terms.effects import sensitivities, static
+from robots.terms.effect_bases import static
+from robots.terms.situations import sensitivities
 
 
 def test_two_functions_never_build_at_once():

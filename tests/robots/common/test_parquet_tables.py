@@ -5,7 +5,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from robots.common.errors import InputError
-from robots.common.tables import read_table, write_table
+from robots.common.tables.table_files import read_table, write_table
 
 
 def refused(path, **kwargs):

@@ -9,7 +9,7 @@ import pytest
 
 from oed.criteria import criterion
 from oed.experiments import InteriorPoint, Ipopt, Solver, usable_limits
-from oed.experiments.problem import FourierProblem
+from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.solvers import Stage
 from oed.experiments.solvers.slacks import LinearSlacks, implied
 from robots.base_parameters import find_base_parameters

@@ -17,7 +17,7 @@ from robots.terms.effects import EFFECTS
 from robots.terms.effects.backlash import LANDS, SLOWEST
 from robots.terms.effects.base_tilt import level_axes
 from robots.terms.effects.joint_elasticity import followed
-from robots.terms.effects.situation import situation
+from robots.terms.situations.situation import situation
 
 STEP = 1e-5
 SOME = slice(100, 1400, 65)

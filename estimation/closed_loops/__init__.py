@@ -1,0 +1,1 @@
+"""The identified robot simulated under its controller."""

@@ -1,0 +1,1 @@
+"""The base model on a recording: its columns, its priors, and known payloads and gravity."""

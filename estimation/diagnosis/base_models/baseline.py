@@ -1,0 +1,214 @@
+"""The base model on a recording: its columns, the sharpness of its sign, and its fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.base_models.payload_and_gravity import base_regressor, build_situation, friction_signs
+from estimation.diagnosis.recordings.directions import SHARP, sharpest_sign_velocity
+from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.thinning import evaluate_at_full_rate
+from estimation.linear_algebra.orthonormal import orthonormal
+from robots.base_parameters import BaseParameters, find_base_parameters
+from robots.regressor import default_model
+from robots.robot import Robot
+from robots.terms.effects import Situation
+
+Array = NDArray[np.float64]
+
+# tanh(dq / v0) of the Coulomb friction: from a slow axis' sharpest to the widest that is still a sign, a share of a
+# fast joint's speed.
+SCALES = tuple(float(v0) for v0 in SHARP * 2.0 ** np.arange(-6.0, 9.5, 0.5))
+WIDEST, SHARE = 0.065, 0.05
+ROUNDS = 3
+# Directions of the column-scaled regressor below this share of the largest are not determined by the log.
+FAINT = 1e-7
+# Of the squares of what a sharper sign would change, the rows that count must show this share.
+SHOWN = 1e-3
+CHUNK = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """The base model, ready to be fitted by any weighting.
+
+    Attributes:
+        base: base parameters of the model.
+        regressor: columns (N, n, b).
+        nuisance: columns (N, n, m) that are fitted beside and belong to no finding: how sharp each joint's sign is.
+    """
+
+    base: BaseParameters
+    regressor: Array
+    nuisance: Array
+
+    def situation(self, recording: Recording, values: Array) -> Situation:
+        """Gives what effects may depend on, with base parameters (b,)."""
+        return replace(
+            build_situation(recording, self.base.model, values, self.base.independent), measured=recording.tau
+        )
+
+
+def base_parameters(
+    robot: Robot, friction: str, scales: tuple[float, ...], gravities: Iterable[Array] = ()
+) -> BaseParameters:
+    """Finds the base parameters of rigid body, friction, rotors and offsets, the sign as sharp as `scales` say.
+
+    They are those under the gravity of the robot's description and under `gravities` (3,) together.
+    """
+    return find_base_parameters(default_model(robot, friction=friction, velocity_scale=scales), gravities=gravities)
+
+
+def build_baseline(
+    base: BaseParameters,
+    recording: Recording,
+    residual_scale: Array | None = None,
+    known: Recording | None = None,
+) -> Baseline:
+    """Chooses the sharpness of each joint's sign by the fit, and evaluates the columns.
+
+    Args:
+        base: base parameters with any sharpness.
+        recording: the data.
+        residual_scale: standard deviation of the noise (n,); by default a share of the torque.
+        known: the same rows without what is known of effects: torque, and the motion that it was needed for. Friction
+            that is logged late turns round beside its own sign, and would look less sharp than it is.
+    """
+    seen = recording if known is None else known
+    scale = seen.tau.std(axis=0) if residual_scale is None else residual_scale
+    least = 1e-9 * max(1.0, float(np.abs(seen.tau).max()))
+    Y = base_regressor(base, recording)
+    signs = [i for i, column in enumerate(base.columns) if column.symbol == "f1"]
+    chosen = None
+    if signs:
+        trial = Y if np.array_equal(seen.dq, recording.dq) else base_regressor(base, seen)
+        fit = _Signs(trial, signs, base, seen, 1.0 / np.maximum(scale, least))
+        narrow = np.full(recording.n, WIDEST)
+        chosen = fit.sharpness(narrow)
+        fast = np.maximum(narrow, SHARE * np.abs(recording.dq).max(axis=0))
+        if np.any((fast > narrow) & (np.array(chosen) == max(v0 for v0 in SCALES if v0 <= WIDEST))):
+            # A log that the base model does not describe at all would have any sign: each counts by what is left of it.
+            left = np.maximum(fit.left(chosen), least)
+            chosen = _Signs(trial, signs, base, seen, 1.0 / left).sharpness(fast)
+        model = default_model(
+            base.model.robot,
+            friction="polynomial" if any(c.symbol == "f4" for c in base.model.columns) else "coulomb-viscous",
+            velocity_scale=chosen,
+        )
+        base = replace(base, model=model)
+        for i in signs:
+            joint = base.columns[i].joint - 1
+            Y[:, joint, i] = friction_signs(recording, joint, np.array([chosen[joint]]))[:, 0]
+    return Baseline(base, Y, _nuisance(recording, chosen))
+
+
+def _nuisance(recording: Recording, chosen: tuple[float, ...] | None) -> Array:
+    """How each joint's sign would change if it were less sharp (N, n, n): its derivative by the logarithm of v0.
+
+    Of a joint whose rows that count hardly show it, nothing: its value would be any, and so the torque in the others.
+    """
+    if chosen is None:
+        return np.zeros((len(recording), recording.n, 0))
+    result = np.zeros((len(recording), recording.n, recording.n))
+    for j, v0 in enumerate(chosen):
+        change = evaluate_at_full_rate(recording, partial(_change, joint=j, v0=v0))
+        if np.sum(change[~recording.unsure[:, j]] ** 2) > SHOWN * np.sum(change**2):
+            result[:, j, j] = change
+    return result
+
+
+def _change(recording: Recording, joint: int, v0: float) -> Array:
+    x = recording.dq[:, joint] / v0
+    return np.asarray(x / np.cosh(np.clip(x, -300, 300)) ** 2)
+
+
+class _Signs:
+    """Signs of all widths on trial beside the rest of the base model, in a weighted fit.
+
+    Args:
+        Y: columns (N, n, b).
+        signs: which of them are signs.
+        base: base parameters.
+        recording: the data.
+        weights: of each joint (n,), or of each row of it (N, n).
+    """
+
+    def __init__(self, Y: Array, signs: list[int], base: BaseParameters, recording: Recording, weights: Array) -> None:
+        self.recording, self.stride = recording, max(1, len(recording) // 20_000)
+        self.joints = [base.columns[i].joint - 1 for i in signs]
+        # The sharpest for each of them.
+        self.first = [
+            sum(v0 < 0.999 * sharpest_sign_velocity(recording.dq[:, joint]) for v0 in SCALES) for joint in self.joints
+        ]
+        rows = slice(None, None, self.stride)
+        self.weights = np.broadcast_to(weights, recording.tau.shape)[rows]
+        self.counts = ~recording.unsure[rows] * self.weights
+        rest = np.delete(Y[rows], signs, axis=2) * self.counts[:, :, None]
+        self.Q = orthonormal(rest.reshape(-1, rest.shape[2]), FAINT).reshape(len(rest), recording.n, -1)
+        self.tau = recording.tau[rows] * self.counts
+        self.along = np.einsum("njb,nj->b", self.Q, self.tau)
+        size = len(self.joints) * len(SCALES)
+        gram, cross, against = np.zeros((size, size)), np.zeros(size), np.zeros((size, self.Q.shape[2]))
+        for a, joint in enumerate(self.joints):
+            # A sign acts on its own joint's rows alone.
+            own = slice(a * len(SCALES), (a + 1) * len(SCALES))
+            columns = friction_signs(recording, joint, np.array(SCALES))[rows] * self.counts[:, joint, None]
+            gram[own, own] = columns.T @ columns
+            cross[own] = columns.T @ self.tau[:, joint]
+            against[own] = columns.T @ self.Q[:, joint]
+        self.gram, self.cross, self.against = gram - against @ against.T, cross - against @ self.along, against
+
+    def sharpness(self, widest: Array) -> tuple[float, ...]:
+        """Picks all joints' scales (n,) together, up to the widest, one joint at a time with the others as they are."""
+        picked = [k + 1 for k in self.first]
+        for _ in range(ROUNDS):
+            for a, joint in enumerate(self.joints):
+                gains = []
+                for k in range(self.first[a], sum(v0 <= widest[joint] for v0 in SCALES)):
+                    trial = [len(SCALES) * b + (k if b == a else picked[b]) for b in range(len(self.joints))]
+                    gains.append(float(self.cross[trial] @ self._fitted(trial)))
+                picked[a] = self.first[a] + int(np.argmax(gains))
+        scales = [SCALES[0]] * self.recording.n
+        for a, joint in enumerate(self.joints):
+            scales[joint] = SCALES[picked[a]]
+        return tuple(scales)
+
+    def left(self, scales: tuple[float, ...]) -> Array:
+        """Gives the RMS residual of each joint with some scales, log by log, for each row (N, n) [N m or N]."""
+        trial = [len(SCALES) * a + SCALES.index(scales[joint]) for a, joint in enumerate(self.joints)]
+        values = self._fitted(trial)
+        residual = self.tau - self.Q @ (self.along - self.against[trial].T @ values)
+        for joint, value in zip(self.joints, values, strict=True):
+            sign = friction_signs(self.recording, joint, np.array([scales[joint]]))[:: self.stride, 0]
+            residual[:, joint] -= value * sign * self.counts[:, joint]
+        result = np.zeros(self.recording.tau.shape)
+        for run in self.recording.runs:
+            rows = slice(-(-run.start // self.stride), -(-run.stop // self.stride))
+            counted = np.maximum((self.counts[rows] > 0).sum(axis=0), 1)
+            squares = np.sum((residual[rows] / self.weights[rows]) ** 2, axis=0) / counted
+            result[run] = np.sqrt(squares)
+        return result
+
+    def _fitted(self, trial: list[int]) -> Array:
+        return np.asarray(np.linalg.pinv(self.gram[np.ix_(trial, trial)], 1e-9) @ self.cross[trial])
+
+
+def inertia_matrix(baseline: Baseline, recording: Recording, values: Array) -> Array:
+    """Gives the torque on each joint per acceleration of each (n, n) [kg m2], as base parameters (b,) say it.
+
+    Rotors included, root mean square over some states.
+    """
+    rows = np.linspace(0, len(recording) - 1, 50).astype(int)
+    q, zero = recording.q[rows], np.zeros((len(rows), recording.n))
+    still = baseline.base.torque(q, zero, zero, values)
+    result = np.empty((recording.n, recording.n))
+    for k in range(recording.n):
+        unit = zero.copy()
+        unit[:, k] = 1.0
+        result[:, k] = np.sqrt(np.mean((baseline.base.torque(q, zero, unit, values) - still) ** 2, axis=0))
+    return result

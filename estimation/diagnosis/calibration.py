@@ -1,0 +1,6 @@
+"""Constants that decide: what is accepted, rejected or reported."""
+
+from __future__ import annotations
+
+MIN_BIC_GAIN = 10.0
+"""An effect is reported if its model's BIC is better by this much: very strong evidence (Kass and Raftery 1995)."""

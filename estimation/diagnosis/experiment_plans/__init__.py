@@ -1,0 +1,1 @@
+"""What a log could have shown, and what to measure next."""

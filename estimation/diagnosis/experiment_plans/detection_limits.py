@@ -1,0 +1,255 @@
+"""What a log could have shown: for each effect and joint the smallest size that it would, and could have named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.hypothesis_tests.groups import Group
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis, all_hypotheses
+from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
+from estimation.diagnosis.hypothesis_tests.power import (
+    detectable_energy,
+    residual_energy,
+    resolving_energy,
+    size_per_energy,
+    unit_mixtures,
+)
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.scan import Entry
+from estimation.diagnosis.hypothesis_tests.scoring import accept, visible_root
+from robots.common.plain import finite
+from robots.terms.effects import EFFECTS
+
+Array = NDArray[np.float64]
+
+HIDDEN = "the base model absorbs it: no size shows in this motion"
+UNSURE = "nearly all of it is at rest or beside reversals, where friction may have either sign: no size shows"
+FEW = "of {} kinds of it that were tried only {} show, from {:.2g} % of the torque on"
+RESTING = 0.02
+"""Share of a log from which it is said that nothing is seen in rests."""
+RESTS = "{:.0f} % of the log the arm stands, where its torque is that of a friction nobody knows: nothing is seen there"
+STILL = 1e-3
+"""Travel of a joint [rad or m] below which it hardly moves."""
+MOST = 0.9
+NAMED = 4
+"""Effects that show at no size that a sentence names."""
+"""Share of effects and places whose limits a sentence covers."""
+SHAPES = 3
+"""Shapes of an effect that its limit is the median of."""
+RIVAL_SHAPES = 4
+"""Shapes with which a rival may imitate it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limit:
+    """What one log can tell of one effect at one joint.
+
+    Attributes:
+        effect: its name.
+        joint: counted from 1; None for the whole robot.
+        detectable: smallest size that is found with 95 % chance, as a share of the joint's torque RMS (of a robot's
+            effect: of the joint where it shows most); infinite where no size shows.
+        at_worst: that size of the kind of it (its time constants, speeds, travels) that shows least, of those that a
+            scan tries; infinite where one of them shows at no size. `detectable` is of a kind in the middle.
+        attributable: smallest that is also told from every rival; infinite where none is.
+        toughest: the rival that is hardest to tell from it; None without.
+        visible: share of its energy that the base model does not absorb.
+        note: why no size shows, or what stays open; or empty.
+    """
+
+    effect: str
+    joint: int | None
+    detectable: float
+    at_worst: float
+    attributable: float
+    toughest: str | None
+    visible: float
+    note: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes it as plain data; what is infinite is None."""
+        return {
+            "effect": self.effect,
+            "joint": self.joint,
+            "detectable": finite(self.detectable),
+            "at_worst": finite(self.at_worst),
+            "attributable": finite(self.attributable),
+            "toughest_rival": self.toughest,
+            "visible": self.visible,
+            "note": self.note,
+        }
+
+
+def find_limits(problem: Problem, entries: Sequence[Entry], *, false_alarm: float = 0.01) -> tuple[Limit, ...]:
+    """Finds the limits of a log, by the noise it has and the base model it is fitted with.
+
+    Args:
+        problem: the data, white; nothing of its residual is used.
+        entries: all hypotheses, measured.
+        false_alarm: chance that noise alone has an effect named.
+
+    Returns:
+        One per hypothesis, in the catalogue's order.
+    """
+    tries = sum(entry.tries for entry in entries)
+    known = {(entry.hypothesis.name, entry.hypothesis.joint): entry for entry in entries}
+    limits = []
+    for hypothesis in all_hypotheses(problem.situation.robot, list(EFFECTS.values())):
+        entry = known.get((hypothesis.name, hypothesis.joint))
+        if entry is None:
+            limits.append(_none(hypothesis, _why_nothing(problem, hypothesis)))
+        else:
+            limits.append(_limit(problem, entry, known, tries, false_alarm))
+    return tuple(limits)
+
+
+def summarise_limits(limits: Sequence[Limit]) -> str:
+    """Says in one sentence, without its stop, what logs would have shown; empty where they would show nothing."""
+    sizes = [limit.detectable for limit in limits if np.isfinite(limit.detectable)]
+    if not sizes:
+        return ""
+    half, most = (f"{100 * float(size):.1f} %" for size in np.quantile(sizes, (0.5, MOST)))
+    hidden = [
+        limit.effect + (f" of joint {limit.joint}" if limit.joint else "")
+        for limit in limits
+        if not np.isfinite(limit.detectable)
+    ]
+    more = len(hidden) - NAMED
+    rest = f"; at any size hidden: {', '.join(hidden if more <= 1 else [*hidden[:NAMED], f'and {more} more'])}"
+    rest = rest if hidden else ""
+    return (
+        f"Of {len(sizes)} effects and places half would have shown from {half} of the joint's torque on, nine in ten "
+        f"from {most}{rest}"
+    )
+
+
+def _why_nothing(problem: Problem, hypothesis: Hypothesis) -> str:
+    joint = hypothesis.joint
+    still = joint is not None and np.ptp(problem.recording.q[:, joint - 1]) < STILL
+    return "joint hardly moves" if still else "nothing of it shows in this motion"
+
+
+def _limit(
+    problem: Problem,
+    entry: Entry,
+    known: dict[tuple[str, int | None], Entry],
+    tries: int,
+    false_alarm: float,
+) -> Limit:
+    hypothesis = entry.hypothesis
+    roots = [visible_root(group.gram, group.raw) for group in entry.groups]
+    mixtures = [unit_mixtures(sizes) for sizes in entry.sizes]
+    showing = [at for at, (own, root) in enumerate(zip(mixtures, roots, strict=True)) if len(own) and len(root)]
+    if not showing:
+        unsure = all(np.isinf(group.raw).all() for group in entry.groups)
+        return _none(hypothesis, UNSURE if unsure else HIDDEN)
+    picked = [showing[k] for k in _spread(len(showing), SHAPES)]
+    bounds = hypothesis.effect.bounds(problem.situation, hypothesis.joint)
+    # What an effect is whole without is none of its parameters where it just shows.
+    free = [k for k, (low, high) in enumerate(bounds) if high > low and not hypothesis.effect.shapes[k].beside]
+
+    def size(at: int) -> float:
+        assumed = hypothesis.effect.likely(
+            problem.situation, hypothesis.joint, entry.shapes[at], np.abs(mixtures[at][0])
+        )
+        fitted = min((sum(known[k] is None for k in free) for known in assumed), default=len(free))
+        penalty = (len(roots[at]) + fitted) * float(np.log(problem.rows * len(entry.groups[at].joints)))
+        needed = detectable_energy(len(roots[at]), tries, false_alarm=false_alarm, penalty=penalty)
+        sure = _certain_share(problem, hypothesis, entry.shapes[at]) if hypothesis.effect.lags else 1.0
+        return float(size_per_energy(mixtures[at], entry.groups[at].gram) * np.sqrt(needed / sure))
+
+    sizes = {at: size(at) for at in showing}
+    found = [sizes[at] for at in picked]
+    detectable = float(np.median(found))
+    if 2 * len(showing) < len(entry.groups):
+        return _none(hypothesis, FEW.format(len(entry.groups), len(showing), 100 * detectable))
+    rivals = _rivals(problem, hypothesis, known)
+    named = [
+        _toughest(problem, entry.groups[at], mixtures[at], rivals, size) for at, size in zip(picked, found, strict=True)
+    ]
+    attributable, toughest = sorted(named, key=lambda one: one[0])[len(named) // 2]
+    shares = [float(np.max(np.diag(g.gram) / np.maximum(g.raw, 1e-300))) for g in (entry.groups[at] for at in picked)]
+    return Limit(
+        effect=hypothesis.name,
+        joint=hypothesis.joint,
+        detectable=detectable,
+        at_worst=max(sizes.values()) if len(showing) == len(entry.groups) else np.inf,
+        attributable=max(attributable, detectable),
+        toughest=toughest,
+        visible=float(np.median(shares)),
+        note=_note(problem, hypothesis) if np.isfinite(detectable) else HIDDEN,
+    )
+
+
+def _certain_share(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> float:
+    """Gives the share of an effect's energy that counts, where joints tell it by reversals."""
+    told = per_joint_evidence(problem, hypothesis, shape, accept(problem, ()))
+    return float(np.sum(told.sure * told.gram) / np.sum(told.gram)) if told.gram.any() else 1.0
+
+
+def _toughest(
+    problem: Problem, group: Group, mixtures: Array, rivals: Sequence[tuple[str, Entry]], smallest: float
+) -> tuple[float, str | None]:
+    """Gives the size, `smallest` at least, from which an effect is told from all rivals, and the one that asks most."""
+    worst: tuple[float, str | None] = (smallest, None)
+    for name, rival in rivals:
+        per_energy = max(
+            size_per_energy(mixtures, residual_energy(group.gram, problem.product(group, other), other.gram, other.raw))
+            for other in (rival.groups[k] for k in _spread(len(rival.groups), RIVAL_SHAPES))
+        )
+        size = per_energy * np.sqrt(resolving_energy())
+        if size > worst[0] or worst[1] is None:
+            worst = (max(size, smallest), name)
+    return worst
+
+
+def _note(problem: Problem, hypothesis: Hypothesis) -> str:
+    """Says what a log leaves open that is shorter than an effect's slowest time constant, or in which the arm rests.
+
+    What acts for a moment may do so in a rest.
+    """
+    if hypothesis.effect.passing:
+        resting = float(np.mean(problem.recording.unsure.all(axis=1)))
+        if resting > RESTING:
+            return RESTS.format(100 * resting)
+    duration = float(problem.recording.t[-1] - problem.recording.t[0])
+    slow = [shape for shape in hypothesis.effect.shapes if shape.name == "time_constant" and shape.upper > duration]
+    if not slow:
+        return ""
+    return (
+        f"in {duration:.0f} s of data, time constants beyond {duration:.0f} s look alike: how fast it goes stays open"
+    )
+
+
+def _rivals(
+    problem: Problem, hypothesis: Hypothesis, known: dict[tuple[str, int | None], Entry]
+) -> list[tuple[str, Entry]]:
+    """Finds the declared rivals on the joints where the effect acts; rare ones only of a rare one."""
+    joints: list[int | None] = [None, *(range(1, problem.n + 1) if hypothesis.joint is None else [hypothesis.joint])]
+    names = [name for name in hypothesis.effect.rivals if hypothesis.effect.rare or not EFFECTS[name].rare]
+    return [(name, known[name, joint]) for name in names for joint in joints if (name, joint) in known]
+
+
+def _spread(count: int, most: int) -> list[int]:
+    """Picks up to `most` of `count` places, evenly, the middle first of all."""
+    if count <= most:
+        return list(range(count))
+    return sorted({round((k + 0.5) * count / most - 0.5) for k in range(most)})
+
+
+def _none(hypothesis: Hypothesis, note: str) -> Limit:
+    return Limit(
+        effect=hypothesis.name,
+        joint=hypothesis.joint,
+        detectable=np.inf,
+        at_worst=np.inf,
+        attributable=np.inf,
+        toughest=None,
+        visible=0.0,
+        note=note,
+    )

@@ -1,0 +1,235 @@
+"""What experiments tell of causes: Gram matrices of base model and causes, of logs and of motions to come."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.base_models.payload_and_gravity import base_regressor
+from estimation.diagnosis.experiment_plans.experiment_motions import Stage
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.power import chance_to_resolve
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.noise_models.masked_rows import no_masked_rows
+from estimation.diagnosis.noise_models.whitening import Whitening
+from robots.base_parameters import find_base_parameters
+from robots.regressor import TorqueModel
+from robots.signals import Motion
+from robots.terms.effect_bases.heat import HeatEffect
+from robots.terms.effects import situation
+from robots.terms.effects.base_tilt import level_axes
+from robots.terms.situations.flange_body import point_mass, with_body
+from robots.terms.situations.situation import Situation, joined
+
+Array = NDArray[np.float64]
+
+SOON, LATER = 2.0, 3600.0
+"""Times from the logs to the experiment [s]: the robot is as warm as they left it, or has cooled. Nobody says which."""
+WARMING = 25
+"""Every so many samples of the logs are enough to tell how warm they leave the robot."""
+ARM = 0.1
+"""Distance of a payload's centre from the flange [m]."""
+
+
+class Cause(Protocol):
+    """A possible cause: an effect with its fitted shape and coefficients."""
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        """Effect and joint."""
+
+    @property
+    def shape(self) -> tuple[float, ...]:
+        """Its shape parameters."""
+
+    @property
+    def coefficients(self) -> Array:
+        """Its coefficients (k,)."""
+
+
+class Grams:
+    """Gram matrices of base columns and all causes' columns, whitened: of the logs, and of any experiment.
+
+    Args:
+        problem: the logs there are.
+        causes: what may have made them.
+        forms: other shapes that a cause may have, each with its cause's index: as a rival it is taken to have the one
+            that imitates best.
+    """
+
+    def __init__(self, problem: Problem, causes: Sequence[Cause], forms: Sequence[tuple[int, Cause]] = ()) -> None:
+        self.problem = problem
+        self.causes = causes
+        self.every = [*causes, *(form for _, form in forms)]
+        self.owners = [*range(len(causes)), *(owner for owner, _ in forms)]
+        self.model: TorqueModel = problem.situation.model
+        # A base that is tilted shows parameters that the logs do not: they take a part of what it shows of a cause.
+        gravity = np.asarray(self.model.robot.chain.gravity, dtype=float)
+        fields = [field for field in problem.recording.fields if field is not None]
+        tilted = [gravity + np.linalg.norm(gravity) * axis for axis in level_axes(gravity)] if gravity.any() else []
+        self.base = find_base_parameters(self.model, gravities=[*fields, *tilted])
+        self.columns = self.base.independent
+        self.sizes = [len(c.coefficients) for c in self.every]
+
+    @cached_property
+    def old(self) -> Array:
+        """Of the logs that there are."""
+        now = self.problem.situation
+        effects = [c.hypothesis.effect.columns(now, c.hypothesis.joint, c.shape) for c in self.every]
+        return self._gram(base_regressor(self.base, self.problem.recording), effects, self.problem.whitening)
+
+    @cached_property
+    def heated(self) -> bool:
+        """Whether a cause depends on how warm the logs left the robot."""
+        return any(isinstance(c.hypothesis.effect, HeatEffect) for c in self.every)
+
+    def chance(self, stages: Sequence[Stage]) -> float:
+        """Gives the chance that each cause, were it true, would be told from every other."""
+        return float(self.chances_of(self.later(stages)).min())
+
+    def later(self, stages: Sequence[Stage]) -> tuple[Array, ...]:
+        """Does what `of` does for an experiment made after the logs: once it has cooled, and with warm joints."""
+        end = float(self.problem.recording.t[-1])
+        cold = self.of(stages, end + LATER)
+        return (cold, self.of(stages, end + SOON, warm=True)) if self.heated else (cold,)
+
+    def chances_of(self, new: Sequence[Array], times: int = 1) -> Array:
+        """Gives the chance that each cause (row), were it true, would be told from each rival (column); one of itself.
+
+        By the Gram matrices of the experiment, made so often; the least chance where there are several.
+        """
+        result = np.ones((len(self.causes),) * 2)
+        for gram in new:
+            total = self.old + times * gram
+            for true, (form, rival) in product(range(len(self.causes)), enumerate(self.owners)):
+                if rival != true:
+                    chance = chance_to_resolve(self.left(total, true, form))
+                    result[true, rival] = min(result[true, rival], chance)
+        return result
+
+    def of(self, stages: Sequence[Stage], begin: float = 0.0, *, warm: bool = False) -> Array:
+        """Evaluates an experiment that begins at a time [s] of the logs' clock: the Gram matrix of all columns.
+
+        Heat begins at zero, or `warm` as the logs leave it, until a payload or another base pose is changed.
+        """
+        bases: list[Array] = []
+        effects: list[list[Array]] = [[] for _ in self.every]
+        starts: list[int] = []
+        t0, rows = begin, 0
+        for number, part in enumerate(_joined(stages)):
+            model = self.model.under(self.problem.recording.gravities[-1] if part.gravity is None else part.gravity)
+            before = self._logged if warm and not number else None
+            played, first = self._played(model, part, t0, before)
+            now = joined([played], self.model)
+            bases.append(model.regressor(now.q[first:], now.dq[first:], now.ddq[first:], columns=self.columns))
+            for columns, cause in zip(effects, self.every, strict=True):
+                values = cause.hypothesis.effect.columns(now, cause.hypothesis.joint, cause.shape)
+                columns.append(values[first:])
+            starts += [rows + s for s in part.starts]
+            rows += len(part.motion)
+            t0 = float(now.t[-1]) + 60.0
+        base = np.concatenate(bases)
+        plain = replace(self.problem.whitening, gaps=no_masked_rows(base.shape[1]), weights=None, levels=None)
+        whitening = replace(plain, starts=tuple(starts))
+        return self._gram(base, [np.concatenate(parts) for parts in effects], whitening)
+
+    def block(self, gram: Array, cause: int) -> Array:
+        """The energy of a cause's columns (k, k), nothing projected out."""
+        edges = len(self.columns) + np.concatenate([[0], np.cumsum(self.sizes)])
+        own = slice(int(edges[cause]), int(edges[cause + 1]))
+        return gram[own, own]
+
+    @cached_property
+    def _logged(self) -> tuple[Motion, tuple[int, ...]]:
+        """The logs' motion and where each begins, thinned out: what warms the robot."""
+        recording = self.problem.recording
+        rows = np.concatenate([np.arange(run.start, run.stop, WARMING) for run in recording.runs])
+        starts = np.searchsorted(rows, recording.starts)
+        motion = Motion(recording.t[rows], recording.q[rows], recording.dq[rows], recording.ddq[rows])
+        return motion, tuple(int(s) for s in starts)
+
+    def _played(
+        self, model: TorqueModel, part: _Part, begin: float, before: tuple[Motion, tuple[int, ...]] | None
+    ) -> tuple[Situation, int]:
+        """What an experiment's part does, after the logs where they are given; and the row at which it begins."""
+        motion, starts, first = part.motion, part.starts, 0
+        t = begin + motion.t
+        if before is not None:
+            logged, ahead = before
+            first = len(logged)
+            t = np.concatenate([logged.t, t])
+            motion = Motion.concatenate([logged, Motion(t[first:], motion.q, motion.dq, motion.ddq)])
+            starts = (*ahead, *(first + s for s in starts))
+        parameters = self._parameters(part.payload)
+        return situation(model, parameters, t, motion.q, motion.dq, motion.ddq, starts=starts), first
+
+    def _parameters(self, payload: float) -> Array:
+        return with_body(self.model, self.problem.parameters_without_payload, point_mass(payload, (0.0, 0.0, ARM)))
+
+    def _gram(self, base: Array, effects: Sequence[Array], whitening: Whitening) -> Array:
+        joined = np.concatenate([base, *effects], axis=2)
+        white = [whitening.apply(np.ascontiguousarray(joined[:, j]), j) for j in range(joined.shape[1])]
+        P = whitening.precision
+        gram = np.zeros((joined.shape[2],) * 2)
+        for j, first in enumerate(white):
+            gram += P[j, j] * (first.T @ first)
+            for k in range(j):
+                if P[j, k]:
+                    part = P[j, k] * (first.T @ white[k])
+                    gram += part + part.T
+        return gram
+
+    def left(self, gram: Array, true: int, rival: int) -> float:
+        """Gives the energy that a rival, in one of its forms, leaves of the true cause."""
+        theta = self.causes[true].coefficients
+        return max(float(theta @ self.remainder(gram, true, rival) @ theta), 0.0)
+
+    def remainder(self, gram: Array, true: int, rival: int | None) -> Array:
+        """What base model and rival, or the base model alone, leave of the true cause's columns (k, k)."""
+        b = len(self.columns)
+        edges = b + np.concatenate([[0], np.cumsum(self.sizes)])
+        own = np.arange(edges[true], edges[true + 1])
+        beside = np.arange(b)
+        if rival is not None:
+            beside = np.concatenate([beside, np.arange(edges[rival], edges[rival + 1])])
+        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        unit = gram / scale[:, None] / scale
+        values, vectors = np.linalg.eigh(unit[np.ix_(beside, beside)])
+        kept = values > 1e-9 * values[-1]
+        cross = unit[np.ix_(own, beside)] @ vectors[:, kept] / np.sqrt(values[kept])
+        left: Array = (unit[np.ix_(own, own)] - cross @ cross.T) * np.outer(scale[own], scale[own])
+        return left
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Stages that only pauses part."""
+
+    motion: Motion
+    starts: tuple[int, ...]
+    payload: float
+    gravity: Array | None
+
+
+def _joined(stages: Sequence[Stage]) -> list[_Part]:
+    """Joins stages of one payload and base pose: heat passes from one to the next."""
+    parts: list[tuple[list[Motion], float, Array | None]] = []
+    for stage in stages:
+        same = parts and parts[-1][1] == stage.payload and parts[-1][2] is stage.gravity
+        if not same:
+            parts.append(([stage.motion], stage.payload, stage.gravity))
+            continue
+        before = parts[-1][0][-1]
+        m = stage.motion
+        parts[-1][0].append(Motion(m.t + float(before.t[-1]) + stage.pause, m.q, m.dq, m.ddq))
+    result = []
+    for motions, carried, gravity in parts:
+        starts = tuple(int(s) for s in np.cumsum([0, *(len(m) for m in motions[:-1])]))
+        result.append(_Part(Motion.concatenate(motions), starts, carried, gravity))
+    return result

@@ -1,0 +1,135 @@
+"""What an experiment that has not been made could show: its limits, by the noise that is expected."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_toeplitz
+
+from estimation.diagnosis.base_models.baseline import build_baseline
+from estimation.diagnosis.experiment_plans.detection_limits import Limit, find_limits
+from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem
+from estimation.diagnosis.hypothesis_tests.scan import measure
+from estimation.diagnosis.noise_models.frequency_bands import Band
+from estimation.diagnosis.noise_models.masked_rows import no_masked_rows
+from estimation.diagnosis.noise_models.whitening import Whitening
+from estimation.diagnosis.recordings.directions import SHARP, SURELY, sharpest_sign_velocity
+from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.regressions.parameter_priors import GaussianPrior
+from robots.base_parameters import find_base_parameters
+from robots.common.errors import InputError
+from robots.plants.sensors import Sensors
+from robots.regressor import TorqueModel
+from robots.signals import Motion
+from robots.terms.effects import EFFECTS
+
+Array = NDArray[np.float64]
+
+ORDER = 12
+"""Of the prediction filter of noise that is a sum of white and first-order noise, which has no finite one."""
+ROUGH = 0.3
+"""Coulomb friction that a plan has at least, over the torque's standard deviation."""
+
+
+def planned_limits(
+    model: TorqueModel, parameters: Array, motions: Sequence[Motion], *, noise: Sensors | None = None
+) -> tuple[Limit, ...]:
+    """Finds the limits of an experiment that has not been made.
+
+    Args:
+        model: the torque model.
+        parameters: its standard parameters (p,).
+        motions: the planned motions, one after the other on one clock.
+        noise: the torque noise expected.
+
+    Raises:
+        InputError: parameters that are not known.
+    """
+    problem = planned_problem(model, parameters, motions, noise=noise or Sensors())
+    return find_limits(problem, measure(problem, all_hypotheses(model.robot, list(EFFECTS.values()))))
+
+
+def planned_problem(
+    model: TorqueModel,
+    parameters: Array,
+    motions: Sequence[Motion],
+    *,
+    noise: Sensors,
+    level: Array | None = None,
+) -> Problem:
+    """Poses the diagnosis of an experiment that has not been made: its torque is the model's.
+
+    `level` (n,) [N m or N] is the noise's standard deviation where it is known, else the share that `noise` says.
+    """
+    if not np.isfinite(parameters).all():
+        missing = model.columns[int(np.argmin(np.isfinite(parameters)))]
+        raise InputError(
+            f"{model.robot.name}: {missing.name} is not known",
+            joint=missing.joint,
+            remedy="identify the robot first, and give its model.json",
+        )
+    joined = Motion.concatenate(motions)
+    starts = tuple(int(s) for s in np.cumsum([0, *(len(motion) for motion in motions[:-1])]))
+    step = float(np.median(np.diff(joined.t)))
+    recording = Recording(
+        t=joined.t,
+        starts=starts,
+        q=joined.q,
+        dq=joined.dq,
+        ddq=joined.ddq,
+        tau=model.torque(joined.q, joined.dq, joined.ddq, parameters),
+        step=step,
+        cycles=(None,) * len(motions),
+        cutoff=0.5 / step,
+        unsure=_at_reversals(joined.dq, starts),
+        clear=np.zeros(joined.q.shape, dtype=bool),
+        jolts=np.zeros(joined.q.shape[1]),
+        floor=np.zeros(joined.q.shape[1]),
+        names=tuple(f"motion {i}" for i in range(1, len(motions) + 1)),
+    )
+    whitening = expected_whitening(recording, noise, level)
+    # How sharp a sign is shows where there is friction, of which a description may say nothing.
+    rough = recording.tau + ROUGH * recording.tau.std(axis=0) * np.tanh(joined.dq / SHARP)
+    baseline = build_baseline(find_base_parameters(model), replace(recording, tau=rough), whitening.scale)
+    # The parameters are known: the motion's own torque gives them back, and nothing is to hold them elsewhere.
+    size = baseline.base.size + baseline.nuisance.shape[2]
+    free = GaussianPrior(np.zeros((size, size)), np.zeros(size))
+    return build_problem(recording, baseline, whitening, draws=0, rng=np.random.default_rng(0), pull=free)
+
+
+def _at_reversals(dq: Array, starts: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Marks rows (N, n) beside reversals, and those too slow for a sign: a log may not know the direction there."""
+    turned = np.zeros(dq.shape, dtype=bool)
+    turned[1:] = dq[1:] * dq[:-1] < 0
+    turned[list(starts)] = False
+    beside = turned | np.roll(turned, -1, axis=0)
+    return beside | (np.abs(dq) < SURELY * np.array([sharpest_sign_velocity(column) for column in dq.T]))
+
+
+def expected_whitening(recording: Recording, noise: Sensors, level: Array | None = None) -> Whitening:
+    """Whitens the noise that sensors are expected to have: white and first-order coloured, a share of the torque.
+
+    `level` (n,) [N m or N] is its standard deviation where that is known.
+    """
+    size = noise.torque_noise * np.sqrt(np.mean(recording.tau**2, axis=0)) if level is None else level
+    size = np.maximum(size, 1e-3 * max(float(size.max()), 1e-9))
+    rho = float(np.exp(-recording.step / noise.correlation_time)) if noise.correlation_time else 0.0
+    lags = noise.coloured_share * rho ** np.arange(ORDER + 1)
+    lags[0] = 1.0
+    taps = solve_toeplitz(lags[:-1], lags[1:])
+    innovation = float(np.sqrt(lags[0] - taps @ lags[1:]))
+    n = recording.n
+    return Whitening(
+        coefficients=(taps,) * n,
+        scale=size * innovation,
+        precision=np.eye(n),
+        starts=recording.starts,
+        gaps=no_masked_rows(n),
+        bands=(Band(np.zeros(0), 1, 0.5 / recording.step),) * recording.n,
+        innovations=np.random.default_rng(0).standard_normal((1024, n)),
+    )

@@ -1,0 +1,1 @@
+"""The whitened regression and the test statistics of each effect at each joint."""

@@ -1,0 +1,292 @@
+"""Continuous refinement of an effect's shape, its linear coefficients and the base model always refitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from estimation.diagnosis.hypothesis_tests.groups import Group
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.reversal_errors import gain_from_reversal_errors
+from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
+
+Array = NDArray[np.float64]
+
+# Evaluations a shape parameter.
+EFFORT = 20
+# Points of each look for a moment, and how far it reaches in steps of the one before; and a step of the search from
+# there, as a share of the first. A sudden change has a narrow summit on a broad one: of one joint, where a look costs
+# little, a wide one is taken between.
+ZOOMS, AGAIN = ((21, 1.2), (11, 1.2), (11, 1.2)), 0.1
+WIDE = (101, 6.0)
+# First step of the search: a factor of a logarithmic parameter, a share of the range of another.
+FACTOR, SHARE = 1.5, 0.04
+# An effect acts where its torque is more than this share of its largest.
+ACTS = 0.02
+# What an effect is beside reversals and elsewhere may differ by this share, for its formula is no better where it is
+# large, and by so many squared standard errors; at so much of twice the log of the odds that there is none elsewhere it
+# is none: one that is there has this in 2 % of logs at most.
+FORMULA, AGREES, ABSENT = 0.35, 2.0, 4.0
+# Friction that would turn round over a shorter way than any, by this factor, turns round at once: late, if anything.
+SHORT_TRAVEL_FACTOR = 1.05
+# Twice the log of the odds against an effect that robots seldom have.
+RARE = 6.0
+
+
+@dataclass(frozen=True, eq=False)
+class FittedEffect:
+    """A hypothesis with its best shape, measured beside the base model and others.
+
+    Attributes:
+        hypothesis: effect and joint.
+        shape: one value per shape parameter.
+        group: its columns there.
+        gain: squared residual explained beside the others, coefficients within their bounds.
+        coefficients: (k,) beside the others.
+        degrees: coefficients that show, and shape parameters that are free: one whose bounds are equal is known.
+        visible: largest share of a column's energy that the model before leaves.
+        scatter: of what each joint says of a coefficient that all have alike, or rows beside reversals and others, as a
+            variance over that of the noise and of the formula (Birge ratio, one at least): the gain counts for so much
+            less.
+        doubt: of the gain so counted, what errors of the motion may make: another cause would owe it to them, too, but
+            whether there is one at all is told by the rest.
+    """
+
+    hypothesis: Hypothesis
+    shape: tuple[float, ...]
+    group: Group
+    gain: float
+    coefficients: Array
+    degrees: int
+    visible: float
+    scatter: float = 1.0
+    doubt: float = 0.0
+
+    def bic(self, rows: int) -> float:
+        """Gain less what its parameters are worth: Schwarz's criterion, larger is better."""
+        return self._less(rows * len(self.group.joints))
+
+    def worth(self, rows: int) -> float:
+        """Does what `bic` does, to say whether it is there at all, not whether another is there instead.
+
+        What acts for a moment is told by the rows of that moment: the other ones are not data of its parameters.
+        """
+        told = self._acting() if self.hypothesis.effect.passing else np.inf
+        return self._less(min(rows * len(self.group.joints), told)) - self.doubt
+
+    def _less(self, rows: float) -> float:
+        prior = RARE if self.hypothesis.effect.rare else 0.0
+        return self.gain / self.scatter - self.degrees * float(np.log(rows)) - prior
+
+    def _acting(self) -> float:
+        """Rows that the columns act on: (sum x^2)^2 / sum x^4, mean over columns, two at least."""
+        whole = np.concatenate(self.group.columns).astype(float) ** 2
+        square, fourth = whole.sum(axis=0), (whole**2).sum(axis=0)
+        counts = square[fourth > 0] ** 2 / fourth[fourth > 0]
+        return max(float(counts.mean()), 2.0) if len(counts) else np.inf
+
+    def gain_on(self, joints: Collection[int]) -> float:
+        """What of the gain is on some joints, counted from 0, by its torque's energy there."""
+        energies = [float(np.sum((X @ self.coefficients) ** 2)) for X in self.group.columns]
+        there = sum(e for j, e in zip(self.group.joints, energies, strict=True) if j in joints)
+        return self.gain * there / max(sum(energies), 1e-300)
+
+    def acts(self) -> NDArray[np.bool_]:
+        """Marks the white rows (N,) in which its torque is more than next to nothing on a joint."""
+        torques = [np.abs(part @ self.coefficients) for part in self.group.columns]
+        return np.asarray(np.max([torque > ACTS * torque.max(initial=0.0) for torque in torques], axis=0))
+
+    def share_beside(self, other: FittedEffect, joint: int) -> float:
+        """Share of this torque's energy on a joint, from 0, in the rows in which another's acts there."""
+        if joint not in self.group.joints or joint not in other.group.joints:
+            return 0.0
+        own, size = (np.abs(m.group.columns[m.group.joints.index(joint)] @ m.coefficients) for m in (self, other))
+        acts = size > ACTS * size.max(initial=0.0)
+        return float(np.sum(own[acts] ** 2) / max(np.sum(own**2), 1e-300))
+
+
+def accept_all_but(problem: Problem, members: Sequence[FittedEffect], i: int) -> Accepted:
+    """Accepts all members but one."""
+    return accept(problem, tuple(m.group for k, m in enumerate(members) if k != i))
+
+
+def refine(
+    problem: Problem, hypothesis: Hypothesis, start: tuple[float, ...], accepted: Accepted, *, effort: int = EFFORT
+) -> FittedEffect:
+    """Searches the shape that explains most for its number of parameters, from a point of the grid.
+
+    The linear coefficients and the base model are projected out at every step (variable projection, Golub and Pereyra
+    1973), so that the search has as many dimensions as the effect has shape parameters. Shapes that machines are built
+    with are then tried, without a parameter to pay for.
+    """
+    situation = problem.sees(hypothesis.effect)
+    bounds = hypothesis.effect.bounds(situation, hypothesis.joint)
+    scales = [shape.scale for shape in hypothesis.effect.shapes]
+    loose = [k for k, (low, high) in enumerate(bounds) if high > low]
+    moments = [shape.moment for shape in hypothesis.effect.shapes]
+    best: list[FittedEffect] = []
+
+    def evaluate(shape: tuple[float, ...], fitted: int | None = None) -> float:
+        if fitted is None:
+            fitted = sum(not hypothesis.effect.shapes[k].is_left(shape[k]) for k in loose)
+        group = problem.measured(hypothesis, shape)
+        result = score(problem, group, accepted)
+        gain, coefficients = result.bounded(*hypothesis.coefficient_bounds(situation.robot, shape))
+        member = FittedEffect(hypothesis, shape, group, gain, coefficients, result.degrees + fitted, result.visible)
+        worth = member.bic(problem.rows)
+        if not best or worth > best[0].bic(problem.rows):
+            best[:] = [member]
+        # What is climbed has no step where a parameter that costs begins to count.
+        return gain
+
+    def search(free: list[int], start: tuple[float, ...]) -> None:
+        at = list(start)
+        steps = {k: _spacing(hypothesis.effect.grid(situation, hypothesis.joint), k, start) for k in free if moments[k]}
+
+        def along(values: tuple[float, ...]) -> float:
+            for k, value in zip(free, values, strict=True):
+                at[k] = value
+            return evaluate(tuple(at))
+
+        for k, step in steps.items():
+            sudden = len(free) == 1 and len(best[0].group.joints) == 1
+            looks = (ZOOMS[0], WIDE, *ZOOMS[1:]) if sudden else ZOOMS
+            _zoom(lambda value, k=k: evaluate((*at[:k], value, *at[k + 1 :])), at[k], step, bounds[k], looks)  # type: ignore[misc]
+            at[:] = best[0].shape
+        if len(steps) < len(free):
+            first = [AGAIN * steps[k] if k in steps else None for k in free]
+            limits, kinds = tuple(bounds[k] for k in free), [scales[k] for k in free]
+            climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)
+            summit = best[0]
+            others = hypothesis.effect.elsewhere(situation, hypothesis.joint, summit.shape, summit.coefficients)
+            for slopes in others:
+                gains = [evaluate(slope) for slope in slopes]
+                at[:] = slopes[int(np.argmax(gains))]
+                climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)
+
+    if hypothesis.effect.last or hypothesis.effect.distorts:
+        # What is known now may have been free, or another, where the search comes from.
+        start = clip_shape(start, bounds)
+    evaluate(start)
+    if loose and effort:
+        # What the effect is whole without comes last, from where the rest led.
+        later = [k for k in loose if hypothesis.effect.shapes[k].is_left(start[k])]
+        search([k for k in loose if k not in later], start)
+        if later:
+            search(loose, best[0].shape)
+    if effort:
+        refined = best[0]
+        for known in hypothesis.effect.likely(situation, hypothesis.joint, refined.shape, refined.coefficients):
+            shape = tuple(own if value is None else value for value, own in zip(known, refined.shape, strict=True))
+            evaluate(shape, sum(known[k] is None for k in loose))
+    found = best[0]
+    if hypothesis.effect.lags:
+        return _with_scatter(problem, found, accepted)
+    if hypothesis.effect.turns and hypothesis.joint is not None:
+        if found.shape[0] < SHORT_TRAVEL_FACTOR * bounds[0][0]:
+            return replace(found, scatter=np.inf)
+        owed = gain_from_reversal_errors(problem, hypothesis.joint, found.group, found.gain, accepted)
+        return replace(found, doubt=owed)
+    return replace(found, scatter=_reversal_scatter(problem, found, accepted)) if hypothesis.effect.kicks else found
+
+
+def clip_shape(shape: Sequence[float], bounds: Sequence[tuple[float, float]]) -> tuple[float, ...]:
+    """Brings each value of a shape into its bounds."""
+    return tuple(min(max(value, low), high) for value, (low, high) in zip(shape, bounds, strict=True))
+
+
+def _with_scatter(problem: Problem, member: FittedEffect, accepted: Accepted) -> FittedEffect:
+    """Says how much less its gain counts where joints differ in what they share (Birge 1932), or tell by reversals."""
+    told = per_joint_evidence(problem, member.hypothesis, member.shape, accepted)
+    if not (acts := told.gram > 0).any():
+        return member
+    told = told.some(acts)
+    agreed = told.gain()
+    scatter = max(1.0, float(told.cross.sum() ** 2 / told.gram.sum()) / agreed)
+    return replace(member, scatter=scatter, doubt=max(0.0, agreed - told.gain(surely=True)))
+
+
+def _reversal_scatter(problem: Problem, member: FittedEffect, accepted: Accepted) -> float:
+    """How much more what an effect is beside reversals and elsewhere differ than they may by chance.
+
+    Beside reversals accelerations are not known to all of their kicks. What is missing of them looks like an effect of
+    the changes of acceleration, on every joint that feels them, and is the same at each.
+    """
+    parts = score(problem, problem.split(member.group, member.coefficients, problem.calm), accepted)
+    # What each part says of the whole, were it as large as it is: the base model may take of one what the other has.
+    expected = parts.gram.sum(axis=1)
+    if (expected <= 0).any():
+        return 1.0
+    told = parts.cross / expected
+    if (1.0 - 2.0 * told[0]) / (parts.gram[0, 0] / expected[0] ** 2 + FORMULA**2) > ABSENT:
+        return np.inf
+    difference = np.array([1.0, -1.0]) / expected
+    return max(1.0, float((told[0] - told[1]) ** 2 / (difference @ parts.gram @ difference + FORMULA**2)) / AGREES)
+
+
+def _spacing(grid: Sequence[tuple[float, ...]], k: int, start: tuple[float, ...]) -> float:
+    """Gives the larger distance of a point's moment to its neighbours on the grid, others alike."""
+    near = [abs(point[k] - start[k]) for point in grid if point[:k] + point[k + 1 :] == start[:k] + start[k + 1 :]]
+    near = sorted(distance for distance in near if distance > 0)
+    return near[min(1, len(near) - 1)] if near else 1.0
+
+
+def _zoom(
+    evaluate: Callable[[float], float],
+    start: float,
+    width: float,
+    bounds: tuple[float, float],
+    looks: Sequence[tuple[int, float]],
+) -> None:
+    """Looks for a moment on points that get closer and closer: no method that climbs finds the top of a random walk."""
+    for count, reach in looks:
+        points = np.clip(start + width * np.linspace(-reach, reach, count), *bounds)
+        gains = [evaluate(float(point)) for point in points]
+        start, width = float(points[int(np.argmax(gains))]), 2 * reach * width / (count - 1)
+
+
+def climb(
+    evaluate: Callable[[tuple[float, ...]], float],
+    start: tuple[float, ...],
+    bounds: tuple[tuple[float, float], ...],
+    scales: Sequence[str],
+    effort: int,
+    first: Sequence[float | None],
+) -> None:
+    """Nelder and Mead's simplex on logarithms where the scale is one, with first steps where they are given."""
+    logs = [scale == "log" and low > 0 for scale, (low, _) in zip(scales, bounds, strict=True)]
+
+    def forward(values: tuple[float, ...]) -> Array:
+        return np.array([np.log(v) if is_log else v for v, is_log in zip(values, logs, strict=True)])
+
+    low, high = forward(tuple(b[0] for b in bounds)), forward(tuple(b[1] for b in bounds))
+    x0 = np.clip(forward(start), low, high)
+    span = np.where(np.isfinite(high - low), high - low, 1.0)
+    step = np.where(logs, np.minimum(np.log(FACTOR), 0.2 * span), SHARE * span)
+    step = np.array([own if given is None else given for own, given in zip(step, first, strict=True)])
+    simplex = np.vstack(
+        [x0, *(x0 + np.where(x0[i] + step[i] > high[i], -1, 1) * step * unit for i, unit in enumerate(np.eye(len(x0))))]
+    )
+
+    def objective(x: Array) -> float:
+        inside = np.clip(x, low, high)
+        shape = tuple(float(np.exp(v)) if is_log else float(v) for v, is_log in zip(inside, logs, strict=True))
+        return -evaluate(shape)
+
+    minimize(
+        objective,
+        x0,
+        method="Nelder-Mead",
+        options={
+            "initial_simplex": simplex,
+            "maxfev": effort * len(x0),
+            "xatol": 1e-3 * float(step.min()),
+            "fatol": 1e-2,
+        },
+    )

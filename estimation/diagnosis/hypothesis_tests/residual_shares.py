@@ -1,0 +1,77 @@
+"""How much of a residual is noise, how much repeats with the motion, and how much changes with time."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+
+Array = NDArray[np.float64]
+
+# From fewer repetitions nothing is said of what repeats.
+FEWEST = 3
+# Frequency below which what differs between repetitions is counted as a change with time [cycles per period].
+SLOW = 3.0
+
+
+def residual_shares(problem: Problem) -> Array:
+    """Splits the squared residual of the base model by what repeats.
+
+    The mean over P repetitions holds what repeats, and 1/P of the noise. What differs between repetitions is noise, but
+    for its slowest part, where noise of a smooth spectrum has no more than next to it: the rest changes with time.
+
+    Args:
+        problem: the data; its base model's residual is split.
+
+    Returns:
+        Shares (n, 3): noise, repeating with the motion, changing with time; NaN where no log repeats three times.
+    """
+    recording = problem.recording
+    totals, states, times = (np.zeros(recording.n) for _ in range(3))
+    for run, cycle in zip(recording.runs, recording.cycles, strict=True):
+        if cycle is None or cycle.count < FEWEST:
+            continue
+        # Where friction turns round, what is left is the doubt of when: it would repeat, but it is no effect.
+        own = (problem.remainder[run] * ~recording.unsure[run])[cycle.start : cycle.stop]
+        period = cycle.period / recording.step
+        mean = period_mean(own, period, cycle.count)
+        differences = period_differences(own, period, cycle.count)
+        noise = (differences**2).sum(axis=0)
+        repeated = (mean**2).sum(axis=0) - noise / cycle.count
+        power = np.abs(np.fft.rfft(differences, axis=0)) ** 2 / len(own) * 2
+        f = np.fft.rfftfreq(len(own)) * period
+        slow, beside = (f > 0) & (f < SLOW), (f >= SLOW) & (f < 3 * SLOW)
+        excess = power[slow].sum(axis=0) - np.median(power[beside], axis=0) / np.log(2) * slow.sum()
+        totals += (own**2).sum(axis=0)
+        states += np.maximum(repeated, 0.0)
+        times += np.clip(excess, 0.0, noise)
+    if not totals.any():
+        return np.full((recording.n, 3), np.nan)
+    safe = np.maximum(totals, 1e-300)
+    state, time = np.clip(states / safe, 0, 1), np.clip(times / safe, 0, 1)
+    return np.column_stack([np.clip(1 - state - time, 0, 1), state, time])
+
+
+def period_differences(series: Array, period: float, count: int) -> Array:
+    """Subtracts the mean over repetitions, and makes up for the variance that goes with it.
+
+    Args:
+        series: (M, n).
+        period: in samples, not necessarily whole.
+        count: of repetitions P.
+
+    Returns:
+        (r - mean) sqrt(P / (P - 1)), (M', n).
+    """
+    return (series - period_mean(series, period, count)) * np.sqrt(count / (count - 1))
+
+
+def period_mean(series: Array, period: float, count: int) -> Array:
+    """Gives the mean over repetitions, repeated (M, n); rows of a period are matched to the nearest sample."""
+    rows = len(series)
+    samples = max(1, round(period))
+    phase = np.floor(np.mod(np.arange(rows) + 1e-6, period) / period * samples).astype(int) % samples
+    hits = np.bincount(phase, minlength=samples)
+    mean = np.stack([np.bincount(phase, column, samples) for column in series.T], axis=1) / np.maximum(hits, 1)[:, None]
+    return np.asarray(mean[phase])

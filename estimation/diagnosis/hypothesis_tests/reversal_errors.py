@@ -1,0 +1,36 @@
+"""How much of what an effect explains an error in the moments of a joint's reversals would explain as well."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimation.diagnosis.hypothesis_tests.groups import Group
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
+from robots.terms.effects import EFFECTS
+
+
+def gain_from_reversal_errors(problem: Problem, joint: int, group: Group, gain: float, accepted: Accepted) -> float:
+    """Gives the part of a gain that is gone where the reversals of a joint (from 1) may all be late by their error.
+
+    Friction that turns round over a short way is late for that. What the moments' error allows is fitted beside it,
+    with that error as its prior.
+    """
+    late = problem.late(joint - 1)
+    if not late.any():
+        return 0.0
+    usual = float(np.sqrt(np.mean(late[late > 0] ** 2)))
+    shifted = problem.measured(Hypothesis(EFFECTS["current_lag"], joint), (usual,))
+    torque = np.where(late > 0, shifted.columns[0][:, 0].astype(float), 0.0)
+    moved = problem.white_group((joint - 1,), (torque[:, None],))
+    own, other = score(problem, group, accepted), score(problem, moved, accepted)
+    between = problem.product(group, moved) - own.onto.T @ other.onto
+    allowed = other.gram + usual**-2.0
+    gram = own.gram - between @ between.T / allowed
+    cross = own.cross - (between * other.cross / allowed)[:, 0]
+    # Directions that the error of the moments explains wholly tell nothing.
+    values, vectors = np.linalg.eigh(gram)
+    told = values > 1e-9 * max(float(np.trace(own.gram)), 1e-300)
+    left = float(np.sum((vectors[:, told].T @ cross) ** 2 / values[told]))
+    return max(gain - left, 0.0)

@@ -1,0 +1,136 @@
+"""What a group of columns explains beyond the base model and the groups that are part of the model already."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from estimation.diagnosis.hypothesis_tests.groups import Group
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+
+Array = NDArray[np.float64]
+
+# A direction of a hypothesis shows only where this share of its energy is left beside the base model.
+VISIBLE = 2e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """Groups that are part of the model already, their columns orthonormal beside the base model.
+
+    Attributes:
+        groups: the groups.
+        root: L^-1 with L L' their joint Gram matrix (a, a): makes their columns orthonormal.
+        cross: orthonormal columns with the residual (a,).
+        nulls: with the noise (a, draws).
+    """
+
+    groups: tuple[Group, ...]
+    root: Array
+    cross: Array
+    nulls: Array
+
+    @property
+    def gain(self) -> float:
+        """Squared residual that the groups explain together."""
+        return float(self.cross @ self.cross)
+
+    def torque(self, white: Array) -> Array:
+        """Gives the groups' torque together, as large as explains most, at white rows (N, n) like these."""
+        total, coefficients = np.zeros_like(white), self.root.T @ self.cross
+        for group in self.groups:
+            own, coefficients = coefficients[: group.size], coefficients[group.size :]
+            for j, part in zip(group.joints, group.columns, strict=True):
+                total[:, j] += part @ own
+        return total
+
+
+def accept(problem: Problem, groups: tuple[Group, ...]) -> Accepted:
+    """Joins groups into one set of orthonormal columns."""
+    draws = problem.nulls[1].shape[1]
+    if not groups:
+        return Accepted((), np.zeros((0, 0)), np.zeros(0), np.zeros((0, draws)))
+    gram = np.block([[problem.product(a, b) for b in groups] for a in groups])
+    raw = np.concatenate([group.raw for group in groups])
+    root = visible_root(gram, raw)
+    cross = np.concatenate([group.cross for group in groups])
+    nulls = np.concatenate([problem.null_crosses([group])[0] for group in groups])
+    return Accepted(groups, root, root @ cross, root @ nulls)
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """What a group explains beyond base model and accepted groups.
+
+    Attributes:
+        gram: (k, k).
+        cross: (k,).
+        raw: (k,).
+        root: (k', k): makes the visible directions orthonormal.
+        onto: orthonormal accepted columns times the group's (a, k).
+    """
+
+    gram: Array
+    cross: Array
+    raw: Array
+    root: Array
+    onto: Array
+
+    @property
+    def degrees(self) -> int:
+        """Directions that show."""
+        return len(self.root)
+
+    @property
+    def gain(self) -> float:
+        """Squared residual explained, unbounded coefficients."""
+        return float(np.sum((self.root @ self.cross) ** 2))
+
+    @property
+    def visible(self) -> float:
+        """Largest share of a column's energy that is left beside the base model."""
+        return float(np.max(np.diag(self.gram) / np.maximum(self.raw, 1e-300), initial=0.0))
+
+    def coefficients(self) -> Array:
+        """Least squares in the visible directions (k,)."""
+        return np.asarray(self.root.T @ (self.root @ self.cross))
+
+    def bounded(self, lower: Array, upper: Array) -> tuple[float, Array]:
+        """Squared residual explained, and coefficients (k,), within bounds (k,)."""
+        c = self.coefficients()
+        if not self.degrees:
+            return 0.0, c
+        if np.all((c >= lower) & (c <= upper)):
+            return self.gain, c
+        # min |A c - y|^2 with A'A the Gram matrix in its visible directions.
+        y = self.root @ self.cross
+        if len(c) == 1:  # most effects have one column, and a scan thousands of those
+            A, c = 1.0 / self.root, np.asarray(np.clip(c, lower, upper))
+        else:
+            A = np.asarray(np.linalg.pinv(self.root.T))
+            c = np.asarray(lsq_linear(A, y, bounds=(lower, upper), method="bvls").x)
+        return max(float(y @ y - np.sum((A @ c - y) ** 2)), 0.0), c
+
+
+def score(problem: Problem, group: Group, accepted: Accepted) -> Score:
+    """Projects the accepted groups out of a group."""
+    if not accepted.groups:
+        onto = np.zeros((0, group.size))
+    else:
+        onto = accepted.root @ np.concatenate([problem.product(other, group) for other in accepted.groups])
+    gram = group.gram - onto.T @ onto
+    cross = group.cross - onto.T @ accepted.cross
+    return Score(gram, cross, group.raw, visible_root(gram, group.raw), onto)
+
+
+def visible_root(gram: Array, raw: Array) -> Array:
+    """Gives R (k', k) with R gram R' the identity on the directions that show beside what was projected out."""
+    if len(raw) == 1:
+        return gram**-0.5 if gram[0, 0] > VISIBLE * max(raw[0], 1e-300) else np.zeros((0, 1))
+    scale = np.sqrt(np.maximum(raw, 1e-300))
+    values, vectors = np.linalg.eigh(gram / scale[:, None] / scale)
+    kept = values > VISIBLE
+    return np.asarray((vectors[:, kept] / np.sqrt(values[kept])).T / scale)

@@ -1,0 +1,222 @@
+"""The extended model: base parameters and all effects found, fitted together, with what is uncertain about both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.base_models.priors import solve_map
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.hypothesis_tests.scoring import accept
+from estimation.diagnosis.joint_fits.event_window import open_event_edges
+from estimation.diagnosis.joint_fits.shape_errors import (
+    formula_errors,
+    shape_errors,
+    spread_over_pauses,
+    widen_change_times,
+    with_value,
+)
+from estimation.diagnosis.joint_fits.shrinkage import effects_prior
+from estimation.identifications.identification import NEGLIGIBLE, RELATIVE
+from estimation.models.extension import Extension
+from estimation.models.model import Model
+from estimation.regressions.parameter_priors import GaussianPrior
+
+Array = NDArray[np.float64]
+
+FAINT = 1e-7
+# A column smaller than this is none: one over its square is no number.
+NOTHING = 1e-100
+# A coefficient of which more than this lies in directions that the data do not determine is not determined.
+LOST = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class ExtendedFit:
+    """Base parameters and effects, fitted together.
+
+    Attributes:
+        model: with the extensions.
+        effects: for each extension, which of its parameters the data determine (k + s,).
+        values: base parameters and nuisance (b + m,).
+    """
+
+    model: Model
+    effects: tuple[NDArray[np.bool_], ...]
+    values: Array
+
+
+def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: dict[str, object]) -> ExtendedFit:
+    """Fits base parameters and the members' coefficients by generalised least squares, shapes as they were refined.
+
+    The covariance counts the shape parameters as free, by the derivative of the members' torque.
+    """
+    baseline, white = problem.baseline, problem.whitening
+    base = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
+    blocks, slices, deviations = [base], [], []
+    at = base.shape[2]
+    told: list[FittedEffect] = []
+    for i, member in enumerate(members):
+        rest = [m for k, m in enumerate(members) if k != i]
+        # How far it may be is asked from the middle of a pause, not from the end of it that the search came to.
+        member = spread_over_pauses(problem, member, rest)
+        steps = shape_errors(problem, member, accept(problem, tuple(m.group for m in rest)))
+        steps = open_event_edges(problem, member, rest, widen_change_times(problem, member, rest, steps))
+        told.append(member)
+        X = dense(problem, member.hypothesis, member.shape)
+        slopes = [_slope(problem, member, k, abs(step)) for k, step in enumerate(steps)]
+        blocks += [X, *slopes]
+        slices.append((at, X.shape[2], len(member.shape)))
+        deviations.append(steps)
+        at += X.shape[2] + len(member.shape)
+    members, columns = told, np.concatenate(blocks, axis=2)
+    fast, kicks = np.zeros((2, columns.shape[2]), dtype=bool)
+    for member, (start, size, shapes) in zip(members, slices, strict=True):
+        rows, effect = slice(start, start + size + shapes), member.hypothesis.effect
+        fast[rows], kicks[rows] = effect.fast, effect.kicks
+    flat, tau = white.independent(columns), white.independent(problem.recording.tau)
+    if problem.upper is not None and fast.any():
+        above, beyond = problem.upper.regression(columns[:, :, fast], calm=kicks[fast])
+        higher = np.zeros((len(above), len(fast)))
+        higher[:, fast] = above
+        flat, tau = np.concatenate([flat, higher]), np.concatenate([tau, beyond])
+    linear = np.ones(columns.shape[2], dtype=bool)
+    for start, size, shapes in slices:
+        linear[start + size : start + size + shapes] = False
+    values = np.zeros(columns.shape[2])
+    free = flat[:, linear]
+    pull = effects_prior(problem, members)
+    # White rows tell what they are, not what coloured ones of their number would.
+    pull = GaussianPrior(pull.precision / white.row_weight, pull.target)
+    values[linear] = solve_map(free.T @ free, free.T @ tau, pull)
+    by_reversals = reversal_columns(members, [start for start, *_ in slices], (problem.n, flat.shape[1]))
+    covariance, unseen = _covariance(np.concatenate([flat, by_reversals]))
+    lower_upper = [m.hypothesis.coefficient_bounds(problem.situation.robot, m.shape) for m in members]
+    extensions, known = [], []
+    for member, (start, size, shapes), steps, (lower, upper) in zip(
+        members, slices, deviations, lower_upper, strict=True
+    ):
+        rows = slice(start, start + size + shapes)
+        # Joints that differ in what they should agree on know it so much worse.
+        own = covariance[rows, rows] * member.scatter
+        scale = np.concatenate([np.ones(size), np.abs(steps)])
+        # What is not known at all stays so, whatever its slope's covariance.
+        open_ = ~np.isfinite(scale)
+        scale[open_] = 1.0
+        open_[:size] |= unseen[start : start + size]
+        own = own * scale[:, None] * scale
+        # The profile is no parabola, for a moment of change least of all: what it says is the least that is unknown.
+        profile = np.concatenate([np.zeros(size), scale[size:]])
+        wider = np.maximum(profile / np.sqrt(np.maximum(np.diag(own), 1e-9 * profile**2 + 1e-300)), 1.0)
+        own = own * wider[:, None] * wider
+        own[range(len(own)), range(len(own))] = np.maximum(np.diag(own), profile**2)
+        own[open_, open_] = np.inf
+        coefficients = np.clip(values[start : start + size], lower, upper)
+        own[range(len(own)), range(len(own))] += formula_errors(problem, member, coefficients) ** 2
+        for i, k, apart in member.hypothesis.effect.ties(coefficients):
+            own = _narrowed(own, size + k, float(np.hypot(np.sqrt(own[i, i]), apart)))
+        errors = np.sqrt(np.maximum(np.diag(own), 0.0))
+        determined = np.concatenate(
+            [
+                np.isfinite(errors[:size]) & (errors[:size] < 0.5 * np.max(np.abs(coefficients), initial=1e-300)),
+                np.array([bool(np.isfinite(step)) for step in steps], dtype=bool),
+            ]
+        )
+        own[~np.isfinite(own)] = np.inf
+        extensions.append(
+            Extension(
+                effect=member.hypothesis.name,
+                joint=member.hypothesis.joint,
+                shape=member.shape,
+                coefficients=coefficients,
+                covariance=own,
+            )
+        )
+        known.append(determined)
+    b = baseline.base.size
+    errors = np.sqrt(np.maximum(np.diag(covariance)[:b], 0.0))
+    model = Model(
+        torque_model=baseline.base.model,
+        columns=baseline.base.independent,
+        values=values[:b],
+        covariance=covariance[:b, :b],
+        determined=_determined(problem, values[:b], errors),
+        formulas=baseline.base.formulas(),
+        provenance=provenance,
+        extensions=tuple(extensions),
+        felt=problem.parameters_without_payload[list(baseline.base.independent)],
+        bearing=problem.bearing,
+        since=problem.situation.origin,
+    )
+    return ExtendedFit(model, tuple(known), values[: base.shape[2]])
+
+
+def dense(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Array:
+    """Evaluates a hypothesis' columns on all joints (N, n, k)."""
+    joints, columns = problem.columns_of(hypothesis, shape)
+    X = np.zeros((len(problem.recording), problem.n, columns[0].shape[1]))
+    for j, part in zip(joints, columns, strict=True):
+        X[:, j] = part
+    return X
+
+
+def reversal_columns(members: Sequence[FittedEffect], starts: Sequence[int], shape: tuple[int, int]) -> Array:
+    """What each joint's reversals tell beside the rows (n, p) of members whose columns start at these."""
+    told = np.zeros(shape)
+    for member, start in zip(members, starts, strict=True):
+        if member.group.timed is not None:
+            told[:, start : start + member.group.size] = member.group.timed
+    return told
+
+
+def _slope(problem: Problem, member: FittedEffect, k: int, step: float) -> Array:
+    """How the member's torque changes by one standard error of a shape parameter (N, n, 1)."""
+    value = member.shape[k]
+    h = step if np.isfinite(step) else 0.3 * abs(value)
+    low, high = member.hypothesis.effect.bounds(problem.sees(member.hypothesis.effect), member.hypothesis.joint)[k]
+    up, down = min(value + h, high), max(value - h, low)
+    if up <= down:
+        return np.zeros((len(problem.recording), problem.n, 1))
+    above, below = (dense(problem, member.hypothesis, with_value(member.shape, k, x)) for x in (up, down))
+    return ((above - below) @ member.coefficients * (h / (up - down)))[:, :, None]
+
+
+def _narrowed(covariance: Array, k: int, error: float) -> Array:
+    """Takes the standard error of one parameter of a covariance to be no more than it may be."""
+    if not np.isfinite(covariance[k, k]):
+        result = covariance.copy()
+        result[k] = result[:, k] = 0.0
+        result[k, k] = error**2
+        return result
+    scale = np.ones(len(covariance))
+    scale[k] = min(1.0, error / max(float(np.sqrt(covariance[k, k])), 1e-300))
+    return np.asarray(covariance * scale[:, None] * scale)
+
+
+def _covariance(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Covariance of least squares of least norm over unit columns: by the data alone, without the pull.
+
+    With it come the coefficients (p,) that the data leave open: their errors there are those of a norm, not of data.
+    """
+    norms = np.linalg.norm(matrix, axis=0)
+    norms[norms < NOTHING] = 1.0
+    values, vectors = np.linalg.eigh((matrix.T @ matrix) / norms[:, None] / norms)
+    kept = values > FAINT**1.5 * values[-1]
+    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+    lost = (vectors[:, ~kept] ** 2).sum(axis=1) > LOST
+    return np.asarray(inverse / norms[:, None] / norms), lost
+
+
+def _determined(problem: Problem, values: Array, errors: Array) -> NDArray[np.bool_]:
+    """Which base parameters mean something by themselves: known to a half, or known to be too small to matter."""
+    Y = problem.baseline.regressor
+    torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
+    excited = np.sqrt(np.mean(Y**2, axis=0))
+    share = (errors * excited / np.maximum(torque, 1e-12)[:, None]).max(axis=0)
+    known: NDArray[np.bool_] = (errors <= RELATIVE * np.abs(values)) | (share <= NEGLIGIBLE)
+    return known & (excited.max(axis=0) > 0) & (errors > 0)

@@ -1,0 +1,238 @@
+"""The frequencies above a joint's band: there accelerations are not known, but torque that owes nothing to them is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.signal import firwin
+
+from estimation.diagnosis.base_models.baseline import FAINT, Baseline
+from estimation.diagnosis.noise_models.frequency_bands import TRANSITION, Band, low_pass
+from estimation.diagnosis.noise_models.masked_rows import find_masked_rows
+from estimation.diagnosis.noise_models.spectral_lines import remove_lines
+from estimation.diagnosis.noise_models.whitening import Whitening
+from estimation.diagnosis.recordings.recording import Recording, rest_rows
+from estimation.linear_algebra.orthonormal import orthonormal
+
+Array = NDArray[np.float64]
+
+# A joint whose band ends within this share of the wider one has nothing above it.
+NEARLY = 0.75
+# Above the bands, the error of the accelerations may have so many times the power of the torque noise: it is part of
+# the noise there.
+WIDER = 50.0
+# Length [s] over which the noise there is taken to be as strong as it is, where that is more than usual.
+BURST = 0.4
+# Parts of the frequencies above a band whose noise is levelled, and the fewest frequencies that a part has.
+PARTS, FEWEST = 8, 10
+
+
+@dataclass(frozen=True, eq=False)
+class JointHighBand:
+    """What one joint's torque is above its band.
+
+    Attributes:
+        passing: lets through what is above, at the white rows, and levels its noise.
+        counts: weights of the rows (N',): none for those whose direction of motion is not known.
+        base: orthonormal columns of the base model (N', b).
+        residual: white torque that the base model leaves, fitted anew (N',).
+        bare: what it leaves as it was fitted to the band (N',).
+    """
+
+    passing: Band
+    counts: Array
+    base: Array
+    residual: Array
+    bare: Array
+
+
+@dataclass(frozen=True, eq=False)
+class HighBand:
+    """A second regression, in the frequencies above each joint's band, for effects that are `fast`.
+
+    The noise is the residual's own there, with what unknown accelerations add to it. Each joint's columns of the base
+    model are fitted anew, for what is left of friction and inertia there is not what they are below; but not for what
+    shakes the arm by itself: the arm answers to that, and an inertia fitted to the answer would take all of it.
+
+    Attributes:
+        whitening: makes the noise white in a band that is far wider.
+        joints: each joint's; None where its band leaves nothing above it.
+        calm: white rows (N',) in which no joint turns round.
+    """
+
+    whitening: Whitening
+    joints: tuple[JointHighBand | None, ...]
+    calm: NDArray[np.bool_]
+
+    def columns(self, series: Array, joint: int, *, calm: bool = False, bare: bool = False) -> Array:
+        """Whitens columns (N, k) of a joint, from 0, above its band and projects the base model out (N', k).
+
+        Those that are to be `calm` count where no joint turns round: all feel what is not known of its acceleration.
+        From those that are `bare` nothing is projected.
+        """
+        above = self.joints[joint]
+        if above is None:
+            return np.zeros((0, series.shape[1]))
+        counts = above.counts * self.calm if calm else above.counts
+        white = _passed(self.whitening, series, joint, above.passing) * counts[:, None]
+        return white if bare else np.asarray(white - above.base @ (above.base.T @ white))
+
+    def cross(self, columns: Array, joint: int, *, bare: bool = False) -> Array:
+        """Gives the products (k,) of such columns with the residual."""
+        above = self.joints[joint]
+        if above is None:
+            return np.zeros(columns.shape[1])
+        return np.asarray(columns.T @ (above.bare if bare else above.residual))
+
+    def slope(self, joint: int, rows: int, *, bare: bool = False) -> Array:
+        """Gives what torque in each of a joint's rows (N,) has to do with the residual above its band."""
+        above = self.joints[joint]
+        if above is None:
+            return np.zeros(rows)
+        left = above.counts * (above.bare if bare else above.residual)
+        runs = _runs(left, self.whitening.starts, rows, self.whitening.stride)
+        # Without delay, what is above is let through alike from either side.
+        return self.whitening.unfiltered(np.concatenate([above.passing.passed(run) for run in runs]), joint, rows)
+
+    def regression(self, columns: Array, *, calm: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Gives the rows (R, k) of columns (N, n, k) above the bands of joints that they act on, and torque (R,).
+
+        Those marked in `calm` (k,) count where no joint turns round.
+        """
+        rows, torque = [np.zeros((0, columns.shape[2]))], [np.zeros(0)]
+        for j, above in enumerate(self.joints):
+            if above is not None and columns[:, j].any():
+                white = np.empty((len(above.residual), columns.shape[2]))
+                for kind in np.unique(calm):
+                    white[:, calm == kind] = self.columns(columns[:, j, calm == kind], j, calm=bool(kind))
+                rows.append(white)
+                torque.append(above.residual)
+        return np.concatenate(rows), np.concatenate(torque)
+
+
+def build_high_band(
+    recording: Recording, baseline: Baseline, remainder: Array, noise: Array, bands: Sequence[Band], wide: Whitening
+) -> HighBand:
+    """Prepares the regression above the bands.
+
+    Args:
+        recording: the data.
+        baseline: the base model.
+        remainder: torque less base model (N, n) [N m or N].
+        noise: that less what is known besides (N, n).
+        bands: each joint's.
+        wide: whitens the noise in wider bands.
+    """
+    # Rows beside reversals are left out after the filters: a ripple goes on through them, and need not be bridged.
+    wide = replace(wide, gaps=find_masked_rows(recording.unsure, recording.starts, rest_rows(recording.step)))
+    joints: list[JointHighBand | None] = []
+    for j, (band, wider) in enumerate(zip(bands, wide.bands, strict=True)):
+        if band.cutoff > NEARLY * wider.cutoff:
+            joints.append(None)
+            continue
+        length = len(low_pass(band.cutoff, 1 / (recording.step * wide.stride), 1).taps)
+        counts = _counts(wide, recording, j, length // 2)
+        passing = _levelling(wide, recording, noise[:, j, None], counts, j, band.cutoff, length)
+        left = _passed(wide, noise[:, j, None], j, passing)[:, 0] * counts
+        counts *= _calmness(left, counts, round(BURST / (recording.step * wide.stride)))
+        own = np.concatenate([baseline.regressor[:, j], baseline.nuisance[:, j]], axis=1)
+        base = orthonormal(_passed(wide, own[:, own.any(axis=0)], j, passing) * counts[:, None], FAINT)
+        white = _passed(wide, remainder[:, j, None], j, passing)[:, 0] * counts
+        joints.append(JointHighBand(passing, counts, base, white - base @ (base.T @ white), white))
+    return HighBand(wide, tuple(joints), recording.calm(wide.stride))
+
+
+def _levelling(
+    wide: Whitening, recording: Recording, noise: Array, counts: Array, joint: int, cutoff: float, length: int
+) -> Band:
+    """Builds the filter, of a length, of what is above a joint's band [Hz]: its noise (N, 1) has unit density there.
+
+    An autoregressive process has the noise of unknown accelerations, which grows with the fourth power of the
+    frequency, but roughly. Where a motion repeats, noise is what is at its harmonics: an encoder rounds each repetition
+    alike, and what repeats is all that an effect of the motion is told from.
+    """
+    rate = 1 / (recording.step * wide.stride)
+    low, high = ((1 - TRANSITION / 2) * f for f in (cutoff, wide.bands[joint].cutoff))
+    longest = max(_lines(recording, run)[0] for run in range(len(recording.runs)))
+    parts = int(np.clip((high - low) * longest / FEWEST, 1, PARTS))
+    edges = np.linspace(low, high, parts + 1)
+    passes = [firwin(length, f, fs=rate, window=("kaiser", 6.0)) for f in edges]
+    between = [Band(above - below, 1, float(high)) for below, above in pairwise(passes)]
+    plain = Band(passes[-1] - passes[0], 1, float(high))
+    white = _passed(wide, noise, joint, plain)[:, 0] * counts
+    density, known = np.zeros(parts), 0
+    for run, values in enumerate(_runs(white, recording.starts, len(recording), wide.stride)):
+        period, first, repeats = _lines(recording, run)
+        start, count = -(-first // wide.stride), max(int(repeats + 1e-6), 1)
+        values = values[start : start + round(count * period * rate)]
+        counted = int(np.count_nonzero(values))
+        power = np.abs(np.fft.rfft(values)) ** 2 / max(counted, 1)
+        f = np.fft.rfftfreq(len(values), 1 / rate)
+        power = remove_lines(power[:, None], f[1], period if count > 1 else None)[:, 0]
+        lines = np.arange(len(f)) % count == 0
+        known += counted
+        for part, (below, above) in enumerate(pairwise(edges)):
+            inside = (f >= below) & (f < above)
+            everywhere = float(power[inside].mean()) if inside.any() else 0.0
+            at_lines = float(power[inside & lines].mean()) if (inside & lines).any() else everywhere
+            # In whole repetitions, which the ends of a log may leave fewer of than there are.
+            more = max(at_lines - everywhere, 0.0) * (repeats - 1.0) / (count - 1.0) if count > 1 else 0.0
+            density[part] += (everywhere + more) * counted
+    levels = np.sqrt(density / max(known, 1))
+    taps = sum((band.taps / level for band, level in zip(between, levels, strict=True) if level > 0), np.zeros(length))
+    return Band(taps, 1, float(high))
+
+
+def _lines(recording: Recording, run: int) -> tuple[float, int, float]:
+    """A log's period [s], the row at which it begins, and how often it is there; all of a log that does not repeat."""
+    rows, cycle = recording.runs[run], recording.cycles[run]
+    if cycle is not None:
+        repeats = (cycle.stop - cycle.start) * recording.step / cycle.period
+        if repeats >= 2 - 1e-6:
+            return cycle.period, cycle.start, repeats
+    return (rows.stop - rows.start) * recording.step, 0, 1.0
+
+
+def _calmness(noise: Array, counts: Array, width: int) -> Array:
+    """Weights of white rows (N',) by the noise about each, one at most.
+
+    Joints that turn round kick each other: what is not known of accelerations comes in bursts, the same in each
+    repetition of a motion.
+    """
+    near = uniform_filter1d(noise**2, width) / np.maximum(uniform_filter1d(counts**2, width), 1e-3)
+    mean = float(np.sum(noise**2) / max(np.sum(counts**2), 1e-300))
+    return np.asarray(1.0 / np.sqrt(np.maximum(near / max(mean, 1e-300), 1.0)))
+
+
+def _runs(white: Array, starts: Sequence[int], rows: int, stride: int) -> list[Array]:
+    """Splits white rows (N', ...) into those of each log."""
+    lengths = [-(-(stop - start) // stride) for start, stop in pairwise((*starts, rows))]
+    return np.split(white, np.cumsum(lengths)[:-1])
+
+
+def _passed(wide: Whitening, series: Array, joint: int, passing: Band) -> Array:
+    """Whitens columns (N, k) of a joint and filters them (N', k)."""
+    runs = _runs(wide.filtered(series, joint), wide.starts, len(series), wide.stride)
+    return np.concatenate([passing.passed(run) for run in runs])
+
+
+def _counts(wide: Whitening, recording: Recording, joint: int, edge: int) -> Array:
+    """Weights of a joint's white rows (N',).
+
+    None beside rows in which its direction is not known, nor in the `edge` rows at the ends of a log, where the filter
+    sees the torque begin and end. They come after the filters: before, they would turn slow torque into fast.
+    """
+    reach = int(np.ceil(0.5 / wide.bands[joint].cutoff / recording.step))
+    parts = []
+    for run in recording.runs:
+        part = ~maximum_filter1d(recording.unsure[run, joint], 2 * reach + 1)[:: wide.stride]
+        part[:edge] = False
+        part[max(len(part) - edge, 0) :] = False
+        parts.append(part)
+    counts = np.concatenate(parts).astype(float)
+    return counts if wide.weights is None else counts * wide.weights[:, joint]

@@ -1,0 +1,101 @@
+"""Rows in which a joint's direction of motion is not known: bridged where they are long, fitted freely elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+
+from estimation.linear_algebra.free_torque import FreeTorque, Real
+from robots.common.stretches import spans
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MaskedRows:
+    """Rows in which a joint's direction of motion is not known, nor then the sign of its friction.
+
+    They are bridged by straight lines in torque and hypotheses alike, so that filters pass over them: a friction that
+    turns round somewhere in them would ring far beyond. Short ones are given a torque of their own each besides, as
+    many numbers as the band lets through: white columns that are projected out of both. Long ones, a joint at rest, do
+    not count.
+
+    Attributes:
+        bridges: per joint the rows, those before and after that count, and the weight of the latter.
+        free: per joint white columns of the short gaps, to be projected out.
+    """
+
+    bridges: tuple[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], Array], ...]
+    free: tuple[FreeTorque, ...]
+
+    def bridged(self, series: Array, joint: int) -> Array:
+        """Replaces the rows of gaps in columns (N,) or (N, k) of a joint, counted from 0."""
+        rows, before, after, weight = self.bridges[joint]
+        if not len(rows):
+            return series
+        result = series.copy(order="K")
+        w = weight[:, *(None,) * (series.ndim - 1)]
+        result[rows] = (1 - w) * series[before] + w * series[after]
+        return result
+
+    def gathered(self, slope: Array, joint: int) -> Array:
+        """Hands on to the rows beside a joint's gaps what (N,) has to do with the bridge: the adjoint of `bridged`."""
+        rows, before, after, weight = self.bridges[joint]
+        result = slope.copy()
+        result[rows] = 0.0
+        np.add.at(result, before, (1 - weight) * slope[rows])
+        np.add.at(result, after, weight * slope[rows])
+        return result
+
+    def freed(self, white: NDArray[Real], joint: int) -> NDArray[Real]:
+        """Projects the short gaps' torques out of white columns of a joint."""
+        return self.free[joint].projected_out(white) if joint < len(self.free) else white
+
+    def resting(self, starts: tuple[int, ...], rows: int, stride: int, margin: int) -> NDArray[np.bool_]:
+        """Marks the thinned rows (M, n) of long gaps and `margin` rows beside: what bridges them is not measured."""
+        columns = []
+        for at, *_ in self.bridges:
+            flags = np.zeros(rows, dtype=bool)
+            flags[at] = True
+            parts = [flags[start:stop] for start, stop in pairwise((*starts, rows))]
+            columns.append(np.concatenate([binary_dilation(part, iterations=margin)[::stride] for part in parts]))
+        return np.column_stack(columns)
+
+
+def find_masked_rows(unsure: NDArray[np.bool_], starts: tuple[int, ...], longest: int = 0) -> MaskedRows:
+    """Makes bridges over stretches of rows (N, n) longer than `longest`, none from one log to another."""
+    bridges = []
+    for column in unsure.T:
+        flags = np.zeros_like(column)
+        for start, stop in spans(column):
+            if stop - start > longest:
+                flags[start:stop] = True
+        pieces = []
+        for start, stop in pairwise((*starts, len(column))):
+            rows, good = np.flatnonzero(flags[start:stop]), np.flatnonzero(~flags[start:stop])
+            if not len(rows):
+                continue
+            if not len(good):
+                good = rows[:1]  # a joint that stands in this log: a constant, which does not count
+            at = np.searchsorted(good, rows)
+            before, after = good[np.maximum(at - 1, 0)], good[np.minimum(at, len(good) - 1)]
+            before = np.where(at == 0, after, before)
+            weight = np.where(after > before, (rows - before) / np.maximum(after - before, 1), 0.0)
+            pieces.append((rows + start, before + start, after + start, np.clip(weight, 0.0, 1.0)))
+        empty = np.zeros(0, dtype=np.intp)
+        if pieces:
+            rows, before, after, weight = (np.concatenate(part) for part in zip(*pieces, strict=True))
+        else:
+            rows, before, after, weight = empty, empty, empty, np.zeros(0)
+        bridges.append((rows, before, after, weight))
+    return MaskedRows(tuple(bridges), ())
+
+
+def no_masked_rows(joints: int) -> MaskedRows:
+    """Builds the gaps of a motion whose direction is known throughout."""
+    none = np.zeros(0, dtype=np.intp)
+    return MaskedRows(((none, none, none, np.zeros(0)),) * joints, ())

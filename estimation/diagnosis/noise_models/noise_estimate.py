@@ -1,0 +1,225 @@
+"""The colour of the torque noise, from the residual of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+
+from estimation.diagnosis.noise_models.bursts import find_bursts
+from estimation.diagnosis.noise_models.frequency_bands import SHARE, find_bands, unbiased_frequencies
+from estimation.diagnosis.noise_models.masked_rows import find_masked_rows
+from estimation.diagnosis.noise_models.noise_nuisance_basis import NuisanceProjection
+from estimation.diagnosis.noise_models.noise_spectrum import ALL_FREQUENCIES, WITHOUT_LOW_FREQUENCIES, fit_noise_process
+from estimation.diagnosis.noise_models.spectral_lines import remove_lines
+from estimation.diagnosis.noise_models.whitening import Whitening, free_columns
+from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.recording import rest_rows
+
+Array = NDArray[np.float64]
+
+# Innovations beyond so many standard deviations count as this many: a level that tails of five degrees pass rarely.
+WINSOR = 5.0
+# The flat part of the band, as a share of its cut-off.
+INSIDE = 0.75
+# Nothing is said of fewer periods than so many.
+FEWEST = 4.0
+# A log's own level counts against that of all logs as its frequencies do against so many.
+FEW = 20.0
+QUIETEST = 1e-3
+# White rows beyond so many standard deviations weigh as if they were there (Huber): kicks that no filter undoes.
+HUBER = 3.5
+# But not where rows stick out for so long [s] together and no reversal is nearer than this [s].
+TOGETHER, KICKED = 0.05, 0.15
+# The noise's fast changes are taken from known rows where a joint has so many.
+FEWEST_ROWS = 100
+# Bridges of so many rows are short in any case; where fewer than this share of the rows remain, all bridges stay.
+SHORT, ENOUGH = 8, 0.3
+# What is not known of kicks drowns in the noise below this share of it: at each reversal it is different.
+DROWNED = 1.0
+
+
+def estimate_whitening(
+    recording: Recording,
+    residual: Array,
+    parameters: int,
+    inertia: Array,
+    share: float = SHARE,
+    spared: Sequence[Array] = (),
+) -> Whitening:
+    """Estimates the noise.
+
+    It is the residual of the model: what is found in it later is taken out, and the noise estimated anew. Differences
+    between repetitions would leave all that repeats out of the noise, also the errors of a model that is right but for
+    a few rows: they are for telling what repeats from what does not (`residual_shares`), not for alarms.
+
+    Args:
+        recording: the data.
+        residual: torque less model (N, n) [N m or N].
+        parameters: how many were fitted to it: they have taken some of the noise.
+        inertia: torque on each joint per acceleration of each (n, n) [kg m2], for what their errors make.
+        share: of the torque noise, what those may make in the bands.
+        spared: for each joint columns (N, k) on which no noise is measured.
+    """
+    colour = WITHOUT_LOW_FREQUENCIES if len(spared) else ALL_FREQUENCIES
+    longest = rest_rows(recording.step)
+    rests = find_masked_rows(recording.unsure, recording.starts, longest)
+    # Where the direction of motion is not known the residual is no noise.
+    gaps = find_masked_rows(recording.unsure, recording.starts)
+    bridged = np.column_stack([gaps.bridged(column, j) for j, column in enumerate(residual.T)])
+    pieces = [bridged[run] for run in recording.runs]
+    moving = np.array([1.0 - len(rows) / len(residual) for rows, *_ in rests.bridges])
+    highest = unbiased_frequencies(recording, inertia, bridged, moving) if share == SHARE else np.inf
+    known = [~recording.unsure[run] for run in recording.runs]
+    bands = find_bands(recording, inertia, _density(pieces, recording.step, known), share, highest)
+    pieces = [
+        np.column_stack([band.passed(column) for band, column in zip(bands, piece.T, strict=True)]) for piece in pieces
+    ]
+    stride = bands[0].stride
+    step = recording.step * stride
+    cutoffs = np.array([band.cutoff for band in bands])
+    widths = 1 / (2 * cutoffs * recording.step)
+    resting = rests.resting(recording.starts, len(residual), stride, int(np.ceil(1.5 * widths.max())) + 2)
+    measured = ~resting if colour.held else _measured(recording, stride, widths, ~resting)
+    spared = [gaps.bridged(X, j) for j, X in enumerate(spared)]
+    beside = NuisanceProjection(spared, bands, recording.runs, measured)
+    left = beside.left(pieces)
+    if (moments := find_bursts(left, measured, step)).any():
+        measured &= ~moments
+        beside = NuisanceProjection(spared, bands, recording.runs, measured)
+        left = beside.left(pieces)
+    counts, pieces = np.maximum(measured.sum(axis=0), 1).astype(float), left
+    slowest, fastest = max(colour.flat, FEWEST / (sum(map(len, pieces)) * step)), INSIDE * cutoffs
+    slowest = slowest if slowest <= ALL_FREQUENCIES.flat else 0.0
+    period = next((cycle.period for cycle in recording.cycles if cycle is not None), None)
+    noise = fit_noise_process(pieces, step, counts, parameters, (slowest, fastest), beside, period, colour)
+    levels = None
+    if len(pieces) > 1:
+        counted = [rows.sum(axis=0) for rows in np.split(~resting, np.cumsum([len(piece) for piece in pieces])[:-1])]
+        levels = _levels([noise.whitened(piece) for piece in pieces], counted, step, slowest, fastest)
+        pieces = [piece / level for piece, level in zip(pieces, levels, strict=True)]
+        noise = fit_noise_process(pieces, step, counts, parameters, (slowest, fastest), beside, period, colour)
+    trimmed = max(len(a) for a in noise.coefficients)
+    innovations = np.concatenate([noise.whitened(piece)[min(trimmed, len(piece) // 2) :] for piece in pieces])
+    # White noise has as much power at each frequency: what effects add to the slow ones is left out, and above the band
+    # there is nothing.
+    spectrum = np.fft.rfft(innovations, axis=0)
+    f = np.fft.rfftfreq(len(innovations), step)
+    inside = (f[:, None] >= slowest) & (f[:, None] < fastest)
+    power = remove_lines(np.abs(spectrum) ** 2, f[1], period)
+    spectrum *= np.sqrt(power) / np.maximum(np.abs(spectrum), np.finfo(float).tiny)
+    spectrum[~inside] = 0.0
+    power = np.where(inside, power / beside.kept(len(innovations), counts), 0.0)
+    scale = np.maximum(np.sqrt(power.sum(axis=0) / np.maximum(inside.sum(axis=0), 1) / counts), 1e-12)
+    white = _unit(spectrum, len(innovations))
+    # Joints correlate in the frequencies that all of them know.
+    spectrum[~inside.all(axis=1)] = 0.0
+    shared = _unit(spectrum, len(innovations))
+    correlation = np.atleast_2d(shared.T @ shared / len(shared))
+    # Too few rows make correlations of nothing; a tenth towards none keeps the inverse tame.
+    correlation = 0.95 * correlation + 0.05 * np.eye(residual.shape[1])
+    plain = Whitening(
+        coefficients=noise.coefficients,
+        scale=scale,
+        precision=np.asarray(np.linalg.inv(correlation), dtype=np.float64),
+        starts=recording.starts,
+        innovations=white,
+        gaps=gaps,
+        bands=bands,
+        levels=levels,
+    )
+    free = free_columns(recording.unsure, longest, plain, widths.tolist())
+    plain = replace(plain, gaps=replace(gaps, free=free))
+    white_left = np.where(resting, np.nan, np.abs(plain.all(residual)))
+    level = np.array([np.nanmedian(column) if np.isfinite(column).any() else 1.0 for column in white_left.T]) / 0.6745
+    weights = np.minimum(1.0, HUBER * np.maximum(level, 0.1) / np.maximum(white_left, 1e-12))
+    weights[_pushed(weights < 1.0, recording, stride, cutoffs)] = 1.0
+    return replace(plain, weights=np.where(resting, 0.0, weights))
+
+
+def _measured(recording: Recording, stride: int, widths: Array, moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Marks thinned rows (M, n) that show the noise: not where a bridge is longer than what the band lets through.
+
+    A bridge holds two samples, with all of the noise beyond the band, for as long as it is.
+    """
+    result = moving.copy()
+    for j, width in enumerate(widths):
+        bridges = find_masked_rows(recording.unsure[:, [j]], recording.starts, max(SHORT, round(width)))
+        held = bridges.resting(recording.starts, len(recording), stride, int(np.ceil(width)))[:, 0]
+        if np.sum(moving[:, j] & ~held) > ENOUGH * np.sum(moving[:, j]):
+            result[:, j] &= ~held
+    return result
+
+
+def _pushed(outside: NDArray[np.bool_], recording: Recording, stride: int, cutoffs: Array) -> NDArray[np.bool_]:
+    """Marks white rows (N, n) that stick out together, away from the joint's reversals: a push is an effect.
+
+    For longer than a kick that the band spreads: three quarters of a wave of its cut-off (n,) [Hz] to either side.
+    """
+    step, reach = recording.step * stride, round(KICKED / recording.step)
+    crowded = np.empty_like(outside)
+    for j, cutoff in enumerate(cutoffs):
+        width = max(3, round(max(TOGETHER, 1.5 / cutoff) / step))
+        crowded[:, j] = uniform_filter1d(outside[:, j].astype(float), width) >= 0.5
+    near = [
+        maximum_filter1d(recording.unsure[run].astype(np.int8), 2 * reach + 1, axis=0)[::stride]
+        for run in recording.runs
+    ]
+    return outside & crowded & (np.concatenate(near) == 0)
+
+
+def _levels(
+    white: Sequence[Array], counts: Sequence[NDArray[np.intp]], step: float, slowest: float, fastest: Array
+) -> Array:
+    """Gives the noise of each log over that of all (logs, n), from whitened residuals (N, n) of each.
+
+    By the faster half of what is known: a torque that acts in one log only is slow. A log of few frequencies, or of few
+    rows in which a joint moves (n,), is taken to be as noisy as the others.
+    """
+    powers, numbers = np.empty((2, len(white), len(fastest)))
+    for i, (rows, counted) in enumerate(zip(white, counts, strict=True)):
+        f = np.fft.rfftfreq(len(rows), step)[:, None]
+        inside = (f >= np.maximum(slowest, fastest / 2)) & (f < fastest)
+        # A joint at rest has no noise, and as many frequencies less.
+        numbers[i] = inside.sum(axis=0) * counted / len(rows)
+        powers[i] = (np.abs(np.fft.rfft(rows, axis=0)) ** 2 * inside).sum(axis=0) / len(rows)
+    mean = np.maximum(powers.sum(axis=0) / np.maximum(numbers.sum(axis=0), 1), 1e-300)
+    ratio = np.maximum(powers / np.maximum(numbers, 1) / mean, QUIETEST**2)
+    return np.asarray(np.where(numbers > 0, ratio ** (0.5 * numbers / (numbers + FEW)), 1.0))
+
+
+def _unit(spectrum: NDArray[np.complex128], rows: int) -> Array:
+    """Gives the signals (N, n) of spectra, outliers cut, of no mean and unit variance."""
+    white = np.fft.irfft(spectrum, rows, axis=0)
+    white = np.clip(white / np.maximum(white.std(axis=0), 1e-12), -WINSOR, WINSOR)
+    white -= white.mean(axis=0)
+    return np.asarray(white / np.maximum(white.std(axis=0), 1e-12))
+
+
+def quiet_joints(recording: Recording, residual: Array, inertia: Array) -> NDArray[np.bool_]:
+    """Tells of which joints (n,) the kicks at reversals, as far as their accelerations are not known, drown in noise.
+
+    Args:
+        recording: the data.
+        residual: torque less model (N, n) [N m or N].
+        inertia: torque on each joint per acceleration of each (n, n) [kg m2].
+    """
+    density = _density([residual[run] for run in recording.runs], recording.step)
+    # Of the samples themselves, which are as many as a kick lasts for.
+    noise = np.sqrt(density * recording.stride / (2 * recording.step))
+    return np.asarray(np.diag(inertia) * recording.jolts < DROWNED * noise)
+
+
+def _density(pieces: Sequence[Array], step: float, known: Sequence[NDArray[np.bool_]] | None = None) -> Array:
+    """Power density of the noise (n,) in the upper half of the band, from its fast changes in rows that are `known`."""
+    # A second difference passes white noise of variance s^2 as 6 s^2 and slow noise not at all; the median square
+    # stands above the rare kicks at reversals.
+    squares = np.concatenate([np.diff(piece, 2, axis=0) ** 2 for piece in pieces])
+    if known is not None:
+        # A bridge is a straight line, without noise: most rows of a joint that stands for most of the time.
+        inner = np.concatenate([rows[:-2] & rows[1:-1] & rows[2:] for rows in known])
+        squares[~inner & (inner.sum(axis=0) >= FEWEST_ROWS)] = np.nan
+    return np.asarray(np.nanmedian(squares, axis=0) / 0.455 / 6 * 2 * step)

@@ -1,0 +1,126 @@
+"""Free functions of each joint's own state, beside the base model: on them no noise is measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.base_models.baseline import Baseline
+from estimation.diagnosis.noise_models.frequency_bands import Band
+from estimation.diagnosis.recordings.recording import Recording
+from estimation.linear_algebra.orthonormal import orthonormal
+
+Array = NDArray[np.float64]
+
+# Knots of the functions: of the position over its range, of friction over time, of the speed as shares of its largest.
+POSITIONS, TIMES = 8, 5
+SPEEDS = (0.0, 0.03, 0.1, 0.3, 0.6, 1.0)
+# Of a shorter log [s] they would take most of the noise at the frequencies of the motion.
+SHORTEST = 20.0
+RANGE = 1e-3  # [rad or m] a joint that moves less than this has none
+# Directions of columns below this share of the largest are none.
+FAINT = 1e-6
+# Where they have taken more of a frequency's noise than this leaves, what is left is no measure of it.
+LEAST_KEPT = 0.2
+
+
+class NuisanceProjection:
+    """Columns that are projected out of white rows, joint by joint, and what of noise they leave at each frequency.
+
+    Args:
+        columns: for each joint (N, k), none for nothing.
+        bands: of the joints.
+        runs: the logs' rows.
+        measured: white rows (M, n) of all logs that count.
+    """
+
+    def __init__(
+        self, columns: Sequence[Array], bands: Sequence[Band], runs: Sequence[slice], measured: NDArray[np.bool_]
+    ) -> None:
+        self.pieces = []  # of each joint and log
+        lengths = [-(-(run.stop - run.start) // bands[0].stride) for run in runs]
+        self.measured = np.split(measured, np.cumsum(lengths)[:-1])
+        for j, (X, band) in enumerate(zip(columns, bands, strict=False)):
+            whole = np.concatenate([band.passed(np.asfortranarray(X[run])) for run in runs]) * measured[:, [j]]
+            self.pieces.append(np.split(orthonormal(whole, FAINT), np.cumsum(lengths)[:-1]))
+
+    def left(self, pieces: list[Array]) -> list[Array]:
+        """Projects the columns out of residuals (M, n) of each log; rows that do not count are zero."""
+        result = [piece * rows for piece, rows in zip(pieces, self.measured, strict=True)]
+        pieces = [piece.copy() for piece in result]
+        for j, own in enumerate(self.pieces):
+            told = sum(X.T @ piece[:, j] for X, piece in zip(own, pieces, strict=True))
+            for X, piece in zip(own, result, strict=True):
+                piece[:, j] -= X @ told
+        return result
+
+    def kept(self, size: int, counts: Array) -> Array:
+        """Gives the share of white noise's power that is left (size // 2 + 1, n), of `counts` rows (n,)."""
+        result = np.ones((size // 2 + 1, len(counts)))
+        for j, own in enumerate(self.pieces):
+            taken = sum((np.abs(np.fft.rfft(X, size, axis=0)) ** 2).sum(axis=1) for X in own)
+            result[:, j] = np.maximum(1.0 - taken / counts[j], LEAST_KEPT)
+        return result
+
+
+def is_short(recording: Recording) -> bool:
+    """Whether what is fitted freely to the logs would take most of their noise at the frequencies of the motion."""
+    return recording.duration < SHORTEST
+
+
+def build_nuisance_projection(recording: Recording, baseline: Baseline, residual: Array) -> tuple[Array, ...]:
+    """Evaluates functions of position, speed and load, and friction by time, less what the base model makes of them.
+
+    Most effects of the catalogue are about such a function. What they leave in the residual is as fast as the motion
+    is, and would pass for a colour of the noise, under which they hide.
+
+    Args:
+        recording: the data.
+        baseline: the base model's columns.
+        residual: torque less model (N, n) [N m or N].
+
+    Returns:
+        For each joint, columns (N, k) on its rows; nothing of a log that is too short.
+    """
+    if is_short(recording):
+        return ()
+    known = ~recording.unsure
+    weights = known / np.maximum(recording.tau.std(axis=0), 1e-12)
+    sign = baseline.situation(recording, np.zeros(baseline.base.size)).sign
+    size = baseline.regressor.shape[2] + baseline.nuisance.shape[2]
+    gram, shown = np.zeros((size, size)), []
+    for j in range(recording.n):
+        own = np.hstack([baseline.regressor[:, j], baseline.nuisance[:, j]])
+        weighted = own * weights[:, j, None]
+        columns = _functions(recording, sign, recording.tau - residual, j)
+        gram += weighted.T @ weighted
+        shown.append((columns, weighted.T @ (columns * weights[:, j, None])))
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    values, vectors = np.linalg.eigh(gram / scale[:, None] / scale)
+    kept = values > FAINT**2 * values[-1]
+    root = vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
+    for j, (columns, cross) in enumerate(shown):
+        made = root @ (root.T @ cross)
+        edge = baseline.regressor.shape[2]
+        columns -= baseline.regressor[:, j] @ made[:edge] + baseline.nuisance[:, j] @ made[edge:]
+    return tuple(columns for columns, _ in shown)
+
+
+def _functions(recording: Recording, sign: Array, torque: Array, joint: int) -> Array:
+    q, speed = recording.q[:, joint], np.abs(recording.dq[:, joint])
+    if np.ptp(q) < RANGE:
+        return np.zeros((len(q), 0))
+    load = torque[:, joint] / max(float(np.abs(torque[:, joint]).max()), 1e-12)
+    blocks = [
+        _hats(q, np.linspace(q.min(), q.max(), POSITIONS)),
+        sign[:, joint, None] * _hats(speed, np.array(SPEEDS) * speed.max()),
+        np.column_stack([np.abs(load) * sign[:, joint], np.abs(load) * load, load**3]),
+        sign[:, joint, None] * _hats(recording.t, np.linspace(recording.t[0], recording.t[-1], TIMES)),
+    ]
+    return np.hstack(blocks)
+
+
+def _hats(x: Array, knots: Array) -> Array:
+    return np.column_stack([np.interp(x, knots, unit) for unit in np.eye(len(knots))])

@@ -1,0 +1,167 @@
+"""The verb: finds what a robot's model gets wrong, names the cause, extends the model, measures the gain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.base_models.baseline import base_parameters
+from estimation.diagnosis.base_models.payload_and_gravity import subtract_known_payload
+from estimation.diagnosis.experiment_plans.detection_limits import find_limits
+from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
+from estimation.diagnosis.hypothesis_tests.residual_shares import residual_shares
+from estimation.diagnosis.hypothesis_tests.scan import measure
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.recordings.log_repair import repair_log
+from estimation.diagnosis.recordings.unusable_logs import find_unusable_logs
+from estimation.diagnosis.results.assembly import DiagnosisInputs, assemble
+from estimation.diagnosis.results.diagnosis import Diagnosis
+from estimation.diagnosis.searches.search import search
+from estimation.diagnosis.validations.verdict import decide_verdict
+from estimation.logs.clocks import put_on_clock
+from robots.common.errors import InputError, NotIdentifiableError
+from robots.common.memory import give_back
+from robots.common.parallel import one_blas_thread
+from robots.common.progress import SILENT, Progress
+from robots.robot import Robot
+from robots.signals import Log
+from robots.terms.discrepancies.patterns import all_patterns
+from robots.terms.effects import EFFECTS, Effect
+
+Array = NDArray[np.float64]
+
+
+@one_blas_thread()
+def diagnose(
+    robot: Robot,
+    logs: Log | Sequence[Log],
+    *,
+    held_out: Log | Sequence[Log] | None = None,
+    candidates: Sequence[str | Effect] | None = None,
+    friction: str = "polynomial",
+    false_alarm: float = 0.01,
+    check: bool = True,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Finds what rigid body, friction, rotors and offsets do not explain in a robot's logs.
+
+    Positions become noise-free motion (harmonics where it repeats, a low-pass chosen by its spectrum elsewhere); the
+    torque noise is estimated with its colour; every effect of the catalogue at every joint is scored beside the base
+    model, against what noise alone would have made of the strongest; shapes are refined, and rivals tried, before the
+    next effect is sought. What no effect explains is told as such.
+
+    Args:
+        robot: the robot.
+        logs: one or several, of t, q and tau or current; t is one clock. Logs that overlap count one after the other,
+            in the order given. A log that says so carries a known payload, or was recorded under another gravity.
+        held_out: logs of other motions to measure the gain on; without, runs or stretches are kept apart.
+        candidates: effects to look for, by name; all by default.
+        friction: of the base model: ``polynomial`` or ``coulomb-viscous``.
+        false_alarm: chance of finding an effect in logs that have none.
+        check: whether each log passes the gate first, which refuses what would be diagnosed wrongly; rows that stick
+            out of their neighbours are filled in, and logs are cut at gaps.
+        seed: of the noise that is drawn.
+        progress: is told how far it is.
+
+    Returns:
+        The diagnosis.
+
+    Raises:
+        InputError: logs of another robot, without torque, too short, given twice or refused by the gate; an unknown
+            effect or option.
+        NotIdentifiableError: no joint moves.
+    """
+    data = [logs] if isinstance(logs, Log) else list(logs)
+    other = [] if held_out is None else [held_out] if isinstance(held_out, Log) else list(held_out)
+    if not data:
+        raise InputError("no logs", allowed="one or more")
+    if not 0 < false_alarm < 0.5:
+        raise InputError(f"a false-alarm probability of {false_alarm}", allowed="between 0 and 0.5")
+    effects = _effects(candidates)
+    bar = progress or SILENT
+    bar.start("diagnosing", 1.0)
+    try:
+        on_clock = put_on_clock(data, other)
+        data, other = sorted(on_clock.logs, key=lambda log: float(log.t[0])), list(on_clock.held_out)
+        found: list[str] = []
+        if check:
+            bar.update(0.0, "checking the logs")
+            (data, told_of_logs), (other, told_of_others) = (
+                _repaired(robot, data, "Log"),
+                _repaired(robot, other, "Held out"),
+            )
+            found = [*told_of_logs, *told_of_others]
+        recording = subtract_known_payload(robot, build_recording(robot, data))
+        if not (np.ptp(recording.q, axis=0) > 0).any():
+            raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
+        # Unseen logs count too: what only they show is told by the description at least.
+        gravities = [log.gravity for log in (*data, *other) if log.gravity is not None]
+        base = base_parameters(robot, friction, (0.001,) * robot.n, gravities)
+        hopeless = find_unusable_logs(base, recording)
+        notes = tuple(_UNUSABLE.format(k + 1, _log_name(recording.names[k]), 100 * s) for k, s in hopeless.items())
+        if hopeless:
+            data = [log for k, log in enumerate(data) if k not in hopeless]
+            recording = subtract_known_payload(robot, build_recording(robot, data))
+        searched = search(base, recording, effects, false_alarm, seed, bar)
+        problem, selection, entries = searched.problem, searched.selection, searched.entries
+        bar.update(0.75, "limits of what the logs can show")
+        limits = find_limits(problem, entries, false_alarm=false_alarm)
+        # The columns of all hypotheses are most of what is kept: those of the patterns take their room.
+        del searched, entries
+        give_back()
+        bar.update(0.83, "what is left")
+        patterns = measure(problem, all_hypotheses(robot, list(all_patterns(robot))))
+        judgement = decide_verdict(problem, selection, patterns, false_alarm, np.random.default_rng(seed + 2))
+        bar.update(0.93, "gain on unseen data")
+        del patterns
+        give_back()
+        told = DiagnosisInputs(
+            problem=problem,
+            selection=selection,
+            judgement=judgement,
+            limits=limits,
+            excess=residual_shares(problem),
+            logs=tuple(data),
+            held_out=tuple(other),
+            dated=on_clock.dated,
+            false_alarm=false_alarm,
+            seed=seed,
+            notes=(*on_clock.notes, *found, *notes),
+        )
+        return assemble(robot, told)
+    finally:
+        bar.finish()
+
+
+_UNUSABLE = (
+    "Log {}{} is left out: fitted to it alone, the base model still leaves {:.0f} % of the torque on every joint. It "
+    "says nothing of what the arm is like; look at its torque."
+)
+
+
+def _repaired(robot: Robot, logs: Sequence[Log], kind: str) -> tuple[list[Log], list[str]]:
+    """The stretches of logs that can be used, and what is to be told of them."""
+    several = [repair_log(robot, log, f"{kind} {k}{_log_name(log.name)}") for k, log in enumerate(logs, start=1)]
+    return [part for one in several for part in one.logs], [note for one in several for note in one.notes]
+
+
+def _log_name(name: str) -> str:
+    return f" ({name})" if name else ""
+
+
+def _effects(candidates: Sequence[str | Effect] | None) -> list[Effect]:
+    if candidates is None:
+        return list(EFFECTS.values())
+    chosen = []
+    for candidate in candidates:
+        if isinstance(candidate, str):
+            if candidate not in EFFECTS:
+                raise InputError(f"unknown effect {candidate!r}", allowed=", ".join(EFFECTS))
+            candidate = EFFECTS[candidate]
+        chosen.append(candidate)
+    if not chosen:
+        raise InputError("no effects to look for", allowed="one or more names")
+    return chosen

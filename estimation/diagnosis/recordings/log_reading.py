@@ -1,0 +1,260 @@
+"""Logs made ready for diagnosis: one grid, motion free of noise, torque as measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from estimation.diagnosis.recordings.constant_speed import remove_encoder_lines
+from estimation.diagnosis.recordings.directions import ALIKE, Directions, find_directions
+from estimation.diagnosis.recordings.periods import Cycle, find_cycle, project_on_harmonics
+from estimation.diagnosis.recordings.position_cutoff import select_position_cutoff
+from estimation.diagnosis.recordings.position_spectra import Spectra, Spectrum
+from estimation.diagnosis.recordings.recording import Recording
+from estimation.diagnosis.recordings.smoothed_motion import smooth_motion
+from estimation.diagnosis.recordings.thinning import decimate_recording, keep_clipped_level, low_pass_rows
+from estimation.gate.checks.resolution import lattice_step
+from estimation.regressions.preparation import Prepared, prepare, still_joints
+from robots.common.errors import InputError
+from robots.robot import Robot
+from robots.signals import Log
+
+Array = NDArray[np.float64]
+_Part = tuple[Array, Array, Array, Array, Array, Cycle | None, Array, Directions, Array, Array | None]
+
+# More rows than this only cost time: the logs are then thinned by a whole number, torque low-passed before.
+MOST_ROWS = 40_000
+# What jumps is evaluated at all rows, where they are no more than this.
+MOST_FINE = 130_000
+FASTEST = 260.0  # [Hz] sampling beyond which no effect of the catalogue gains
+# At its ends a log knows its derivatives less well, for nothing is known beyond: so many periods of the cut-off are
+# lost, and no more than a share of the log.
+LOST, MOST_LOST = 4.0, 0.02
+SHORTEST = 5.0  # [s] of log below which nothing can be told
+# A step is so many whole periods, but for this share of one.
+WHOLE = 1e-3
+# A mean over repetitions is taken where it knows frequencies higher by this factor than a single pass.
+SHARPER = 1.2
+# At the ends of a log, rows in which all joints are slower than this share are left out, up to so long [s].
+SETTLED, ENDS = 0.15, 2.0
+
+
+def build_recording(
+    robot: Robot,
+    logs: Sequence[Log],
+    *,
+    step: float | None = None,
+    shortest: float = SHORTEST,
+    travel: Array | float = 0.0,
+) -> Recording:
+    """Reads logs into noise-free motion on a common grid.
+
+    Positions of a repeated motion are projected on its harmonics. Others are low-passed, joint by joint, where their
+    spectrum meets the encoder's noise: what is left has a known ratio of signal to noise at every frequency, and so in
+    every derivative.
+
+    Args:
+        robot: the robot.
+        logs: of t, q and tau or current.
+        step: sample period to take [s]; by default that of the slowest log, longer where there are too many rows.
+        shortest: least time of all logs together [s].
+        travel: the joints' ranges (n,) in logs besides, by which those are known that stand in all of these.
+
+    Raises:
+        InputError: logs of another robot, without torque, or too short.
+    """
+    prepared = sorted((prepare(robot, log) for log in logs), key=lambda log: float(log.log.t[0]))
+    for before, after in pairwise(prepared):
+        if after.log.t[0] <= before.log.t[-1]:
+            raise InputError(
+                "overlaps another log in time",
+                file=after.log.metadata.get("file", after.log.name or None),
+                column="t",
+                allowed="one clock for all logs of a robot, one after the other",
+                remedy="shift t by the time at which the log was recorded; where that is not known, --own-clocks or "
+                "estimation.on_one_clock put the logs one after the other",
+            )
+    own, step = max(log.positions.period for log in prepared), _step(prepared) if step is None else step
+    stride = round(step / own)
+    whole = abs(step - stride * own) < WHOLE * own
+    if stride > 1 and whole and sum(log.log.duration for log in prepared) / own <= MOST_FINE:
+        return decimate_recording(build_recording(robot, logs, step=own, shortest=shortest, travel=travel), stride)
+    spectra = [Spectra.of(log.positions) for log in prepared]
+    found = [[of.of_positions(x) for x in log.positions.q.T] for of, log in zip(spectra, prepared, strict=True)]
+    highest = np.max([[spectrum.cutoff() for spectrum in own] for own in found], axis=0)
+    cap = select_position_cutoff(robot, prepared, highest)
+    parts = [_part(log, step, cap, of, own) for log, of, own in zip(prepared, spectra, found, strict=True)]
+    never = np.all([np.ptp(part[1], axis=0) == 0 for part in parts], axis=0)
+    parts = _zero_resting_joints(parts, still_joints([part[1] for part in parts], travel) | never)
+    lengths = [len(part[0]) for part in parts]
+    total = sum(lengths) * step
+    if total < shortest:
+        recorded = sum(log.log.duration for log in prepared)
+        raise InputError(
+            f"{total:.1f} s of logs without the ends, where filters err ({recorded:.1f} s with them)",
+            file=prepared[0].log.metadata.get("file", prepared[0].log.name or None) if len(prepared) == 1 else None,
+            allowed=f"{shortest:g} s or more",
+            remedy="record a longer log",
+        )
+    joined = [np.concatenate([part[k] for part in parts]) for k in range(5)]
+    rests = [part[9] for part in parts if part[9] is not None]
+    return Recording(
+        t=joined[0],
+        starts=tuple(int(s) for s in np.cumsum([0, *lengths[:-1]])),
+        q=joined[1],
+        dq=joined[2],
+        ddq=joined[3],
+        tau=joined[4],
+        step=step,
+        cycles=tuple(part[5] for part in parts),
+        cutoff=min(float(part[6].min()) for part in parts),
+        floor=np.max([part[8] for part in parts], axis=0),
+        unsure=np.concatenate([part[7].unsure for part in parts]),
+        clear=np.concatenate([part[7].clear for part in parts]),
+        jolts=np.max([part[7].jolts for part in parts], axis=0),
+        late=np.concatenate([part[7].late for part in parts]),
+        rest=np.concatenate(rests) if len(rests) == len(parts) else None,
+        cutoffs=np.array([part[6] for part in parts]) if len(rests) == len(parts) else None,
+        names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
+        payloads=_payloads(prepared),
+        fields=_fields(prepared),
+    )
+
+
+def _zero_resting_joints(parts: Sequence[_Part], held: NDArray[np.bool_]) -> list[_Part]:
+    """Takes joints that stand in a log (logs, n), but for a tremble, for joints at rest: it says nothing of them.
+
+    What moves there is the error of the position loop, by some steps of the encoder, and friction holds against it. A
+    step has accelerations that the other joints would feel.
+    """
+    result = []
+    for part, stands in zip(parts, held, strict=True):
+        t, q, dq, ddq, tau, cycle, cutoffs, turns, floor, rest = part
+        dq, ddq, floor = (np.where(stands, 0.0, values) for values in (dq, ddq, floor))
+        still = replace(
+            turns,
+            unsure=turns.unsure | stands,
+            clear=turns.clear & ~stands,
+            jolts=np.where(stands, 0.0, turns.jolts),
+            late=np.where(stands, 0.0, turns.late),
+        )
+        result.append((t, q, dq, ddq, tau, cycle, cutoffs, still, floor, rest))
+    return result
+
+
+def _payloads(prepared: Sequence[Prepared]) -> tuple[Array, ...]:
+    if all(log.log.payload is None for log in prepared):
+        return ()
+    return tuple(np.zeros(10) if log.log.payload is None else np.array(log.log.payload) for log in prepared)
+
+
+def _fields(prepared: Sequence[Prepared]) -> tuple[Array | None, ...]:
+    gravities = tuple(log.log.gravity for log in prepared)
+    return () if all(gravity is None for gravity in gravities) else gravities
+
+
+def _step(prepared: Sequence[Prepared]) -> float:
+    slowest = max(log.positions.period for log in prepared)
+    rows = sum(log.log.duration for log in prepared) / slowest
+    stride = max(1, int(np.ceil(1 / (slowest * FASTEST))), int(np.ceil(rows / MOST_ROWS)))
+    return slowest * stride
+
+
+def _part(log: Prepared, step: float, cap: float, spectra: Spectra, found: Sequence[Spectrum]) -> _Part:
+    """One log: t, q, dq, ddq, tau on the working grid, its cycle there, the lowest cut-off, its directions, noise.
+
+    Above `cap` [Hz], what the positions have is noise, whatever its power; `found` are the positions' own spectra.
+    """
+    period, grid = log.positions.period, log.positions.t
+    positions = log.positions.q
+    cutoffs = np.minimum([spectrum.cutoff() for spectrum in found], cap)
+    q, dq, ddq = smooth_motion(positions, period, cutoffs)
+    cycle = find_cycle(positions, period)
+    if cycle is not None:
+        rows = slice(cycle.start, cycle.stop)
+        exact, known, repeated = project_on_harmonics(positions, period, cycle)
+        # One pass alone may be sharper, where the motion does not repeat as exactly as its encoder counts.
+        better = (known > SHARPER * cutoffs) & (known <= cap)
+        rest = positions[rows] - exact[0]
+        slow = smooth_motion(rest, period, np.array([spectra.of_positions(x).cutoff(none=0.0) for x in rest.T]))
+        for whole, harmonic, other in zip((q, dq, ddq), exact, slow, strict=True):
+            # What does not repeat is motion too, where it stands out of the noise.
+            whole[rows] = np.where(better, harmonic + other, whole[rows])
+        cutoffs = np.where(better, known, cutoffs)
+    floor = np.array([spectrum.floor if cap == np.inf else spectrum.noise_at(cap) for spectrum in found])
+    edge = min(LOST / float(cutoffs.min()), MOST_LOST * (grid[-1] - grid[0]))
+    # On a sample: between two of them nobody knows when a torque jumped.
+    begin = grid[0] + np.ceil(edge / period - 1e-9) * period
+    count = int(np.floor((grid[-1] - edge - begin) / step + 1e-6)) + 1
+    t = begin + step * np.arange(count)
+    tau = _torque(log, step)(np.minimum(t, log.log.t[-1]))
+    first = round((begin - grid[0]) / period)
+    if abs(step - period) < 1e-9:
+        states = [array[first : first + count] for array in (q, dq, ddq)]
+    else:
+        states = [CubicSpline(grid, array)(t) for array in (q, dq, ddq)]
+    moved = None
+    if cycle is not None:
+        start = max(0, int(np.ceil((cycle.start - first) * period / step)))
+        stop = min(count, int(np.floor((cycle.stop - first) * period / step)))
+        moved = Cycle(start, stop, cycle.period, int((stop - start) * step / cycle.period + 0.1))
+    if cycle is not None:
+        floor = np.where(better, np.clip(repeated, floor / cycle.count, floor), floor)
+    ends = [spectrum.at(float(cutoff)) for cutoff, spectrum in zip(cutoffs, found, strict=True)]
+    beside = log.log.t[np.clip(np.searchsorted(log.log.t, t), 1, len(log.log.t) - 1) + np.array([[-1], [0]])]
+    sampled = abs(step - period) < 1e-9 and bool(np.abs(beside - t).min(axis=0).max() < ALIKE * period)
+    steps = np.array([lattice_step(x) for x in log.log.q.T])
+    states[1:] = remove_encoder_lines(states[0], states[1], states[2], steps, step)
+    besides = positions[first : first + count] - q[first : first + count] if sampled else None
+    turns = find_directions(states[1], states[2], cutoffs, floor, np.maximum(ends, floor), step, besides)
+    turns = turns.spread(_between(log.log.t, t, period))
+    cut = slice(None) if moved is not None else _trim_ends(states[1], step)
+    q, dq, ddq = (array[cut] for array in states)
+    rests = None if besides is None else besides[cut]
+    return t[cut], q, dq, ddq, tau[cut], moved, cutoffs, turns.rows(cut), floor, rests
+
+
+def _between(own: Array, t: Array, period: float) -> NDArray[np.intp]:
+    """Numbers the pairs of a log's samples that the rows (N,) of a grid lie between; -1 on a sample."""
+    after = np.clip(np.searchsorted(own, t, side="right"), 1, len(own) - 1)
+    on = np.minimum(np.abs(own[after] - t), np.abs(t - own[after - 1])) < ALIKE * period
+    return np.where(on, -1, after)
+
+
+def _torque(log: Prepared, step: float) -> _Interpolation:
+    """Gives the torque as a function of time, low-passed where the grid is coarser than the log."""
+    t, tau = log.log.t, log.tau
+    period = log.positions.period
+    if step > 1.5 * period:
+        even = t[0] + period * np.arange(int((t[-1] - t[0]) / period + 1e-6) + 1)
+        tau = np.column_stack([np.interp(even, t, column) for column in tau.T])
+        t, tau = even, keep_clipped_level(tau, low_pass_rows(tau, step / period))
+    return _Interpolation(t, tau)
+
+
+class _Interpolation:
+    """Straight lines between samples: they neither overshoot at a step nor ring."""
+
+    def __init__(self, t: Array, values: Array) -> None:
+        self.t, self.values = t, values
+
+    def __call__(self, at: Array) -> Array:
+        return np.column_stack([np.interp(at, self.t, column) for column in self.values.T])
+
+
+def _trim_ends(dq: Array, step: float) -> slice:
+    """Leaves out the ends of a log where the robot comes from and to rest: stiction may hold any torque there."""
+    speed = np.sqrt(np.mean(dq**2, axis=0))
+    active = np.flatnonzero((np.abs(dq) > SETTLED * np.maximum(speed, 1e-9)).any(axis=1))
+    if not len(active):
+        return slice(None)
+    most = int(min(ENDS / step, 0.05 * len(dq)))
+    return slice(min(int(active[0]), most), max(int(active[-1]) + 1, len(dq) - most))
+
+
+__all__ = ["Recording", "build_recording"]

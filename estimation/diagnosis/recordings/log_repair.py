@@ -1,0 +1,136 @@
+"""Logs as a diagnosis may take them: rows of lost messages filled in, cut at gaps, and what the gate says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from estimation.gate import GateReport, check_log
+from estimation.gate.checks.spikes import are_accidents, stray_rows
+from estimation.gate.columns import Columns
+from estimation.gate.finding import Finding
+from estimation.gate.report import FEWEST
+from robots.robot import Robot
+from robots.signals import Log
+
+Array = NDArray[np.float64]
+
+# What an effect may look like to the quick fit of the gate, or what a diagnosis says itself, with its own reason.
+TOLD = frozenset(
+    {
+        "badly_excited",
+        "jump",
+        "moved_by_others",
+        "negative_friction",
+        "no_motion",
+        "position_sign",
+        "short",
+        "torque_sign",
+        "unit_of_torque",
+    }
+)
+# Warnings of what a diagnosis looks at more closely.
+OWN = frozenset({"badly_excited", "clipped", "delay", "hardly_moves", "poorly_explained", "unit_of_torque"})
+# A stretch between gaps that is shorter than this [s] tells nothing that its ends do not spoil.
+SHORTEST = 2.0
+
+_BY_FIT = ", by a quick look at rigid body and friction alone"
+
+
+@dataclass(frozen=True)
+class RepairedLog:
+    """A log without what would be taken for an effect of the robot.
+
+    Attributes:
+        logs: its stretches between gaps.
+        notes: what was wrong with it, and what was done.
+    """
+
+    logs: tuple[Log, ...]
+    notes: tuple[str, ...]
+
+
+def repair_log(robot: Robot, log: Log, which: str) -> RepairedLog:
+    """Fills rows that stick out of their neighbours, and cuts the log at its gaps.
+
+    A lost message is a torque of a thousandth of a second, which would be named a contact with any certainty, and a
+    bridge over a gap is a motion that never was.
+
+    Args:
+        robot: the robot.
+        log: as it was recorded.
+        which: what notes call it.
+
+    Raises:
+        InputError: a log that says nothing of the robot: positions in degrees, times in milliseconds, absurd values,
+            torques of the motors.
+    """
+    gate = check_log(robot, log)
+    sizes = [f for f in gate.findings if f.name == "unit_of_torque" and f.joint is not None]
+    strange = 2 * len(sizes) >= max(robot.n, 3)
+    told = TOLD - {"unit_of_torque"} if strange else TOLD
+    replace(gate, findings=tuple(f for f in gate.findings if f.name not in told)).raise_if_refused()
+    notes = [_SIZES.format(which, len(sizes), robot.n, _range([f.value for f in sizes]))] if strange else []
+    notes += [
+        f"{which}{_BY_FIT if finding.name in TOLD else ''}: {finding}."
+        for finding in gate.findings
+        if _is_reported(finding)
+    ]
+    log = gate.on_time(log)
+    return RepairedLog(_stretches(_filled(log) if len(gate.spikes) else log, gate), tuple(notes))
+
+
+_SIZES = (
+    "{}: the torques of {} of {} joints are {} times those of the robot's description: check unit and gear ratios (a "
+    "mapping states them) before anything else that is said here; they are right if the description is that wrong."
+)
+
+
+def _range(values: Sequence[float]) -> str:
+    low, high = (f"{float(f'{value:.2g}'):g}" for value in (min(values), max(values)))
+    return low if low == high else f"{low} to {high}"
+
+
+def _is_reported(finding: Finding) -> bool:
+    if finding.severity == "refuse":
+        return finding.name not in ("no_motion", "short")
+    return finding.severity == "warning" and finding.name not in OWN
+
+
+def _filled(log: Log) -> Log:
+    """Puts what lies between its neighbours where a column sticks out: rows stay where they are in time."""
+    values: dict[str, Array] = {}
+    for (prefix, joint), rows in stray_rows(Columns.of(log)).items():
+        name = {"q": "q", "tau": "tau", "i": "current"}[prefix]
+        known = np.setdiff1d(np.arange(len(log)), rows)
+        if not are_accidents(rows, len(log)) or len(known) < FEWEST:
+            continue
+        column = values.setdefault(name, np.array(getattr(log, name)))[:, joint]
+        if prefix == "q":
+            # A straight line would cut the motion's corner, by more than an encoder's step.
+            column[rows] = CubicSpline(log.t[known], column[known])(log.t[rows])
+        else:
+            column[rows] = np.interp(log.t[rows], log.t[known], column[known])
+    return replace(log, **values) if values else log  # type: ignore[arg-type]
+
+
+def _stretches(log: Log, gate: GateReport) -> tuple[Log, ...]:
+    """Cuts a log at its gaps and where a column hung; it is left whole where no stretch is long enough by itself."""
+    spans = [(first, stop) for first, stop in gate.parts if log.t[stop - 1] - log.t[first] >= SHORTEST]
+    if gate.parts == ((0, len(log)),) or not spans:
+        return (_fresh(log, gate, 0, len(log)),)
+    parts = (_fresh(log, gate, first, stop) for first, stop in spans)
+    return tuple(
+        replace(part, name=f"{log.name or 'log'} from {part.t[0]:.4g} to {part.t[-1]:.4g} s") for part in parts
+    )
+
+
+def _fresh(log: Log, gate: GateReport, first: int, stop: int) -> Log:
+    """The rows of a stretch that are of their time."""
+    if not len(gate.stale):
+        return log if stop - first == len(log) else log.rows(slice(first, stop))
+    return log.rows(np.setdiff1d(np.arange(first, stop), gate.stale))

@@ -1,0 +1,108 @@
+"""Positions low-passed without lag, and their derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.linalg import solveh_banded
+from scipy.signal import butter, sosfiltfilt
+from scipy.sparse import diags_array
+from scipy.special import binom
+
+Array = NDArray[np.float64]
+
+ORDER = 8
+# Nobody knows what a position was before a log began. A filter's guess rings on for some ten periods of the cut-off;
+# near the ends a smoothing spline of the same response needs none. Both agree where the one gives way to the other.
+FREE, BLENDED = 12.0, 6.0  # [periods of the cut-off]
+DEGREE = 7
+KNOTS = 6.0  # per period of the cut-off
+
+
+def smooth_motion(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array, Array]:
+    """Low-passes positions (N, n) without lag and differentiates them.
+
+    Args:
+        x: positions on an even grid.
+        period: of the grid [s].
+        cutoffs: of each joint (n,) [Hz]; one of zero or less leaves nothing.
+
+    Returns:
+        Positions, velocities and accelerations (N, n).
+    """
+    q = np.zeros_like(x)
+    for j, cutoff in enumerate(cutoffs):
+        if cutoff <= 0:
+            continue
+        sections = butter(ORDER, min(cutoff * 2 * period, 0.99), output="sos")
+        padding = min(len(x) - 1, round(12 / (cutoff * period)))
+        q[:, j] = sosfiltfilt(sections, x[:, j], padtype="odd", padlen=padding)
+    states = (q, *differentiate(q, period))
+    for j, cutoff in enumerate(cutoffs):
+        if cutoff <= 0:
+            continue
+        rows = min(len(x), int((FREE + BLENDED) / (cutoff * period)) + 1)
+        weight = _step((np.arange(rows) * period * cutoff - FREE) / BLENDED)
+        begin = _free(x[:rows, j], period, cutoff)
+        end = _free(x[len(x) - rows :, j], period, cutoff)
+        for state, first, last in zip(states, begin, end, strict=True):
+            column = state[:, j]
+            column[:rows] = first + weight * (column[:rows] - first)
+            column[len(x) - rows :] = last + weight[::-1] * (column[len(x) - rows :] - last)
+    return states
+
+
+def low_pass_gain(f: Array, cutoff: float) -> Array:
+    """Gives the share that passes of positions of some frequencies [Hz]: that of the filter, forward and backward."""
+    return np.asarray(1.0 / (1.0 + (f / cutoff) ** (2 * ORDER)))
+
+
+def differentiate(x: Array, period: float) -> tuple[Array, Array]:
+    """Gives the first and second derivative (N, n) by central differences of sixth order, lower at the ends.
+
+    Args:
+        x: (N, n) on an even grid.
+        period: of the grid [s].
+    """
+    first = np.gradient(x, period, axis=0, edge_order=2)
+    second = np.gradient(first, period, axis=0, edge_order=2)
+    if len(x) > 7:
+        a, b, c = x[4:-2] - x[2:-4], x[5:-1] - x[1:-5], x[6:] - x[:-6]
+        first[3:-3] = (45 * a - 9 * b + c) / (60 * period)
+        a, b, c = x[4:-2] + x[2:-4], x[5:-1] + x[1:-5], x[6:] + x[:-6]
+        second[3:-3] = (270 * a - 27 * b + 2 * c - 490 * x[3:-3]) / (180 * period**2)
+    return first, second
+
+
+def _free(x: Array, period: float, cutoff: float) -> tuple[Array, Array, Array]:
+    """Fits a smoothing spline to a position (N,) and gives it with two derivatives.
+
+    A penalty on the differences of B-spline coefficients (Eilers and Marx 1996), of the order of the filter and as
+    strong as halves the cut-off, has in the middle of a log the response of that filter passed forward and backward,
+    1 / (1 + (f / fc)^16), and nothing beyond the ends.
+    """
+    length = (len(x) - 1) * period
+    spans = int(np.clip(np.ceil(length * cutoff * KNOTS), ORDER + 1, max(len(x) - 1, ORDER + 1)))
+    width = length / spans
+    knots = np.arange(-DEGREE, spans + DEGREE + 1) * width
+    t = np.arange(len(x)) * period
+    design = BSpline.design_matrix(np.minimum(t, length * (1 - 1e-12)), knots, DEGREE)
+    size = spans + DEGREE
+    signs = [(-1.0) ** k * binom(ORDER, k) for k in range(ORDER + 1)]
+    differences = diags_array(signs, offsets=range(ORDER + 1), shape=(size - ORDER, size)).tocsr()
+    # At the cut-off, the penalty weighs as much as the data, whose weight B-splines pass on low-passed.
+    passed = width / period * np.sinc(cutoff * width) ** (2 * DEGREE + 2)
+    strength = passed / (2 * np.sin(np.pi * cutoff * width)) ** (2 * ORDER)
+    normal = (design.T @ design + strength * (differences.T @ differences)).tocsr()
+    bands = np.zeros((ORDER + 1, size))
+    for k in range(ORDER + 1):
+        bands[ORDER - k, k:] = normal.diagonal(k)
+    curve = BSpline(knots, solveh_banded(bands, design.T @ x), DEGREE)
+    return curve(t), curve(t, 1), curve(t, 2)
+
+
+def _step(x: Array) -> Array:
+    """Rises from 0 to 1 over the unit interval, with two continuous derivatives."""
+    x = np.clip(x, 0.0, 1.0)
+    return x**3 * (10 - 15 * x + 6 * x**2)

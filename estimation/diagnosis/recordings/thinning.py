@@ -1,0 +1,115 @@
+"""Logs of more rows than are needed: torque, and what of a model jumps between rows, low-passed alike and thinned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+from scipy.signal import firwin, upfirdn
+
+from estimation.diagnosis.recordings.periods import Cycle
+from estimation.diagnosis.recordings.recording import Recording
+from robots.common.stretches import spans
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# The low-pass before thinning sees so many new rows to either side, and no farther: what is not known of a torque for
+# some rows must not ring beside them. Its window (Kaiser) leaves a hundredth of what would fall onto the bands.
+REACH, WINDOW = 2, 3.4
+# Torque within this share of its largest is at it, three samples in a row.
+FLAT = 1e-6
+
+
+def decimate(series: Array, starts: Sequence[int], stride: int) -> Array:
+    """Low-passes rows (N, ...) of logs that begin at `starts`, without delay, and keeps every `stride`-th of each."""
+    runs = [series[start:stop] for start, stop in pairwise((*starts, len(series)))]
+    return np.concatenate([low_pass_rows(run, stride, stride) for run in runs])
+
+
+def decimate_recording(finer: Recording, stride: int) -> Recording:
+    """Thins a recording, which is kept beside."""
+    rows = np.concatenate([np.arange(run.start, run.stop, stride) for run in finer.runs])
+    width = 2 * stride + 1
+
+    def near(flags: Array | Flags) -> Array:
+        spread = [maximum_filter1d(np.asarray(flags[run], dtype=float), width, axis=0) for run in finer.runs]
+        return np.concatenate(spread)[rows]
+
+    unsure = near(finer.unsure) > 0
+    passed = keep_clipped_level(
+        finer.tau, np.concatenate([low_pass_rows(finer.tau[run], stride) for run in finer.runs])
+    )
+    lengths = [-(-(run.stop - run.start) // stride) for run in finer.runs]
+    return replace(
+        finer,
+        t=finer.t[rows],
+        starts=tuple(int(start) for start in np.cumsum([0, *lengths[:-1]])),
+        q=finer.q[rows],
+        dq=finer.dq[rows],
+        ddq=finer.ddq[rows],
+        tau=passed[rows],
+        step=stride * finer.step,
+        cycles=tuple(None if cycle is None else _cycle(cycle, stride, finer.step) for cycle in finer.cycles),
+        unsure=unsure,
+        clear=unsure & ~(near(finer.unsure & ~finer.clear) > 0),
+        late=None if finer.late is None else near(finer.late),
+        rest=None,
+        cutoffs=None,
+        finer=finer,
+    )
+
+
+def shift_motion(recording: Recording, by: float) -> Recording:
+    """Gives a recording with the motion of a moment [s] before: what torque that is logged so late was needed for."""
+    if by == 0.0:
+        return recording
+    moved: dict[str, Array] = {}
+    for name in ("q", "dq", "ddq"):
+        values = getattr(recording, name)
+        moved[name] = np.empty_like(values)
+        for run in recording.runs:
+            t = recording.t[run]
+            at = np.clip(t - by, t[0], t[-1])
+            moved[name][run] = np.column_stack([np.interp(at, t, x) for x in values[run].T])
+    finer = None if recording.finer is None else shift_motion(recording.finer, by)
+    return replace(recording, **moved, finer=finer)  # type: ignore[arg-type]
+
+
+def evaluate_at_full_rate(recording: Recording, evaluate: Callable[[Recording], Array]) -> Array:
+    """Evaluates rows (N, ...) on a recording: of one that is thinned, on all samples, and thinned as its torque was."""
+    if recording.finer is None:
+        return evaluate(recording)
+    return decimate(evaluate(recording.finer), recording.finer.starts, recording.stride)
+
+
+def low_pass_rows(series: Array, ratio: float, kept: int = 1) -> Array:
+    """Low-passes rows (N, ...) of one log without delay, to be `ratio` times as far apart; every `kept`-th of them."""
+    half = int(np.ceil(REACH * ratio))
+    taps = firwin(2 * half + 1, min(1.0 / ratio, 0.99), window=("kaiser", WINDOW))
+    # Beyond its ends a log goes on as it does when it is turned about them.
+    beyond = np.pad(series, ((half, half), *((0, 0),) * (series.ndim - 1)), mode="reflect", reflect_type="odd")
+    first = 2 * half // kept
+    return np.asarray(upfirdn(taps, beyond, down=kept, axis=0))[first : first + -(-len(series) // kept)]
+
+
+def keep_clipped_level(tau: Array, passed: Array) -> Array:
+    """Keeps the flat tops of torque (N, n) that a filter has passed: a drive at its limit gives no more than that."""
+    result = passed.copy()
+    for own, column in zip(result.T, tau.T, strict=True):
+        most = float(np.abs(column).max(initial=0.0))
+        flat = [slice(a, b) for a, b in spans(np.abs(column) >= (1.0 - FLAT) * most) if b - a >= 3]
+        if flat:
+            np.clip(own, -most, most, out=own)
+        for rows in flat:
+            own[rows] = column[rows]
+    return result
+
+
+def _cycle(cycle: Cycle, stride: int, step: float) -> Cycle:
+    start, stop = -(-cycle.start // stride), cycle.stop // stride
+    return Cycle(start, stop, cycle.period, int((stop - start) * stride * step / cycle.period + 0.1))

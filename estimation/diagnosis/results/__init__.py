@@ -1,0 +1,1 @@
+"""The result of a diagnosis and its text; nothing is decided here."""

@@ -1,0 +1,239 @@
+"""From numbers to a diagnosis: the extended model, its gain on unseen data, findings in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.base_models.payload_and_gravity import build_situation
+from estimation.diagnosis.experiment_plans.detection_limits import Limit
+from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment, plan_next
+from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.hypothesis_tests.scan import measure
+from estimation.diagnosis.joint_fits.extended_fit import fit_extended
+from estimation.diagnosis.recordings.recording import cut_recording
+from estimation.diagnosis.results.diagnosis import Diagnosis, Trace
+from estimation.diagnosis.results.notes import (
+    beside_larger,
+    farther_joints,
+    faster_joints,
+    notes_of,
+    turning_joints,
+    worse_joints,
+)
+from estimation.diagnosis.results.wording import no_part, word_finding
+from estimation.diagnosis.searches.selection import SelectedEffect, Selection
+from estimation.diagnosis.validations.equivalent_shapes import complete_effects, equivalent_shapes
+from estimation.diagnosis.validations.free_functions import strongest_pattern
+from estimation.diagnosis.validations.gain_intervals import HeldOutErrors
+from estimation.diagnosis.validations.gear_compliance import EFFECT as ELASTICITY
+from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance, measure_gear_compliance
+from estimation.diagnosis.validations.held_out_errors import HeldOutResult, measure_held_out, simulate_held_out
+from estimation.diagnosis.validations.held_out_validation import validate_on_held_out
+from estimation.diagnosis.validations.prediction_settings import (
+    all_row_errors,
+    with_band,
+    with_best_cutoff,
+    with_best_sign_sharpness,
+)
+from estimation.diagnosis.validations.verdict import CLOSE, Verdict, has_close_rivals
+from estimation.logs.provenance import describe_logs
+from robots.robot import Robot
+from robots.signals import Log
+from robots.terms.discrepancies.patterns import all_patterns
+from robots.terms.effects import Effect
+from robots.version import VERSION
+
+Array = NDArray[np.float64]
+
+SHOWN = 4000  # rows of the curves kept for pictures
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosisInputs:
+    """All that a diagnosis is made of."""
+
+    problem: Problem
+    selection: Selection
+    judgement: Verdict
+    limits: tuple[Limit, ...]
+    excess: Array
+    logs: tuple[Log, ...]
+    held_out: tuple[Log, ...]
+    false_alarm: float
+    seed: int
+    dated: bool = True
+    notes: tuple[str, ...] = ()
+
+
+def assemble(robot: Robot, told: DiagnosisInputs) -> Diagnosis:
+    """Fits the extended model, measures it on unseen data, and puts the findings into words."""
+    problem = told.problem
+    judgement = replace(told.judgement, kept=complete_effects(problem, told.judgement.kept))
+    held = validate_on_held_out(
+        judgement,
+        lambda members, gone: measure_held_out(robot, problem, members, told.held_out, told.seed + 3, gone),
+        partial(_is_beyond, told),
+        partial(equivalent_shapes, problem),
+        lambda member: member.worth(problem.rows),
+        partial(_unnamed, robot, told),
+    )
+    members, founds, seen = held.members, held.founds, held.seen
+    twisted = _compliances(told, seen)
+    # Where nothing else is left, a name that unseen data refuted shows at least where something is unexplained.
+    spoiling = held.spoiling or (() if members or twisted else held.refuted)
+    verdict = judgement.verdict
+    if len(members) > len(founds) or spoiling:
+        verdict = "unexplained"
+    elif held.notes:
+        # Something did stand out of the noise clearly, if a name that did does not hold.
+        verdict = "ambiguous" if any(map(has_close_rivals, founds)) else "named"
+        verdict = verdict if members else "unexplained" if held.refuted else "none"
+    fitted = fit_extended(problem, members, _provenance(told))
+    findings = tuple(
+        word_finding(
+            robot,
+            problem,
+            member,
+            fitted,
+            i,
+            held.p_values[i],
+            founds[i] if i < len(founds) else None,
+            seen.gains[i],
+        )
+        for i, member in enumerate(members)
+    )
+    order = sorted(range(len(findings)), key=lambda i: -findings[i].delta_bic)
+    findings = tuple(findings[i] for i in order)
+    if spoiling:
+        fit = fit_extended(problem, [*members, *(member for member, _, _ in spoiling)], {})
+        findings += tuple(
+            no_part(word_finding(robot, problem, member, fit, i, p_value, None, gain))
+            for i, (member, p_value, gain) in enumerate(spoiling, start=len(members))
+        )
+    unseen, apart = seen.unseen, findings[len(members) :]
+    if twisted and not members and not spoiling:
+        verdict = "named"
+    findings += tuple(windup.finding for windup in twisted)
+    known = {extension.joint for extension in fitted.model.extensions if extension.effect == ELASTICITY}
+    added = [windup.extension for windup in twisted if windup.extension.joint not in known]
+    simulation = simulate_held_out(problem, members, seen, bool(told.held_out)) if members else None
+    lost = (_LOST,) if members and simulation is None else ()
+    timed = [member for member in members if member.group.by_reversals]
+    whole = replace(fitted.model, extensions=(*fitted.model.extensions, *added))
+    whole = with_best_sign_sharpness(with_best_cutoff(whole, problem, told.logs), told.logs)
+    model = with_band(whole, told.logs, told.held_out, unseen)
+    # Of a joint that rests in all of them unseen data say nothing: that is no error of zero.
+    shown = unseen.counts.any(axis=0)
+    before, after = (np.where(shown, unseen.nrmse(model), np.nan) for model in (0, len(unseen.errors) - 1))
+    return Diagnosis(
+        verdict=verdict,
+        findings=findings,
+        baseline=before,
+        extended=after,
+        explained=judgement.explained,
+        excess=told.excess,
+        limits=told.limits,
+        next_experiment=_next(problem, founds) if verdict == "ambiguous" else None,
+        model=model,
+        how_unseen=unseen.how,
+        notes=_each_once(
+            *told.notes,
+            *notes_of(problem, told.false_alarm, findings, apart, after, [m.hypothesis.name for m in timed]),
+            *worse_joints(before, after),
+            *turning_joints(all_row_errors(model), after, unseen.counts),
+            *faster_joints(problem, seen),
+            *farther_joints(problem, seen, findings),
+            *held.notes,
+            *beside_larger(told.selection.slight, members),
+            *lost,
+        ),
+        trace=_trace(unseen, [seen.coordinates[i] for i in order], twisted),
+        simulation=simulation,
+    )
+
+
+def _each_once(*notes: str) -> tuple[str, ...]:
+    """Several functions of one joint are told in the same words."""
+    return tuple(dict.fromkeys(notes))
+
+
+def _is_beyond(told: DiagnosisInputs, effect: Effect) -> bool:
+    """Whether unseen logs say nothing of an effect that belongs to the logs of the fit: a contact, a drift.
+
+    Where it is not known when they were recorded, they say nothing of what comes with time.
+    """
+    if any(f.member.hypothesis.effect is effect and f.member.group.by_reversals for f in told.selection.found):
+        return True
+    if not told.held_out:
+        return False
+    return effect.passing or (not told.dated and effect.depends_on == "time")
+
+
+def _unnamed(
+    robot: Robot, told: DiagnosisInputs, member: FittedEffect, beside: Sequence[FittedEffect]
+) -> tuple[FittedEffect, float] | None:
+    """Finds a free function on the joint of a name that unseen data refuted, or on all where it was the robot's."""
+    own = member.hypothesis.joint
+    wanted = [h for h in all_hypotheses(robot, list(all_patterns(robot))) if own is None or h.joint == own]
+    entries = measure(told.problem, wanted)
+    rng = np.random.default_rng(told.seed + 4)
+    return strongest_pattern(told.problem, entries, beside, told.false_alarm, rng)
+
+
+_LOST = "Simulated forward, the fitted robot ran away from the position loop: its fit suits no simulation."
+
+
+def _compliances(told: DiagnosisInputs, seen: HeldOutResult) -> tuple[MeasuredCompliance, ...]:
+    """Gears whose wind-up was logged; on held-out logs their gain is measured where those have it too."""
+    if all(log.qlink is None for log in told.logs):
+        return ()
+    now, unseen = told.problem.situation, None
+    if any(log.qlink is not None for log in told.held_out):
+        other = cut_recording(seen.whole, slice(seen.first, len(seen.whole)))
+        there = build_situation(other, now.model, told.problem.parameters_without_payload)
+        unseen = (there, other, told.held_out)
+    return measure_gear_compliance(now, told.problem.recording, told.logs, false_alarm=told.false_alarm, unseen=unseen)
+
+
+def _next(problem: Problem, founds: Sequence[SelectedEffect]) -> NextExperiment | None:
+    """Plans the experiment that tells the causes that are left apart."""
+    for found in founds:
+        close = [rival for rival, worse in found.rivals if worse < CLOSE]
+        if close:
+            return plan_next(problem, [found.member, *close])
+    return None
+
+
+def _trace(unseen: HeldOutErrors, seen_as: Sequence[Array], windups: Sequence[MeasuredCompliance]) -> Trace:
+    rows = slice(None, None, max(1, len(unseen.t) // SHOWN))
+    hidden = ~unseen.counts
+    before, after = (np.where(hidden, np.nan, unseen.errors[k]) for k in (0, -1))
+    coordinates = tuple(values[rows] for values in seen_as)
+    curves = tuple(
+        tuple(values[:: max(1, len(values) // SHOWN)] for values in (w.coordinate, w.before, w.after)) for w in windups
+    )
+    return Trace(unseen.t[rows], unseen.measured[rows], before[rows], after[rows], coordinates, curves)
+
+
+def _provenance(told: DiagnosisInputs) -> dict[str, object]:
+    problem = told.problem
+    torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
+    return {
+        "logs": describe_logs(told.logs),
+        "method": "diagnosis",
+        "tool_version": VERSION,
+        "cutoff_hz": float(max(problem.recording.cutoff, *(band.cutoff for band in problem.whitening.bands))),
+        "velocity_scales": [float(v) for v in problem.situation.velocity_scale],
+        "seed": told.seed,
+        "false_alarm": told.false_alarm,
+        "residual_rms": np.sqrt(np.mean(problem.remainder**2, axis=0)).tolist(),
+        "torque_rms": torque.tolist(),
+        "gravities": [list(gravity) for gravity in problem.baseline.base.gravities],
+    }

@@ -1,0 +1,292 @@
+"""What a diagnosis found: the verdict, the causes, what mending them brings, and what could not have been seen."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.experiment_plans.detection_limits import Limit, summarise_limits
+from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
+from estimation.diagnosis.findings import Finding, list_parameters, read_finding
+from estimation.diagnosis.validations.prediction_settings import all_row_errors
+from estimation.diagnosis.validations.simulation_result import Simulation, read_simulation
+from estimation.models.model import Model, load_model
+from robots.common.errors import InputError
+from robots.common.files import write_atomic
+from robots.common.plain import finite, number
+from robots.terms.base import length_unit
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+DIAGNOSIS, MODEL = "diagnosis.json", "model.json"
+VERDICTS = ("none", "named", "ambiguous", "unexplained")
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Curves behind a finding, for pictures; all (M,) or (M, n).
+
+    Attributes:
+        coordinate: per finding in the torque the axis on which it shows.
+        measured: torque.
+        before: residual of the base model.
+        after: residual of the extended model.
+        t: time [s].
+        windups: per finding by encoders behind the gears, which follow: load, and position behind the gear, measured
+            less simulated, by a rigid and by an elastic gear.
+    """
+
+    t: Array
+    measured: Array
+    before: Array
+    after: Array
+    coordinate: tuple[Array, ...]
+    windups: tuple[tuple[Array, ...], ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnosis:
+    """The result of `diagnose`.
+
+    Attributes:
+        verdict: ``none``, ``named``, ``ambiguous`` or ``unexplained``.
+        findings: the strongest first.
+        baseline: NRMSE of the base model per joint (n,), on data that the fit has not seen.
+        extended: NRMSE of the extended model there.
+        explained: share of the excess over noise that the named effects explain; 1 where nothing is left.
+        excess: per joint the shares (n, 3) of the base model's squared residual that are noise, that repeat with the
+            motion, and that change with time; NaN where the motion does not repeat.
+        limits: what the logs could have shown.
+        next_experiment: what to measure next; None where nothing is open.
+        model: the extended model.
+        how_unseen: how the unseen data were kept apart.
+        notes: what a reader must know.
+        trace: curves for pictures; None once loaded from a file.
+        simulation: the motion of a stretch of unseen data, simulated without and with what was found; None where
+            nothing was.
+    """
+
+    verdict: str
+    findings: tuple[Finding, ...]
+    baseline: Array
+    extended: Array
+    explained: float
+    excess: Array
+    limits: tuple[Limit, ...]
+    next_experiment: NextExperiment | None
+    model: Model
+    how_unseen: str
+    notes: tuple[str, ...] = ()
+    trace: Trace | None = field(default=None, repr=False)
+    simulation: Simulation | None = None
+
+    @property
+    def success(self) -> bool:
+        """Whether the question is answered: nothing found, or named without a rival left."""
+        return self.verdict in ("none", "named")
+
+    @property
+    def every_row(self) -> Array:
+        """NRMSE (n,) of the extended model on unseen data as `predict` has it; NaN where it is not known.
+
+        `baseline` and `extended` leave out rows in which a joint's direction of motion is not known.
+        """
+        return all_row_errors(self.model)
+
+    def summary(self) -> str:
+        """Says what was found, what it brings, and what stays open."""
+        robot = self.model.robot
+        lines = [f"{robot.name}: {_VERDICTS[self.verdict]}"]
+        if self.verdict == "none" and (seen := summarise_limits(self.limits)):
+            lines.append(f"  {seen[0].lower()}{seen[1:]}")
+        for finding in self.findings:
+            where = f"joint {finding.joint}" if finding.joint else "whole robot"
+            gain = finding.gain
+            lines.append(f"  {finding.effect} ({where}), p {_p(finding.p_value)}: {finding.sentence}")
+            of = "wind-up" if finding.measured_by else "torque"
+            before, after = (f"{100 * value:.2f} %" for value in (gain.nrmse_before, gain.nrmse_after))
+            fall = " to ".join(f"{100 * value:.2f}" for value in gain.ci95)
+            # Its own gain is what the model loses without it alone.
+            beside = ", beside the other findings" if len(self.findings) > 1 and not finding.measured_by else ""
+            lines.append(f"    unseen error{finding.elsewhere} {before} -> {after} of the {of}{beside} (fall {fall} %)")
+            # Coefficients of a free function mean nothing each.
+            parameters = finding.parameters if finding.effect != "unexplained" else ()
+            if known := [parameter.told for parameter in parameters if parameter.determined]:
+                lines.append(f"    95 % intervals: {list_parameters(known)}")
+            if open_ := [parameter.told for parameter in parameters if not parameter.determined]:
+                lines.append(f"    not well determined by these logs: {list_parameters(open_)}")
+            close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]
+            if close:
+                lines.append(f"    not told apart from: {', '.join(close)}")
+        before, after, every = (
+            " ".join(f"{100 * value:.2f}" if np.isfinite(value) else "-" for value in errors)
+            for errors in (self.baseline, self.extended, self.every_row)
+        )
+        told = {"unseen error per joint [% of torque RMS]": before}
+        if self.findings:
+            told["with the extension"] = after
+        if np.isfinite(self.every_row).any():
+            told[f"every row counted, as in `oed predict{' --before' if self.model.keeps_heat else ''}`"] = every
+        width = 2 + max(map(len, told))
+        lines += [f"{name:>{width}}: {errors}" for name, errors in told.items()]
+        lines.append(f"  measured on {self.how_unseen}")
+        if self.simulation is not None:
+            lengths = [length_unit(robot, j) for j in range(robot.n)]
+            lines.append(f"  {self.simulation.summary(lengths)}")
+        if self.next_experiment is not None:
+            lines.append(f"  next: {self.next_experiment.why}")
+        lines += [f"  {note}" for note in self.notes]
+        return "\n".join(lines)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per finding and parameter."""
+        import pandas as pd
+
+        rows = [
+            {
+                "effect": finding.effect,
+                "joint": finding.joint,
+                "parameter": parameter.name,
+                "value": parameter.value,
+                "unit": parameter.unit,
+                "low": parameter.ci95[0],
+                "high": parameter.ci95[1],
+                "determined": parameter.determined,
+                "p_value": finding.p_value,
+                "delta_bic": finding.delta_bic,
+            }
+            for finding in self.findings
+            for parameter in finding.parameters
+        ]
+        names = ["effect", "joint", "parameter", "value", "unit", "low", "high", "determined", "p_value", "delta_bic"]
+        return pd.DataFrame(rows, columns=names)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes `diagnosis.json`."""
+        return {
+            "verdict": self.verdict,
+            "findings": [finding.to_dict() for finding in self.findings],
+            "baseline": {"nrmse": list(map(finite, self.baseline.tolist()))},
+            "extended": {"nrmse": list(map(finite, self.extended.tolist()))},
+            "explained": self.explained,
+            "excess": [
+                dict(zip(("noise", "state", "time"), map(finite, row), strict=True)) for row in self.excess.tolist()
+            ],
+            "limits": [limit.to_dict() for limit in self.limits],
+            "next_experiment": None if self.next_experiment is None else self.next_experiment.to_dict(),
+            "unseen": self.how_unseen,
+            "simulation": None if self.simulation is None else self.simulation.to_dict(),
+            "notes": list(self.notes),
+        }
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the unseen error of each joint, before and after."""
+        from matplotlib.figure import Figure
+
+        axes = ax if ax is not None else Figure(figsize=(6, 4)).subplots()
+        joints = np.arange(1, len(self.baseline) + 1)
+        axes.bar(joints - 0.2, 100 * self.baseline, 0.4, label="base model")
+        axes.bar(joints + 0.2, 100 * self.extended, 0.4, label="extended model")
+        axes.set_xlabel("joint")
+        axes.set_ylabel("unseen error / torque RMS [%]")
+        axes.legend()
+        return axes
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Writes `diagnosis.json` and `model.json` into a folder that is there.
+
+        Raises:
+            InputError: a file is there, and force is not given.
+        """
+        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
+        write_atomic(Path(folder) / DIAGNOSIS, text, force=force)
+        self.model.save(Path(folder) / MODEL, force=force)
+
+    @staticmethod
+    def load(folder: str | Path) -> Diagnosis:
+        """Reads what `save` wrote; the curves and the motions of the next experiment are not in the files.
+
+        Raises:
+            InputError: a missing file, or one that is no diagnosis.
+        """
+        file = Path(folder) / DIAGNOSIS
+        try:
+            data = json.loads(file.read_text(encoding="utf-8"))
+            model = load_model(Path(folder) / MODEL)
+            return _from_dict(data, model)
+        except FileNotFoundError:
+            raise InputError("no such file", file=file, remedy="give the folder that `oed diagnose` wrote") from None
+        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+            raise InputError(f"cannot be read as JSON: {error}", file=file) from error
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(f"is damaged: {type(error).__name__} {error}", file=file) from error
+
+
+def _from_dict(data: dict[str, Any], model: Model) -> Diagnosis:
+    if data["verdict"] not in VERDICTS:
+        raise ValueError(f"verdict {data['verdict']!r}")
+    following = data["next_experiment"]
+    return Diagnosis(
+        verdict=data["verdict"],
+        findings=tuple(read_finding(item) for item in data["findings"]),
+        baseline=np.array(data["baseline"]["nrmse"], dtype=float),
+        extended=np.array(data["extended"]["nrmse"], dtype=float),
+        explained=float(data["explained"]),
+        excess=np.array([[number(row[key]) for key in ("noise", "state", "time")] for row in data["excess"]]),
+        limits=tuple(_limit(item) for item in data["limits"]),
+        next_experiment=None if following is None else _next(following),
+        model=model,
+        how_unseen=data["unseen"],
+        notes=tuple(data["notes"]),
+        # Older files have none.
+        simulation=None if data.get("simulation") is None else read_simulation(data["simulation"]),
+    )
+
+
+def _limit(item: dict[str, Any]) -> Limit:
+    return Limit(
+        effect=item["effect"],
+        joint=item["joint"],
+        detectable=number(item["detectable"], np.inf),
+        # Older files have none.
+        at_worst=number(item.get("at_worst"), np.inf),
+        attributable=number(item["attributable"], np.inf),
+        toughest=item["toughest_rival"],
+        visible=float(item["visible"]),
+        note=item["note"],
+    )
+
+
+def _next(item: dict[str, Any]) -> NextExperiment:
+    return NextExperiment(
+        kind=item["kind"],
+        joint=item["joint"],
+        why=item["why"],
+        resolves=float(item["resolves"]),
+        stages=(),
+        ranking=(),
+        # Older files have none.
+        times=int(item.get("times", 1)),
+        logged=str(item.get("logged", "")),
+    )
+
+
+_VERDICTS = {
+    "none": "nothing found beyond the base model and its noise",
+    "named": "the model lacks a cause that has a name",
+    "ambiguous": "the model lacks a cause, and more than one fits",
+    "unexplained": "the model lacks something that no effect of the catalogue explains",
+}
+
+
+def _p(value: float) -> str:
+    return f"{value:.3f}" if value >= 0.001 else "< 0.001"

@@ -1,0 +1,249 @@
+"""What a person must know besides: joints that rest or err, values not told, what unseen data do not bear out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.experiment_plans.detection_limits import STILL
+from estimation.diagnosis.experiment_plans.undetectable_springs import undetectable_springs
+from estimation.diagnosis.findings import Finding
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.recordings.recording import cut_recording
+from estimation.diagnosis.validations.held_out_errors import HeldOutResult
+from robots.terms.effects import EFFECTS
+from robots.terms.effects.current_clipping import CERTAIN, CurrentClipping
+
+Array = NDArray[np.float64]
+
+# Error on unseen data that is worth a word: so many times that of the fit and more than this share of the torque, or
+# more than the second share, whatever the fit's.
+STRANGE, FAR, ODD = 1.5, 0.035, 0.2
+# Unseen speeds beyond the fitted ones by this factor are worth one, too.
+FASTER = 1.3
+# So are positions beyond the fitted ones by this share of their range, for this share of the time.
+FARTHER, PLACED = 0.05, ("spring", "unexplained")
+# So is a joint on which the extended model errs by so many times what the base model does, and so much more.
+WORSE, LITTLE = 1.1, 0.001
+# So is a joint that errs so many times as much in all rows as in those that count, where this share or more does not.
+MUCH_MORE, SEVERAL = 2.0, 0.01
+CLIPPING = CurrentClipping()
+
+
+_AT_LIMIT = (
+    "The torque of joint {} is at its largest, {:.4g}, in samples in a row, several times: its drive is at its limit "
+    "there. What that cuts off is too little to show."
+)
+
+
+def notes_of(
+    problem: Problem,
+    false_alarm: float,
+    findings: Sequence[Finding],
+    apart: Sequence[Finding],
+    after: Array,
+    timed: Sequence[str] = (),
+) -> tuple[str, ...]:
+    """Says what the logs and the findings leave open.
+
+    Args:
+        problem: the logs.
+        false_alarm: chance of one.
+        findings: all of them.
+        apart: those that are no part of the extended model.
+        after: error of that model over torque RMS on unseen data (n,).
+        timed: effects that reversals tell whose rows do not count.
+    """
+    recording = problem.recording
+    notes = []
+    still = [j + 1 for j in range(recording.n) if np.ptp(recording.q[:, j]) < STILL]
+    if still:
+        names = ", ".join(map(str, still))
+        whose = f"Joints {names} hardly moved: their" if len(still) > 1 else f"Joint {names} hardly moved: its"
+        notes.append(
+            f"{whose} friction, gears and rotors cannot be judged; what gravity and the other joints ask of them can."
+        )
+    told_of = {finding.joint for finding in findings if finding.effect == CLIPPING.name}
+    for j in sorted({*range(1, recording.n + 1)} - told_of):
+        if CLIPPING.chance(problem.sees(CLIPPING), j, recording.tau) < CERTAIN:
+            notes.append(_AT_LIMIT.format(j, float(np.abs(recording.tau[:, j - 1]).max())))
+    strange = _strange(problem, after)
+    notes += strange.values()
+    notes += [
+        f"Joint {j + 1}: {100 * after[j]:.0f} % of the torque that no fit has seen is left. What cannot be told from "
+        "noise counts as noise, and an effect has to stand out of it: look at the logs one by one."
+        for j in np.flatnonzero(after > ODD)
+        if j not in strange
+    ]
+    for finding in findings:
+        shapes = EFFECTS[finding.effect].shapes if finding.effect in EFFECTS else ()
+        assumed = {(shape.name, shape.default) for shape in shapes}
+        lost = [p for p in finding.parameters if not p.determined and p.unit == "s" and np.isnan(p.standard_error)]
+        for parameter in (p for p in lost if (p.name, p.value) not in assumed):
+            notes.append(
+                f"{parameter.name} of {finding.effect} is not determined by {recording.duration:.0f} s of logs: the "
+                f"value {parameter.value:.3g} s is one of many that fit."
+            )
+        # What is no part of the model says so itself.
+        if finding.effect in timed:
+            notes.append(_TIMED.format(finding.effect))
+        elif finding.gain.ci95[0] <= 0 and finding not in apart:
+            notes.append(unsure_gain(finding))
+    part = [finding for finding in findings if finding not in apart]
+    open_ = sorted({finding.joint for finding in part if finding.effect == "unexplained" and finding.joint})
+    if open_:
+        names = ", ".join(map(str, open_))
+        notes.append(
+            f"No effect of the catalogue explains what stands out of the noise on joint{'s' if len(open_) > 1 else ''} "
+            f"{names}: a free function of the inputs named above was fitted there instead. It predicts where the robot "
+            "has been, and says nothing elsewhere."
+        )
+    sprung = {finding.joint for finding in findings if finding.effect == "spring"}
+    notes += [text for joint, text in undetectable_springs(problem, false_alarm) if joint not in sprung]
+    return tuple(notes)
+
+
+_TIMED = (
+    "What tells {} are impulses at reversals, whose rows count neither in the fit nor on unseen data: encoders tell "
+    "too little of when the joints turn round. Its gain there says nothing of it."
+)
+_UNSURE = "The gain of {} on unseen data is not sure: its interval begins below zero."
+_VAGUE = (
+    " Nor do these logs determine any of its parameters: they tell that something acts there, and the name is no more "
+    "than the likeliest for it."
+)
+_AGAINST = (
+    "With {} the model predicts the unseen data worse: what is in the logs of the fit is not so there, has another "
+    "cause, or moves base parameters that those logs hardly tell."
+)
+
+
+def unsure_gain(finding: Finding) -> str:
+    """Says that the interval of a gain begins below zero, and what else is open of a name."""
+    named = finding.effect != "unexplained"
+    what = finding.effect if named else "what is unexplained"
+    where = f"{what} of joint {finding.joint}" if finding.joint else what
+    vague = named and finding.parameters and not any(parameter.determined for parameter in finding.parameters)
+    return (_UNSURE if finding.gain.ci95[1] >= 0 else _AGAINST).format(where) + (_VAGUE if vague else "")
+
+
+def _strange(problem: Problem, after: Array) -> dict[int, str]:
+    """Says where the model predicts logs far worse than it fits them: there is more in them than was found."""
+    counts = ~problem.recording.unsure
+    number = np.maximum(counts.sum(axis=0), 1)
+    torque = np.sqrt((problem.recording.tau**2 * counts).sum(axis=0) / number)
+    fitted = np.sqrt((problem.remainder**2 * counts).sum(axis=0) / number) / np.maximum(torque, 1e-12)
+    far = np.flatnonzero(after > np.maximum(STRANGE * fitted, FAR))
+    return {int(j): _STRANGE.format(j + 1, 100 * after[j], 100 * fitted[j]) for j in far}
+
+
+_STRANGE = (
+    "Joint {}: {:.3g} % of the torque that no fit has seen is left, where the base model leaves {:.2g} % of what it "
+    "was fitted to. The logs differ in something that was not found, or some of them do not tell its parameters."
+)
+
+
+def worse_joints(before: Array, after: Array) -> list[str]:
+    """Says on which joints the extended model errs more on unseen data than the base model does, by their NRMSE (n,).
+
+    What helps on one joint moves base parameters of others.
+    """
+    worse = np.flatnonzero(after > np.maximum(WORSE * before, before + LITTLE))
+    if not len(worse):
+        return []
+    told = ", ".join(f"{j + 1} ({100 * before[j]:.3g} -> {100 * after[j]:.3g} %)" for j in worse)
+    return [f"The extended model errs more than the base model on joint{'s' if len(worse) > 1 else ''} {told}."]
+
+
+def turning_joints(every: Array, after: Array, counts: NDArray[np.bool_]) -> list[str]:
+    """Says on which joints rows that do not count make the model's error far larger, and why no model has less there.
+
+    Args:
+        every: its NRMSE with every row counted (n,).
+        after: of rows that count (n,).
+        counts: which those are (N, n).
+    """
+    aside = 1.0 - counts.mean(axis=0)
+    (joints,) = np.nonzero((every > MUCH_MORE * after) & (aside > SEVERAL))
+    if not len(joints):
+        return []
+    names = ", ".join(str(j + 1) for j in joints)
+    shares = sorted({f"{100 * share:.0f}" for share in (aside[joints].min(), aside[joints].max())}, key=float)
+    return [_TURNING.format("s" if len(joints) > 1 else "", names, " to ".join(shares))]
+
+
+_TURNING = (
+    "Joint{} {}: in {} % of the unseen rows the joint rests or turns round. Friction may hold against either side "
+    "there, and no model of motion knows which: the error with every row counted has those rows besides."
+)
+
+
+def faster_joints(problem: Problem, seen: HeldOutResult) -> list[str]:
+    """Says which joints are faster on unseen data than their friction's polynomial was fitted for."""
+    if seen.whole is problem.recording or not any(column.symbol == "f4" for column in problem.baseline.base.columns):
+        return []
+    unseen = cut_recording(seen.whole, slice(seen.first, len(seen.whole)))
+    known, there = (np.abs(recording.dq).max(axis=0) for recording in (problem.recording, unseen))
+    ratio = there / np.maximum(known, 1e-9)
+    fast = np.flatnonzero(ratio > FASTER)
+    names = ", ".join(str(j + 1) for j in fast)
+    return [_FASTER.format("s" if len(fast) > 1 else "", names, ratio[fast].max())] if len(fast) else []
+
+
+def farther_joints(problem: Problem, seen: HeldOutResult, findings: Sequence[Finding]) -> list[str]:
+    """Says where unseen data go beyond the positions by which a function of a joint's position was fitted."""
+    if seen.whole is problem.recording:
+        return []
+    unseen = cut_recording(seen.whole, slice(seen.first, len(seen.whole)))
+    notes = []
+    placed = {f.joint for f in findings if f.effect in PLACED and f.coordinate.startswith("position of joint")}
+    for joint in sorted(joint for joint in placed if joint):
+        known, there = (np.ptp(recording.q[:, joint - 1]) for recording in (problem.recording, unseen))
+        low, high = (float(limit(problem.recording.q[:, joint - 1])) for limit in (np.min, np.max))
+        q = unseen.q[:, joint - 1]
+        beyond = float(np.mean((q < low - FARTHER * known) | (q > high + FARTHER * known)))
+        if beyond > FARTHER:
+            notes.append(_FARTHER.format(joint, 100 * beyond, there / max(known, 1e-9)))
+    return notes
+
+
+_FARTHER = (
+    "Joint {}: for {:.0f} % of the time the unseen data are beyond the positions in the logs of the fit ({:.1f} times "
+    "their range). What was found to depend on its position is not known there: error and gain may be far off."
+)
+_FASTER = (
+    "Joint{} {}: up to {:.1f} times as fast on the unseen data as in the logs of the fit. What a polynomial fitted to "
+    "slower motion says of friction there may be far off, and with it error and gain; coulomb-viscous errs less."
+)
+
+
+def beside_larger(slight: FittedEffect | None, members: Sequence[FittedEffect]) -> tuple[str, ...]:
+    """Says what stood out beside what was found, but is as small as formulas may leave of that."""
+    if slight is None:
+        return ()
+    told = [(slight.gain_on([j]) / m.gain_on([j]), m, j) for m in members for j in slight.group.joints if _acts(m, j)]
+    if not told:
+        return ()
+    share, member, j = min(told, key=lambda each: each[0])
+    if slight.hypothesis.effect.alike:
+        return (_NOT_ALIKE.format(slight.hypothesis.label, member.hypothesis.label),)
+    if share >= 1.0:
+        return ()
+    return (_SLIGHT.format(slight.hypothesis.label, member.hypothesis.label, 100 * share, j + 1),)
+
+
+def _acts(member: FittedEffect, joint: int) -> bool:
+    return joint in member.group.joints and member.gain_on([joint]) > 0
+
+
+_SLIGHT = (
+    "{0} stands out of the noise, too, but explains {2:.1f} % of what {1} does on joint {3}, as much as the formula of "
+    "that may leave: it is not told as a finding. A log in which {1} acts less would show whether it is one."
+)
+_NOT_ALIKE = (
+    "{0} stands out of the noise, too, but not beyond what {1} may leave, or make drives answer, on the joints that "
+    "tell it: it is not told as a finding."
+)

@@ -1,0 +1,182 @@
+"""A fitted effect as a finding: its parameters with intervals, its rivals, its gain, and what it means in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.findings import Finding, Gain, Parameter
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.joint_fits.extended_fit import ExtendedFit
+from estimation.diagnosis.searches.selection import SelectedEffect
+from robots.robot import Robot
+from robots.terms.base import force_unit, length_unit
+from robots.terms.discrepancies.patterns import PREFIX
+from robots.terms.effect_bases.base import Coefficient, Effect, Shape
+from robots.terms.effects import EFFECTS
+
+# A parameter that an effect is not linear in is determined where its interval reaches no farther than this share of it;
+# a moment, so many seconds.
+WITHIN, MOMENT = 0.2, 0.2
+# Share of an effect's largest coefficient that is none.
+NOTHING = 1e-6
+
+
+def word_finding(
+    robot: Robot,
+    problem: Problem,
+    member: FittedEffect,
+    fitted: ExtendedFit,
+    i: int,
+    p_value: float,
+    found: SelectedEffect | None,
+    gain: Gain,
+) -> Finding:
+    """Puts one effect of the extended model into words and numbers.
+
+    Args:
+        robot: of the logs.
+        problem: what the effect was found in.
+        member: the effect.
+        fitted: the extended model that holds it.
+        i: its place there.
+        p_value: of the effect.
+        found: with its rivals; None for a free function.
+        gain: on unseen data.
+    """
+    extension, known = fitted.model.extensions[i], fitted.effects[i]
+    hypothesis = member.hypothesis
+    joint = hypothesis.joint
+    units = {}
+    if joint is not None:
+        units = {"force": force_unit(robot, joint - 1), "length": length_unit(robot, joint - 1)}
+    parameters = _parameters(robot, member, fitted, i, known)
+    sentence = _when(hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units), parameters)
+    if hypothesis.effect.vague and not known[: len(extension.coefficients)].any():
+        sentence = hypothesis.effect.vague.format(joint=joint)
+    pattern = hypothesis.name if hypothesis.name.startswith(PREFIX) else ""
+    rivals = [] if found is None else [(rival.hypothesis, worse) for rival, worse in found.rivals]
+    return Finding(
+        effect="unexplained" if pattern else hypothesis.name,
+        joint=joint,
+        parameters=parameters,
+        p_value=p_value,
+        delta_bic=member.worth(problem.rows),
+        gain=gain,
+        rivals=tuple(
+            (h.name if h.joint in (joint, None) else f"{h.name} of joint {h.joint}", float(worse))
+            for h, worse in rivals
+        ),
+        sentence=sentence,
+        visible=member.visible,
+        coordinate=hypothesis.effect.coordinate(problem.sees(hypothesis.effect), joint, member.shape)[0],
+        pattern=pattern,
+    )
+
+
+def _when(sentence: str, parameters: Sequence[Parameter]) -> str:
+    """Says between which times a change came where it is not known better, and at least when something pushed."""
+    for own in parameters:
+        if own.name == "change_time" and not own.determined and np.isfinite(own.ci95).all():
+            between = f"between t = {own.ci95[0]:.1f} and {own.ci95[1]:.1f} s"
+            sentence = sentence.replace(f"at t = {own.value:.2f} s", between)
+    spell = {own.name: own for own in parameters if own.name in ("start", "duration")}
+    if len(spell) == 2 and not all(np.isfinite(own.ci95).all() for own in spell.values()):
+        start, duration = (spell[name].value for name in ("start", "duration"))
+        least = f"from t = {start:.1f} to {start + duration:.1f} s at least"
+        sentence = sentence.replace(f"from t = {start:.2f} s for {duration:.2g} s", least)
+    return sentence
+
+
+def no_part(finding: Finding) -> Finding:
+    """Words what shows that something is unexplained, but is no part of the extended model."""
+    if finding.pattern:
+        return replace(finding, sentence=f"{finding.sentence} {_ERRS}")
+    told = _DENIED.format(EFFECTS[finding.effect].title)
+    return replace(finding, effect="unexplained", parameters=(), rivals=(), sentence=told)
+
+
+_ERRS = (
+    "Unseen data do not bear that function out: it shows where something is unexplained, and is no part of the model."
+)
+_DENIED = (
+    "Something stands out of the noise that looks like {}, but unseen data speak against that: what it is, is not "
+    "known. The model has no part of it."
+)
+
+
+def _parameters(
+    robot: Robot, member: FittedEffect, fitted: ExtendedFit, i: int, known: NDArray[np.bool_]
+) -> tuple[Parameter, ...]:
+    extension = fitted.model.extensions[i]
+    effect = member.hypothesis.effect
+    described: list[Coefficient | Shape] = [
+        *effect.described(robot, extension.joint, extension.shape),
+        *effect.shapes,
+    ]
+    values = [*extension.coefficients.tolist(), *extension.shape]
+    errors = np.sqrt(np.maximum(np.diag(extension.covariance), 0.0))
+    largest = NOTHING * float(np.abs(extension.coefficients).max(initial=0.0))
+    result = []
+    unused = {len(extension.coefficients) + k for k in effect.unused(extension.shape)}
+    for k, (own, value, error, sure) in enumerate(zip(described, values, errors, known, strict=True)):
+        if not own.name or k in unused or (isinstance(own, Shape) and own.is_left(value)):
+            continue
+        if isinstance(own, Coefficient) and abs(value) <= largest and not np.isfinite(error):
+            # A column that is none in these logs, such as a knot of a short drift.
+            continue
+        interval = (value - 1.96 * error, value + 1.96 * error)
+        if isinstance(own, Shape) and own.scale == "log" and np.isfinite(error) and value > 0:
+            factor = float(np.exp(1.96 * error / value))
+            interval = (value / factor, value * factor)
+        rough = isinstance(own, Shape) and (_roughly(own, value, interval) or _stopped(own, value))
+        # No machine has what lies beyond, whatever the data leave open.
+        interval = (min(max(interval[0], own.lower), value), max(min(interval[1], own.upper), value))
+        result.append(
+            Parameter(
+                name=own.name,
+                value=float(value),
+                unit=own.unit_at(robot, extension.joint) if isinstance(own, Shape) else own.unit,
+                standard_error=float(error) if np.isfinite(error) else float("nan"),
+                ci95=(float(interval[0]), float(interval[1])) if np.isfinite(error) else (-np.inf, np.inf),
+                determined=bool(sure) and not rough,
+            )
+        )
+    idle = _perhaps_unused(effect, extension.shape, {parameter.name: parameter.ci95 for parameter in result})
+    return tuple(_opened(told) if told.name in idle else told for told in result)
+
+
+def _stopped(shape: Shape, value: float) -> bool:
+    """Whether a size is the least or the largest that machines have: what the data would have beyond is not known."""
+    return shape.scale == "log" and value != shape.default and bool(np.isclose(value, [shape.lower, shape.upper]).any())
+
+
+def _opened(parameter: Parameter) -> Parameter:
+    return replace(parameter, standard_error=float("nan"), ci95=(-np.inf, np.inf), determined=False)
+
+
+def _perhaps_unused(effect: Effect, shape: tuple[float, ...], intervals: Mapping[str, tuple[float, float]]) -> set[str]:
+    """Names shape parameters that mean nothing at a value that another may have: levers perhaps none have no angle."""
+    names: set[str] = set()
+    for k, own in enumerate(effect.shapes):
+        if own.default is None or own.name not in intervals:
+            continue
+        low, high = intervals[own.name]
+        if low <= own.default <= high:
+            idle = effect.unused((*shape[:k], own.default, *shape[k + 1 :]))
+            names |= {effect.shapes[i].name for i in idle if i != k}
+    return names
+
+
+def _roughly(shape: Shape, value: float, interval: tuple[float, float]) -> bool:
+    """Whether a value is known but roughly; of a place, such as a dead centre, that may have either sign, never."""
+    half = 0.5 * (interval[1] - interval[0])
+    if not np.isfinite(half):
+        return False
+    if shape.moment:
+        return bool(half > MOMENT)
+    return bool(shape.lower >= 0 and half > WITHIN * abs(value))

@@ -1,0 +1,1 @@
+"""The balance of impulses where a joint's velocity reverses."""

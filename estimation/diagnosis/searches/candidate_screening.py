@@ -1,0 +1,52 @@
+"""Which hypotheses of a scan are worth refining: near the best at the grid, and able to come near it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.hypothesis_tests.scan import Outcome, Scan
+from robots.terms.effects import Effect
+
+# Hypotheses refined at each step, the best by their point on the grid.
+MOST_CANDIDATES = 7
+# A hypothesis whose grid point explains less than this share of the best one's gain is no contender.
+NEAR = 0.3
+# What acts for a moment is no contender where twice its gain at the grid is too little: its search takes the longest.
+TWICE = 2.0
+
+
+def screen_candidates(
+    problem: Problem, result: Scan, members: Sequence[FittedEffect] = (), least: float = -np.inf
+) -> list[Outcome]:
+    """Picks the hypotheses worth refining: near the best at the grid, each effect and joint once.
+
+    What acts for a moment must also be able to come near the best there, or near a worth (Schwarz) that is known to be
+    reached: `least`.
+    """
+    taken = {(m.hypothesis.name, m.hypothesis.joint) for m in members}
+    able = [o for o in result.outcomes if o.degrees and (o.hypothesis.name, o.hypothesis.joint) not in taken]
+    if not able:
+        return []
+
+    def worth(outcome: Outcome) -> float:
+        return float(outcome.gain - outcome.degrees * np.log(problem.rows))
+
+    def reached(outcome: Outcome, times: float = 1.0) -> float:
+        """What it is worth with its shape parameters paid for, as when it is refined."""
+        effect, joint = outcome.hypothesis.effect, outcome.hypothesis.joint
+        free = sum(high > low for low, high in effect.bounds(problem.sees(effect), joint))
+        rows = problem.rows * len(effect.acts_on(problem.situation.robot, joint))
+        return float(times * outcome.gain - (outcome.degrees + free) * np.log(rows))
+
+    ranked = sorted(able, key=worth, reverse=True)
+    best, top = max(o.gain for o in able), max(*map(reached, ranked[:MOST_CANDIDATES]), least)
+    hopeless = {o.hypothesis for o in able if _of_a_moment(o.hypothesis.effect) and reached(o, TWICE) < top}
+    return [o for o in ranked if o.gain >= NEAR * best and o.hypothesis not in hopeless][:MOST_CANDIDATES]
+
+
+def _of_a_moment(effect: Effect) -> bool:
+    return effect.passing or any(shape.moment for shape in effect.shapes)

@@ -1,0 +1,1 @@
+"""Whether findings hold against generic alternatives and on held-out data."""

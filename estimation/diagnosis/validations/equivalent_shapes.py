@@ -1,0 +1,73 @@
+"""Forms of one effect that fit alike: first the one beside which the base model stays nearest to what is known of it.
+
+Over the angles of a log a spring's torque is a polynomial's as well as any lever's; beyond those angles they part, and
+so do the gravity terms that each leaves to the base model. The robot's description then says which is likelier.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.diagnosis.base_models.priors import explained_chi2
+from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, refine
+from estimation.diagnosis.hypothesis_tests.scoring import accept
+from estimation.diagnosis.joint_fits.extended_fit import dense
+from estimation.diagnosis.joint_fits.shrinkage import effects_prior
+from estimation.diagnosis.searches.selection import SelectedEffect
+from estimation.regressions.parameter_priors import GaussianPrior
+
+# Forms whose fits differ by less than this, twice a log-likelihood, are alike to the log.
+ALIKE = 3.0
+
+
+def equivalent_shapes(problem: Problem, members: Sequence[FittedEffect], i: int) -> list[FittedEffect]:
+    """Lists the other forms of a member that fit about as well beside the rest, the likeliest first."""
+    own, others = members[i], [m for k, m in enumerate(members) if k != i]
+    shapes = own.hypothesis.effect.forms(problem.situation, own.hypothesis.joint)
+    beside = accept(problem, tuple(m.group for m in others))
+    forms = [refine(problem, own.hypothesis, shape, beside, effort=0) for shape in shapes if shape != own.shape]
+    forms = [form for form in forms if form.gain > own.gain - ALIKE]
+    return sorted(forms, key=_evidence(problem, others), reverse=True) if forms else []
+
+
+def complete_effects(problem: Problem, founds: Sequence[SelectedEffect]) -> tuple[SelectedEffect, ...]:
+    """Gives what was found with all that its effect has once it is there, where it is worth that.
+
+    A search pays for each coefficient, and goes without those that are hardly told; values without them are told as
+    surer than they are, and off by what those would have been.
+    """
+    members = [found.member for found in founds]
+    whole = []
+    for i, found in enumerate(founds):
+        own = found.member
+        shape = own.hypothesis.effect.complete(problem.situation, own.hypothesis.joint, own.shape)
+        if shape != own.shape:
+            form = refine(problem, own.hypothesis, shape, accept_all_but(problem, members, i))
+            found = replace(found, member=form) if form.worth(problem.rows) > MIN_BIC_GAIN else found
+        whole.append(found)
+    return tuple(whole)
+
+
+def _evidence(problem: Problem, others: Sequence[FittedEffect]) -> Callable[[FittedEffect], float]:
+    """Builds the function that gives twice the log-evidence of a form, up to what all forms have alike."""
+    baseline, white = problem.baseline, problem.whitening
+    blocks = [baseline.regressor, baseline.nuisance, *(dense(problem, m.hypothesis, m.shape) for m in others)]
+    known, tau = white.independent(np.concatenate(blocks, axis=2)), white.independent(problem.recording.tau)
+
+    def evidence(form: FittedEffect) -> float:
+        flat = np.hstack([known, white.independent(dense(problem, form.hypothesis, form.shape))])
+        pull = effects_prior(problem, [*others, form])
+        precision = pull.precision / white.row_weight
+        gram = flat.T @ flat
+        both = gram + precision
+        scale = np.sqrt(np.maximum(np.diag(both), 1e-300))
+        volume = np.linalg.slogdet(both / scale[:, None] / scale)[1] + 2.0 * float(np.sum(np.log(scale)))
+        prior = float(np.sum(np.log(np.maximum(np.diag(precision)[known.shape[1] :], 1e-300))))
+        return explained_chi2(gram, flat.T @ tau, GaussianPrior(precision, pull.target)) - float(volume) + prior
+
+    return evidence

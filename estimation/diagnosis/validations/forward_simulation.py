@@ -1,0 +1,269 @@
+"""Simulates a fitted robot forward under a position loop, with and without what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from estimation.diagnosis.base_models.payload_and_gravity import build_situation
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.recordings.recording import Recording, cut_recording
+from estimation.diagnosis.validations.simulation_result import Curves, Simulation
+from robots.plants.closed_loop import Driven, Loop, Reference, Tangent, drive
+from robots.regressor import TorqueModel
+from robots.terms.discrepancies.patterns import PREFIX
+from robots.terms.effect_bases.gear_load import ExtraGearLoad, with_gear_load
+from robots.terms.effect_bases.static import StaticJointEffect
+from robots.terms.situations.flange_body import with_body
+from robots.terms.situations.of_model import sign_of
+from robots.terms.situations.situation import Situation
+
+Array = NDArray[np.float64]
+
+# What is found is evaluated along the simulated motion up to this many times the loop's bandwidth: above, the loop
+# shows the noise of the driving torque, whose derivatives no effect may feel.
+SEEN = 3.0
+SLUGGISH = 0.02
+# The width of a sign that is none.
+NO_SIGN = 1e12
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FittedRobot:
+    """A fitted robot.
+
+    Attributes:
+        model: the base model.
+        columns: indices of its base parameters.
+        values: their values (b,).
+        members: effects beside it; none of the base model alone.
+        coefficients: of each effect.
+        felt: base parameters (b,) by which effects reckon load and friction; None for `values`.
+        bearing: what of the effects the gears bear; None for nothing.
+        since: moment from which phases count [s]; None for the first of a motion.
+    """
+
+    model: TorqueModel
+    columns: tuple[int, ...]
+    values: Array
+    members: Sequence[FittedEffect] = ()
+    coefficients: Sequence[Array] = ()
+    felt: Array | None = None
+    bearing: ExtraGearLoad | None = None
+    since: float | None = None
+
+    def at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
+        """Gives what the base model says along a motion at the times of a recording."""
+        return self._by(self.values, part, motion)
+
+    def felt_at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
+        """Gives what effects depend on there."""
+        now = self._by(self.values if self.felt is None else self.felt, part, motion)
+        return with_gear_load(now, self.bearing)
+
+    def _by(self, values: Array, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
+        q, dq, ddq = motion
+        now = build_situation(replace(part, q=q, dq=dq, ddq=ddq), self.model, values, self.columns)
+        return replace(now, since=self.since)
+
+    def base(self, part: Recording, motion: tuple[Array, Array, Array]) -> Array:
+        """Evaluates the base model's torque (N, n) along a motion of one log, with its gravity and payload."""
+        own = self.model.under(part.gravities[0]).torque(*motion, self.values, columns=self.columns)
+        return own + self.carried(part, motion)
+
+    def carried(self, part: Recording, motion: tuple[Array, Array, Array]) -> Array:
+        """Evaluates the torque (N, n) of the payload that one log carries."""
+        body = with_body(self.model, np.zeros(self.model.size), part.bodies[0])
+        columns = np.flatnonzero(body).tolist()
+        if not columns:
+            return np.zeros_like(motion[0])
+        return self.model.under(part.gravities[0]).torque(*motion, body[columns], columns=columns)
+
+    def beyond(self, now: Situation, members: Sequence[int]) -> Array:
+        """Evaluates the torque of some of the effects (N, n) [N m or N]."""
+        total = np.zeros_like(now.q)
+        for i in members:
+            member = self.members[i]
+            joints, parts = member.hypothesis.columns(now, member.shape)
+            for j, X in zip(joints, parts, strict=True):
+                total[:, j] += X @ self.coefficients[i]
+        return total
+
+    def unread(self, now: Situation, reading: Array) -> tuple[FittedRobot, Array]:
+        """Gives the plant without effects that only distort the reading, and the torque (N, n) that was read so."""
+        wrong = [i for i, member in enumerate(self.members) if member.hypothesis.effect.distorts]
+        plain = [i for i in range(len(self.members)) if i not in wrong]
+        beyond, torque = self.beyond(now, plain), reading.copy()
+        for i in wrong:
+            effect, joint = self.members[i].hypothesis.effect, self.members[i].hypothesis.joint
+            assert isinstance(effect, StaticJointEffect)
+            assert joint is not None
+            own = (reading - beyond)[:, joint - 1]
+            true = effect.undone(now, joint, self.coefficients[i], self.members[i].shape, own)
+            torque[:, joint - 1] += true - own
+        members, coefficients = [self.members[i] for i in plain], [self.coefficients[i] for i in plain]
+        return replace(self, members=members, coefficients=coefficients), torque
+
+
+def simulate_both(
+    before: FittedRobot, after: FittedRobot, whole: Recording, rows: slice, loop: Loop | None = None
+) -> Simulation | None:
+    """Simulates a stretch of unseen data with both robots under the same loop.
+
+    Args:
+        before: the base model.
+        after: the extended one.
+        whole: the unseen data and all that heat and other histories depend on before.
+        rows: the stretch, within one log.
+        loop: 5 Hz, critically damped, by default.
+
+    Returns:
+        What the loop had to do; None where a robot ran away from it.
+    """
+    loop = loop or Loop()
+    part = cut_recording(whole, rows)
+    inertia = _loop_inertia(before, part)
+    # The recording's torque is the arm's own; what drives it carries the log's payload besides.
+    driving = part.tau + before.carried(part, (part.q, part.dq, part.ddq))
+    reference = Reference(step=part.step, q=part.q, dq=part.dq, ddq=part.ddq, torque=driving)
+    driven = [_driven(plant, whole, rows, reference, inertia, loop) for plant in (before, after)]
+    if not all(np.isfinite(run.change) for run, _ in driven):
+        return None
+    notes = []
+    if any(run.filled.any() for run, _ in driven):
+        notes.append("The fitted inertia is not positive in all directions: the loop feeds back acceleration besides.")
+    if not driven[1][1]:
+        notes.append("What was found is taken along the measured motion: along the simulated one it did not settle.")
+    if not all(run.converged for run, _ in driven):
+        notes.append("The simulated motion did not settle to a hundredth.")
+    level = np.maximum(np.sqrt(np.mean(part.tau**2, axis=0)), 1e-300)
+    shares, motions = [], []
+    for run, _ in driven:
+        shares.append(np.sqrt(np.mean(run.correction**2, axis=0)) / level)
+        motions.append(np.sqrt(np.mean((run.q - part.q) ** 2, axis=0)))
+    (one, _), (two, _) = driven
+    return Simulation(
+        start=float(part.t[0]),
+        end=float(part.t[-1]),
+        loop=loop,
+        torque=(shares[0], shares[1]),
+        motion=(motions[0], motions[1]),
+        note=" ".join(notes),
+        curves=Curves(
+            t=part.t,
+            measured=part.tau,
+            torque=(part.tau + one.correction, part.tau + two.correction),
+            deviation=(one.q - part.q, two.q - part.q),
+        ),
+    )
+
+
+def _driven(
+    plant: FittedRobot, whole: Recording, rows: slice, reference: Reference, inertia: Array, loop: Loop
+) -> tuple[Driven, bool]:
+    """Follows one robot; says too whether its effects were evaluated along the simulated motion."""
+    part = cut_recording(whole, rows)
+    measured = plant.at(part, (part.q, part.dq, part.ddq))
+    plant, torque = plant.unread(plant.felt_at(part, (part.q, part.dq, part.ddq)), reference.torque)
+    reference = replace(reference, torque=torque)
+    width, coulomb, tangent = measured.velocity_scale, _coulomb(measured), _tangent(measured)
+    effects = _Effects(plant, whole, rows, SEEN * loop.bandwidth)
+
+    def follow(moving: bool) -> Driven:
+        def resistance(q: Array, dq: Array, ddq: Array) -> tuple[Array, Array]:
+            base = plant.base(part, (q, dq, ddq))
+            smooth, turning = effects.along((q, dq, ddq)) if moving else effects.measured
+            return base - coulomb * sign_of(dq, width) + smooth, coulomb + turning
+
+        return drive(reference, resistance, tangent, inertia=inertia, sign_width=width, loop=loop)
+
+    result = follow(bool(plant.members))
+    if plant.members and not result.converged:
+        return follow(False), False
+    return result, True
+
+
+class _Effects:
+    """The effects' torque along motions near the measured one: a smooth part, and a factor of the velocity's sign."""
+
+    def __init__(self, plant: FittedRobot, whole: Recording, rows: slice, cutoff: float) -> None:
+        self.plant, self.part = plant, cut_recording(whole, rows)
+        count = range(len(plant.members))
+        # What depends on the past, as a free function may, needs all of it; the rest this stretch alone.
+        effects = [member.hypothesis.effect for member in plant.members]
+        late = [i for i in count if effects[i].depends_on == "time" or effects[i].name.startswith(PREFIX)]
+        self.near = [i for i in count if i not in late]
+        self.late = late
+        zero = np.zeros_like(self.part.q)
+        self.sections = butter(4, min(2 * cutoff * self.part.step, 0.9), output="sos")
+        self.history = (zero, zero)
+        if late:
+            past = cut_recording(whole, slice(0, rows.stop))
+            own = slice(rows.start, rows.stop)
+            full = self._parts(past, (past.q, past.dq, past.ddq), late)
+            alone = self._parts(self.part, (self.part.q, self.part.dq, self.part.ddq), late)
+            self.history = (full[0][own] - alone[0], full[1][own] - alone[1])
+        self.measured = self.along((self.part.q, self.part.dq, self.part.ddq)) if plant.members else (zero, zero)
+
+    def along(self, motion: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+        """Evaluates both parts along a motion (N, n) of this stretch."""
+        part, h = self.part, self.part.step
+        off = motion[0] - part.q
+        padding = min(len(off) - 1, 3 * round(1 / h))
+        off = sosfiltfilt(self.sections, off, axis=0, padtype="odd", padlen=padding)
+        rate = np.gradient(off, h, axis=0)
+        seen = (part.q + off, part.dq + rate, part.ddq + np.gradient(rate, h, axis=0))
+        smooth, turning = self._parts(part, seen, [*self.near, *self.late])
+        return smooth + self.history[0], turning + self.history[1]
+
+    def _parts(self, part: Recording, motion: tuple[Array, Array, Array], members: list[int]) -> tuple[Array, Array]:
+        now = self.plant.felt_at(part, motion)
+        total = self.plant.beyond(now, members)
+        smooth = self.plant.beyond(replace(now, velocity_scale=np.full(part.n, NO_SIGN), _cache={}), members)
+        return smooth, _factor(total - smooth, now.sign)
+
+
+def _factor(turning: Array, sign: Array) -> Array:
+    """Divides by the sign (N, n); where that is small, neighbours say it."""
+    result = np.zeros_like(turning)
+    rows = np.arange(len(turning))
+    for j in range(turning.shape[1]):
+        sure = np.abs(sign[:, j]) > 0.5
+        if sure.any() and turning[:, j].any():
+            result[:, j] = np.interp(rows, rows[sure], turning[sure, j] / sign[sure, j])
+    return result
+
+
+def _coulomb(now: Situation) -> Array:
+    """The base model's Coulomb friction (n,)."""
+    result = np.zeros(now.robot.n)
+    for column, value in zip(now.model.columns, now.parameters, strict=True):
+        if column.symbol == "f1":
+            result[column.joint - 1] += value
+    return result
+
+
+def _tangent(now: Situation) -> Tangent:
+    inertia, damping = now.sensitivity("inertia").copy(), now.sensitivity("velocity").copy()
+    for i, column in enumerate(now.model.columns):
+        if column.term == "rotor_inertia":
+            inertia[:, column.joint - 1, column.joint - 1] += now.parameters[i]
+    # Friction but for its sign, by differences.
+    step = 1e-3 * np.maximum(np.sqrt(np.mean(now.dq**2, axis=0)), 1e-9)
+    up, down = now.dq + step, now.dq - step
+    turning = _coulomb(now) * (sign_of(up, now.velocity_scale) - sign_of(down, now.velocity_scale))
+    rows = np.arange(now.robot.n)
+    damping[:, rows, rows] += (now.friction_at(up) - now.friction_at(down) - turning) / (2 * step)
+    return Tangent(inertia=inertia, damping=damping, stiffness=now.sensitivity("position"))
+
+
+def _loop_inertia(plant: FittedRobot, part: Recording) -> Array:
+    """The inertia (n,) that the loop is laid out for; one that the fit has lost is taken from torque and motion."""
+    now = plant.at(part, (part.q, part.dq, part.ddq))
+    own = np.mean(np.diagonal(_tangent(now).inertia, axis1=1, axis2=2), axis=0)
+    torque, curve = (np.sqrt(np.mean(values**2, axis=0)) for values in (part.tau, part.ddq))
+    return np.maximum(own, SLUGGISH * torque / np.maximum(curve, 1e-3 * max(float(curve.max()), 1e-9)))

@@ -1,0 +1,80 @@
+"""Free functions of the motion, time and load: what they explain beside names, or in place of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
+from estimation.diagnosis.hypothesis_tests.scan import Entry, scan
+from estimation.diagnosis.hypothesis_tests.scoring import accept
+
+MOST_PATTERNS = 3
+# A grid tells narrow functions of few parameters less well than wide ones of many: so many are refined and compared.
+CONTENDERS = 3
+# A pattern beside named effects counts when it explains this share of what they do on its joint: formulas are true to
+# some per cent.
+BEYOND = 0.05
+# A pattern is a flexible thing: beside what is named it must be worth its parameters by this much (Schwarz), strong
+# evidence, for formulas are not exact. Where nothing is named it must be no more than sure.
+LEAST = 10.0
+SURE = 1e-9
+
+
+def free_functions(
+    problem: Problem,
+    patterns: Sequence[Entry],
+    named: Sequence[FittedEffect],
+    false_alarm: float,
+    rng: np.random.Generator,
+    *,
+    alone: bool = False,
+) -> tuple[list[FittedEffect], list[float]]:
+    """Adds patterns beside named effects, while the strongest is significant and worth it.
+
+    Where the first is `alone`, no formula beside it that could be inexact, it must be no more than sure.
+    """
+    members: list[FittedEffect] = []
+    p_values: list[float] = []
+    while len(members) < MOST_PATTERNS:
+        accepted = accept(problem, tuple(m.group for m in (*named, *members)))
+        result = scan(problem, patterns, accepted, rng)
+        if not result.outcomes:
+            break
+        p = result.p_value(result.outcomes[0].evidence)
+        if not p <= false_alarm:
+            break
+        near = [refine(problem, o.hypothesis, o.shape, accepted) for o in result.outcomes[:CONTENDERS] if o.degrees]
+        member = max(near, key=lambda m: m.bic(problem.rows))
+        before = (*named, *members)
+        if excess_chi2(member) < BEYOND * sum(m.gain_on(member.group.joints) for m in before):
+            break
+        if member.bic(problem.rows) < LEAST and (before or not alone or p > SURE):
+            break
+        members.append(member)
+        p_values.append(p)
+    return members, p_values
+
+
+def strongest_pattern(
+    problem: Problem,
+    patterns: Sequence[Entry],
+    named: Sequence[FittedEffect],
+    false_alarm: float,
+    rng: np.random.Generator,
+) -> tuple[FittedEffect, float] | None:
+    """Gives the free function that explains most beside names, and its p-value; None where noise explains as much."""
+    members, p_values = free_functions(problem, patterns, named, false_alarm, rng, alone=True)
+    return (members[0], p_values[0]) if members else None
+
+
+def set_bic_gain(problem: Problem, free: Sequence[FittedEffect]) -> float:
+    """What functions explain together, each beside those before, less what their parameters are worth (Schwarz)."""
+    return sum(member.gain - member.degrees * float(np.log(problem.rows)) for member in free)
+
+
+def excess_chi2(member: FittedEffect) -> float:
+    """What a member explains more than as many columns of noise would."""
+    return max(member.gain - member.degrees, 0.0)

@@ -1,0 +1,264 @@
+"""Gears whose wind-up is measured: encoders on both sides of them show how far the load twists them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.stats import t as student
+
+from estimation.diagnosis.findings import Finding, Parameter
+from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.validations.jackknife import blocks_of, gain_by_blocks, independent_rows, jackknife
+from estimation.models.extension import Extension
+from robots.signals import Log
+from robots.terms.base import force_unit, length_unit
+from robots.terms.effect_bases.unknown_rotor import KNOWN
+from robots.terms.effects import EFFECTS
+from robots.terms.situations.situation import Situation
+
+Array = NDArray[np.float64]
+
+EFFECT = "joint_elasticity"
+# Share of the load's energy that zero, delay, friction and eccentricity must leave.
+VISIBLE = 1e-2
+ALIGNED = 2  # times that the delay is taken off and found again
+STIFFEST = 1e-12  # [rad/(N m)] below which a gear is rigid
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredCompliance:
+    """The elasticity of one gear, by its two encoders.
+
+    Attributes:
+        finding: what it is; its gain is of the link's position, over the wind-up's standard deviation.
+        extension: the effect of the catalogue with that compliance.
+        coordinate: load of the gear (M,) [N m or N].
+        before: position behind the gear, measured less simulated by a rigid one (M,) [rad or m].
+        after: by an elastic one (M,).
+    """
+
+    finding: Finding
+    extension: Extension
+    coordinate: Array
+    before: Array
+    after: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Signals:
+    """Of one joint: wind-up (M,), what it is made of (M, k) besides the load, the load, its rival (M, 2).
+
+    The delay [s] is taken off already.
+    """
+
+    t: Array
+    windup: Array
+    rest: Array
+    load: Array
+    rival: Array
+    delay: float
+
+
+def measure_gear_compliance(
+    now: Situation,
+    recording: Recording,
+    logs: Sequence[Log],
+    *,
+    false_alarm: float,
+    unseen: tuple[Situation, Recording, Sequence[Log]] | None = None,
+) -> tuple[MeasuredCompliance, ...]:
+    """Finds the gears that wind up under load, where encoders behind them were logged.
+
+    q - q_link = c load + d dq + h sign(dq) + zero + eccentricity: c the compliance, d the delay of one encoder behind
+    the other, h half the lost motion, eccentricity once per turn of the link. Load is what the base model's rigid body
+    asks of the gear. Standard errors are by leaving out blocks in turn (jackknife), for what the formula lacks makes
+    neighbours alike.
+
+    Args:
+        now: the base model along the recording.
+        recording: the logs on one grid.
+        logs: those that the recording was made of.
+        false_alarm: chance of finding one in a robot whose gears are stiff.
+        unseen: the same of held-out logs, to measure the gain on; by default each block is predicted from the others.
+    """
+    robot = now.robot
+    joints = [
+        j + 1
+        for j in range(robot.n)
+        if np.ptp(recording.q[:, j]) > 0 and np.isfinite(gear_deflection(recording, logs, j + 1)).any()
+    ]
+    found = []
+    for joint in joints:
+        # A delay is no multiple of the velocity where the joint speeds up: what was found of it is taken off first.
+        delay = 0.0
+        for _ in range(ALIGNED):
+            signals = _signals(now, gear_deflection(recording, logs, joint, delay), joint, delay)
+            delay += float(_solve(np.column_stack([signals.rest, signals.load]), signals.windup)[1])
+        signals = _signals(now, gear_deflection(recording, logs, joint, delay), joint, delay)
+        other = None
+        if unseen is not None:
+            again = gear_deflection(unseen[1], unseen[2], joint, delay)
+            other = _signals(unseen[0], again, joint, delay) if np.isfinite(again).any() else None
+        result = _test_joint(now, signals, other, joint, len(joints), false_alarm)
+        if result is not None:
+            found.append(result)
+    return tuple(found)
+
+
+def gear_deflection(recording: Recording, logs: Sequence[Log], joint: int, delay: float = 0.0) -> Array:
+    """Gives a joint's position less that behind its gear on a recording's rows (N,).
+
+    NaN where that was not logged, and where the joint's direction is not known, nor then the side of the lost motion.
+
+    Args:
+        recording: the logs on one grid.
+        logs: those that it was made of.
+        joint: counted from 1.
+        delay: by which the encoder behind the gear is logged later [s].
+    """
+    result = np.full(len(recording), np.nan)
+    ordered = sorted(logs, key=lambda log: float(log.t[0]))
+    for log, run in zip(ordered, recording.runs, strict=True):
+        if log.qlink is not None and np.isfinite(log.qlink[:, joint - 1]).all():
+            t = recording.t[run]
+            # Straight lines between samples would cut the corners of an accelerated motion.
+            own, link = (CubicSpline(log.t, signal[:, joint - 1]) for signal in (log.q, log.qlink))
+            result[run] = own(t) - link(np.clip(t + delay, log.t[0], log.t[-1]))
+    result[recording.unsure[:, joint - 1]] = np.nan
+    return result
+
+
+def _signals(now: Situation, measured: Array, joint: int, delay: float) -> _Signals:
+    j = joint - 1
+    rows = np.isfinite(measured)
+    q, dq, sign = (values[rows, j] for values in (now.q, now.dq, now.sign))
+    turns = now.robot.chain.joints[j].kind == "revolute"
+    x = q - q.mean()
+    once = (np.sin(x), np.cos(x)) if turns else (x, x**2)
+    twice = (np.sin(2 * x), np.cos(2 * x)) if turns else (x**3, x**4)
+    return _Signals(
+        t=now.t[rows],
+        windup=measured[rows],
+        rest=np.column_stack([np.ones_like(q), dq, sign, *once]),
+        load=now.load[:, joint - 1][rows],
+        rival=np.column_stack(twice),
+        delay=delay,
+    )
+
+
+def _test_joint(
+    now: Situation, own: _Signals, other: _Signals | None, joint: int, tests: int, false_alarm: float
+) -> MeasuredCompliance | None:
+    """Judges one joint: an elastic gear against a rigid one, and against an encoder that is out of true."""
+    w = own.windup
+    alone, whole = own.rest, np.column_stack([own.rest, own.load])
+    hidden = own.load - alone @ _solve(alone, own.load)
+    if not hidden @ hidden > VISIBLE * np.sum((own.load - own.load.mean()) ** 2):
+        return None
+    blocks = blocks_of(own.t)
+    values = _solve(whole, w)
+    folds = [_solve(whole[~b], w[~b]) for b in blocks]
+    error = jackknife(np.stack(folds))
+    freedom = len(blocks) - 1
+    quantile = float(student.ppf(0.975, freedom))
+    p_value = min(tests * float(student.sf(values[-1] / max(error[-1], 1e-300), freedom)), 1.0)
+    if not (values[-1] > STIFFEST and p_value <= false_alarm):
+        return None
+    base = [_solve(alone[~b], w[~b]) for b in blocks]
+    if other is None:
+        errors = [
+            (w[b] - alone[b] @ one, w[b] - whole[b] @ two) for b, one, two in zip(blocks, base, folds, strict=True)
+        ]
+        level = w
+    else:
+        one, two = _solve(alone, w), values
+        level, both = other.windup, np.column_stack([other.rest, other.load])
+        errors = [(level[b] - other.rest[b] @ one, level[b] - both[b] @ two) for b in blocks_of(other.t)]
+    gain = gain_by_blocks(errors, level)
+    if gain.ci95[1] < 0:
+        return None
+    residual = w - whole @ values
+    count = independent_rows(residual)
+    squares = [float(np.sum((w - X @ _solve(X, w)) ** 2)) for X in (alone, np.column_stack([alone, own.rival]))]
+    better, worse = (count * float(np.log(s / (residual @ residual))) for s in squares)
+    robot = now.robot
+    force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
+    parameters = tuple(
+        _parameter(name, known + factor * values[i], abs(factor) * error[i], unit, quantile)
+        for name, i, factor, known, unit in (
+            ("compliance", len(values) - 1, 1.0, 0.0, f"{length}/({force})"),
+            ("lost_motion", 2, 2.0, 0.0, length),
+            ("encoder_delay", 1, 1.0, own.delay, "s"),
+        )
+    )
+    finding = Finding(
+        effect=EFFECT,
+        joint=joint,
+        parameters=parameters,
+        p_value=p_value,
+        delta_bic=better - float(np.log(count)),
+        gain=gain,
+        rivals=(("encoder_eccentricity", worse + float(np.log(count))),),
+        sentence=_sentence(joint, parameters, force, length),
+        visible=float(hidden @ hidden) / float(own.load @ own.load),
+        coordinate=f"load of joint {joint} [{force}]",
+        measured_by="qlink",
+    )
+    return MeasuredCompliance(
+        finding=finding,
+        extension=_extension(now, joint, float(values[-1]), float(error[-1])),
+        coordinate=own.load,
+        before=-(residual + own.load * values[-1]),
+        after=-residual,
+    )
+
+
+def _solve(X: Array, w: Array) -> Array:
+    scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+    return np.asarray(np.linalg.lstsq(X / scale, w, rcond=1e-9)[0] / scale)
+
+
+def _parameter(name: str, value: float, error: float, unit: str, quantile: float) -> Parameter:
+    reach = quantile * error
+    return Parameter(
+        name=name,
+        value=float(value),
+        unit=unit,
+        standard_error=float(error),
+        ci95=(float(value - reach), float(value + reach)),
+        determined=bool(reach < abs(value)),
+    )
+
+
+def _extension(now: Situation, joint: int, compliance: float, error: float) -> Extension:
+    """The effect of the catalogue; its dynamics have the same stiffness, its rotor is the one that is known."""
+    low, high = EFFECTS[EFFECT].bounds(now, joint)[0]
+    stiffness = float(np.clip(1.0 / compliance, low, high)) if compliance > 0 else high
+    return Extension(
+        effect=EFFECT,
+        joint=joint,
+        shape=(stiffness, KNOWN),
+        coefficients=np.array([compliance]),
+        covariance=np.diag([error**2, np.inf, np.inf]),
+    )
+
+
+def _sentence(joint: int, parameters: Sequence[Parameter], force: str, length: str) -> str:
+    compliance, motion, delay = parameters
+    low, high = compliance.ci95
+    span = f"{1 / high:.3g} to {1 / low:.3g}" if low > 0 else f"above {1 / high:.3g}"
+    text = (
+        f"The gear of joint {joint} winds up under load, by its two encoders: a stiffness of "
+        f"{1 / compliance.value:.3g} {force}/{length} (95 % interval {span})"
+    )
+    if motion.determined:
+        text += f", with {abs(motion.value):.2g} {length} of lost motion at reversals"
+    text += "."
+    if delay.determined:
+        which = "later" if delay.value > 0 else "earlier"
+        text += f" The encoder behind the gear is logged {1e3 * abs(delay.value):.2f} ms {which} than the motor's."
+    return text

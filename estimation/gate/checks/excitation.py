@@ -1,0 +1,74 @@
+"""Torque that does not follow from the motion: joints that are badly excited, or explained badly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.gate.finding import Finding
+from estimation.gate.quick_fits.joint_physics import JointPhysics
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+# A joint whose left-out torque is predicted hardly better than by a constant says nothing of its parameters.
+HOPELESS = 0.9
+# A joint of which less than half of the torque's variance follows from the motion, and of whose own parameters none is
+# told apart from zero by so many standard errors, is no better.
+WEAK, FAINTLY = 0.7, 10.0
+# An error above this share of the torque's standard deviation is worth a warning by itself.
+POOR = 0.3
+
+
+def check_excitation(
+    robot: Robot, physics: Sequence[JointPhysics | None], unexplained: Array, name: str
+) -> list[Finding]:
+    """Finds joints whose torque does not follow from the motion.
+
+    Args:
+        robot: with n joints.
+        physics: what the fits of each joint say.
+        unexplained: error on left-out stretches over the torque's standard deviation (n,).
+        name: prefix of the torques.
+    """
+    told = unexplained < HOPELESS
+    findings = []
+    for joint, (found, error) in enumerate(zip(physics, unexplained, strict=True), start=1):
+        if found is not None and POOR <= error < HOPELESS and (error <= WEAK or found.information >= FAINTLY):
+            findings.append(_poor(robot, float(error), name, joint))
+        if found is None or (error < HOPELESS and not (error > WEAK and found.information < FAINTLY)):
+            continue
+        title = robot.joint_names[joint - 1]
+        findings.append(
+            Finding(
+                name="badly_excited",
+                severity="warning" if told.any() else "refuse",
+                text=f"{title} is badly excited: on stretches that a fit has not seen, the error is "
+                f"{100 * error:.3g} % of the torque's standard deviation, and its own inertia and friction are at most "
+                f"{found.information:.2g} standard errors from zero",
+                action="its own parameters are not determined; record faster motions of this joint with larger torques"
+                if told.any()
+                else "check units, signs and order of the joints, and that the log is of this robot",
+                value=100 * float(error),
+                unit="%",
+                column=f"{name}{joint}",
+                joint=joint,
+            )
+        )
+    return findings
+
+
+def _poor(robot: Robot, error: float, name: str, joint: int) -> Finding:
+    return Finding(
+        name="poorly_explained",
+        severity="warning",
+        text=f"{robot.joint_names[joint - 1]}: rigid body and friction leave {100 * error:.3g} % of the torque's "
+        "standard deviation unexplained on stretches that the fit has not seen",
+        action="look for what is missing: noise, an effect the model lacks, or a wrong order, sign or zero of a joint",
+        value=100 * error,
+        unit="%",
+        column=f"{name}{joint}",
+        joint=joint,
+    )

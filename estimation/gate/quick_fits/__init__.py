@@ -1,0 +1,1 @@
+"""The quick fit that shows whether torque follows from motion at all."""

@@ -1,0 +1,1 @@
+"""Verbs and results that turn logs into an identified model."""

@@ -1,0 +1,214 @@
+"""The verb: checks an estimate's standard errors by resampling its logs, without a model of the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+from itertools import pairwise
+from operator import add
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.identifications.estimate import Estimate
+from estimation.preprocessing import Harmonics
+from estimation.regressions.joint_regressor import JointRegressor, chunks
+from estimation.regressions.moments import Moments
+from estimation.regressions.preparation import Prepared, Rows, prepare_all
+from robots.base_parameters import find_base_parameters
+from robots.common.errors import InputError, NotIdentifiableError
+from robots.common.parallel import one_blas_thread, threaded
+from robots.robot import Robot
+from robots.signals import Log
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+# Fewer blocks than this say too little of a spread.
+LEAST_BLOCKS = 8
+# A log without a period is cut into so many cells, and blocks are so many consecutive ones.
+CELLS, MOVING = 120, 4
+# Keeps a resample invertible that has lost a direction.
+FAINT = 1e-12
+# Quantiles one standard deviation from the middle of a normal distribution: a resample that has lost a direction does
+# not spoil them.
+SPREAD = (0.158655, 0.841345)
+METHODS = ("wls", "ols")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Bootstrap:
+    """The scatter of refits to resampled data.
+
+    Attributes:
+        names: of the parameters (b,).
+        errors: standard errors (b,) by resampling.
+        stated: standard errors (b,) of the estimate.
+        determined: which parameters the estimate calls determined (b,).
+        values: the refits (R, b).
+        kind: what was resampled: ``logs``, ``periods`` or ``blocks``.
+        blocks: how many of them the data hold.
+    """
+
+    names: tuple[str, ...]
+    errors: Array
+    stated: Array
+    determined: NDArray[np.bool_]
+    values: Array
+    kind: str
+    blocks: int
+
+    @property
+    def ratio(self) -> float:
+        """Median of the errors by resampling over the stated ones, of the determined parameters; 1 without any."""
+        known = self.determined & (self.stated > 0)
+        return float(np.median(self.errors[known] / self.stated[known])) if known.any() else 1.0
+
+    def summary(self) -> str:
+        """Says what was resampled, and how the two errors compare."""
+        return (
+            f"{len(self.values)} refits to resampled {self.kind} ({self.blocks} of them): standard errors are "
+            f"{self.ratio:.2f} times the stated ones on the median determined parameter"
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per parameter: both errors, and whether it is determined."""
+        import pandas as pd
+
+        columns = {"bootstrap": self.errors, "stated": self.stated, "determined": self.determined}
+        return pd.DataFrame(columns, index=pd.Index(self.names, name="parameter"))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives both errors as plain data."""
+        return {
+            "kind": self.kind,
+            "blocks": self.blocks,
+            "ratio": self.ratio,
+            "names": list(self.names),
+            "bootstrap": self.errors.tolist(),
+            "stated": self.stated.tolist(),
+            "determined": self.determined.tolist(),
+        }
+
+
+@one_blas_thread()
+def bootstrap(
+    robot: Robot, logs: Log | Sequence[Log], estimate: Estimate, *, resamples: int = 500, seed: int = 0
+) -> Bootstrap:
+    """Refits to resampled data, and compares the scatter with the stated standard errors.
+
+    Whole logs are drawn where there are eight or more, whole periods where the motion repeats itself eight times or
+    more, else moving blocks of a thirtieth of the data: what stays together keeps the noise's colour, whatever it is.
+    Normal equations are sums over rows, so that a refit is a sum and a solution, without a pass over the data. The
+    refits are those of least squares without regularisation, smoothing and weights as the estimate has them. With K
+    blocks the scatter is multiplied by sqrt(K / (K - 1)), and is itself uncertain by a share of 1 / sqrt(2 K).
+
+    Args:
+        robot: the robot.
+        logs: what the estimate was made of.
+        estimate: by ``wls`` or ``ols``.
+        resamples: how many refits.
+        seed: of the draws.
+
+    Returns:
+        Both standard errors of each parameter.
+
+    Raises:
+        InputError: an estimate of another robot or method, other logs, or less than two resamples.
+        NotIdentifiableError: too little data to be resampled.
+
+    Source: Kuensch, "The jackknife and the bootstrap for general stationary observations", Ann. Stat. 17 (1989).
+    """
+    model, choice = estimate.model, estimate.choice
+    method = str(model.provenance.get("method"))
+    if method not in METHODS:
+        raise InputError(f"an estimate by {method}", allowed=" or ".join(METHODS))
+    if resamples < 2:
+        raise InputError(f"{resamples} resamples", allowed="2 or more")
+    data = [logs] if isinstance(logs, Log) else list(logs)
+    gates = estimate.gates
+    if gates and len(gates) != len(data):
+        raise InputError(f"{len(data)} logs", allowed=f"{len(gates)}, as the estimate was made of")
+    base = find_base_parameters(model.torque_model, gravities=model.gravities)
+    if base.independent != tuple(model.columns) or robot.n != model.robot.n:
+        raise InputError("the estimate is of another robot", remedy="identify it again")
+    usable = [part for log, gate in zip(data, gates, strict=True) for part in gate.usable(log)] if gates else data
+    prepared = prepare_all(robot, usable)
+    rows = [log.rows(choice.smoother) for log in prepared]
+    if sum(len(part.motion) for part in rows) != len(estimate.t):
+        raise InputError("other logs", allowed="those that the estimate was made of")
+    kind, pieces, moving = _pieces(prepared, rows, estimate)
+    regressor = JointRegressor(base)
+    found = list(threaded(lambda piece: _moments(regressor, *piece), pieces))
+    total = reduce(add, found)
+    weights = 1.0 / total.level(model.values) ** 2 if method == "wls" else np.ones(robot.n)
+    gram = np.array([np.tensordot(weights, part.gram, axes=1) for part in found])
+    cross = np.array([weights @ part.cross for part in found])
+    values = _refits(gram, cross, moving, resamples, np.random.default_rng(seed))
+    count = max(len(found) // moving, 2)
+    low, high = np.quantile(values, SPREAD, axis=0)
+    return Bootstrap(
+        names=model.names,
+        errors=(high - low) / 2 * np.sqrt(count / (count - 1)),
+        stated=model.standard_errors,
+        determined=model.determined,
+        values=values,
+        kind=kind,
+        blocks=count,
+    )
+
+
+def _pieces(
+    prepared: Sequence[Prepared], rows: Sequence[Rows], estimate: Estimate
+) -> tuple[str, list[tuple[Rows, slice]], int]:
+    """What is drawn: its kind, its rows, and how many consecutive pieces make a block."""
+    if len(rows) >= LEAST_BLOCKS:
+        return "logs", [(part, slice(0, len(part.motion))) for part in rows], 1
+    smoother = estimate.choice.smoother
+    periods = [smoother.period if isinstance(smoother, Harmonics) else log.period for log in prepared]
+    cut: list[tuple[Rows, slice]] = []
+    for part, period in zip(rows, periods, strict=True):
+        t = part.motion.t
+        whole = round((t[-1] - t[0]) / period) if period else 0
+        if period and whole:
+            # Smoothing takes the ends; what is left of the last period goes with it: each row counts once.
+            bounds = [*np.searchsorted(t, t[0] + period * np.arange(whole)).tolist(), len(t)]
+            cut += [(part, slice(first, stop)) for first, stop in pairwise(bounds)]
+    if all(periods) and len(cut) >= LEAST_BLOCKS:
+        return "periods", cut, 1
+    total = sum(len(part.motion) for part in rows)
+    size = -(-total // CELLS)
+    cells = [(part, at) for part in rows for at in chunks(len(part.motion), size)]
+    if len(cells) < LEAST_BLOCKS * MOVING:
+        raise NotIdentifiableError("too few rows to be resampled", remedy="record a longer log")
+    return "blocks", cells, MOVING
+
+
+def _moments(regressor: JointRegressor, part: Rows, piece: slice) -> Moments:
+    motion = part.motion
+    sums = []
+    for rows in chunks(piece.stop - piece.start):
+        at = slice(piece.start + rows.start, piece.start + rows.stop)
+        states = (motion.q[at], motion.dq[at], motion.ddq[at])
+        sums.append(regressor.moments(*states, part.tau[at], part.mask[at], part.gravity))
+    return reduce(add, sums)
+
+
+def _refits(gram: Array, cross: Array, moving: int, resamples: int, rng: np.random.Generator) -> Array:
+    """Solutions (R, b) of sums of drawn blocks, each of `moving` consecutive pieces, in a circle."""
+    pieces = len(gram)
+    draws = rng.integers(pieces, size=(resamples, -(-pieces // moving)))
+    drawn = (draws[:, :, None] + np.arange(moving)).reshape(resamples, -1) % pieces
+    scale = np.sqrt(np.maximum(np.einsum("kpp->p", gram), 0.0))
+    scale = np.where(scale > 0, scale, 1.0)
+    gram, cross = gram / scale[:, None] / scale, cross / scale
+    faint = FAINT * np.eye(len(scale))
+    values = np.empty((resamples, len(scale)))
+    for k, chosen in enumerate(drawn):
+        counts = np.bincount(chosen, minlength=pieces).astype(float)
+        values[k] = np.linalg.solve(np.tensordot(counts, gram, axes=1) + faint, counts @ cross) / scale
+    return values

@@ -1,0 +1,226 @@
+"""What an identification found, how sure it is, and how well it predicts what it has not seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.gate import GateReport
+from estimation.identifications.choices import Choice
+from estimation.models.model import Model
+from robots.common.plain import finite
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+MODEL = "model.json"
+# Above this ratio of honest to white-noise standard errors the summary warns.
+COLOURED = 2.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointFit:
+    """How well one joint's torque is explained, beside what would flatter or shame it.
+
+    Attributes:
+        joint: counted from 1.
+        name: the joint's name.
+        torque_rms: of the measured torque [N m or N].
+        torque_spread: its standard deviation: the error of the best constant.
+        residual_rms: error on the fitted logs, rows besides in which the joint is at rest, which no fit counts.
+        held_out_rms: error on all rows of blocks that were left out of the fit: what to expect of a prediction.
+        nominal_rms: error of the robot description's own parameters; NaN where it has none.
+        noise_floor: what no model of the motion can predict: what differs from period to period where the motion is
+            periodic, else the level of white noise that explains the residual's fastest part.
+        band: half-width of a band that holds 95 % of the left-out errors.
+        band_coverage: share of each left-out block that the band of the other blocks holds; NaN of a single block.
+        identified: whether the left-out error is clearly below that of a constant.
+    """
+
+    joint: int
+    name: str
+    torque_rms: float
+    torque_spread: float
+    residual_rms: float
+    held_out_rms: float
+    nominal_rms: float
+    noise_floor: float
+    band: float
+    band_coverage: float
+    identified: bool
+
+    @property
+    def nrmse(self) -> float:
+        """Left-out error over torque RMS."""
+        return self.held_out_rms / self.torque_rms if self.torque_rms else np.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """An identified model and the evidence for it.
+
+    Attributes:
+        model: parameters and their covariance.
+        choice: smoothing and regularisation that the data chose.
+        joints: how well each joint is explained.
+        white_noise_errors: standard errors (b,) that white noise would have: too small where noise is coloured.
+        t: times (N,) of the fitted rows [s].
+        dq: joint velocities (N, n) of the fitted rows.
+        measured: torque (N, n) of the fitted rows, less that of known payloads [N m or N].
+        predicted: by the model (N, n).
+        dropped_rows: rows of the logs that repeated an old position.
+        gates: what the gate found in each log; empty where it was not asked.
+    """
+
+    model: Model
+    choice: Choice
+    joints: tuple[JointFit, ...]
+    white_noise_errors: Array
+    t: Array
+    dq: Array
+    measured: Array
+    predicted: Array
+    dropped_rows: int
+    gates: tuple[GateReport, ...] = ()
+
+    @property
+    def success(self) -> bool:
+        """Whether every joint and every parameter is determined."""
+        return all(joint.identified for joint in self.joints) and bool(self.model.determined.all())
+
+    @property
+    def colour(self) -> float:
+        """Median ratio of honest to white-noise standard errors of the determined parameters."""
+        return colour_of(self.model.standard_errors, self.white_noise_errors, self.model.determined)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before using the numbers."""
+        found = []
+        lost = [joint for joint in self.joints if not joint.identified]
+        if lost:
+            names = ", ".join(f"{joint.joint} ({joint.name})" for joint in lost)
+            found.append(
+                f"Badly excited: joints {names}. Their left-out torque is predicted hardly better than by a constant; "
+                "their friction, rotor inertia and offset mean nothing."
+            )
+        unknown = [name for name, known in zip(self.model.names, self.model.determined, strict=True) if not known]
+        if unknown:
+            found.append(
+                f"{len(unknown)} of {len(self.model.names)} parameters are not determined: {', '.join(unknown)}."
+            )
+        if self.choice.pull is not None:
+            found.append(
+                f"The data leave directions of the parameters open; a pull of {self.choice.ridge:g} towards the "
+                "robot's description fills them, and helps on data left out. Standard errors are those without it, and "
+                "what it moves each value by."
+            )
+        elif self.choice.ridge > 1e-6:
+            found.append(
+                f"The data leave directions of the parameters open; a ridge of {self.choice.ridge:g} keeps predictions "
+                "sane and pulls those directions towards zero. Standard errors are those without it, and what it moves "
+                "each value by."
+            )
+        if bounds := self.model.provenance.get("at_bounds"):
+            found.append(
+                f"At their bounds: {', '.join(bounds)}. Standard errors are those of a fit without bounds: too large "
+                "there rather than too small."
+            )
+        if self.colour > COLOURED:
+            found.append(
+                "The residual is coloured: standard errors by white noise would be too small by "
+                f"{self.colour:.1f} times."
+            )
+        if self.dropped_rows:
+            rows = "row repeats" if self.dropped_rows == 1 else "rows repeat"
+            found.append(f"{self.dropped_rows} {rows} an old position: left out.")
+        return tuple(found)
+
+    def summary(self) -> str:
+        """Says how well each joint is explained, and what to beware of."""
+        model = self.model
+        lines = [
+            f"{model.robot.name}: {len(model.names)} base parameters from {len(self.t)} samples; "
+            f"{self.choice.smoother.text}",
+            "  joint                 torque RMS   fitted   left out   constant    nominal  noise floor",
+        ]
+        for joint in self.joints:
+            shares = [
+                100 * value / joint.torque_rms if joint.torque_rms else np.nan
+                for value in (
+                    joint.residual_rms,
+                    joint.held_out_rms,
+                    joint.torque_spread,
+                    joint.nominal_rms,
+                    joint.noise_floor,
+                )
+            ]
+            texts = [f"{share:8.2f} %" if np.isfinite(share) else "       – " for share in shares]
+            mark = "" if joint.identified else "  NOT IDENTIFIED"
+            lines.append(f"  {joint.joint} {joint.name[:18]:18} {joint.torque_rms:11.4g} {' '.join(texts)}{mark}")
+        lines += [f"  {warning}" for warning in self.warnings]
+        return "\n".join(lines)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per parameter, see `Model.to_frame`."""
+        return self.model.to_frame()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives what machines want to know of it."""
+        return {
+            "success": self.success,
+            "warnings": list(self.warnings),
+            "joints": [
+                {
+                    "joint": joint.joint,
+                    "name": joint.name,
+                    "identified": joint.identified,
+                    "torque_rms": joint.torque_rms,
+                    "residual_rms": joint.residual_rms,
+                    "held_out_rms": joint.held_out_rms,
+                    "held_out_nrmse": finite(joint.nrmse),
+                    "constant_rms": joint.torque_spread,
+                    "nominal_rms": finite(joint.nominal_rms),
+                    "noise_floor": joint.noise_floor,
+                    "band95": joint.band,
+                    "band95_coverage": finite(joint.band_coverage),
+                }
+                for joint in self.joints
+            ],
+            "model": self.model.to_dict(),
+        }
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws measured against predicted torque of all joints, each over its RMS."""
+        from matplotlib.figure import Figure
+
+        axes = ax if ax is not None else Figure(figsize=(5, 5)).subplots()
+        for joint in self.joints:
+            scale = joint.torque_rms or 1.0
+            index = joint.joint - 1
+            axes.plot(self.measured[:, index] / scale, self.predicted[:, index] / scale, ".", ms=1, label=joint.name)
+        axes.set_xlabel("measured torque / RMS")
+        axes.set_ylabel("predicted torque / RMS")
+        axes.legend(markerscale=8)
+        return axes
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Writes `model.json` into a folder that is there.
+
+        Raises:
+            InputError: the file is there, and force is not given.
+        """
+        self.model.save(Path(folder) / MODEL, force=force)
+
+
+def colour_of(errors: Array, white: Array, determined: NDArray[np.bool_]) -> float:
+    """Gives the median ratio of honest to white-noise errors (b,) of the determined parameters; 1 without any."""
+    known = determined & (white > 0)
+    return float(np.median(errors[known] / white[known])) if known.any() else 1.0

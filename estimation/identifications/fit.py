@@ -1,0 +1,250 @@
+"""One fit with settled choices: parameters, residuals and their covariance, in passes over chunks of the logs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.estimators import Estimator, RegressionData, Solution
+from estimation.identifications.choices import Choice
+from estimation.regressions.joint_regressor import CHUNK, JointRegressor, chunks
+from estimation.regressions.moments import Moments
+from estimation.regressions.preparation import Prepared, Rows
+from estimation.uncertainty import Part, batch_factors, covariance
+from robots.base_parameters import BaseParameters
+from robots.common.parallel import threaded
+
+Array = NDArray[np.float64]
+
+# Standard errors are those of the fit without regularisation; this much keeps the inverse finite.
+FAINT = 1e-13
+# Of a longer log, evenly spread stretches stand for the colour of the noise and for the sandwich's meat.
+MOST_ROWS, STRETCHES = 100_000, 24
+# For the sandwich the rows of a long log are averaged over so much time [s], ...
+AVERAGED = 0.02
+# ... as long as so many averages remain.
+LEAST_AVERAGES = 10_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """What a fit found.
+
+    Attributes:
+        base: base parameters of the model that was fitted.
+        choice: of smoothing and regularisation.
+        solution: parameters and weights.
+        moments: normal equations of the rows that count.
+        rows: what was fitted, in order.
+        torque: predicted, of all rows (N, n).
+        predicted: the same, part by part.
+        nominal: sum of each joint's squared errors (n,) by the robot's description, over all rows; NaN without one.
+        covariance: of the parameters (b, b).
+        white: standard errors (b,) that white noise would have.
+    """
+
+    base: BaseParameters
+    choice: Choice
+    solution: Solution
+    moments: Moments
+    rows: Sequence[Rows]
+    torque: Array
+    predicted: Sequence[Array]
+    nominal: Array
+    covariance: Array
+    white: Array
+
+
+def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, choice: Choice, seed: int) -> Fit:
+    """Fits with settled choices.
+
+    Args:
+        base: base parameters of the model with the chosen friction.
+        logs: the data.
+        estimator: what solves.
+        choice: smoothing and regularisation.
+        seed: of the noise drawn to correct the standard errors.
+    """
+    rows = [part for log in logs for part in log.pieces(choice.smoother)]
+    regressor = JointRegressor(base)
+    moments = sum_moments(regressor, rows).pulled(choice.pull)
+    values, weights = estimator.solve(moments, choice.ridge)
+    whole = len(rows) == len(logs)
+    data = RegressionData(
+        base=base,
+        moments=moments,
+        parts=rows,
+        ridge=choice.ridge,
+        logs=[log.log for log in logs] if whole else (),
+        smoother=choice.smoother,
+    )
+    solution = estimator.refine(data, values, weights)
+    # One array for all parts, which the estimate keeps: of millions of rows a copy counts.
+    torque = np.empty((sum(len(part.motion) for part in rows), rows[0].tau.shape[1]))
+    predicted = np.split(torque, np.cumsum([len(part.motion) for part in rows])[:-1])
+    long = len(torque) > MOST_ROWS
+    passes = [_pass(regressor, part, solution, into, long) for part, into in zip(rows, predicted, strict=True)]
+    scores = np.concatenate([found.scores for found in passes])
+    fitted = [_Fitted(part, torque, None) for part, torque in zip(rows, predicted, strict=True)]
+    if solution.row_weights is not None:
+        factors = [solution.row_weights(part.tau - torque) for part, torque in zip(rows, predicted, strict=True)]
+        weighted = [replace(part, mask=part.mask * factor) for part, factor in zip(rows, factors, strict=True)]
+        moments = sum_moments(regressor, weighted).pulled(choice.pull)
+        # An M-estimator's scores are its weights times its errors (Huber 1967).
+        fitted = [_Fitted(*some) for some in zip(rows, predicted, factors, strict=True)]
+        scores = _scores(regressor, fitted, solution.weights) if long else scores
+    averaged = round(AVERAGED / float(np.median([log.positions.period for log in logs])))
+    full, white = _covariances(regressor, fitted, scores, moments, solution, averaged, seed)
+    return Fit(
+        base=base,
+        choice=choice,
+        solution=solution,
+        moments=moments,
+        rows=rows,
+        torque=torque,
+        predicted=predicted,
+        nominal=np.sum([found.nominal for found in passes], axis=0),
+        covariance=full,
+        white=white,
+    )
+
+
+def sum_moments(regressor: JointRegressor, rows: Sequence[Rows]) -> Moments:
+    """Sums the normal equations of all rows, chunk by chunk on some threads."""
+
+    def of(item: tuple[Rows, slice]) -> Moments:
+        part, at = item
+        motion = part.motion
+        return regressor.moments(motion.q[at], motion.dq[at], motion.ddq[at], part.tau[at], part.mask[at], part.gravity)
+
+    return reduce(add, threaded(of, ((part, at) for part in rows for at in chunks(len(part.motion)))))
+
+
+class _Fitted(NamedTuple):
+    """Rows, the torque (N, n) that a fit predicts of them, and how much each counts (N, n), None for alike."""
+
+    rows: Rows
+    torque: Array
+    factor: Array | None
+
+    def errors(self, at: slice) -> Array:
+        """Errors of some rows, zero where a row does not count."""
+        errors = (self.rows.tau[at] - self.torque[at]) * self.rows.mask[at]
+        return errors if self.factor is None else errors * self.factor[at]
+
+
+class _Pass(NamedTuple):
+    """What one look at the rows gives, besides the torque that the fit predicts.
+
+    Attributes:
+        nominal: sum of each joint's squared errors (n,) by the robot's description.
+        scores: Y' W e of the fit over each chunk (chunks, b), of the rows that count; zero where nobody asks.
+    """
+
+    nominal: Array
+    scores: Array
+
+
+def _pass(regressor: JointRegressor, part: Rows, solution: Solution, torque: Array, scored: bool) -> _Pass:
+    """Looks at all rows once more, now that the parameters are known, and writes the predicted torque (N, n)."""
+    motion, base = part.motion, regressor.base
+    described = base.from_standard(base.model.nominal)
+    both = np.column_stack([solution.values, described])
+
+    def of(at: slice) -> tuple[Array, Array]:
+        nominal, score = np.empty(part.tau.shape[1]), np.zeros(base.size)
+        for joint, Y in enumerate(regressor(motion.q[at], motion.dq[at], motion.ddq[at], part.gravity)):
+            used = regressor.used[joint]
+            fitted, expected = (Y @ both[used]).T
+            torque[at, joint] = fitted
+            measured = part.tau[at, joint]
+            expected = measured - expected
+            nominal[joint] = expected @ expected
+            if scored:
+                score[used] += ((measured - fitted) * part.mask[at, joint] * solution.weights[joint]) @ Y
+        return nominal, score
+
+    nominal, scores = zip(*threaded(of, chunks(len(motion))), strict=True)
+    return _Pass(np.sum(nominal, axis=0), np.array(scores))
+
+
+def _covariances(
+    regressor: JointRegressor,
+    fitted: Sequence[_Fitted],
+    scores: Array,
+    moments: Moments,
+    solution: Solution,
+    averaged: int,
+    seed: int,
+) -> tuple[Array, Array]:
+    weights = solution.weights
+    inverse = moments.inverse(weights, FAINT)
+    variance = moments.residual(solution.values) / np.maximum(moments.count, 1)
+    textbook = inverse @ np.tensordot(weights**2 * variance, moments.gram, axes=1) @ inverse
+    white = np.sqrt(np.maximum(np.diag(textbook), 0.0))
+    if solution.covariance is not None:
+        return solution.covariance, white
+    parts = _parts(regressor, fitted)
+    total = sum(len(some.torque) for some in fitted)
+    seen = sum(part.rows for part in parts)
+    share = seen / total
+    full = covariance(parts, weights, inverse, seed, share=share, averaged=min(averaged, seen // LEAST_AVERAGES))
+    if share < 1:
+        factors = batch_factors(scores, inverse, full)
+        full = full * factors[:, None] * factors
+    return full, white
+
+
+def _parts(regressor: JointRegressor, fitted: Sequence[_Fitted]) -> list[Part]:
+    """The rows as the sandwich wants them, of a long log some stretches."""
+    total = sum(len(some.torque) for some in fitted)
+    parts = []
+    for some in fitted:
+        count = len(some.torque)
+        places = [(0, count)]
+        if total > MOST_ROWS:
+            number = max(1, round(STRETCHES * count / total))
+            length = min(count, max(CHUNK, MOST_ROWS // STRETCHES))
+            places = [(begin, begin + length) for begin in np.linspace(0, count - length, number).astype(int).tolist()]
+        parts += [_part(regressor, some, *place) for place in places]
+    return parts
+
+
+def _part(joints: JointRegressor, fitted: _Fitted, begin: int, end: int) -> Part:
+    motion, mask, gravity = fitted.rows.motion, fitted.rows.mask[begin:end], fitted.rows.gravity
+
+    def regressor(start: int, stop: int) -> Array:
+        at = slice(begin + start, begin + stop)
+        return joints.base.regressor(motion.q[at], motion.dq[at], motion.ddq[at], gravity=gravity)
+
+    def split(start: int, stop: int) -> tuple[Array, ...]:
+        at = slice(begin + start, begin + stop)
+        return joints(motion.q[at], motion.dq[at], motion.ddq[at], gravity)
+
+    def sums(start: int, stop: int, size: int) -> list[Array]:
+        at = slice(begin + start, begin + stop)
+        return joints.counted(motion.q[at], motion.dq[at], motion.ddq[at], mask[start:stop], size, gravity)
+
+    return Part(end - begin, regressor, mask, fitted.errors(slice(begin, end)), joints.used, split, sums)
+
+
+def _scores(regressor: JointRegressor, fitted: Sequence[_Fitted], weights: Array) -> Array:
+    """Sums Y' W e over each chunk (chunks, b)."""
+
+    def of(item: tuple[_Fitted, slice]) -> Array:
+        some, at = item
+        motion = some.rows.motion
+        error = some.errors(at) * weights
+        score = np.zeros(regressor.base.size)
+        for joint, Y in enumerate(regressor(motion.q[at], motion.dq[at], motion.ddq[at], some.rows.gravity)):
+            score[regressor.used[joint]] += error[:, joint] @ Y
+        return score
+
+    items = ((some, at) for some in fitted for at in chunks(len(some.torque)))
+    return np.array(list(threaded(of, items)))

@@ -1,0 +1,263 @@
+"""The verb: identifies a robot's dynamic parameters from its logs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.estimators import Estimator
+from estimation.estimators import estimator as choose_estimator
+from estimation.gate import GateReport, check_log
+from estimation.identifications.choices import VELOCITY_SCALES, Candidates, Choice, choose
+from estimation.identifications.estimate import Estimate, JointFit, colour_of
+from estimation.identifications.fit import Fit, fit
+from estimation.logs.known_setup import gravities_of, require_plain
+from estimation.logs.provenance import describe_logs
+from estimation.models.model import Model
+from estimation.preprocessing import Harmonics
+from estimation.regressions.preparation import Prepared, prepare_all
+from estimation.uncertainty import fast_noise, period_noise
+from robots.base_parameters import find_base_parameters
+from robots.common.errors import InputError, NotIdentifiableError
+from robots.common.parallel import one_blas_thread
+from robots.common.progress import SILENT, Progress
+from robots.regressor import default_model
+from robots.robot import Robot
+from robots.signals import Log
+from robots.version import VERSION
+
+Array = NDArray[np.float64]
+
+# Where this share of the parameters is determined by the data alone, nothing is regularised: a ridge or a pull would
+# move values by what is not data.
+ENOUGH = 0.9
+# A parameter is determined when its standard error is below this share of it ...
+RELATIVE = 0.5
+# ... or when the torque that its standard error makes is below this share of every joint's torque: it is then known
+# to be too small to matter.
+NEGLIGIBLE = 0.02
+# A joint whose left-out torque is predicted hardly better than by a constant is not identified.
+HOPELESS = 0.9
+# A torque that varies by less than this share of its size, or of 1 N m, is constant but for rounding.
+ROUNDING = 1e-9
+
+
+@one_blas_thread()
+def identify(
+    robot: Robot,
+    logs: Log | Sequence[Log],
+    *,
+    method: str | Estimator = "wls",
+    friction: str = "polynomial",
+    rotor: bool = True,
+    offset: bool = True,
+    candidates: Candidates | None = None,
+    check: bool = True,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Estimate:
+    """Identifies base parameters of rigid body, friction, rotors and torque offsets, with standard errors.
+
+    Positions are smoothed and differentiated without phase lag; smoothing, regularisation and the sharpness of the
+    friction's sign are chosen by predicting blocks of the logs from the rest. Torque is fitted as it was logged. The
+    standard errors survive coloured noise.
+
+    Args:
+        robot: the robot.
+        logs: one log or several, of t, q and tau or current. One that states a payload or a gravity counts as such: the
+            parameters are the arm's own, and all that bases which stand unlike show together.
+        method: ``wls``, ``ols``, or an estimator of one's own.
+        friction: ``polynomial`` or ``coulomb-viscous``.
+        rotor: with rotor inertias.
+        offset: with a torque offset per joint.
+        candidates: settings that the data choose from.
+        check: whether each log passes the gate first, which refuses what would be fitted wrongly and cuts at gaps.
+        seed: of the noise drawn to correct the standard errors.
+        progress: is told how far it is.
+
+    Returns:
+        The estimate.
+
+    Raises:
+        InputError: logs of another robot, without torque, too short, or refused by the gate; unknown options; a payload
+            or gravity that the method does not know.
+        NotIdentifiableError: logs in which no joint moves, or no joint's torque can be predicted.
+    """
+    chosen = choose_estimator(method)
+    data = [logs] if isinstance(logs, Log) else list(logs)
+    if not data:
+        raise InputError("no logs", allowed="one or more")
+    if chosen.simulates:
+        require_plain(data, f"the method {chosen.name}")
+    bar = progress or SILENT
+    bar.start("identifying", 4.0)
+    _require_motion(data)
+    gates: list[GateReport] = []
+    for log in data if check else ():
+        bar.update(0.0, "checking the logs")
+        gates.append(check_log(robot, log))
+        gates[-1].raise_if_refused()
+    usable = [part for log, gate in zip(data, gates, strict=True) for part in gate.usable(log)] if gates else data
+    prepared = prepare_all(robot, usable)
+    sharp = default_model(robot, friction=friction, velocity_scale=VELOCITY_SCALES[0], rotor=rotor, offset=offset)
+    base = find_base_parameters(sharp, gravities=gravities_of(data))
+    bar.update(1.0, "choosing smoothing and regularisation")
+    choice = choose(base, prepared, chosen, candidates or Candidates())
+    predictable = _predictable(prepared, choice)
+    bar.update(2.0, "fitting")
+
+    def fitted(setting: Choice, free: Array | None = None) -> tuple[Fit, tuple[JointFit, ...], NDArray[np.bool_]]:
+        scales, own = setting.velocity_scales, base
+        if set(scales) != {VELOCITY_SCALES[0]}:
+            model = default_model(robot, friction=friction, velocity_scale=scales, rotor=rotor, offset=offset)
+            own = replace(base, model=model)
+        found = fit(own, prepared, chosen, setting, seed)
+        if free is not None:
+            # The covariance is that of the fit without regularisation; how far that has moved each value comes on top.
+            moved = found.solution.values - free
+            found = replace(found, covariance=found.covariance + np.outer(moved, moved))
+        joints = _joint_fits(found, predictable)
+        return found, joints, _determined(found, joints)
+
+    found, joints, determined = fitted(choice.plain or choice)
+    if choice.plain is not None and determined.mean() < ENOUGH:
+        bar.update(3.0, "fitting with regularisation")
+        found, joints, determined = fitted(choice, found.solution.values)
+    bar.finish()
+    colour = colour_of(np.sqrt(np.maximum(np.diag(found.covariance), 0.0)), found.white, determined)
+    base, rows = found.base, found.rows
+    provenance = {**_provenance(data, chosen, found.choice, joints, seed), "colour": colour}
+    provenance["gravities"] = [list(gravity) for gravity in base.gravities]
+    if "standard" in found.solution.extras:
+        provenance["standard_parameters"] = np.asarray(found.solution.extras["standard"], dtype=float).tolist()
+    if found.solution.extras.get("active"):
+        provenance["at_bounds"] = list(found.solution.extras["active"])
+    return Estimate(
+        model=Model(
+            torque_model=base.model,
+            columns=base.independent,
+            values=found.solution.values,
+            covariance=found.covariance,
+            determined=determined,
+            formulas=base.formulas(),
+            provenance=provenance,
+        ),
+        choice=found.choice,
+        joints=joints,
+        white_noise_errors=found.white,
+        t=np.concatenate([part.motion.t for part in rows]),
+        dq=np.concatenate([part.motion.dq for part in rows]),
+        measured=np.concatenate([part.tau for part in rows]),
+        predicted=found.torque,
+        dropped_rows=sum(log.positions.dropped for log in prepared),
+        gates=tuple(gates),
+    )
+
+
+def _require_motion(logs: Sequence[Log]) -> None:
+    if not any(np.ptp(log.q, axis=0).any() for log in logs):
+        raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
+
+
+def _predictable(prepared: Sequence[Prepared], choice: Choice) -> NDArray[np.bool_]:
+    """Which joints (n,) move, and have a torque that varies and follows from the motion.
+
+    Raises:
+        NotIdentifiableError: none.
+    """
+    moves = np.any([np.ptp(log.log.q, axis=0) > 0 for log in prepared], axis=0)
+    highest = np.max([log.tau.max(axis=0) for log in prepared], axis=0)
+    lowest = np.min([log.tau.min(axis=0) for log in prepared], axis=0)
+    varies = highest - lowest > ROUNDING * np.maximum(1.0, np.maximum(highest, -lowest))
+    follows = choice.held_out < HOPELESS * choice.spread
+    if (moves & varies & follows).any():
+        return np.asarray(moves & varies & follows)
+    if not varies.any():
+        raise NotIdentifiableError(
+            "no joint's torque varies", remedy="record the torque of the moving arm, and check what tau1.. hold"
+        )
+    raise NotIdentifiableError(
+        "no joint's torque can be predicted from its motion",
+        allowed="left-out torque errors below its standard deviation",
+        remedy="check units and signs of q and tau, and that the arm moves",
+    )
+
+
+def _joint_fits(found: Fit, predictable: NDArray[np.bool_]) -> tuple[JointFit, ...]:
+    """Measures each joint's errors, beside what a constant and the robot's description would give."""
+    base, choice = found.base, found.choice
+    total = sum(len(part.motion) for part in found.rows)
+    rms = np.sqrt(sum(np.einsum("tj,tj->j", part.tau, part.tau) for part in found.rows) / total)
+    # On all rows, as the left-out errors are: those of a joint at rest do not count in the fit, but in its verdict.
+    errors = (part.tau - torque for part, torque in zip(found.rows, found.predicted, strict=True))
+    fitted = np.sqrt(sum(np.einsum("tj,tj->j", error, error) for error in errors) / total)
+    nominal = np.sqrt(found.nominal / total)
+    floor = _noise_floor(found)
+    return tuple(
+        JointFit(
+            joint=j + 1,
+            name=base.model.robot.joint_names[j],
+            torque_rms=float(rms[j]),
+            torque_spread=float(choice.spread[j]),
+            residual_rms=float(fitted[j]),
+            held_out_rms=float(choice.held_out[j]),
+            nominal_rms=float(nominal[j]),
+            noise_floor=float(floor[j]),
+            band=float(choice.band[j]),
+            band_coverage=float(choice.band_coverage[j]),
+            identified=bool(predictable[j]),
+        )
+        for j in range(len(rms))
+    )
+
+
+def _noise_floor(found: Fit) -> Array:
+    residuals = [part.tau - torque for part, torque in zip(found.rows, found.predicted, strict=True)]
+    smoother = found.choice.smoother
+    if isinstance(smoother, Harmonics):
+        levels = [
+            period_noise(part.motion.t, residual, smoother.period)
+            for part, residual in zip(found.rows, residuals, strict=True)
+        ]
+        known = [level**2 for level in levels if level is not None]
+        if known:
+            return np.asarray(np.sqrt(np.mean(known, axis=0)))
+    return fast_noise(residuals)
+
+
+def _determined(found: Fit, joints: Sequence[JointFit]) -> NDArray[np.bool_]:
+    values, moments, columns = found.solution.values, found.moments, found.base.columns
+    errors = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
+    excited = np.einsum("jpp->jp", moments.gram) / np.maximum(moments.count, 1)[:, None]  # mean square of each column
+    torque = np.array([joint.torque_rms for joint in joints])
+    share = (errors * np.sqrt(excited) / np.maximum(torque, np.finfo(float).tiny)[:, None]).max(axis=0)
+    known = (errors <= RELATIVE * np.abs(values)) | (share <= NEGLIGIBLE)
+    own = np.array([column.term != "rigid_body" for column in columns])
+    lost = np.array([not joints[column.joint - 1].identified for column in columns])
+    return known & (excited.sum(axis=0) > 0) & ~(own & lost)
+
+
+def _provenance(
+    logs: Sequence[Log], method: Estimator, choice: Choice, joints: Sequence[JointFit], seed: int
+) -> dict[str, object]:
+    return {
+        "logs": describe_logs(logs),
+        "method": method.name,
+        "tool_version": VERSION,
+        "cutoff_hz": choice.cutoff,
+        "smoothing": choice.smoother.to_dict(),
+        "ridge": choice.ridge,
+        "regularised": choice.plain is not None,
+        "pulled_to_description": choice.pull is not None,
+        "velocity_scales": list(choice.velocity_scales),
+        "seed": seed,
+        "band95": [joint.band for joint in joints],
+        "noise_floor": [joint.noise_floor for joint in joints],
+        "residual_rms": [joint.residual_rms for joint in joints],
+        "held_out_rms": [joint.held_out_rms for joint in joints],
+        "torque_rms": [joint.torque_rms for joint in joints],
+        "joints_identified": [joint.identified for joint in joints],
+    }

@@ -1,0 +1,174 @@
+"""Logs whose clocks each began anew, put on one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from estimation.logs.provenance import are_same_log, describe_logs
+from robots.common.errors import InputError
+from robots.signals import UNKNOWN_PAUSE, Log
+
+OWN = 1.0
+"""So far [s] a log may reach beyond what is known of it in a fit, to be on the same clock."""
+
+
+def on_one_clock(logs: Sequence[Log], pause: float = UNKNOWN_PAUSE) -> list[Log]:
+    """Puts logs that each began at a time of their own one after the other, in the order given.
+
+    What depends on the time between logs, such as heat, is then known as well as the pause is.
+
+    Args:
+        logs: in the order in which they were recorded.
+        pause: between the end of one and the start of the next [s].
+
+    Returns:
+        The logs, the first as it was.
+
+    Raises:
+        InputError: a pause of nothing or less.
+    """
+    if not pause > 0.0:
+        raise InputError(f"a pause of {pause} s between logs", allowed="more than 0")
+    result: list[Log] = []
+    for log in logs:
+        start = float(result[-1].t[-1]) + pause if result else float(log.t[0])
+        result.append(replace(log, t=log.t - log.t[0] + start))
+    return result
+
+
+def do_not_overlap(logs: Sequence[Log]) -> bool:
+    """Whether logs can be on one clock: none begins before another has ended."""
+    ordered = sorted(logs, key=lambda log: float(log.t[0]))
+    return all(before.t[-1] < after.t[0] for before, after in pairwise(ordered))
+
+
+@dataclass(frozen=True, eq=False)
+class ClockedLogs:
+    """Logs on one clock.
+
+    Attributes:
+        logs: to fit to.
+        held_out: unseen ones.
+        dated: whether it is known when the unseen ones were recorded.
+        notes: what was taken for granted.
+    """
+
+    logs: tuple[Log, ...]
+    held_out: tuple[Log, ...]
+    dated: bool = True
+    notes: tuple[str, ...] = ()
+
+
+def put_on_clock(logs: Sequence[Log], held_out: Sequence[Log]) -> ClockedLogs:
+    """Puts logs on one clock where their own times say that they are on none.
+
+    Two recordings of one robot cannot overlap: where they do, each began its clock anew. Held-out logs that overlap the
+    others count as recorded after them.
+
+    Args:
+        logs: to fit to, in the order in which they were recorded where they overlap.
+        held_out: unseen ones, likewise.
+
+    Raises:
+        InputError: one log given twice.
+    """
+    _refuse_copies(logs, held_out)
+    notes = []
+    if not do_not_overlap(logs):
+        logs = on_one_clock(logs)
+        notes.append(_OVERLAP.format(UNKNOWN_PAUSE))
+    dated = not held_out or do_not_overlap([*logs, *held_out])
+    if not dated:
+        latest = max(logs, key=lambda log: float(log.t[-1]))
+        held_out = on_one_clock([latest, *held_out])[1:]
+        notes.append(_UNDATED.format(UNKNOWN_PAUSE))
+    return ClockedLogs(tuple(logs), tuple(held_out), dated, tuple(notes))
+
+
+_OVERLAP = (
+    "The logs overlap in time: each began its clock anew. They count one after the other in the order given, {:.0f} s "
+    "apart; what heats, drifts or happens between them is known as well as that is."
+)
+_UNDATED = (
+    "The held-out logs overlap the others in time: they count as recorded {:.0f} s after them. What changes with time "
+    "may be otherwise there: where they speak against it, it is kept all the same."
+)
+
+
+def later_by(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
+    """How much later than its own clock says a log counts beside those that a model was fitted to, and a word on that.
+
+    Two recordings of one robot cannot overlap: one that does began its clock anew, and counts as recorded after them.
+
+    Args:
+        logs: of the model's fit, as its provenance describes them; those of older files state no start.
+        log: another, or one of them.
+    """
+    if not logs or any(known.get("start") is None for known in logs):
+        return 0.0, ""
+    (own,) = describe_logs([log])
+    for known in logs:
+        if are_same_log(own, known):
+            # Some of its rows may have been left out of the fit, and it may be a part of it.
+            late = float(known["start"] - log.t[0])
+            within = -late > -OWN and log.t[-1] < known["start"] + known["duration"] + OWN
+            return (0.0 if within else late), ""
+    first, last = min(known["start"] for known in logs), max(known["start"] + known["duration"] for known in logs)
+    if log.t[0] > last or log.t[-1] < first:
+        return 0.0, ""
+    return float(last + UNKNOWN_PAUSE - log.t[0]), _LATER.format(UNKNOWN_PAUSE)
+
+
+def before_it(logs: Sequence[Log], motion: Log, start: float, shifts: Sequence[float]) -> tuple[list[Log], str]:
+    """Puts logs of what a robot did before a motion on the clock of that, and says what that takes for granted.
+
+    Args:
+        logs: of what came before, in the order in which they were recorded where their clocks each began anew.
+        motion: a log.
+        start: when it counts as begun [s].
+        shifts: how much later [s] than their clocks say the logs count, by what is known of them.
+    """
+    placed = [replace(log, t=log.t + shift) for log, shift in zip(logs, shifts, strict=True)]
+    if do_not_overlap([*placed, begun := replace(motion, t=motion.t - motion.t[0] + start)]):
+        late = [log for log in placed if log.t[0] > begun.t[0]]
+        if late:
+            raise InputError(
+                "a log of what came before that comes after the motion",
+                file=late[0].metadata.get("file", late[0].name or None),
+                allowed="logs that end before the motion begins, on one clock, or that each begin their clock anew",
+            )
+        return sorted(placed, key=lambda log: float(log.t[0])), ""
+    *earlier, last = on_one_clock([*logs, motion])
+    shift = start - float(last.t[0])
+    return [replace(log, t=log.t + shift) for log in earlier], _ANEW.format(UNKNOWN_PAUSE)
+
+
+_ANEW = "the clocks of those logs and the motion's each began anew: they count in the order given, {:.0f} s apart"
+
+_LATER = (
+    "The log overlaps in time those that the model was fitted to, in which something changed: it counts as recorded "
+    "{:.0f} s after them."
+)
+
+
+def _refuse_copies(logs: Sequence[Log], held_out: Sequence[Log]) -> None:
+    every = [*logs, *held_out]
+    for k, log in enumerate(every):
+        for i, other in enumerate(every[:k]):
+            if _same(log, other):
+                unseen = i < len(logs) <= k
+                raise InputError(
+                    "the held-out log is one of the logs that are fitted to" if unseen else "the log is given twice",
+                    file=log.metadata.get("file", log.name or None),
+                    remedy="hold out a log of another motion" if unseen else "name it once: it would count double",
+                )
+
+
+def _same(one: Log, other: Log) -> bool:
+    pairs = ((one.q, other.q), (one.tau, other.tau), (one.current, other.current))
+    return all(np.array_equal(a, b) if a is not None and b is not None else a is b for a, b in pairs)

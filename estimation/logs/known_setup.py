@@ -1,0 +1,121 @@
+"""How the robot was set up for a log, where that is known: what it carried, and how its base stood."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from robots.common.errors import InputError
+from robots.regressor import TorqueModel
+from robots.robot import Robot
+from robots.signals import Log, Motion
+from robots.terms import RigidBody
+from robots.terms.situations.sensitivities import moved_body
+
+Array = NDArray[np.float64]
+
+HEAT = "a model of heat"
+"""What does not know payloads and gravities, for `require_plain`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """A known payload.
+
+    Attributes:
+        model: the rigid body, under the log's gravity.
+        parameters: ten inertial parameters about the last link's frame.
+    """
+
+    model: TorqueModel
+    parameters: Array
+
+    def torque(self, motion: Motion) -> Array:
+        """Evaluates the payload's torque (N, n) [N m or N]."""
+        last = range(self.model.size - 10, self.model.size)
+        return self.model.torque(motion.q, motion.dq, motion.ddq, self.parameters, columns=last)
+
+
+def load_of(robot: Robot, log: Log) -> Load | None:
+    """Gives a log's payload; None without."""
+    if log.payload is None or not log.payload.any():
+        return None
+    return Load(_rigid_body(robot.under(log.gravity)), moved_body(robot.chain.tip) @ log.payload)
+
+
+# What was compiled for a model is kept by the model.
+@lru_cache(maxsize=16)
+def _rigid_body(robot: Robot) -> TorqueModel:
+    return TorqueModel(robot, (RigidBody(),))
+
+
+def robot_for_log(robot: Robot, log: Log) -> Robot:
+    """Gives the robot as it was for a log: on its base, the payload a part of the last link."""
+    standing = robot.under(log.gravity)
+    if log.payload is None or not log.payload.any():
+        return standing
+    return _with_payload(standing, tuple(log.payload.tolist()))
+
+
+@lru_cache(maxsize=16)
+def _with_payload(robot: Robot, body: tuple[float, ...]) -> Robot:
+    inertia = np.array(robot.inertia)
+    inertia[-1] += moved_body(robot.chain.tip) @ np.array(body)
+    return replace(robot, inertia=inertia)
+
+
+def gravities_of(logs: Sequence[Log]) -> list[Array]:
+    """Lists the gravities (3,) that logs state [m/s2]."""
+    return [log.gravity for log in logs if log.gravity is not None]
+
+
+def require_plain(logs: Sequence[Log], what: str) -> None:
+    """Refuses logs that state a payload or a gravity where neither can be counted in.
+
+    Args:
+        logs: some.
+        what: does not know them, as in ``the method iv``.
+
+    Raises:
+        InputError: naming the log.
+    """
+    for log in logs:
+        stated = "gravity" if log.gravity is not None else "payload" if log.payload is not None else None
+        if stated is not None:
+            raise InputError(
+                f"the log states a {stated}, which {what} does not know",
+                file=log.metadata.get("file", log.name or None),
+                column=stated,
+                allowed="logs without payload, of the base as the robot's description has it",
+            )
+
+
+def require_known(model: TorqueModel, columns: Sequence[int], known: Sequence[ArrayLike], gravity: ArrayLike) -> None:
+    """Refuses a gravity under which base parameters do not say the torque.
+
+    Args:
+        model: the torque model.
+        columns: those that carry a base parameter.
+        known: gravities (3,) under which they were found, besides the description's.
+        gravity: another (3,) [m/s2].
+
+    Raises:
+        InputError: naming parameters that the gravity asks for besides.
+    """
+    from robots.base_parameters import find_base_parameters
+
+    if model.robot.under(gravity) is model.robot or any(np.array_equal(gravity, other) for other in known):
+        return
+    asked = find_base_parameters(model, gravities=[*known, gravity])
+    missing = [name for name, i in zip(asked.names, asked.independent, strict=True) if i not in set(columns)]
+    if missing:
+        some = ", ".join(missing[:3]) + (", ..." if len(missing) > 3 else "")
+        raise InputError(
+            f"the gravity {np.array2string(np.asarray(gravity, dtype=float))} shows what the model lacks: {some}",
+            column="gravity",
+            remedy="identify the model with a log under such a gravity besides",
+        )

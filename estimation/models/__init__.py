@@ -1,0 +1,1 @@
+"""Identified models: their files, their extensions, their predictions."""

@@ -1,0 +1,283 @@
+"""The identified model: parameters with their uncertainty, and the file that carries them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimation.logs.known_setup import require_known
+from estimation.models.extension import Extension, extension_torque, read_extension, read_gear_load, write_gear_load
+from estimation.models.robot_in_file import build_robot, describe_robot, require_described
+from robots.common.errors import InputError
+from robots.common.files import write_atomic
+from robots.regressor import TorqueModel
+from robots.robot import Robot
+from robots.signals import Motion
+from robots.terms import Column, build_term, describe_term
+from robots.terms.effect_bases.gear_load import ExtraGearLoad
+from robots.terms.situations.flange_body import with_body
+from robots.terms.situations.situation import Situation, joined, situation
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+FORMAT = "robot-oed model"
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Model:
+    """A torque model with the parameters that the data determined.
+
+    Attributes:
+        torque_model: robot and terms.
+        columns: indices (b,) of the regressor columns that carry a parameter.
+        values: base parameters (b,), in the columns' units.
+        covariance: (b, b) of the values.
+        determined: (b,), False where the data do not determine a parameter: its value is then a convention that
+            makes the others right together, and means nothing by itself.
+        formulas: (b,) the sum of standard parameters that each value stands for.
+        provenance: logs with hashes, method, residual level per joint, tool version.
+        extensions: effects beyond the terms, as a diagnosis found them.
+        felt: base parameters (b,) by which the extensions reckon load and friction, those that they were fitted beside;
+            None for `values`. The two differ where an effect and the base model share a torque.
+        bearing: what of the extensions the gears bear, so that others feel it as load; None for nothing.
+        since: moment from which the phase of an extension that vibrates counts [s]; None for the first of a motion.
+    """
+
+    torque_model: TorqueModel
+    columns: tuple[int, ...]
+    values: Array
+    covariance: Array
+    determined: NDArray[np.bool_]
+    formulas: tuple[str, ...]
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    extensions: tuple[Extension, ...] = ()
+    felt: Array | None = None
+    bearing: ExtraGearLoad | None = None
+    since: float | None = None
+
+    @property
+    def gravities(self) -> tuple[tuple[float, ...], ...]:
+        """Gravities (3,) in the base frame [m/s2] besides the description's, under which the parameters hold too."""
+        return tuple(tuple(map(float, gravity)) for gravity in self.provenance.get("gravities", ()))
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.torque_model.robot
+
+    @cached_property
+    def parameters(self) -> tuple[Column, ...]:
+        """The parameters' descriptions (b,)."""
+        return tuple(self.torque_model.columns[i] for i in self.columns)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters' names (b,)."""
+        return tuple(column.name for column in self.parameters)
+
+    @property
+    def standard_errors(self) -> Array:
+        """Standard errors (b,), infinite where the data do not determine the parameter."""
+        return np.where(self.determined, np.sqrt(np.diag(self.covariance)), np.inf)
+
+    @property
+    def keeps_heat(self) -> bool:
+        """Whether what came before a motion acts in it still."""
+        return any(extension.source.keeps for extension in self.extensions)
+
+    def torque(
+        self,
+        q: ArrayLike,
+        dq: ArrayLike,
+        ddq: ArrayLike,
+        t: ArrayLike | None = None,
+        *,
+        gravity: ArrayLike | None = None,
+        payload: ArrayLike | None = None,
+        before: Sequence[Motion] = (),
+    ) -> Array:
+        """Predicts the torque (N, n) [N m or N] of a motion given by arrays (N, n).
+
+        Args:
+            q: positions.
+            dq: velocities.
+            ddq: accelerations.
+            t: times (N,) [s]. With them the extensions count, some of which depend on time or on what came before;
+                without, the terms alone.
+            gravity: (3,) in the base frame [m/s2], where the base stands otherwise than the robot's description says.
+            payload: ten inertial parameters of a body on the flange, in its frame, as `Log` has them.
+            before: motions that came before on the same clock, with the same gravity and payload: the heat they left
+                acts.
+
+        Raises:
+            InputError: a gravity that shows parameters which the model lacks.
+        """
+        model = self.torque_model.under(gravity)
+        if model is not self.torque_model:
+            require_known(self.torque_model, self.columns, self.gravities, np.asarray(gravity, dtype=float))
+        parameters, felt = (
+            _with_payload(model, self.columns, values, payload)
+            for values in (self.values, self.values if self.felt is None else self.felt)
+        )
+        asked: tuple[int, ...] = self.columns
+        if payload is not None:
+            asked = tuple(np.union1d(asked, np.flatnonzero(parameters)).tolist())
+        own = model.torque(q, dq, ddq, parameters[list(asked)], columns=asked)
+        if t is None or not self.extensions:
+            return own
+        arrays = [np.asarray(t, dtype=float), *(np.atleast_2d(np.asarray(x, dtype=float)) for x in (q, dq, ddq))]
+
+        def state(known: Array) -> Situation:
+            earlier = [situation(model, known, m.t, m.q, m.dq, m.ddq) for m in before]
+            return replace(joined([*earlier, situation(model, known, *arrays)], self.torque_model), since=self.since)
+
+        cut = any(extension.source.last for extension in self.extensions)
+        extended = extension_torque(self.extensions, state(felt), state(parameters) if cut else None, self.bearing)
+        return own + extended[-len(own) :]
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per parameter: joint, value, standard error, percent, unit, determined, formula."""
+        import pandas as pd
+
+        errors = self.standard_errors
+        with np.errstate(divide="ignore", invalid="ignore"):
+            percent = 100 * errors / np.abs(self.values)
+        columns = {
+            "joint": [column.joint for column in self.parameters],
+            "value": self.values,
+            "standard_error": errors,
+            "percent": percent,
+            "unit": [column.unit for column in self.parameters],
+            "determined": self.determined,
+            "stands_for": self.formulas,
+        }
+        return pd.DataFrame(columns, index=pd.Index(self.names, name="parameter"))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes the model as plain data for `model.json`."""
+        robot, errors = self.robot, np.sqrt(np.diag(self.covariance))
+        parameters = [
+            {
+                "name": column.name,
+                "joint": column.joint,
+                "term": column.term,
+                "value": float(value),
+                "unit": column.unit,
+                # A number that JSON cannot hold, and that nobody should trust, is left out.
+                "standard_error": float(error) if known else None,
+                "determined": bool(known),
+                "stands_for": formula,
+            }
+            for column, value, error, known, formula in zip(
+                self.parameters, self.values, errors, self.determined, self.formulas, strict=True
+            )
+        ]
+        return {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "robot": describe_robot(robot),
+            "terms": [describe_term(term) for term in self.torque_model.terms],
+            "parameters": parameters,
+            "covariance": self.covariance.tolist(),
+            "provenance": dict(self.provenance),
+            **({"extensions": [extension.to_dict(robot) for extension in self.extensions]} if self.extensions else {}),
+            **({"felt_by_extensions": self.felt.tolist()} if self.extensions and self.felt is not None else {}),
+            **({"phases_since": self.since} if self.extensions and self.since is not None else {}),
+            **(
+                {"borne_by_gears": write_gear_load(self.bearing)}
+                if self.extensions and self.bearing is not None
+                else {}
+            ),
+        }
+
+    def save(self, path: Path, *, force: bool = False) -> None:
+        """Writes `model.json`, whole or not at all.
+
+        Raises:
+            InputError: the file is there, and force is not given.
+        """
+        write_atomic(path, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
+
+
+def load_model(path: str | Path) -> Model:
+    """Reads a `model.json`, or the one in a folder.
+
+    The file holds what the model refers to of the robot, so that a prediction needs nothing else.
+
+    Raises:
+        InputError: a missing file, or one that is no model.
+    """
+    file = Path(path)
+    file = file / "model.json" if file.is_dir() else file
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError("no such file", file=file, remedy="give a model.json, or the folder that holds one") from None
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"cannot be read as JSON: {error}", file=file) from error
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise InputError("is no model file", file=file, allowed=f'"format": "{FORMAT}"')
+    version = data.get("format_version")
+    if not isinstance(version, int) or version > FORMAT_VERSION:
+        raise InputError(f"format version {version!r}", file=file, allowed=f"up to {FORMAT_VERSION}")
+    try:
+        return _from_dict(data)
+    except InputError as error:
+        raise InputError(error.problem, file=file, allowed=error.allowed, remedy=error.remedy) from error
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise InputError(f"is damaged: {type(error).__name__} {error}", file=file) from error
+
+
+def _from_dict(data: Mapping[str, Any]) -> Model:
+    terms = tuple(build_term(term) for term in data["terms"])
+    torque_model = TorqueModel(build_robot(data["robot"]), terms)
+    index = {name: i for i, name in enumerate(torque_model.names)}
+    parameters = data["parameters"]
+    unknown = [item["name"] for item in parameters if item["name"] not in index]
+    if unknown:
+        raise InputError(f"parameter {unknown[0]} is none of the model's terms")
+    torque_model.symbolic()  # a term that does not suit the robot says so now, not at the first prediction
+    columns = tuple(index[item["name"]] for item in parameters)
+    values = np.array([item["value"] for item in parameters], dtype=float)
+    covariance = np.array(data["covariance"], dtype=float).reshape(len(parameters), len(parameters))
+    felt = np.array(data.get("felt_by_extensions", values), dtype=float).reshape(len(parameters))
+    if not columns or len(set(columns)) < len(columns):
+        raise InputError("parameters are missing or repeated", allowed="one or more, each once")
+    if not all(np.isfinite(numbers).all() for numbers in (values, covariance, felt)):
+        raise InputError("values or covariances that are not finite", remedy="identify the robot again")
+    if data.get("extensions"):
+        require_described(data["robot"])
+    cutoff = data["provenance"].get("cutoff_hz", 1.0)
+    if isinstance(cutoff, bool) or not (isinstance(cutoff, int | float) and 0 < cutoff < np.inf):
+        raise InputError(f"provenance: cutoff_hz is {cutoff!r}", allowed="a positive number [Hz]")
+    return Model(
+        torque_model=torque_model,
+        columns=columns,
+        values=values,
+        covariance=covariance,
+        determined=np.array([item["determined"] for item in parameters], dtype=bool),
+        formulas=tuple(item["stands_for"] for item in parameters),
+        provenance=data["provenance"],
+        extensions=tuple(read_extension(item, torque_model.robot) for item in data.get("extensions", [])),
+        felt=felt if "felt_by_extensions" in data else None,
+        since=None if data.get("phases_since") is None else float(data["phases_since"]),
+        bearing=read_gear_load(data["borne_by_gears"], torque_model.robot) if "borne_by_gears" in data else None,
+    )
+
+
+def _with_payload(model: TorqueModel, columns: Sequence[int], values: Array, payload: ArrayLike | None) -> Array:
+    """Standard parameters (p,) of base parameters, with a body at the flange."""
+    parameters = np.zeros(model.size)
+    parameters[list(columns)] = values
+    return parameters if payload is None else with_body(model, parameters, np.asarray(payload, dtype=float))

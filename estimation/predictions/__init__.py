@@ -1,0 +1,1 @@
+"""Torques predicted for unseen logs, and estimators compared on them."""

@@ -1,0 +1,141 @@
+"""Normal equations per joint: all that least squares needs of a log, however long it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.linear_algebra.positive import solve_positive
+from estimation.regressions.parameter_priors import GaussianPrior
+
+Array = NDArray[np.float64]
+
+# Keeps a matrix invertible that no ridge helps.
+FAINT = 1e-12
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Sums over samples, joint by joint.
+
+    Attributes:
+        gram: (n, p, p), Y_j' Y_j.
+        cross: (n, p), Y_j' tau_j.
+        square: (n,), tau_j' tau_j.
+        count: (n,), rows.
+        pull: what the ridge of `solve` pulls to; without, to zero.
+    """
+
+    gram: Array
+    cross: Array
+    square: Array
+    count: Array
+    pull: GaussianPrior | None = None
+
+    @staticmethod
+    def of(Y: Array, tau: Array, mask: Array) -> Moments:
+        """Sums the rows of Y (N, n, p) and tau (N, n) where the mask (N, n) is one."""
+        n, p = Y.shape[1:]
+        gram, cross = np.zeros((n, p, p)), np.zeros((n, p))
+        for joint in range(n):
+            # Most columns do not act on a joint: links before it, friction of others.
+            used = np.flatnonzero(Y[:, joint].any(axis=0))
+            rows = Y[:, joint][:, used] * mask[:, joint, None]
+            gram[joint][np.ix_(used, used)] = rows.T @ rows
+            cross[joint, used] = rows.T @ tau[:, joint]
+        return Moments(gram, cross, (mask * tau**2).sum(axis=0), mask.sum(axis=0))
+
+    def __add__(self, other: Moments) -> Moments:
+        return replace(
+            self,
+            gram=self.gram + other.gram,
+            cross=self.cross + other.cross,
+            square=self.square + other.square,
+            count=self.count + other.count,
+        )
+
+    def __sub__(self, other: Moments) -> Moments:
+        return replace(
+            self,
+            gram=self.gram - other.gram,
+            cross=self.cross - other.cross,
+            square=self.square - other.square,
+            count=self.count - other.count,
+        )
+
+    def pulled(self, pull: GaussianPrior | None) -> Moments:
+        """Gives the same sums with another pull."""
+        return replace(self, pull=pull)
+
+    def columns(self, chosen: NDArray[np.intp]) -> Moments:
+        """Keeps some of the p columns."""
+        pull = None if self.pull is None else self.pull.columns(chosen)
+        return Moments(self.gram[:, chosen][:, :, chosen], self.cross[:, chosen], self.square, self.count, pull)
+
+    def solve(self, weights: Array, ridge: float) -> Array:
+        """Solves for parameters (p,).
+
+        Args:
+            weights: of each joint's rows (n,).
+            ridge: how much the pull counts. Without a pull it is added to the diagonal of the weighted Gram matrix
+                once its columns have unit length; with one, a ridge of 1 weighs an error of a parameter's own size
+                as much as all of the torque.
+        """
+        gram, cross = self._weighted(weights), weights @ self.cross
+        return solve_all(gram[None], cross[None], np.array([weights @ self.square]), ridge, self.pull)[0]
+
+    def inverse(self, weights: Array, ridge: float) -> Array:
+        """Inverts the weighted Gram matrix (p, p) with the ridge of `solve`."""
+        matrix = self._weighted(weights)
+        scale = np.sqrt(np.diag(matrix))
+        scale = np.where(scale > 0, scale, 1.0)
+        unit = np.eye(len(scale))
+        inverse = solve_positive(matrix / scale[:, None] / scale + ridge * unit, unit)
+        return inverse / scale[:, None] / scale
+
+    def _weighted(self, weights: Array) -> Array:
+        return np.asarray((weights @ self.gram.reshape(len(self.gram), -1)).reshape(self.gram.shape[1:]))
+
+    def residual(self, parameters: Array) -> Array:
+        """Sums each joint's squared residuals (n,)."""
+        quadratic = (self.gram @ parameters) @ parameters
+        return np.maximum(self.square - 2 * self.cross @ parameters + quadratic, 0.0)
+
+    def level(self, parameters: Array) -> Array:
+        """Gives each joint's residual RMS (n,) [N m or N], floored where a fit is exact."""
+        rows = np.maximum(self.count, 1)
+        floor = 1e-6 * self.square / rows
+        return np.sqrt(np.maximum(self.residual(parameters) / rows, np.maximum(floor, np.finfo(float).tiny)))
+
+
+def solve_all(gram: Array, cross: Array, square: Array, ridge: float, pull: GaussianPrior | None) -> Array:
+    """Solves several weighted normal equations with one ridge, see `Moments.solve`.
+
+    Args:
+        gram: (B, p, p), weighted and summed over the joints.
+        cross: (B, p).
+        square: (B,), of the torques.
+        ridge: how much the pull counts.
+        pull: what it pulls to; None for zero.
+
+    Returns:
+        Parameters (B, p).
+    """
+    diagonal = np.arange(gram.shape[1])
+    scale = np.sqrt(gram[:, diagonal, diagonal])
+    scale = np.where(scale > 0, scale, 1.0)
+    factor = 1.0 / scale
+    right = cross * factor
+    matrix = gram * factor[:, :, None]
+    if pull is None:
+        matrix *= factor[:, None, :]
+        matrix[:, diagonal, diagonal] += ridge
+    else:
+        strength = ridge * square[:, None]
+        matrix += strength[:, :, None] * (factor[:, :, None] * pull.precision)
+        matrix *= factor[:, None, :]
+        matrix[:, diagonal, diagonal] += FAINT
+        right += strength * (pull.precision @ pull.target) * factor + FAINT * scale * pull.target
+    return np.array([solve_positive(*system) for system in zip(matrix, right, strict=True)]) * factor

@@ -1,0 +1,114 @@
+"""What is known of parameters before a log is read: how far each may lie from the robot's description."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.base_parameters import BaseParameters
+from robots.terms.rigid_body import SYMBOLS
+
+Array = NDArray[np.float64]
+
+# A link may be wrong by its own size: its mass, its mass times its reach, its mass times its reach squared.
+SMALLEST_LINK = 0.05
+SMALLEST_REACH = 0.3
+# Friction, rotor and offset of a joint may make so many times its torque: descriptions rarely state them.
+OWN = 3.0
+# A column below this RMS does not act.
+SILENT = 1e-9
+# Keeps the precision finite where a description has links of no size.
+FAINT = 1e-12
+
+
+@dataclass(frozen=True)
+class GaussianPrior:
+    """A quadratic penalty (pi - target)' precision (pi - target), 1 where a parameter is wrong by its own size.
+
+    Attributes:
+        precision: (p, p).
+        target: (p,).
+    """
+
+    precision: Array
+    target: Array
+
+    def columns(self, chosen: NDArray[np.intp]) -> GaussianPrior:
+        """Keeps some of the p columns, of independent parameters."""
+        return GaussianPrior(self.precision[np.ix_(chosen, chosen)], self.target[chosen])
+
+
+def prior_from_description(base: BaseParameters, torque: Array, level: Array) -> GaussianPrior | None:
+    """Pulls towards the robot's description, in steps of what could be wrong with it.
+
+    Standard inertial parameters scatter about the description by each link's mass m, m l and m l^2, l its radius of
+    gyration about its frame; regrouped, that is the covariance K S K' of base parameters, so that a combination which
+    only light links feel is held tighter than one of heavy ones. Friction, rotor and offset scatter about what is
+    described by three times what makes their joint's torque at the joint's limit velocity: a cubic term that a slow log
+    leaves open must not explode beyond it.
+
+    Args:
+        base: base parameters.
+        torque: each joint's torque RMS (n,) [N m or N].
+        level: RMS of each column on the joint of its own (b,).
+
+    Returns:
+        The pull, or None where the description lacks inertial parameters.
+    """
+    model = base.model
+    if not np.isfinite(model.nominal).all() or not np.any(model.robot.inertia):
+        return None
+    spread = np.zeros(model.size)
+    links = link_spreads(np.asarray(model.robot.inertia, dtype=float))
+    own = {column: position for position, column in enumerate(base.independent)}
+    for i, column in enumerate(model.columns):
+        joint = column.joint - 1
+        if column.term == "rigid_body":
+            spread[i] = links[joint, SYMBOLS.index(column.symbol)]
+        elif i in own:
+            # A column that never acts is held at its description by any spread.
+            spread[i] = OWN * torque[joint] / (level[own[i]] if level[own[i]] > SILENT else 1.0)
+    covariance = (base.grouping * spread**2) @ base.grouping.T
+    scale = np.sqrt(np.diag(covariance))
+    scale = np.where(scale > 0, scale, 1.0)
+    normalised = covariance / scale[:, None] / scale + FAINT * np.eye(len(scale))
+    precision = np.linalg.inv(normalised) / scale[:, None] / scale
+    return GaussianPrior(precision, base.from_standard(model.nominal))
+
+
+def link_spreads(inertia: Array) -> Array:
+    """How far each inertial parameter of a link may be off: by the link's own mass m, by m l and by m l^2.
+
+    Args:
+        inertia: described parameters (n, 10); l is the radius of gyration about the link frame. Links much smaller
+            than the largest count as some share of it.
+
+    Returns:
+        (n, 10), positive.
+    """
+    mass = np.maximum(inertia[:, 0], SMALLEST_LINK * inertia[:, 0].max())
+    second = np.maximum(inertia[:, [4, 7, 9]].sum(axis=1) / 2, 0.0) / mass
+    reach = np.sqrt(np.maximum(second, (SMALLEST_REACH**2) * second.max()))
+    return np.asarray(mass[:, None] * reach[:, None] ** np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2]))
+
+
+def friction_levels(base: BaseParameters, level: Array, fastest: Array) -> Array:
+    """Raises the levels of friction columns to those at the limit velocity.
+
+    Args:
+        base: base parameters.
+        level: RMS of each column on the joint of its own (b,).
+        fastest: highest speed seen of each joint (n,); the limit velocity counts where the robot states one.
+
+    Returns:
+        Levels (b,).
+    """
+    limit = np.asarray(base.model.robot.limits.velocity, dtype=float)
+    speed = np.where(np.isfinite(limit), np.maximum(limit, fastest), fastest)
+    raised = level.copy()
+    for i, column in enumerate(base.columns):
+        if column.term == "friction":
+            raised[i] = max(raised[i], speed[column.joint - 1] ** (int(column.symbol[1:]) - 1))
+    return raised

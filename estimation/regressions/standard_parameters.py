@@ -1,0 +1,186 @@
+"""Standard parameters under constraints: what physics says of each of them, and a description to lean on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.regressions.regression_data import RegressionData
+from robots.consistency import inertial_from_pseudo, pseudo_inertia
+from robots.geometry.inertia import SIZE
+from robots.regressor import TorqueModel
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Eigenvalues of a described pseudo-inertia below this share of its trace are lifted: thin rods and point masses, and
+# files that breach the triangle inequality, would pull towards bodies that cannot exist.
+THIN = 0.02
+# Radius of gyration of a link that nobody describes, as a share of its length and of the arm's.
+OWN_SHARE, ARM_SHARE = 0.2, 0.05
+GRAVITY = 9.81
+# Speeds, as shares of the largest, at which friction must not drive the joint.
+SPEEDS = np.linspace(0.0, 1.0, 13)
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """Units in which every parameter is of the order of one.
+
+    Attributes:
+        reference: per link a body that can exist, to lean on (n, 10).
+        described: per link, whether the reference is the description's (n,).
+        scale: of all standard parameters (p,): a parameter is its scale times a number.
+        bodies: column indices of each link's ten parameters (n, 10); empty (0, 10) without a rigid body.
+    """
+
+    reference: Array
+    described: NDArray[np.bool_]
+    scale: Array
+    bodies: NDArray[np.intp]
+
+    @property
+    def unit_reference(self) -> Array:
+        """The reference in these units (n, 10)."""
+        return np.asarray(self.reference / self.scale[self.bodies])
+
+
+def scaling(data: RegressionData) -> Scaling:
+    """Chooses units for the model's standard parameters from the description, or from the data where there is none."""
+    model = data.base.model
+    n = model.robot.n
+    reference, described = reference_bodies(model.robot, _mass_from_torque(data))
+    bodies = body_columns(model)
+    rows = np.maximum(data.moments.count, 1)
+    torque = np.sqrt(np.maximum(data.moments.square / rows, np.finfo(float).tiny))
+    scale = np.ones(model.size)
+    mean_square = {int(c): data.moments.gram[:, k, k] / rows for k, c in enumerate(data.base.independent)}
+    for k, column in enumerate(model.columns):
+        own = float(np.sqrt(mean_square.get(k, np.zeros(n))[column.joint - 1]))
+        scale[k] = torque[column.joint - 1] / own if own > 0 else 1.0
+    for link, columns in enumerate(bodies):
+        mass, length = _size(reference[link])
+        scale[columns] = mass * np.array([1.0] + [length] * 3 + [length**2] * 6)
+    return Scaling(reference[: len(bodies)], described[: len(bodies)], scale, bodies)
+
+
+def body_columns(model: TorqueModel) -> NDArray[np.intp]:
+    """Finds each link's ten parameters among the model's columns (n, 10), (0, 10) where it has no rigid body."""
+    found = [k for k, column in enumerate(model.columns) if column.term == "rigid_body"]
+    return np.array(found, dtype=np.intp).reshape(-1, SIZE)
+
+
+def reference_bodies(robot: Robot, mass: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Gives a body per link that can exist: the description's, mended where it is degenerate, or a plausible one.
+
+    Args:
+        robot: the robot.
+        mass: of an arm that nobody describes [kg].
+
+    Returns:
+        Parameters (n, 10), and whether the description states them (n,).
+    """
+    inertia = np.asarray(robot.inertia, dtype=float)
+    joints = robot.chain.joints
+    ends = [joint.translation for joint in joints[1:]] + [robot.chain.tip[:3, 3]]
+    lengths = np.array([float(np.linalg.norm(end)) for end in ends])
+    arm = max(float(lengths.sum()), float(np.linalg.norm(joints[0].translation)), 0.1)
+    bodies = np.empty((robot.n, SIZE))
+    described = np.isfinite(inertia).all(axis=1) & (inertia[:, 0] > 0)
+    for link in range(robot.n):
+        if described[link]:
+            bodies[link] = _mended(inertia[link], 0.01 * arm)
+        else:
+            own, centre = mass / robot.n, ends[link] / 2
+            spread = (OWN_SHARE * lengths[link] + ARM_SHARE * arm) ** 2
+            pseudo = np.zeros((4, 4))
+            pseudo[:3, :3] = np.outer(centre, centre) + spread * np.eye(3)
+            pseudo[:3, 3] = pseudo[3, :3] = centre
+            pseudo[3, 3] = 1.0
+            bodies[link] = inertial_from_pseudo(own * pseudo)
+    return bodies, described
+
+
+def nonnegative_rows(model: TorqueModel, speed: Array) -> Array:
+    """Lists what must not be negative: rotor inertias, Coulomb and viscous friction, and the torque of all friction.
+
+    Of a friction polynomial, f1 and f2 must be positive, and the whole must brake at every speed that was seen: its
+    higher coefficients alone may have either sign, as measured curves that flatten show.
+
+    Args:
+        model: the torque model with p standard parameters.
+        speed: largest speed of each joint in the data (n,) [rad/s or m/s].
+
+    Returns:
+        Rows (m, p), each of which times the parameters must be zero or more.
+    """
+    rows = []
+    powers: dict[int, dict[int, int]] = {}
+    for k, column in enumerate(model.columns):
+        if column.term == "rotor_inertia" or (column.term == "friction" and column.symbol in ("f1", "f2")):
+            row = np.zeros(model.size)
+            row[k] = 1.0
+            rows.append(row)
+        if column.term == "friction":
+            powers.setdefault(column.joint - 1, {})[int(column.symbol[1:])] = k
+    for joint, columns in powers.items():
+        if max(columns) > 2:
+            for share in SPEEDS[1:]:
+                row = np.zeros(model.size)
+                for power, k in columns.items():
+                    row[k] = (share * speed[joint]) ** (power - 1)
+                rows.append(row)
+    return np.array(rows).reshape(-1, model.size)
+
+
+def box_rows(model: TorqueModel, boxes: Mapping[int, tuple[Array, Array]]) -> Array:
+    """Writes "the centre of mass lies in the box", lower m <= m c <= upper m, as rows (6 k, p) that must be >= 0.
+
+    Args:
+        model: the torque model.
+        boxes: link, counted from 1, to its lowest and highest corner in the link's frame, (3,) [m].
+    """
+    bodies = body_columns(model)
+    rows = np.zeros((6 * len(boxes), model.size))
+    for index, (link, (lower, upper)) in enumerate(sorted(boxes.items())):
+        columns = bodies[link - 1]
+        for axis in range(3):
+            low, high = rows[6 * index + 2 * axis], rows[6 * index + 2 * axis + 1]
+            low[columns[1 + axis]], low[columns[0]] = 1.0, -lower[axis]
+            high[columns[1 + axis]], high[columns[0]] = -1.0, upper[axis]
+    return rows
+
+
+def largest_speed(data: RegressionData) -> Array:
+    """Finds each joint's largest speed in the data (n,) [rad/s or m/s]."""
+    return np.max([np.abs(part.motion.dq).max(axis=0) for part in data.parts], axis=0)
+
+
+def _size(body: Array) -> tuple[float, float]:
+    """Mass, and radius of gyration about the frame's origin."""
+    pseudo = pseudo_inertia(body)
+    return float(body[0]), float(np.sqrt(np.trace(pseudo[:3, :3]) / body[0]))
+
+
+def _mended(body: Array, shortest: float) -> Array:
+    """Lifts the eigenvalues of a body's normalised pseudo-inertia to a share of their sum."""
+    mass = float(body[0])
+    pseudo = pseudo_inertia(body) / mass
+    length = max(float(np.sqrt(max(np.trace(pseudo[:3, :3]), 0.0))), shortest)
+    unit = np.array([length] * 3 + [1.0])
+    values, vectors = np.linalg.eigh(pseudo / unit[:, None] / unit)
+    lifted = (vectors * np.maximum(values, THIN)) @ vectors.T
+    lifted[3, 3] = max(lifted[3, 3], THIN)
+    return inertial_from_pseudo(mass * lifted * unit[:, None] * unit)
+
+
+def _mass_from_torque(data: RegressionData) -> float:
+    """The mass of an arm whose gravity makes the torques that were measured [kg]."""
+    chain = data.robot.chain
+    reach = sum(float(np.linalg.norm(joint.translation)) for joint in chain.joints[1:])
+    reach = max(reach + float(np.linalg.norm(chain.tip[:3, 3])), 0.1)
+    largest = float(np.sqrt((data.moments.square / np.maximum(data.moments.count, 1)).max()))
+    return max(3.0 * largest / (GRAVITY * reach), 1e-3)

@@ -1,0 +1,299 @@
+"""The verb: rigid body, friction and heat of all joints, fitted together to a whole campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from estimation.identifications.identification import identify
+from estimation.logs.known_setup import HEAT, require_plain
+from estimation.models.model import Model
+from estimation.thermal.band import error_band
+from estimation.thermal.results.campaign_estimate import CampaignEstimate
+from estimation.thermal.results.estimate import ThermalEstimate
+from estimation.thermal.runs.condensed import Condensed, JointSums, condense
+from estimation.thermal.runs.extraction import join_pieces, piece_on_bins, ratio_of
+from estimation.thermal.runs.thermal_run import ThermalRun
+from estimation.thermal.thermal_fit import fit_thermal
+from estimation.thermal.torque import ThermalTorqueModel
+from robots.common.errors import InputError, NotIdentifiableError
+from robots.common.parallel import one_blas_thread
+from robots.common.progress import SILENT, Progress
+from robots.robot import Robot
+from robots.signals import Log
+
+Array = NDArray[np.float64]
+
+# The fits of rigid body and heat take turns until no friction changes by more than this share.
+SETTLED = 1e-4
+MOST_ROUNDS = 12
+# Least regularisation that keeps the inverse finite.
+FAINT = 1e-12
+
+
+@one_blas_thread()
+def fit_campaign(
+    robot: Robot,
+    logs: Log | Sequence[Log],
+    *,
+    order: str | int = "second",
+    alpha: float | None = None,
+    fixed: Mapping[str, float] | None = None,
+    model: Model | None = None,
+    sensor: str = "motor",
+    width: float = 10.0,
+    start: str = "ambient",
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> CampaignEstimate:
+    """Fits rigid body, friction at T0 and each joint's heat to all logs of a campaign.
+
+    The logs are condensed to normal equations of short times, in which a temperature is constant. On those, the linear
+    parameters given the temperatures and the thermal models given the friction of each short time take turns until both
+    stand still: a minimum of the joint problem. Standard errors come from the joint information.
+
+    Args:
+        robot: the robot.
+        logs: on one clock; the pauses between them are rests.
+        order: of the thermal models, see `fit_thermal`.
+        alpha: slope of the friction, where it is known [1/K].
+        fixed: other known thermal parameters.
+        model: where to begin; identified from the logs by default.
+        sensor: where joint temperatures, if any, were measured: ``motor`` or ``housing``.
+        width: of the short times [s].
+        start: ``ambient`` or ``free``. Where a campaign does not start cold, friction at T0 is extrapolated: `free`
+            finds it only if cooling or several powers are in the logs. A contradiction is told.
+        seed: of the thermal searches.
+        progress: is told how far it is.
+
+    Returns:
+        The estimate.
+
+    Raises:
+        InputError: no logs, logs of another robot, or that state a payload or gravity.
+        NotIdentifiableError: no joint moves.
+    """
+    data = [logs] if isinstance(logs, Log) else list(logs)
+    if not data:
+        raise InputError("no logs", allowed="one or more")
+    require_plain(data, HEAT)
+    bar = progress or SILENT
+    bar.start("fitting rigid body, friction and heat", float(MOST_ROUNDS + 2))
+    try:
+        begin = identify(robot, data, seed=seed).model if model is None else model
+        bar.update(1.0, "condensing")
+        condensed = condense(begin, data, width)
+        bar.update(2.0, "fitting")
+        return _Turns(begin, condensed, sensor).run(
+            bar, {"order": order, "alpha": alpha, "fixed": dict(fixed or {}), "start": start, "seed": seed}
+        )
+    finally:
+        bar.finish()
+
+
+class _Turns:
+    """The two fits that take turns."""
+
+    def __init__(self, model: Model, condensed: Condensed, sensor: str) -> None:
+        self.model, self.condensed, self.sensor = model, condensed, sensor
+        self.moves = [bool(sums.count.sum() > 0 and sums.friction.any()) for sums in condensed.joints]
+        if not any(self.moves):
+            raise NotIdentifiableError("no joint moves", remedy="record logs in which the arm moves")
+        bins = int(condensed.offsets[-1])
+        self.factors = [np.ones(bins) for _ in condensed.joints]
+        self.weights = np.ones(len(condensed.joints))
+        self.values = np.array(model.values)
+
+    def run(self, bar: Progress, options: dict[str, Any]) -> CampaignEstimate:
+        """Takes turns until the friction stands still."""
+        self._solve_linear()
+        without = self._residuals()
+        fits: list[ThermalEstimate | None] = [None] * len(self.moves)
+        rounds = 0
+        for rounds in range(1, MOST_ROUNDS + 1):
+            change = 0.0
+            for j, sums in enumerate(self.condensed.joints):
+                if not self.moves[j]:
+                    continue
+                runs = self._runs(j, sums)
+                fit = fit_thermal(runs, starts=3 if rounds == 1 else 1, **options)
+                factor = self._factor(fit, runs) / fit.model.beta
+                change = max(change, float(np.abs(factor / self.factors[j] - 1.0).max()))
+                fits[j], self.factors[j] = fit, factor
+            self._solve_linear()
+            bar.update(2.0 + rounds, f"friction changed by {change:.1e}")
+            if change < SETTLED:
+                break
+        notes = [] if change < SETTLED else [f"The turns ended at a change of {change:.1e}, before they had settled."]
+        notes += sorted({note for fit in fits if fit is not None for note in fit.notes})
+        notes += self._warm(fits, options)
+        final = [None if fit is None else self._unit(fit) for fit in fits]
+        covariance, errors = self._joint_covariance(final)
+        finished = [None if fit is None else _with_errors(fit, errors[j]) for j, fit in enumerate(final)]
+        model = replace(self.model, values=self.values, covariance=covariance)
+        thermal = tuple(None if fit is None else fit.model for fit in finished)
+        residuals = self._residuals()
+        provenance = {
+            **model.provenance,
+            "residual_rms": residuals.tolist(),
+            "residual_rms_without_heat": without.tolist(),
+            "band95": error_band(ThermalTorqueModel(model=model, thermal=thermal), self.condensed, self.factors),
+        }
+        return CampaignEstimate(
+            torque_model=ThermalTorqueModel(model=replace(model, provenance=provenance), thermal=thermal),
+            thermal=tuple(finished),
+            residual_rms=residuals,
+            residual_without=without,
+            rounds=rounds,
+            notes=tuple(notes),
+        )
+
+    def _warm(self, fits: Sequence[ThermalEstimate | None], options: dict[str, Any]) -> list[str]:
+        """Says which joints do not start at the surroundings' temperature although they were taken to."""
+        if options["start"] != "ambient":
+            return []
+        found = []
+        for j, (sums, fit) in enumerate(zip(self.condensed.joints, fits, strict=True)):
+            if fit is not None:
+                tried = fit_thermal(self._runs(j, sums), starts=1, **{**options, "start": "auto"})
+                found += [note for note in tried.notes if "does not start" in note]
+        return found
+
+    def _solve_linear(self) -> None:
+        for _ in range(2):
+            size = len(self.values)
+            gram, cross = np.zeros((size, size)), np.zeros(size)
+            for sums, factor, weight in zip(self.condensed.joints, self.factors, self.weights, strict=True):
+                part, right = sums.scaled(factor)
+                gram[np.ix_(sums.used, sums.used)] += weight * part
+                cross[sums.used] += weight * right
+            self.values = _solve(gram, cross)
+            self.weights = 1.0 / np.maximum(self._residuals(), 1e-9) ** 2
+
+    def _residuals(self) -> Array:
+        return np.array(
+            [
+                np.sqrt(sums.residual(factor, self.values[sums.used]) / max(float(sums.count.sum()), 1.0))
+                for sums, factor in zip(self.condensed.joints, self.factors, strict=True)
+            ]
+        )
+
+    def _runs(self, j: int, sums: JointSums) -> list[ThermalRun]:
+        values = self.values[sums.used]
+        cross, square = sums.friction_scale(values)
+        ratio = ratio_of(cross, square)
+        power = np.maximum(sums.power @ values[sums.friction], 0.0)
+        offsets, found = self.condensed.offsets, []
+        for number, run in enumerate(self.condensed.runs, start=1):
+            pieces = []
+            for k in run:
+                part = slice(int(offsets[k]), int(offsets[k + 1]))
+                log = self.condensed.logs[k]
+                pieces.append(piece_on_bins(self.condensed.edges[k], ratio[part], square[part], power[part], log, j))
+            found.append(join_pieces(pieces, self.sensor, f"run {number}, joint {j + 1}"))
+        return found
+
+    def _factor(self, fit: ThermalEstimate, runs: Sequence[ThermalRun]) -> Array:
+        """Friction factor in the middle of every bin (B,), also of those in which it was not measured."""
+        parts = []
+        for number, (run, members) in enumerate(zip(runs, self.condensed.runs, strict=True)):
+            about = next(item for item in fit.runs if item.name == runs[number].name)
+            values = None if run.ambient is None else np.asarray(run.ambient)[:-1]
+            T = fit.model.temperatures(
+                run.held_power,
+                np.diff(run.t),
+                start=list(about.start),
+                ambient=about.ambient if values is None or not np.isfinite(values).all() else values,
+            )
+            for k in members:
+                edges = self.condensed.edges[k]
+                parts.append(np.interp((edges[1:] + edges[:-1]) / 2.0, run.t, fit.model.friction_factor(T[:, 0])))
+        return np.concatenate(parts)
+
+    def _unit(self, fit: ThermalEstimate) -> ThermalEstimate:
+        """Counts friction from the model's own at T0: beta is one by that."""
+        beta = fit.model.beta
+        model = replace(fit.model, alpha=fit.model.alpha / beta, beta=1.0)
+        # Exchanges and capacities stay: heat is W times the factor, and W has taken the beta.
+        parameters = tuple(
+            replace(q, value=1.0, standard_error=float("inf"))
+            if q.name == "beta"
+            else replace(q, value=q.value / beta)
+            if q.name == "alpha"
+            else q
+            for q in fit.parameters
+        )
+        return replace(fit, model=model, parameters=parameters)
+
+    def _joint_covariance(self, fits: Sequence[ThermalEstimate | None]) -> tuple[Array, list[dict[str, float]]]:
+        """Covariance of the linear parameters, and standard errors of the thermal ones, none held fixed."""
+        size = len(self.values)
+        names = [[] if fit is None else _searched(fit) for fit in fits]
+        offsets = size + np.concatenate([[0], np.cumsum([len(own) for own in names])]).astype(int)
+        information = np.zeros((int(offsets[-1]),) * 2)
+        for j, (sums, factor, fit) in enumerate(zip(self.condensed.joints, self.factors, fits, strict=True)):
+            own = int(sums.used.size)
+            slopes = np.zeros((len(factor), 0)) if fit is None else self._slopes(j, sums, fit, names[j])
+            f, values = sums.friction, self.values[sums.used]
+            weight = self.weights[j] / self._colour(sums, factor, values, j)
+            # Rows of a bin are [Y_r, factor Y_f, Y_f pi_f slope]: their Gram matrix follows from that of Y.
+            gram, _ = sums.scaled(factor)
+            which = np.concatenate([sums.used, np.arange(offsets[j], offsets[j + 1])])
+            block = np.zeros((own + slopes.shape[1],) * 2)
+            block[:own, :own] = gram
+            acts = np.einsum("bij,j->bi", sums.gram[:, :, f], values[f])  # (B, k)
+            acts[:, f] *= factor[:, None]
+            block[:own, own:] = acts.T @ slopes
+            block[own:, :own] = block[:own, own:].T
+            _, square = sums.friction_scale(values)
+            block[own:, own:] = slopes.T @ (square[:, None] * slopes)
+            information[np.ix_(which, which)] += weight * block
+        inverse = _solve(information, np.eye(len(information)))
+        errors = np.sqrt(np.maximum(np.diag(inverse), 0.0))
+        found = [{name: float(errors[offsets[j] + k]) for k, name in enumerate(own)} for j, own in enumerate(names)]
+        return inverse[:size, :size], found
+
+    def _colour(self, sums: JointSums, factor: Array, values: Array, j: int) -> float:
+        """Variance of the friction of short times over what independent samples would leave."""
+        cross, square = sums.friction_scale(values)
+        known = square > 1e-3 * float(square.max(initial=0.0))
+        if known.sum() < 10:
+            return 1.0
+        left = (cross[known] / square[known] - factor[known]) ** 2 * square[known] * self.weights[j]
+        return max(1.0, float(np.mean(left)))
+
+    def _slopes(self, j: int, sums: JointSums, fit: ThermalEstimate, names: Sequence[str]) -> Array:
+        """Derivatives of the friction factor by thermal parameters (B, p), by central differences."""
+        runs, columns = self._runs(j, sums), []
+        for name in names:
+            value = getattr(fit.model, name)
+            step = 1e-4 * max(abs(value), 1e-3)
+            ends = [replace(fit, model=replace(fit.model, **{name: value + sign * step})) for sign in (1.0, -1.0)]
+            high, low = (self._factor(end, runs) for end in ends)
+            columns.append((high - low) / (2.0 * step))
+        return np.stack(columns, axis=1) if columns else np.zeros((len(self.factors[j]), 0))
+
+
+def _searched(fit: ThermalEstimate) -> list[str]:
+    """Parameters that were searched and have both sides to move to; beta is the scale of the friction itself."""
+    return [q.name for q in fit.parameters if np.isfinite(q.standard_error) and q.value != 0.0 and q.name != "beta"]
+
+
+def _with_errors(fit: ThermalEstimate, errors: Mapping[str, float]) -> ThermalEstimate:
+    parameters = tuple(
+        replace(q, standard_error=max(q.standard_error, errors[q.name])) if q.name in errors else q
+        for q in fit.parameters
+    )
+    return replace(fit, parameters=parameters)
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    scaled = matrix / scale[:, None] / scale + FAINT * np.eye(len(scale))
+    solved = cho_solve(cho_factor(scaled), right / (scale if right.ndim == 1 else scale[:, None]))
+    return np.asarray(solved / scale if right.ndim == 1 else solved / scale[:, None])

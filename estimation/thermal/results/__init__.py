@@ -1,0 +1,1 @@
+"""What thermal fits found."""

@@ -1,0 +1,98 @@
+"""What a campaign's fit of rigid body, friction and heat found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.models.model import Model
+from estimation.thermal.results.estimate import ThermalEstimate
+from estimation.thermal.torque import ThermalTorqueModel
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CampaignEstimate:
+    """A torque model with heat, and the evidence for it.
+
+    Attributes:
+        torque_model: rigid body, friction at T0 and thermal models together.
+        thermal: each joint's fit (n,); None where a joint does not move.
+        residual_rms: of each joint's torque with heat (n,) [N m or N].
+        residual_without: the same without heat (n,): one friction for cold and warm.
+        rounds: of the two fits' turns.
+        notes: what a reader must know.
+    """
+
+    torque_model: ThermalTorqueModel
+    thermal: tuple[ThermalEstimate | None, ...]
+    residual_rms: Array
+    residual_without: Array
+    rounds: int
+    notes: tuple[str, ...] = ()
+
+    @property
+    def model(self) -> Model:
+        """The torque model at T0."""
+        return self.torque_model.model
+
+    @property
+    def success(self) -> bool:
+        """Whether every joint's thermal fit succeeded."""
+        return all(fit is not None and fit.success for fit in self.thermal)
+
+    def summary(self) -> str:
+        """Gives each joint's error with and without heat, and its time constants."""
+        lines = ["  joint   error with heat   without     slow / fast at full power   cold over warm"]
+        for j, fit in enumerate(self.thermal):
+            head = f"  {j + 1:5} {self.residual_rms[j]:14.4g} {self.residual_without[j]:11.4g}"
+            if fit is None:
+                lines.append(f"{head}     does not move")
+                continue
+            constants = [q for q in fit.combinations if "time constant" in q.name][: len(fit.model.zones)]
+            ratio = next((q.value for q in fit.combinations if q.name.startswith("friction cold")), float("nan"))
+            texts = " / ".join(f"{q.value / 60:.1f} ± {q.standard_error / 60:.1f}" for q in constants)
+            lines.append(f"{head}     {texts} min   {ratio:.2f}")
+        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per joint and thermal quantity."""
+        import pandas as pd
+
+        frames = [fit.to_frame().assign(joint=j + 1) for j, fit in enumerate(self.thermal) if fit is not None]
+        return pd.concat(frames)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes the estimate as plain data."""
+        return {
+            "success": self.success,
+            "residual_rms": self.residual_rms.tolist(),
+            "residual_without": self.residual_without.tolist(),
+            "rounds": self.rounds,
+            "notes": list(self.notes),
+            "thermal": [None if fit is None else fit.to_dict() for fit in self.thermal],
+            "model": self.torque_model.to_dict(),
+        }
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws each joint's friction over that at T0 against time."""
+        from matplotlib.figure import Figure
+
+        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        for j, fit in enumerate(self.thermal):
+            for run in fit.runs if fit is not None else ():
+                if run.channel == "friction":
+                    (line,) = axes.plot(run.t / 60.0, run.measured, ".", ms=2, alpha=0.4)
+                    axes.plot(run.t / 60.0, run.predicted, color=line.get_color(), label=f"joint {j + 1}")
+        axes.set_xlabel("time [min]")
+        axes.set_ylabel("friction over that at T0")
+        axes.legend()
+        return axes

@@ -1,0 +1,238 @@
+"""What a thermal fit found, how sure it is, and what it cannot know."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.thermal.results.derived import Quantity
+from robots.common.errors import InputError
+from robots.common.files import existing_file, write_atomic
+from robots.common.plain import finite
+from robots.thermal import ThermalModel, build_thermal_model
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+THERMAL = "thermal.json"
+FORMAT = "robot-oed thermal model"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunFit:
+    """One run beside what the model says of it.
+
+    Attributes:
+        name: of the run.
+        channel: ``friction``, or the zone of a thermometer.
+        t: times that were measured (M,) [s].
+        heating: whether the joint was under power (M,).
+        measured: friction torque [N m or N] or temperature [degC] (M,).
+        predicted: the same by the model (M,).
+        power: mean power while heating [W].
+        start: temperatures of the zones at first [degC].
+        ambient: surroundings at first [degC].
+    """
+
+    name: str
+    channel: str
+    t: Array
+    heating: NDArray[np.bool_]
+    measured: Array
+    predicted: Array
+    power: float
+    start: tuple[float, ...]
+    ambient: float
+
+    @property
+    def rms(self) -> float:
+        """RMS of the error, in the unit of the measurement."""
+        return float(np.sqrt(np.mean((self.measured - self.predicted) ** 2)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ThermalEstimate:
+    """A fitted thermal model and the evidence for it.
+
+    Attributes:
+        model: with the estimated parameters; those that are not determined are conventions that make it predict right.
+        parameters: values, standard errors, and whether the data determine them.
+        combinations: what the data determine even where they leave the parameters open.
+        bounds: by name, numbers that only a bound is known of, such as a slow time constant of too short a log.
+        covariance: of the parameters (p, p), zero where one is fixed.
+        runs: the data beside the predictions.
+        noise: standard deviation by channel: friction over cold friction, temperatures [K].
+        proportional: whether the friction's noise goes with the torque.
+        colour: honest over white-noise standard errors, median.
+        log_likelihood: of the data, Gaussian, at the estimated noise.
+        rows: number of measurements.
+        free: number of numbers that were fitted.
+        success: whether the solver found a minimum.
+        status: what the solver said.
+        notes: what a reader must know before using the numbers.
+    """
+
+    model: ThermalModel
+    parameters: tuple[Quantity, ...]
+    combinations: tuple[Quantity, ...]
+    covariance: Array
+    runs: tuple[RunFit, ...]
+    noise: Mapping[str, float]
+    proportional: bool
+    colour: float
+    log_likelihood: float
+    rows: int
+    free: int
+    success: bool
+    status: str
+    bounds: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> Quantity:
+        """Finds a parameter or a combination by its name.
+
+        Raises:
+            InputError: there is none of that name.
+        """
+        everything = (*self.parameters, *self.combinations)
+        for quantity in everything:
+            if quantity.name == name:
+                return quantity
+        raise InputError(f"no quantity {name!r}", allowed=", ".join(quantity.name for quantity in everything))
+
+    @property
+    def aic(self) -> float:
+        """Akaike's criterion: smaller is better."""
+        return 2.0 * self.free - 2.0 * self.log_likelihood
+
+    @property
+    def bic(self) -> float:
+        """Bayes' criterion: smaller is better."""
+        return float(np.log(self.rows)) * self.free - 2.0 * self.log_likelihood
+
+    @property
+    def residual(self) -> float:
+        """RMS of the friction's error over its measured RMS; NaN without friction."""
+        parts = [run for run in self.runs if run.channel == "friction"]
+        if not parts:
+            return float("nan")
+        error = np.concatenate([run.measured - run.predicted for run in parts])
+        return float(np.sqrt(np.mean(error**2) / np.mean(np.concatenate([run.measured for run in parts]) ** 2)))
+
+    def summary(self) -> str:
+        """Says what is determined and what is not."""
+        head = f"{self.model.name} thermal model from {self.rows} measurements"
+        if np.isfinite(self.residual):
+            head += f", friction error {100 * self.residual:.2f} % of its RMS"
+        lines = [head]
+        for title, quantities in (("parameters", self.parameters), ("combinations", self.combinations)):
+            lines.append(f"  {title}")
+            for item in quantities:
+                error = f"± {item.standard_error:.2g}" if np.isfinite(item.standard_error) else "fixed"
+                mark = "" if item.determined else "  not determined"
+                lines.append(f"    {item.name:36} {item.value:12.5g} {error:>10} {item.unit}{mark}")
+        lines += [f"  {name} above {value:.4g}" for name, value in self.bounds.items()]
+        lines += [f"  {note}" for note in self.notes]
+        return "\n".join(lines)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per parameter and combination."""
+        import pandas as pd
+
+        rows = [asdict(item) for item in (*self.parameters, *self.combinations)]
+        kinds = ["parameter"] * len(self.parameters) + ["combination"] * len(self.combinations)
+        return pd.DataFrame(rows).assign(kind=kinds).set_index("name")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes the estimate as plain data, without the measurements."""
+
+        def plain(item: Quantity) -> dict[str, Any]:
+            error = finite(item.standard_error)
+            return {**asdict(item), "standard_error": error}
+
+        return {
+            "format": FORMAT,
+            "format_version": 1,
+            "success": self.success,
+            "status": self.status,
+            "model": self.model.to_dict(),
+            "parameters": [plain(item) for item in self.parameters],
+            "combinations": [plain(item) for item in self.combinations],
+            "bounds": dict(self.bounds),
+            "covariance": self.covariance.tolist(),
+            "noise": dict(self.noise),
+            "noise_proportional": self.proportional,
+            "colour": self.colour,
+            "log_likelihood": self.log_likelihood,
+            "aic": self.aic,
+            "bic": self.bic,
+            "rows": self.rows,
+            "free": self.free,
+            "runs": [
+                {
+                    "name": run.name,
+                    "channel": run.channel,
+                    "rows": len(run.t),
+                    "rms": run.rms,
+                    "power": run.power,
+                    "start": list(run.start),
+                    "ambient": run.ambient,
+                }
+                for run in self.runs
+            ],
+            "notes": list(self.notes),
+        }
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the friction, or without it the temperatures, against time, run by run."""
+        from matplotlib.figure import Figure
+
+        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        shown = [run for run in self.runs if run.channel == "friction"] or list(self.runs)
+        for run in shown:
+            minutes = (run.t - run.t[0]) / 60.0
+            (line,) = axes.plot(minutes, run.measured, ".", ms=2, alpha=0.5)
+            axes.plot(minutes, run.predicted, color=line.get_color(), label=run.name)
+        axes.set_xlabel("time [min]")
+        axes.set_ylabel("friction [N m]" if shown[0].channel == "friction" else "temperature [°C]")
+        axes.legend()
+        return axes
+
+    def save(self, folder: str | PathLike[str], *, force: bool = False) -> None:
+        """Writes `thermal.json` into a folder that is there.
+
+        Raises:
+            InputError: the file is there, and force is not given.
+        """
+        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
+        write_atomic(Path(folder) / THERMAL, text, force=force)
+
+
+def load_thermal_model(path: str | PathLike[str]) -> ThermalModel:
+    """Reads the model of a saved estimate.
+
+    Args:
+        path: a `thermal.json`, or the folder that holds one.
+
+    Raises:
+        InputError: a missing or damaged file.
+    """
+    file = Path(path)
+    file = existing_file(file / THERMAL if file.is_dir() else file)
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+        if data["format"] != FORMAT or data["format_version"] != 1:
+            raise InputError("is no thermal model file of this version", file=file, allowed=f'"format": "{FORMAT}"')
+        return build_thermal_model(data["model"])
+    except (UnicodeDecodeError, json.JSONDecodeError, AttributeError, KeyError, TypeError) as error:
+        raise InputError(f"is no thermal model file: {type(error).__name__} {error}", file=file) from error

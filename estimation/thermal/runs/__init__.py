@@ -1,0 +1,1 @@
+"""Friction torques and temperatures out of logs: what a thermal fit is given."""

@@ -1,0 +1,1 @@
+"""A thermal fit as a nonlinear program: mesh, coordinates, search, solver, information."""

@@ -1,0 +1,204 @@
+"""The experiment that tells two possible causes apart, for a robot of which there is no log.
+
+Of each kind of experiment, T-optimality asks how much of either cause base model and rival would leave in the noise
+(Atkinson and Fedorov 1975): here of the very motion that is written, the reference included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS, VARIED
+from estimation.diagnosis.experiment_plans.next_experiment import VARIANTS
+from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from oed.campaigns.discriminations.discrimination import Discrimination, Judged
+from oed.campaigns.discriminations.judging import STEP, Judge, require_separable
+from oed.campaigns.discriminations.rivals import parse_rivals
+from oed.campaigns.discriminations.separating import Run, Workshop
+from robots.base_parameters import find_base_parameters
+from robots.common.errors import InfeasibleError, InputError, NotIdentifiableError
+from robots.common.progress import SILENT, Progress
+from robots.plants import Sensors
+from robots.regressor import default_model
+from robots.robot import Robot
+from robots.terms.effects import EFFECTS, EXPERIMENTS
+
+Array = NDArray[np.float64]
+
+REFERENCES = 6
+"""Reference motions that are drawn at most; the one that tells most is taken."""
+SHARE = 0.02
+"""Noise as a share of each joint's torque RMS, where it is not stated."""
+SHARP = 1e-3
+"""Velocity [rad/s or m/s] at which the planned model's friction turns round."""
+
+
+def discriminate(
+    robot: Robot,
+    rivals: str | Sequence[str],
+    *,
+    noise: ArrayLike | None = None,
+    size: float = 0.005,
+    friction: str = "polynomial",
+    home: ArrayLike | None = None,
+    velocity_fraction: float = 1.0,
+    seed: int = 0,
+    progress: Progress = SILENT,
+) -> Discrimination:
+    """Finds the experiment that tells two effects apart, before there is any log.
+
+    A reference motion within the robot's limits, the best of several, is followed by each kind of experiment. The kind
+    that tells the smallest effects apart is taken, of those that are sure without a change by hand where there are any,
+    and the best of its variants.
+
+    Args:
+        robot: the robot, its nominal dynamics known.
+        rivals: two effects, such as ``stribeck:2,load_dependent_friction:2``. A joint left out is that of the other;
+            left out of both, the one where the reference alone tells least.
+        noise: standard deviation of the torque noise (n,) [N m or N]; by default 2 % of each joint's torque RMS.
+        size: of what the effect shows beyond the base model, as a share of the joint's torque RMS in the reference.
+        friction: of the base model, ``polynomial`` or ``coulomb-viscous``.
+        home: pose (n,) at both ends of all motions; by default `Limits.home`.
+        velocity_fraction: share of the velocity limits to use.
+        seed: of the reference motion.
+        progress: is told of each kind.
+
+    Raises:
+        InputError: an effect or joint that there is not, values out of range, dynamics that are not known.
+        NotIdentifiableError: effects that no experiment of the catalogue tells apart.
+        InfeasibleError: no motion keeps the limits.
+    """
+    places = parse_rivals(rivals, robot)
+    level = _level(noise, robot)
+    if not (np.isfinite(size) and 0.0 < size <= 1.0):
+        raise InputError(f"found the size {size}", allowed="above 0, up to 1")
+    if not (np.isfinite(velocity_fraction) and 0.0 < velocity_fraction <= 1.0):
+        raise InputError(f"found the velocity fraction {velocity_fraction}", allowed="above 0, up to 1")
+    model = default_model(robot, friction=friction, velocity_scale=SHARP)
+    workshop = Workshop(find_base_parameters(model), home=home, velocity_fraction=velocity_fraction, seed=seed)
+    reference = workshop.runs()[0]
+    base = workshop.base.model
+    if level is None:
+        m, nominal = reference.motion, np.nan_to_num(base.nominal)
+        level = SHARE * np.sqrt(np.mean(base.torque(m.q, m.dq, m.ddq, nominal) ** 2, axis=0))
+    problem = _planned(reference, level, workshop)
+    pair = _choose(problem, places, reference)
+    judge = Judge(problem, pair, size)
+    best = judge("reference", (reference,))
+    for draw in range(1, REFERENCES):
+        other = Workshop(workshop.base, home=home, velocity_fraction=velocity_fraction, seed=seed + draw)
+        drawn = judge("reference", other.runs())
+        if drawn.merit > best.merit:
+            workshop, reference, best = other, other.runs()[0], drawn
+    index = next((h.joint - 1 for h in pair if h.joint is not None), int(np.argmax(np.ptp(reference.motion.q, axis=0))))
+    judged: dict[str, Judged] = {}
+    runs: dict[str, tuple[Run, ...]] = {}
+    progress.start("kinds of experiment", len(MAKERS))
+    try:
+        for number, (kind, make) in enumerate(MAKERS.items(), start=1):
+            try:
+                runs[kind] = workshop.runs(make(workshop.room, index, 0), kind)
+                judged[kind] = judge(kind, runs[kind])
+            except InfeasibleError as error:
+                judged[kind] = Judged.impossible(kind, str(error))
+            progress.update(number, kind)
+    finally:
+        progress.finish()
+    if not runs:
+        raise InfeasibleError(
+            f"no kind of experiment is possible within the limits of {robot.name}: {judged['repeat'].note}"
+        )
+    require_separable(pair, list(judged.values()))
+    kind = max(runs, key=lambda name: judged[name].merit)
+    for variant in range(1, VARIANTS if kind in VARIED else 1):
+        try:
+            varied = workshop.runs(MAKERS[kind](workshop.room, index, variant), kind)
+        except InfeasibleError:
+            continue
+        better = judge(kind, varied)
+        if better.merit > judged[kind].merit:
+            runs[kind], judged[kind] = varied, better
+    return Discrimination(
+        robot=robot,
+        rivals=tuple((h.name, h.joint) for h in pair),
+        kind=kind,
+        what=EXPERIMENTS[kind],
+        runs=runs[kind],
+        ranking=tuple(sorted(judged.values(), key=lambda j: j.merit, reverse=True)),
+        alone=best.resolves,
+        noise=level,
+        size=size,
+        settings={
+            "friction": friction,
+            "home": workshop.home.tolist(),
+            "velocity_fraction": velocity_fraction,
+            "seed": seed,
+        },
+    )
+
+
+def _level(noise: ArrayLike | None, robot: Robot) -> Array | None:
+    if noise is None:
+        return None
+    level = np.asarray(noise, dtype=float)
+    if level.shape != (robot.n,):
+        raise InputError(f"torque noise of shape {level.shape}", allowed=f"{robot.n} numbers, one per joint")
+    wrong = ~(np.isfinite(level) & (level > 0.0))
+    if wrong.any():
+        joint = int(np.argmax(wrong))
+        raise InputError(f"a torque noise of {level[joint]:g}", joint=joint + 1, allowed="above 0")
+    return level
+
+
+def _planned(reference: Run, level: Array, workshop: Workshop) -> Problem:
+    """Poses the diagnosis of the reference motion at `STEP`, the white part of the noise averaged over each step."""
+    part = reference.parts(STEP)[0]
+    sensors = Sensors()
+    every = max(round(STEP / workshop.period), 1)
+    share = sensors.coloured_share
+    kept = (1.0 - share) / every + share
+    thinned = Sensors(coloured_share=share / kept, correlation_time=sensors.correlation_time)
+    model = workshop.base.model
+    return planned_problem(
+        model,
+        np.asarray(model.nominal),
+        [part.motion],
+        noise=thinned,
+        level=level * np.sqrt(kept),
+    )
+
+
+def _choose(problem: Problem, places: list[tuple[str, int | None]], reference: Run) -> tuple[Hypothesis, Hypothesis]:
+    """Puts rivals without a joint where the reference alone tells them least, of the joints where both show."""
+    robot = problem.situation.robot
+    joints = [EFFECTS[name].joints(robot) if joint is None else (joint,) for name, joint in places]
+    common = [joint for joint in joints[0] if joint in joints[1]]
+    if common:
+        options = [(joint, joint) for joint in common]
+    else:
+        options = [(first, second) for first in joints[0] for second in joints[1]]
+    if not options:
+        silent = places[0][0] if not joints[0] else places[1][0]
+        raise InputError(f"{silent} cannot act on any joint of {robot.name}", remedy="choose another effect")
+    best: tuple[float, tuple[Hypothesis, Hypothesis]] | None = None
+    failed: NotIdentifiableError | None = None
+    for first, second in options:
+        pair = (Hypothesis(EFFECTS[places[0][0]], first), Hypothesis(EFFECTS[places[1][0]], second))
+        if len(options) == 1:
+            return pair
+        try:
+            merit = Judge(problem, pair, SHARE)("reference", (reference,)).energy
+        except NotIdentifiableError as error:
+            failed = error
+            continue
+        if best is None or merit < best[0]:
+            best = merit, pair
+    if best is None:
+        assert failed is not None
+        raise failed
+    return best[1]

@@ -1,0 +1,230 @@
+"""The experiment that tells two causes apart: its motions, its chance, and its files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.hypothesis_tests.power import resolving_energy
+from oed.campaigns.discriminations.separating import Run
+from oed.experiments.results.design_file import DESIGN, TRAJECTORY
+from oed.experiments.safety_checks.margins import margin_data, missing_limits
+from oed.exports import write_trajectory
+from robots.common.files import write_atomic
+from robots.robot import Robot
+from robots.signals import Motion
+from robots.version import VERSION
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """One kind of experiment, judged.
+
+    Attributes:
+        kind: a name of `robots.terms.effects.EXPERIMENTS`.
+        resolves: chance that it leaves one cause.
+        energy: what is left of the true cause beside the wrong one, in units of the noise.
+        duration: of all runs [s].
+        runs: how many motions it takes, with changes by hand between them.
+        shares: of each cause's energy, the largest that the other one leaves.
+        visible: the largest that the base model alone leaves.
+        note: why it cannot be made, or empty.
+    """
+
+    kind: str
+    resolves: float
+    energy: float
+    duration: float
+    runs: int
+    shares: tuple[float, float]
+    visible: tuple[float, float]
+    note: str = ""
+
+    @classmethod
+    def impossible(cls, kind: str, note: str) -> Judged:
+        """A kind that the limits forbid."""
+        return cls(kind=kind, resolves=0.0, energy=-1.0, duration=0.0, runs=0, shares=(0, 0), visible=(0, 0), note=note)
+
+    @property
+    def merit(self) -> tuple[bool, float]:
+        """What ranks it: first those that are sure without a change by hand, then by what is left (T-optimality)."""
+        return self.runs == 1 and self.energy >= resolving_energy(), self.energy
+
+    def smallest(self, size: float) -> float | None:
+        """The size at which it tells the causes apart with 95 % chance, of one judged at a `size`; None for none."""
+        return size * float(np.sqrt(resolving_energy() / self.energy)) if self.energy > 0 else None
+
+    def to_dict(self, size: float) -> dict[str, Any]:
+        """Writes it as plain data; `size` is the one it was judged at."""
+        return {
+            "kind": self.kind,
+            "resolves": self.resolves,
+            "smallest_size": self.smallest(size),
+            "duration": self.duration,
+            "runs": self.runs,
+            "note": self.note,
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Discrimination:
+    """The experiment proposed.
+
+    Attributes:
+        robot: what it is for.
+        rivals: name and joint (from 1, or None) of the two causes.
+        kind: a name of `robots.terms.effects.EXPERIMENTS`.
+        what: what the robot does in it.
+        runs: its motions; more than one where a payload or the base is changed between them.
+        ranking: all kinds, the best first.
+        alone: the chance of the reference motion alone.
+        noise: standard deviation of the torque noise (n,) [N m or N].
+        size: of what the effect shows beyond the base model, as a share of the joint's torque RMS in the reference.
+        settings: what makes the same experiment again.
+    """
+
+    robot: Robot
+    rivals: tuple[tuple[str, int | None], ...]
+    kind: str
+    what: str
+    runs: tuple[Run, ...]
+    ranking: tuple[Judged, ...]
+    alone: float
+    noise: Array
+    size: float
+    settings: Mapping[str, Any]
+
+    @property
+    def resolves(self) -> float:
+        """The chance that it leaves one cause."""
+        return next(judged.resolves for judged in self.ranking if judged.kind == self.kind)
+
+    @property
+    def motion(self) -> Motion:
+        """The first run's motion."""
+        return self.runs[0].motion
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The file of each run; runs of one and the same motion share it."""
+        names: list[str] = []
+        for number, run in enumerate(self.runs):
+            same = next(
+                (i for i in range(number) if np.array_equal(self.runs[i].motion.q, run.motion.q)),
+                None,
+            )
+            first = TRAJECTORY if number == 0 else f"trajectory_{number + 1}.csv"
+            names.append(first if same is None else names[same])
+        return tuple(names)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The causes in words."""
+        return tuple(
+            name.replace("_", " ") + ("" if joint is None else f" of joint {joint}") for name, joint in self.rivals
+        )
+
+    @property
+    def why(self) -> str:
+        """The result in two sentences, without the last full stop."""
+        first, second = self.labels
+        return (
+            f"A {self.kind.replace('_', ' ')} experiment ({self.what}) distinguishes {first} from {second} with "
+            f"probability "
+            f"{100 * self.resolves:.0f} %, for an effect size of {100 * self.size:.2g} % of the torque. "
+            f"The reference motion alone reaches {100 * self.alone:.0f} %"
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Conditions and limitations of the experiment."""
+        notes = []
+        if self.resolves < 0.5:
+            notes.append(
+                "No experiment is likely to distinguish them at this effect size and noise. Repeat the best one, or "
+                "accept that both remain possible."
+            )
+        if any(run.payload for run in self.runs):
+            mass = max(run.payload for run in self.runs)
+            notes.append(
+                f"A payload of {mass:.3g} kg with known mass and centre (here 0.1 m in front of the flange) must be "
+                f"mounted before the marked run."
+            )
+        if any(run.gravity is not None for run in self.runs):
+            notes.append("The base must be tilted by a known angle of 15 degrees before the marked run.")
+        lacking = missing_limits(self.robot.limits)
+        if lacking:
+            notes.append(
+                f"Conservative limits were assumed where the robot's description states none: {', '.join(lacking)}."
+            )
+        notes.append("Collisions are not checked.")
+        return tuple(notes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes everything but the samples as plain data for `design.json`."""
+        return {
+            "format": "robot-oed discriminating experiment",
+            "format_version": 1,
+            "tool_version": VERSION,
+            "robot": {"name": self.robot.name, "origin": self.robot.origin, "sha256": self.robot.digest},
+            "criterion": "discriminate",
+            "rivals": [{"effect": name, "joint": joint} for name, joint in self.rivals],
+            "kind": self.kind,
+            "what": self.what,
+            "why": self.why,
+            "resolves": self.resolves,
+            "reference_alone": self.alone,
+            "size": self.size,
+            "noise": self.noise.tolist(),
+            "segments": self.runs[0].table(),
+            "runs": [
+                {
+                    "file": file,
+                    "payload_kg": run.payload,
+                    "gravity": None if run.gravity is None else run.gravity.tolist(),
+                    "duration": run.motion.duration,
+                    "segments": run.table(),
+                    "smallest_margins": [margin_data(margin) for margin in run.margins],
+                }
+                for file, run in zip(self.files, self.runs, strict=True)
+            ],
+            "alternatives": [judged.to_dict(self.size) for judged in self.ranking],
+            "quality": [],
+            "duration": sum(run.motion.duration for run in self.runs),
+            "period": self.robot.period,
+            "warnings": list(self.warnings),
+            "settings": dict(self.settings),
+        }
+
+    def save(self, folder: str | Path) -> None:
+        """Writes the trajectories and `design.json`."""
+        target = Path(folder)
+        written: set[str] = set()
+        for file, run in zip(self.files, self.runs, strict=True):
+            if file not in written:
+                stated = {"robot": self.robot.name, "experiment": self.kind, "tool": f"robot-oed {VERSION}"}
+                write_trajectory(target / file, run.motion, stated, force=True)
+                written.add(file)
+        write_atomic(target / DESIGN, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n")
+
+    def summary(self) -> str:
+        """Describes the experiment and its alternatives in a few lines."""
+        lines = [self.why, "  kind           probability [%]   size for 95 %   duration [s]"]
+        for judged in self.ranking:
+            least = judged.smallest(self.size)
+            least_text = "-" if least is None else f"{100 * least:.2g}"
+            value = judged.note or f"{100 * judged.resolves:10.0f}   {least_text:>13}   {judged.duration:12.0f}"
+            lines.append(f"  {judged.kind:18}  {value}")
+        for file, run in zip(self.files, self.runs, strict=True):
+            load = f", payload {run.payload:.3g} kg" if run.payload else ""
+            tilt = ", base tilted by 15 degrees" if run.gravity is not None else ""
+            lines.append(f"  play {file}: {run.motion.duration:.1f} s{load}{tilt}")
+        return "\n".join([*lines, *(f"note: {text}" for text in self.warnings)])

@@ -1,0 +1,109 @@
+"""``oed identify``: a robot's dynamic parameters from its logs."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from oed.cli.console import Console
+from oed.cli.options import (
+    ForceOption,
+    JointsOption,
+    JsonOption,
+    LockOption,
+    LogOption,
+    MappingOption,
+    OutOption,
+    PngOption,
+    QuietOption,
+    RobotOption,
+    SeedOption,
+    TipOption,
+    robot_from,
+)
+from oed.cli.set_up import GravityOption, PayloadOption, with_known_setup
+
+
+def identify(
+    robot: RobotOption,
+    log: LogOption,
+    mapping: MappingOption = None,
+    payload: PayloadOption = None,
+    gravity: GravityOption = None,
+    method: Annotated[str, typer.Option(help="Estimator, or `all` to compare them.")] = "wls",
+    friction: Annotated[str, typer.Option(help="Friction model: polynomial or coulomb-viscous.")] = "polynomial",
+    rotor: Annotated[bool, typer.Option(help="Include rotor inertias in the model.")] = True,
+    offset: Annotated[bool, typer.Option(help="Include a constant torque offset per joint in the model.")] = True,
+    seed: SeedOption = 0,
+    out: OutOption = Path("identified"),
+    urdf: Annotated[
+        Path | None, typer.Option("--urdf", help="Also write a URDF with the identified links.", show_default=False)
+    ] = None,
+    c_code: Annotated[
+        Path | None, typer.Option("--c-code", help="Also write C code for torque and gravity.", show_default=False)
+    ] = None,
+    tip: TipOption = None,
+    joints: JointsOption = None,
+    lock: LockOption = None,
+    png: PngOption = False,
+    force: ForceOption = False,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Identifies a robot's dynamic parameters with their uncertainty.
+
+    Writes model.json and report.html.
+    """
+    console = Console(json=json, quiet=quiet)
+    with console.working() as progress:
+        from estimation import identify as run
+        from estimation import read_logs
+        from estimation.exports import c_code as c_text
+        from estimation.exports import urdf_text
+        from estimation.predictions.method_table import compare_methods
+        from oed.reports import save_estimate_report
+        from robots.common.files import ResultFolder, open_atomic
+
+        with ExitStack() as files:
+            folder = files.enter_context(ResultFolder(out, force, names=["model.json", "report.html"]))
+            # Opened before the work: an existing file ends the command early, and an error leaves no file behind.
+            streams = {path: files.enter_context(open_atomic(path, force=force)) for path in (urdf, c_code) if path}
+            described = robot_from(robot, tip, joints, lock)
+            logs = with_known_setup(
+                read_logs(log, n=described.n, mapping=mapping, joints=described.joint_names), payload, gravity
+            )
+            options: dict[str, Any] = {
+                "friction": friction,
+                "rotor": rotor,
+                "offset": offset,
+                "seed": seed,
+                "progress": progress,
+            }
+            table = compare_methods(described, logs, **options) if method == "all" else None
+            chosen = method if table is None else table.rows[0].method
+            result = run(described, logs, method=chosen, **options)
+            result.save(folder.path("model.json").parent)
+            save_estimate_report(result, folder, png=png, methods=table)
+            if urdf is not None:
+                streams[urdf].write(urdf_text(result.model, described).encode())
+            if c_code is not None:
+                streams[c_code].write(c_text(result.model).encode())
+    found = "\n".join(gate.summary() for gate in result.gates if gate.findings)
+    console.result(
+        "\n".join(
+            [
+                *([found] if found else []),
+                *([table.summary()] if table else []),
+                result.summary(),
+                *(f"written to {path.resolve()}" for path in (out, urdf, c_code) if path is not None),
+            ]
+        ),
+        {
+            **result.to_dict(),
+            "gate": [gate.to_dict() for gate in result.gates],
+            "methods": table.to_dict() if table else None,
+        },
+    )

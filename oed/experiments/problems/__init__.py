@@ -1,0 +1,1 @@
+"""The design problem: objective, limits as rows, and which of them the solver sees."""

@@ -1,0 +1,86 @@
+"""The pointwise limits as rows of the solver: only where a motion comes near them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oed.experiments.problems.problem import FourierProblem
+
+Array = NDArray[np.float64]
+
+# Kept from each bound, in its own scale, for what happens between the samples.
+BETWEEN = 0.005
+
+
+class PointwiseRows:
+    """Chosen (sample, row) pairs of the pointwise limits, all averaged ones, and their exact derivatives by z.
+
+    Args:
+        problem: the design problem; with no pointwise limits there are no rows.
+        near: how close to a bound, in its own scale, a peak must come to be chosen.
+    """
+
+    def __init__(self, problem: FourierProblem, near: float = 0.01) -> None:
+        self._problem, self._near = problem, near
+        count = sum(len(limit.labels) for limit in problem.pointwise)
+        self._chosen = np.zeros((problem.limit_samples, count), dtype=bool)
+        self._averaged = sum(len(limit.labels) for limit in problem.averaged)
+
+    @property
+    def size(self) -> int:
+        """Number of rows chosen."""
+        return int(self._chosen.sum()) + self._averaged
+
+    def add_peaks(self, z: Array, tolerance: float) -> bool:
+        """Adds the sample of each near peak; tells whether one passed its bound by more than the tolerance."""
+        if not self._problem.pointwise:
+            return False
+        excess = self._problem.pointwise_excess(z)
+        peak = (excess >= np.roll(excess, 1, 0)) & (excess > np.roll(excess, -1, 0)) & (excess > -self._near)
+        # One row a peak: each costs IPOPT a dense one.
+        passed = bool((excess[peak & ~self._chosen] > tolerance).any())
+        self._chosen |= peak
+        return passed
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds of the chosen rows."""
+        limits = self._problem.pointwise
+        lower = np.concatenate([limit.lower for limit in limits]) if limits else np.zeros(0)
+        upper = np.concatenate([limit.upper for limit in limits]) if limits else np.zeros(0)
+        columns = np.nonzero(self._chosen)[1]
+        lower = np.append(lower[columns], np.full(self._averaged, -np.inf))
+        upper = np.append(upper[columns], np.ones(self._averaged))
+        return lower + BETWEEN, upper - BETWEEN
+
+    def values(self, z: Array) -> Array:
+        """Evaluates the chosen rows."""
+        states = self._problem.limit_states(z)
+        whole = [limit.values(*states) for limit in self._problem.averaged]
+        rows = np.flatnonzero(self._chosen.any(axis=1))
+        if not len(rows):
+            return np.concatenate([np.zeros(0), *whole])
+        values = [limit.values(*(state[rows] for state in states)) for limit in self._problem.pointwise]
+        return np.concatenate([np.concatenate(values, axis=1)[self._chosen[rows]], *whole])
+
+    def jacobian(self, z: Array) -> Array:
+        """Evaluates the derivatives (rows, n K) of the chosen rows by z."""
+        problem = self._problem
+        states = problem.limit_states(z)
+        bases = np.stack(problem.limit_bases[:3], axis=1)  # (M, 3, K)
+        whole = []
+        for limit in problem.averaged:
+            each = limit.jacobian(*states).reshape(len(limit.labels), len(bases), 3, problem.joints)
+            summed = np.einsum("rmdj,mdk->rjk", each, bases, optimize=True) * problem.scale
+            whole.append(summed.reshape(len(limit.labels), -1))
+        samples = np.flatnonzero(self._chosen.any(axis=1))
+        if not len(samples):
+            return np.concatenate([np.zeros((0, problem.size)), *whole])
+        by_state = np.concatenate(
+            [limit.jacobian(*(state[samples] for state in states)) for limit in problem.pointwise], axis=1
+        )
+        chosen = self._chosen[samples]
+        slopes = by_state[chosen].reshape(-1, 3, problem.joints)  # per row: by q, dq, ddq of each joint
+        at = samples[np.nonzero(chosen)[0]]
+        gradient = np.einsum("rdj,rdk->rjk", slopes, bases[at]) * problem.scale
+        return np.concatenate([gradient.reshape(len(at), -1), *whole])

@@ -1,0 +1,1 @@
+"""Designed and retimed experiments, and their files."""

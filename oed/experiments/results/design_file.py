@@ -1,0 +1,76 @@
+"""A design as `design.json`, and back."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from oed.criteria import Criterion
+from oed.criteria import criterion as choose_criterion
+from oed.experiments.problems.essential import restricted
+from oed.experiments.quality import Quality, design_model
+from oed.experiments.results.outcome import Outcome
+from oed.experiments.safety_checks.margins import margin_from
+from oed.experiments.safety_checks.spatial_check import SpatialMargin
+from oed.exports import read_trajectory
+from robots.base_parameters import find_base_parameters
+from robots.common.errors import InputError
+from robots.common.files import existing_file
+from robots.loading import load_robot
+from robots.robot import Robot
+
+TRAJECTORY, DESIGN = "trajectory.csv", "design.json"
+
+
+def read_design(
+    folder: str | Path, robot: Robot | None = None, criterion: str | Criterion | None = None
+) -> dict[str, Any]:
+    """Reads the attributes of a saved design.
+
+    Args:
+        folder: where `save` wrote.
+        robot: the robot; by default the one that the design names. One that was made in memory, or of chosen
+            joints of a URDF, must be given.
+        criterion: what was optimised, if it was a criterion of one's own.
+
+    Raises:
+        InputError: a missing or damaged file, or another robot than the design's.
+    """
+    file = Path(folder) / DESIGN
+    try:
+        data = json.loads(existing_file(file).read_text(encoding="utf-8"))
+        known = robot or load_robot(data["robot"]["origin"])
+        settings = data["settings"]
+        base = find_base_parameters(design_model(known, settings))
+        if settings.get("essential"):
+            base = restricted(base, [i for i, name in enumerate(base.names) if name in data["model"]["columns"]])
+        if list(base.names) != data["model"]["columns"]:
+            raise InputError(f"the design is for {data['robot']['name']}, not for {known.name}", file=file)
+        qualities = tuple(
+            Quality(part=q["part"], samples=q["samples"], singular_values=tuple(q["singular_values_Y"]))
+            for q in data["quality"]
+        )
+        margins = tuple(margin_from(margin) for margin in data["smallest_margins"])
+        motion = read_trajectory(Path(folder) / TRAJECTORY)[0]
+        return {
+            "robot": known,
+            "base": base,
+            "criterion": choose_criterion(criterion or data["criterion"]),
+            "motion": motion,
+            "segments": tuple(data["segments"]),
+            "qualities": qualities,
+            "margins": margins,
+            "islands": tuple(Outcome.from_dict(island) for island in data["solver"]["islands"]),
+            "settings": settings,
+            "coefficients": np.array(data["fourier"]["coefficients"]),
+            "home": np.array(data["home"]) if "home" in data else motion.q[0],
+            "home_moved": data.get("home_moved", False),
+            "space": tuple(SpatialMargin(**margin) for margin in data.get("limits_in_space", ())),
+            "freedom": data["collision"],
+            "strokes_left_out": tuple(data["strokes_left_out"]),
+        }
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
+        raise InputError(f"is not a design file, or is damaged ({type(error).__name__}: {error})", file=file) from error

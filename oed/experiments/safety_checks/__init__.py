@@ -1,0 +1,1 @@
+"""How far a motion stays from every limit."""

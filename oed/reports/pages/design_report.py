@@ -1,0 +1,216 @@
+"""The page of a designed experiment."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oed.experiments import Design
+from oed.experiments.quality import Quality
+from oed.experiments.safety_checks.margins import missing_limits
+from oed.reports.pictures.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.significant import significant
+from robots.common.files import ResultFolder
+from robots.limits import Margin
+
+Array = NDArray[np.float64]
+
+
+def save_design_report(design: Design, folder: ResultFolder, *, png: bool = False) -> None:
+    """Writes the page of a design, and its pictures as PNG on request."""
+    save_page(design_page(design), folder, png=png)
+
+
+def design_page(design: Design) -> Page:
+    """Builds the page: what the experiment is worth, how it moves, how far it stays from the limits."""
+    robot, motion = design.robot, design.motion
+    label, value = design.criterion.label, design.fourier.value(design.criterion)
+    verdict = (
+        f"The optimised motion reaches {label} = {significant(value)} over {design.base.size} parameters. The whole "
+        f"experiment takes {motion.duration:.0f} s."
+    )
+    if design.violated:
+        verdict += f" It exceeds a limit: {_name(design.violated[0])}."
+    return Page(
+        title="Excitation experiment",
+        subtitle=robot.title or robot.name,
+        verdict=verdict,
+        status="good" if design.success else "bad",
+        facts=_facts(design),
+        warnings=_warnings(design),
+        sections=(
+            Section(
+                title="Motion",
+                paragraphs=(
+                    (
+                        "Motion of each joint with its limits. The shaded parts are the segments: the optimised "
+                        "Fourier series, one velocity stroke per joint in both directions, and jerk-limited moves in "
+                        "between."
+                    ),
+                ),
+                pictures=(
+                    trajectory_picture(
+                        motion.t,
+                        motion.q,
+                        motion.dq,
+                        motion.ddq,
+                        limits=robot.limits,
+                        joint_names=robot.joint_names,
+                        kinds=robot.chain.kinds,
+                        segments=design.segments,
+                    ),
+                ),
+                tables=(_segments(design),),
+            ),
+            quality_section(design.qualities),
+            margins_section(design.margins, robot.joint_names),
+            Section(title="Search", paragraphs=(_search_text(design),), tables=(_islands(design),)),
+            parameters_section(design.base.names, design.base.formulas()),
+        ),
+        footer=footer(),
+    )
+
+
+def quality_section(qualities: tuple[Quality, ...]) -> Section:
+    """Shows what each part tells of the parameters."""
+    rows = []
+    for quality in qualities:
+        data = quality.to_dict()
+        rows.append(
+            (
+                quality.part,
+                quality.samples,
+                data["cond_Y"],
+                None if data["cond_Y"] is None else data["cond_Y"] ** 2,
+                data["log_det_YtY"],
+                data["smallest_singular_value_Y"],
+            )
+        )
+    table = Table(
+        headings=("part", "samples", "cond(Y)", "cond(Y'Y)", "log det(Y'Y)", "smallest singular value of Y"),
+        rows=tuple(rows),
+        caption=(
+            "Values of the unscaled regressor Y in SI units. A dash: this part alone does not determine all parameters."
+        ),
+    )
+    return Section(
+        title="Information in the data",
+        paragraphs=(
+            (
+                "Condition numbers depend on the units of the columns; do not compare them across robots or models. "
+                "The standard error in the worst-determined direction is the torque noise divided by the smallest "
+                "singular value."
+            ),
+        ),
+        pictures=(spectrum_picture({quality.part: _shown(quality) for quality in qualities}),),
+        tables=(table,),
+    )
+
+
+def _shown(quality: Quality) -> Array:
+    """The singular values (m,), those that are zero but for rounding as zero."""
+    values = np.array(quality.singular_values)
+    return np.where(values > 1e-10 * values.max(), values, 0.0)
+
+
+def margins_section(margins: tuple[Margin, ...], joint_names: tuple[str, ...]) -> Section:
+    """Shows how close the motion comes to each limit."""
+    rows = tuple(
+        (m.quantity, m.joint, m.value, m.limit, 100 * m.slack_fraction, m.time)
+        for m in sorted(margins, key=lambda m: m.slack_fraction)
+        if np.isfinite(m.limit)
+    )
+    table = Table(
+        headings=("limit", "joint", "value", "bound", "left [%]", "at [s]"),
+        rows=rows[:12],
+        caption="The twelve smallest distances at the samples of the file.",
+    )
+    return Section(title="Limits", pictures=(margins_picture(margins, joint_names=joint_names),), tables=(table,))
+
+
+def parameters_section(names: tuple[str, ...], formulas: tuple[str, ...]) -> Section:
+    """Lists the base parameters and what they stand for."""
+    rows: tuple[tuple[Cell, ...], ...] = tuple(zip(names, formulas, strict=True))
+    return Section(
+        title="Base parameters",
+        paragraphs=("The torques depend only on these combinations of link parameters (base parameters).",),
+        tables=(Table(headings=("parameter", "stands for"), rows=rows),),
+        folded=True,
+    )
+
+
+def _facts(design: Design) -> tuple[Fact, ...]:
+    fourier, whole = design.fourier.to_dict(), design.whole.to_dict()
+    tightest = min((m for m in design.margins if np.isfinite(m.limit)), key=lambda m: m.slack_fraction, default=None)
+    facts = [
+        Fact(label="cond(Y), optimised motion", value=fourier["cond_Y"]),
+        Fact(label="cond(Y), whole experiment", value=whole["cond_Y"]),
+        Fact(label="Parameters", value=design.base.size),
+        Fact(label="Duration", value=f"{design.motion.duration:.1f} s"),
+    ]
+    if tightest is not None:
+        facts.append(
+            Fact(
+                label="Tightest limit",
+                value=f"{100 * tightest.slack_fraction:.2f} % left",
+                note=_name(tightest),
+                status="bad" if tightest.violated else "good",
+            )
+        )
+    return tuple(facts)
+
+
+def _warnings(design: Design) -> tuple[str, ...]:
+    warnings = [f"The motion exceeds the limit of {_name(margin)}." for margin in design.violated]
+    if design.robot.assumed:
+        warnings.append(f"Assumed values without a source: {', '.join(design.robot.assumed)}.")
+    substitutes = {"acceleration": "4/s times the velocity limit", "jerk": "20/s times the acceleration limit"}
+    for name, joints in missing_limits(design.robot.limits).items():
+        warnings.append(
+            f"The robot's description states no {name} limit for joint {', '.join(map(str, joints))}; assumed: "
+            f"{substitutes[name]}."
+        )
+    if not any(margin.quantity == "torque" for margin in design.margins):
+        warnings.append(
+            "Torque limits were not checked: the robot's description lacks nominal dynamics or torque limits."
+        )
+    if design.freedom is None:
+        warnings.append("Collisions were not checked. Use --collision with a robot that has collision bodies.")
+    elif not design.freedom["certified"]:
+        warnings.append("Absence of collisions was checked at the samples only; between samples it is not proved.")
+    if design.strokes_left_out:
+        left_out = ", ".join(str(joint) for joint in design.strokes_left_out)
+        warnings.append(f"No velocity stroke for joints {left_out}: the arm would collide.")
+    return tuple(warnings)
+
+
+def _name(margin: Margin) -> str:
+    quantity = "position" if margin.quantity in ("lower", "upper") else margin.quantity
+    return f"{quantity} of joint {margin.joint} at {margin.time:.3f} s"
+
+
+def _segments(design: Design) -> Table:
+    rows = tuple((s["kind"].replace("_", " "), s["joint"], s["start"], s["end"]) for s in design.segments)
+    return Table(headings=("segment", "joint", "start [s]", "end [s]"), rows=rows)
+
+
+def _search_text(design: Design) -> str:
+    settings, count = design.settings, len(design.islands)
+    searches = "One search" if count == 1 else f"{count} independent searches"
+    return (
+        f"{searches} from seed {settings['seed']}, {'' if count == 1 else 'each '}with "
+        f"{settings['effort']['starts']} screened starts and {settings['effort']['hops']} hops, solved by "
+        f"{'IPOPT' if settings['solver']['name'] == 'ipopt' else 'a feasible interior-point method'} with exact "
+        "gradients. The limits also hold between the samples."
+    )
+
+
+def _islands(design: Design) -> Table:
+    rows = tuple(
+        tuple(value for key, value in island.to_dict().items() if key != "starts") for island in design.islands
+    )
+    name = design.criterion.name
+    headings = ("search", f"first {name}", f"final {name}", "iterations", "evaluations", "end")
+    return Table(headings=headings, rows=rows, caption="Criterion of one period, at the controller's sample times.")

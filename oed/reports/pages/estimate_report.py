@@ -1,0 +1,296 @@
+"""The page of an identification."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.identifications.estimate import Estimate
+from estimation.predictions.method_table import MethodTable
+from oed.reports.pictures.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
+from oed.reports.pictures.torque_pictures import residual_picture, torque_picture
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.picture import Picture
+from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.significant import significant, significant_error
+from robots.common.files import ResultFolder
+from robots.common.plain import finite
+
+Array = NDArray[np.float64]
+
+# Pairs of parameters shown, and the correlation of their errors from which they are.
+PAIRS, CORRELATED = 12, 0.8
+
+
+def save_estimate_report(
+    estimate: Estimate, folder: ResultFolder, *, png: bool = False, methods: MethodTable | None = None
+) -> None:
+    """Writes the page of an identification, and its pictures as PNG on request."""
+    save_page(estimate_page(estimate, methods), folder, png=png)
+
+
+def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Page:
+    """Builds the page: torque errors, parameters and their uncertainty.
+
+    Args:
+        estimate: the identification.
+        methods: estimators compared on held-out data.
+    """
+    model, joints = estimate.model, estimate.joints
+    robot = model.robot
+    known = int(model.determined.sum())
+    lost = [joint for joint in joints if not joint.identified]
+    verdict = (
+        f"{known} of {len(model.names)} parameters are determined. The prediction error on held-out data is "
+        f"{100 * np.median([joint.nrmse for joint in joints]):.1f} % of the torque RMS (median joint)."
+    )
+    if lost:
+        verdict += f" Not identified: joint {', '.join(str(joint.joint) for joint in lost)}."
+    period = float(np.median(np.diff(estimate.t))) if len(estimate.t) > 1 else 1.0
+    kinds, names = robot.chain.kinds, robot.joint_names
+    residual = estimate.measured - estimate.predicted
+    sections = [
+        Section(
+            title="Torque",
+            paragraphs=(
+                (
+                    "Measured and predicted torque, and the residual, on the fitted rows. The table compares the "
+                    "model's error on held-out blocks of the logs with that of a constant and of the robot's "
+                    "description."
+                ),
+            ),
+            pictures=(
+                _errors(estimate),
+                torque_picture(
+                    estimate.t,
+                    estimate.measured,
+                    estimate.predicted,
+                    band=[joint.band for joint in joints],
+                    joint_names=names,
+                    kinds=kinds,
+                ),
+            ),
+            tables=(_joints(estimate),),
+        ),
+        Section(
+            title="Parameters",
+            pictures=_parameter_pictures(estimate),
+            tables=(_parameters(estimate), *_correlations(estimate)),
+        ),
+        Section(
+            title="Residual",
+            pictures=(residual_picture(residual, estimate.dq, period=period, joint_names=names, kinds=kinds),),
+        ),
+        Section(
+            title="Method",
+            paragraphs=(
+                f"Estimator: {model.provenance['method']}. Positions: {estimate.choice.smoother.text}, without phase "
+                f"lag. Regularisation: {_regularisation(estimate)}. Both were chosen by cross-validation on "
+                f"contiguous blocks of the logs. "
+                "Standard errors: sandwich estimator with an autoregressive model of the residuals, correlated across "
+                "joints. "
+                "The 95 % band is computed from the errors on held-out blocks. Its coverage is counted on each block "
+                "with the band of the other blocks.",
+            ),
+            tables=(_logs(estimate),),
+            folded=True,
+        ),
+    ]
+    if methods is not None:
+        sections.insert(1, Section(title="Estimators", tables=(_methods(methods),)))
+    if any(gate.findings for gate in estimate.gates):
+        sections.insert(len(sections) - 1, Section(title="The logs", tables=(_findings(estimate),)))
+    return Page(
+        title="Identified dynamics",
+        subtitle=robot.title or robot.name,
+        verdict=verdict,
+        status="good" if estimate.success else "warning",
+        facts=(
+            Fact(label="Parameters determined", value=f"{known} of {len(model.names)}"),
+            Fact(label="Worst joint, held-out data", value=f"{100 * max(joint.nrmse for joint in joints):.1f} %"),
+            Fact(label="Samples", value=len(estimate.t)),
+            Fact(
+                label="Residual correlation factor",
+                value=f"{estimate.colour:.1f}",
+                note="the standard errors are this many times those of white noise",
+            ),
+        ),
+        warnings=estimate.warnings,
+        sections=tuple(sections),
+        footer=footer(),
+    )
+
+
+def _errors(estimate: Estimate) -> Picture:
+    def shares(name: str) -> Array:
+        pairs = [(getattr(joint, name), joint.torque_rms) for joint in estimate.joints]
+        return np.array([error / scale if scale else np.nan for error, scale in pairs])
+
+    errors = {"fitted": shares("residual_rms"), "held out": shares("held_out_rms"), "constant": shares("torque_spread")}
+    errors["noise floor"] = shares("noise_floor")
+    nominal = shares("nominal_rms")
+    if np.isfinite(nominal).any():
+        errors["robot's description"] = nominal
+    return error_bars_picture(errors, joint_names=estimate.model.robot.joint_names)
+
+
+def _joints(estimate: Estimate) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for joint in estimate.joints:
+        scale = joint.torque_rms or np.nan
+        errors = (
+            joint.residual_rms,
+            joint.held_out_rms,
+            joint.torque_spread,
+            joint.nominal_rms,
+            joint.noise_floor,
+            joint.band,
+        )
+        rows.append(
+            (
+                joint.joint,
+                joint.name,
+                joint.torque_rms,
+                *(None if not np.isfinite(e) else 100 * e / scale for e in errors),
+                finite(100 * joint.band_coverage),
+                "yes" if joint.identified else "NO",
+            )
+        )
+    headings = (
+        "joint",
+        "name",
+        "torque RMS",
+        "fitted [%]",
+        "held out [%]",
+        "constant [%]",
+        "description [%]",
+        "noise floor [%]",
+        "95 % band ± [%]",
+        "band coverage [%]",
+        "identified",
+    )
+    return Table(
+        headings=headings,
+        rows=tuple(rows),
+        caption=(
+            "RMS errors in per cent of the joint's torque RMS. Fitted and held-out errors count only rows in which "
+            "the joint moves."
+        ),
+    )
+
+
+def _parameters(estimate: Estimate) -> Table:
+    model = estimate.model
+    rows: list[tuple[Cell, ...]] = []
+    for column, value, error, known, formula in zip(
+        model.parameters, model.values, model.standard_errors, model.determined, model.formulas, strict=True
+    ):
+        if known:
+            percent = significant(100 * error / abs(value), digits=2) if value else "–"
+            shown = (significant(value, error), significant_error(error), percent)
+            rows.append((column.name, *shown, column.unit, formula))
+        else:
+            rows.append((column.name, "not determined", "–", "–", column.unit, formula))
+    return Table(
+        headings=("parameter", "value", "standard error", "percent", "unit", "meaning"),
+        rows=tuple(rows),
+        caption="Values are rounded to two digits of the standard error.",
+        align=("left", "right", "right", "right", "left", "left"),
+    )
+
+
+def _regularisation(estimate: Estimate) -> str:
+    choice = estimate.choice
+    if choice.pull is not None:
+        return f"prior on the robot's description, weight {choice.ridge:g}"
+    return f"ridge, weight {choice.ridge:g}, on the Gram matrix with unit columns"
+
+
+def _correlations(estimate: Estimate) -> tuple[Table, ...]:
+    """Pairs of determined parameters with strongly correlated errors."""
+    model = estimate.model
+    known = np.flatnonzero(model.determined)
+    errors = np.sqrt(np.maximum(np.diag(model.covariance), np.finfo(float).tiny))
+    correlation = (model.covariance / errors[:, None] / errors)[np.ix_(known, known)]
+    first, second = np.triu_indices(len(known), 1)
+    values = correlation[first, second]
+    order = [k for k in np.argsort(-np.abs(values))[:PAIRS] if abs(values[k]) >= CORRELATED]
+    if not order:
+        return ()
+    names = [model.names[i] for i in known]
+    rows = tuple((names[first[k]], names[second[k]], f"{values[k]:+.3f}") for k in order)
+    caption = (
+        f"Pairs of determined parameters with error correlations of {CORRELATED:g} or more. Do not interpret them "
+        f"separately."
+    )
+    return (Table(headings=("parameter", "parameter", "correlation"), rows=rows, caption=caption),)
+
+
+def _methods(methods: MethodTable) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for row in methods.rows:
+        shares = [None if row.problem else 100 * float(value) for value in row.unseen]
+        mean = None if row.problem else 100 * float(row.unseen.mean())
+        rows.append((row.method, *shares, mean, 100 * row.determined, row.seconds, row.problem or "–"))
+    joints = (f"joint {joint} [%]" for joint in range(1, len(methods.joint_names) + 1))
+    return Table(
+        headings=("estimator", *joints, "mean [%]", "determined [%]", "time [s]", "problem"),
+        rows=tuple(rows),
+        caption=(
+            "Standard deviation of the error divided by that of the torque, on held-out data. This report shows the "
+            "best estimator."
+        ),
+    )
+
+
+def _findings(estimate: Estimate) -> Table:
+    rows = tuple((gate.log, finding.severity, str(finding)) for gate in estimate.gates for finding in gate.findings)
+    caption = "Result of the data checks before the fit, and the action taken."
+    return Table(headings=("log", "severity", "finding"), rows=rows, caption=caption)
+
+
+def _parameter_pictures(estimate: Estimate) -> tuple[Picture, ...]:
+    model = estimate.model
+    known = model.determined
+    pictures: list[Picture] = []
+    if known.any():
+        pictures.append(
+            parameter_picture(
+                [name for name, k in zip(model.names, known, strict=True) if k],
+                model.values[known],
+                model.standard_errors[known],
+                [column.unit for column, k in zip(model.parameters, known, strict=True) if k],
+            )
+        )
+    n = model.robot.n
+    coefficients, covariances = np.zeros((n, 4)), np.zeros((n, 4, 4))
+    place = {column.name: i for i, column in enumerate(model.parameters)}
+    for joint in range(n):
+        found = [(power, place.get(f"f{power + 1}_{joint + 1}")) for power in range(4)]
+        for power, i in found:
+            if i is None:
+                continue
+            coefficients[joint, power] = model.values[i]
+            for other, k in found:
+                if k is not None:
+                    covariances[joint, power, other] = model.covariance[i, k]
+    speed = np.abs(estimate.dq).max(axis=0)
+    if coefficients.any() and (speed > 0).all():
+        pictures.append(
+            friction_picture(
+                coefficients,
+                speed,
+                covariances=covariances,
+                joint_names=model.robot.joint_names,
+                kinds=model.robot.chain.kinds,
+            )
+        )
+    return tuple(pictures)
+
+
+def _logs(estimate: Estimate) -> Table:
+    rows = tuple(
+        (log["name"], log["samples"], log["duration"], (log["sha256"] or "")[:16])
+        for log in estimate.model.provenance["logs"]
+    )
+    return Table(headings=("log", "samples", "duration [s]", "sha256"), rows=rows)

@@ -1,0 +1,101 @@
+"""The page of a retimed experiment."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from oed.criteria import CRITERIA
+from oed.experiments import RetimedExperiment
+from oed.reports.pages.design_report import margins_section, parameters_section, quality_section
+from oed.reports.pictures.trajectory_pictures import trajectory_picture
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.saving import footer, save_page
+from robots.common.files import ResultFolder
+from robots.common.plain import finite
+from robots.signals import Motion
+
+
+def save_retime_report(result: RetimedExperiment, given: Motion, folder: ResultFolder, *, png: bool = False) -> None:
+    """Writes the page of a retimed experiment, and its pictures as PNG on request."""
+    save_page(retime_page(result, given), folder, png=png)
+
+
+def retime_page(result: RetimedExperiment, given: Motion) -> Page:
+    """Builds the page: what the new timing gained and what it cost."""
+    robot, retimed = result.robot, result.retimed
+    before, after = result.before.to_dict()["cond_Y"], result.after.to_dict()["cond_Y"]
+    name, joint, share = retimed.peak
+    pictures = tuple(
+        trajectory_picture(
+            motion.t,
+            motion.q,
+            motion.dq,
+            motion.ddq,
+            limits=robot.limits,
+            joint_names=robot.joint_names,
+            kinds=robot.chain.kinds,
+            name=stem,
+        )
+        for stem, motion in (("after", result.motion), ("before", given))
+    )
+    warnings = [] if result.success else ["The new timing exceeds a limit."]
+    if retimed.slower:
+        warnings.append(retimed.verdict())
+    if robot.assumed:
+        warnings.append(f"Assumed values without a source: {', '.join(robot.assumed)}.")
+    return Page(
+        title="Retimed path",
+        subtitle=robot.title or robot.name,
+        verdict=(
+            f"{retimed.method} runs the path in {retimed.duration_after:.1f} s instead of "
+            f"{retimed.duration_before:.1f} s, using {100 * share:.1f} % of the {name} limit of joint {joint}. "
+            f"{retimed.verdict()}"
+        ),
+        status="good" if result.success else "bad",
+        facts=(
+            Fact(label=f"{CRITERIA['cond']().label} before", value=before if before is not None else "not all excited"),
+            Fact(label="cond(Y) after", value=after if after is not None else "not all excited"),
+            Fact(label="Duration before", value=f"{retimed.duration_before:.3f} s"),
+            Fact(
+                label="Duration after",
+                value=f"{retimed.duration_after:.3f} s",
+                status="bad" if retimed.slower and retimed.given_keeps_limits else "neutral",
+            ),
+            Fact(label="Intermediate stops", value=retimed.stops),
+            Fact(label="Path deviation", value=f"{retimed.deviation:.2g}", note="rad or m, largest of all joints"),
+        ),
+        warnings=tuple(warnings),
+        sections=(
+            Section(title="New motion", pictures=pictures[:1]),
+            *_torque_sections(result),
+            quality_section((result.before, result.after)),
+            margins_section(tuple(m for m in result.margins if np.isfinite(m.limit)), robot.joint_names),
+            Section(title="Given motion", pictures=pictures[1:], folded=True),
+            parameters_section(result.base.names, result.base.formulas()),
+        ),
+        footer=footer(),
+    )
+
+
+def _torque_sections(result: RetimedExperiment) -> tuple[Section, ...]:
+    before, after = result.torque_before, result.torque_after
+    if before is None or after is None:
+        return ()
+    limits = result.robot.limits.torque
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
+        (
+            name,
+            float(before.peak[joint]),
+            float(after.peak[joint]),
+            finite(limits[joint]),
+            float(before.rms[joint]),
+            float(after.rms[joint]),
+        )
+        for joint, name in enumerate(result.robot.joint_names)
+    )
+    table = Table(
+        headings=("joint", "peak before", "peak after", "peak allowed", "RMS before", "RMS after"),
+        rows=rows,
+        caption="In N m (prismatic joints: N), by the nominal model with friction.",
+    )
+    return (Section(title="Torque", tables=(table,)),)

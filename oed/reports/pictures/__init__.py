@@ -1,0 +1,1 @@
+"""Pictures from plain arrays, free of any drawing library."""

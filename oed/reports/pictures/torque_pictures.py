@@ -1,0 +1,252 @@
+"""Pictures of what a model explains of the torque, and of what it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from oed.reports.rendering.joint_units import joint_titles, joint_units
+from oed.reports.rendering.palette import joint_role
+from oed.reports.rendering.picture import Band, Line, Panel, Picture, Series
+from oed.reports.rendering.significant import NORMAL_95, percent, significant
+from robots.common.errors import InputError
+from robots.signals import FloatArray
+
+BINS = 41
+LAGS = 200
+"""Longest lag of the autocorrelation, in samples."""
+
+
+def torque_picture(
+    t: ArrayLike,
+    measured: ArrayLike,
+    predicted: ArrayLike,
+    *,
+    band: ArrayLike | None = None,
+    joint_names: Sequence[str] | None = None,
+    kinds: Sequence[str] | None = None,
+    name: str = "torque",
+) -> Picture:
+    """Shows measured against predicted torque of each joint, and the residual beside it.
+
+    Args:
+        t: time [s], (N,).
+        measured: torques [N m, or N of a prismatic joint], (N, n); NaN where there is none.
+        predicted: torques of the model, (N, n).
+        band: half-widths of a band about the prediction that holds 95 % of new errors, (n,) or (N, n); NaN where
+            none is known.
+        joint_names: names, (n,).
+        kinds: "revolute" or "prismatic" of each joint, (n,); None where all are revolute.
+        name: the stem of the file name.
+
+    Raises:
+        InputError: arrays of shapes that do not fit.
+    """
+    times = np.asarray(t, dtype=np.float64)
+    truth, model = _matrix("measured", measured), _matrix("predicted", predicted)
+    if truth.shape != model.shape or len(times) != len(truth):
+        raise InputError(f"shapes {times.shape}, {truth.shape} and {model.shape}", allowed="(N,), (N, n) and (N, n)")
+    count = truth.shape[1]
+    widths = _widths(band, truth.shape)
+    titles, units = joint_titles(joint_names, count), joint_units(kinds, count)
+    panels = []
+    for joint in range(count):
+        width = None if widths is None or not np.isfinite(widths[:, joint]).all() else widths[:, joint]
+        residual = truth[:, joint] - model[:, joint]
+        level, size = _rms(residual), _rms(truth[:, joint][np.isfinite(residual)])
+        unit = units[joint].torque
+        share = f" ({percent(level / size)} of the torque)" if size > 0.0 else ""
+        panels += [
+            Panel(
+                title=titles[joint],
+                x_label="time [s]",
+                y_label=f"[{unit}]",
+                series=(
+                    Series(x=times, y=truth[:, joint], name="measured", role="measured"),
+                    Series(
+                        x=times,
+                        y=model[:, joint],
+                        name="predicted" if width is None else "predicted, 95 % band",
+                        role="predicted",
+                        opacity=0.9,
+                        error=width,
+                    ),
+                ),
+            ),
+            Panel(
+                title=f"{titles[joint]} residual: {significant(level, digits=3)} {unit} RMS{share}",
+                x_label="time [s]",
+                y_label=f"[{unit}]",
+                series=(Series(x=times, y=residual, name="residual", role="residual"),),
+                lines=(Line(value=0.0, role="neutral", dash="solid"),),
+                bands=()
+                if width is None
+                else (Band(low=-float(width.mean()), high=float(width.mean()), label="95 % band", role="predicted"),),
+            ),
+        ]
+    return Picture(
+        title="Measured and predicted torque",
+        name=name,
+        panels=tuple(panels),
+        columns=2,
+        shared_x=True,
+        panel_height=150,
+        caption="Left: measured and predicted torque. Right: measured minus predicted, on its own scale."
+        + ("" if widths is None else " The band contains 95 % of the errors on held-out data."),
+    )
+
+
+def residual_picture(
+    residual: ArrayLike,
+    velocity: ArrayLike,
+    *,
+    period: float,
+    joint_names: Sequence[str] | None = None,
+    kinds: Sequence[str] | None = None,
+    name: str = "residual",
+) -> Picture:
+    """Shows how the residual of each joint is spread, how long it remembers, and how it depends on velocity.
+
+    Args:
+        residual: measured less predicted torque, (N, n), uniform in time; NaN where there is none.
+        velocity: joint velocities [rad/s or m/s], (N, n).
+        period: sample period [s].
+        joint_names: names, (n,).
+        kinds: "revolute" or "prismatic" of each joint, (n,); None where all are revolute.
+        name: the stem of the file name.
+
+    Raises:
+        InputError: arrays of shapes that do not fit.
+    """
+    errors, speeds = _matrix("residual", residual), _matrix("velocity", velocity)
+    if errors.shape != speeds.shape:
+        raise InputError(f"shapes {errors.shape} and {speeds.shape}", allowed="the same shape (N, n)")
+    count = errors.shape[1]
+    titles, units = joint_titles(joint_names, count), joint_units(kinds, count)
+    panels: list[Panel] = []
+    for joint in range(count):
+        panels += [
+            _histogram(errors[:, joint], titles[joint], units[joint].torque, joint_role(joint + 1)),
+            _memory(errors[:, joint], titles[joint], period, joint_role(joint + 1)),
+            _against_velocity(
+                errors[:, joint],
+                speeds[:, joint],
+                titles[joint],
+                (units[joint].velocity, units[joint].torque),
+                joint_role(joint + 1),
+            ),
+        ]
+    return Picture(
+        title="Residuals",
+        name=name,
+        panels=tuple(panels),
+        columns=3,
+        panel_height=150,
+        caption=(
+            "For white noise the histogram is bell-shaped, the autocorrelation stays within the 95 % band beyond lag "
+            "0, and the mean over velocity is flat (bin means with standard deviation)."
+        ),
+    )
+
+
+def autocorrelation(values: ArrayLike, lags: int) -> FloatArray:
+    """Estimates the autocorrelation of a uniform series, leaving out pairs with a gap.
+
+    Args:
+        values: the series, (N,), NaN where there is none.
+        lags: the longest lag, in samples.
+
+    Returns:
+        Correlations at lags 0 to ``lags``, (lags + 1,); all NaN of a constant series.
+    """
+    series = np.asarray(values, dtype=np.float64)
+    known = np.isfinite(series)
+    if not known.any():
+        return np.full(lags + 1, np.nan)
+    centred = np.where(known, series - series[known].mean(), 0.0)
+    size = 1 << int(2 * len(series)).bit_length()
+    sums = np.fft.irfft(np.abs(np.fft.rfft(centred, size)) ** 2, size)[: lags + 1]
+    pairs = np.rint(np.fft.irfft(np.abs(np.fft.rfft(known.astype(float), size)) ** 2, size)[: lags + 1])
+    if sums[0] <= 0.0:
+        return np.full(lags + 1, np.nan)
+    return np.where(pairs > 0, sums / np.maximum(pairs, 1.0), np.nan) / (sums[0] / pairs[0])
+
+
+def _histogram(errors: FloatArray, title: str, unit: str, role: str) -> Panel:
+    known = errors[np.isfinite(errors)]
+    if len(known) == 0:
+        return Panel(title=f"{title} spread", note="no data")
+    deviation = float(known.std())
+    # Outliers beyond six deviations would leave the bell a single bar.
+    reach = min(float(np.abs(known - known.mean()).max()), 6.0 * deviation) or 1.0
+    edges = np.linspace(known.mean() - reach, known.mean() + reach, BINS + 1)
+    density, _ = np.histogram(known, bins=edges)
+    width = edges[1] - edges[0]
+    middle: FloatArray = 0.5 * (edges[1:] + edges[:-1])
+    series = [Series(x=middle, y=density / (len(known) * width), kind="bars", role=role, opacity=0.75)]
+    if deviation > 0.0:
+        bell = np.exp(-0.5 * ((middle - known.mean()) / deviation) ** 2) / (deviation * np.sqrt(2.0 * np.pi))
+        series.append(Series(x=middle, y=bell, name="normal distribution", role="neutral"))
+    return Panel(title=f"{title} spread", x_label=f"residual [{unit}]", y_label="density", series=tuple(series))
+
+
+def _memory(errors: FloatArray, title: str, period: float, role: str) -> Panel:
+    lags = min(LAGS, len(errors) - 1)
+    times: FloatArray = period * np.arange(lags + 1, dtype=np.float64)
+    correlation = autocorrelation(errors, lags)
+    bound = NORMAL_95 / np.sqrt(max(int(np.isfinite(errors).sum()), 1))
+    return Panel(
+        title=f"{title} memory",
+        x_label="lag [s]",
+        y_label="autocorrelation",
+        series=(Series(x=times, y=correlation, role=role),),
+        bands=(Band(low=-bound, high=bound, label="white noise, 95 %"),),
+        y_range=(min(-0.3, 1.1 * float(np.nanmin(correlation))) if np.isfinite(correlation).any() else -0.3, 1.05),
+    )
+
+
+def _against_velocity(errors: FloatArray, speeds: FloatArray, title: str, units: tuple[str, str], role: str) -> Panel:
+    known = np.isfinite(errors) & np.isfinite(speeds)
+    errors, speeds = errors[known], speeds[known]
+    title, x_label, y_label = f"{title} over velocity", f"velocity [{units[0]}]", f"residual [{units[1]}]"
+    if len(errors) < 2:
+        return Panel(title=title, x_label=x_label, y_label=y_label, note="no data")
+    edges = np.linspace(speeds.min(), speeds.max() + 1e-12, 26)
+    index = np.clip(np.searchsorted(edges, speeds, side="right") - 1, 0, len(edges) - 2)
+    number = np.bincount(index, minlength=len(edges) - 1)
+    full = number >= 5
+    total = np.maximum(number, 1)
+    mean = np.bincount(index, errors, len(edges) - 1) / total
+    spread = np.sqrt(np.maximum(np.bincount(index, errors**2, len(edges) - 1) / total - mean**2, 0.0))
+    return Panel(
+        title=title,
+        x_label=x_label,
+        y_label=y_label,
+        series=(
+            Series(x=0.5 * (edges[1:] + edges[:-1])[full], y=mean[full], error=spread[full], kind="markers", role=role),
+        ),
+        lines=(Line(value=0.0, role="neutral", dash="solid"),),
+    )
+
+
+def _widths(band: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray | None:
+    if band is None:
+        return None
+    widths = np.asarray(band, dtype=np.float64)
+    if widths.shape not in (shape, shape[1:]):
+        raise InputError(f"shape {widths.shape}", column="band", allowed=f"{shape[1:]} or {shape}")
+    return np.broadcast_to(widths, shape)
+
+
+def _rms(values: FloatArray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
+
+
+def _matrix(name: str, value: ArrayLike) -> FloatArray:
+    array = np.asarray(value, dtype=np.float64)
+    if array.ndim != 2:
+        raise InputError(f"shape {array.shape}", column=name, allowed="shape (N, n)")
+    return array

@@ -1,0 +1,1 @@
+"""Pages and pictures as files: HTML, plotly, matplotlib, numbers, colours."""

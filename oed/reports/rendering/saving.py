@@ -1,0 +1,29 @@
+"""A page and its pictures as files."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+from oed.reports.rendering.matplotlib_ import save_png
+from oed.reports.rendering.page import Footer, Page, render
+from robots.common.files import ResultFolder, write_atomic
+from robots.version import VERSION
+
+REPORT = "report.html"
+
+
+def save_page(page: Page, folder: ResultFolder, *, png: bool = False) -> None:
+    """Writes ``report.html`` and, on request, each picture as PNG."""
+    write_atomic(folder.path(REPORT), render(page))
+    if png:
+        for picture in page.pictures:
+            save_png(picture, folder.path(f"{picture.name}.png"))
+
+
+def footer() -> Footer:
+    """Says which tool made the page, when, and by which command."""
+    command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
+    return Footer(tool=f"robot-oed {VERSION}", date=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC", command=command)

@@ -1,0 +1,198 @@
+"""Tables in files: one reader and one writer for CSV and Parquet, chosen by the suffix."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import ArrayLike
+
+from robots.common.errors import InputError
+from robots.common.files import existing_file, open_atomic
+from robots.common.tables.csv_faults import check_unique, is_number
+from robots.common.tables.csv_tables import read_csv, write_csv
+from robots.common.tables.ecsv import plain
+from robots.common.tables.table import Column, Table
+
+__all__ = ["Table", "read_table", "write_table"]
+
+SUFFIXES = (".csv", ".parquet")
+_KEY = b"table"
+_FOREIGN = ("pandas", "ARROW:schema", "table")
+
+
+def read_table(path: str | PathLike[str], *, wanted: Callable[[str], bool] | None = None) -> Table:
+    """Reads a table from ``.csv`` (commas, semicolons or tabs, a leading ``#`` block allowed) or ``.parquet``.
+
+    Args:
+        path: the file.
+        wanted: tells by name which columns to read, all by default; the others are named in ``Table.skipped`` and may
+            hold anything.
+
+    Returns:
+        The table; a column is float64 if all its cells are numbers or empty, and object if none is a number.
+
+    Raises:
+        InputError: a missing, empty or unreadable file, no header, a duplicate column, a row of another length, a cell
+            that is no number in a column of numbers; with column and line where they apply.
+    """
+    path = existing_file(path)
+    suffix = _suffix(path)
+    wanted = wanted or (lambda name: True)
+    return read_csv(path, wanted) if suffix == ".csv" else _read_parquet(path, wanted)
+
+
+def write_table(
+    path: str | PathLike[str],
+    columns: Mapping[str, ArrayLike],
+    metadata: Mapping[str, Any] | None = None,
+    *,
+    units: Mapping[str, str] | None = None,
+    force: bool = False,
+) -> None:
+    """Writes a table that reads back exactly, as ``.csv`` with an ECSV block or as ``.parquet``; whole or not at all.
+
+    Args:
+        path: the file.
+        columns: the columns by name, (N,) each: numbers or text.
+        metadata: anything of text, numbers, lists and mappings.
+        units: the unit of a column by its name.
+        force: whether an existing file may be replaced.
+
+    Raises:
+        InputError: another suffix, columns that make no table, an existing file without ``force``, or a folder that
+            cannot be written to.
+    """
+    path = Path(path)
+    suffix = _suffix(path)
+    arrays = _checked_columns(columns, path)
+    units = dict(units or {})
+    for name in units:
+        if name not in arrays:
+            raise InputError("a unit for a column that does not exist", file=path, column=name)
+    write = write_csv if suffix == ".csv" else _write_parquet
+    with open_atomic(path, force=force) as stream:
+        try:
+            write(stream, arrays, dict(metadata or {}), units)
+        except (pa.ArrowException, UnicodeError, OSError) as error:
+            raise InputError(f"cannot be written ({error})", file=path) from error
+
+
+def _suffix(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InputError(
+            f"a file of type {path.suffix or '(none)'!r}", file=path, allowed=" or ".join(SUFFIXES), remedy="rename it"
+        )
+    return suffix
+
+
+def _checked_columns(columns: Mapping[str, ArrayLike], path: Path) -> dict[str, Column]:
+    if not columns:
+        raise InputError("no columns to write", file=path)
+    arrays: dict[str, Column] = {}
+    first = next(iter(columns))
+    for name, values in columns.items():
+        # What the reader would take for something else must not be written.
+        if not name or name != name.strip() or set(name) & set(',;"#\r\n\t\0'):
+            raise InputError(f"{name!r} cannot name a column", file=path, allowed='text without , ; " # or line ends')
+        array = np.asarray(values)
+        if array.ndim != 1 or len(array) == 0:
+            raise InputError(f"shape {array.shape}", file=path, column=name, allowed="shape (N,), N at least 1")
+        arrays[name] = _writable(array, path, name)
+        if len(array) != len(arrays[first]):
+            raise InputError(f"{len(array)} rows, but column {first} has {len(arrays[first])}", file=path, column=name)
+    if len(arrays) == 1 and " " in first:
+        raise InputError(f"{first!r} cannot name the only column", file=path, allowed="a name without spaces")
+    if all(is_number(name) for name in arrays):
+        raise InputError("column names that are all numbers", file=path, allowed="at least one that is a word")
+    return arrays
+
+
+def _writable(array: Column, path: Path, name: str) -> Column:
+    if array.dtype.kind == "f":
+        return np.ascontiguousarray(array, dtype=np.float64)
+    if array.dtype.kind in "iub":
+        return np.ascontiguousarray(array, dtype=np.int64)
+    texts = array.astype(object)
+    for row, cell in enumerate(texts, start=1):
+        if not isinstance(cell, str) or set(cell) & set("\r\n\0"):
+            raise InputError(
+                f"found {cell!r}", file=path, column=name, row=row, allowed="numbers, or text of one line in all rows"
+            )
+    return texts
+
+
+def _read_parquet(path: Path, wanted: Callable[[str], bool]) -> Table:
+    if path.stat().st_size == 0:
+        raise InputError("the file is empty", file=path)
+    try:
+        with pq.ParquetFile(path, memory_map=True) as file:
+            schema = file.schema_arrow
+            check_unique(schema.names, path)
+            chosen = [name for name in schema.names if wanted(name)]
+            content = file.read(columns=chosen)
+        arrays = {name: _parquet_column(content.column(name), name, path) for name in chosen}
+    except (pa.ArrowException, OSError, ValueError, KeyError) as error:
+        raise InputError(
+            f"not a Parquet file that can be read ({str(error).splitlines()[0] if str(error) else 'damaged'})",
+            file=path,
+            remedy="write it again",
+        ) from error
+    if content.num_rows == 0:
+        raise InputError("no rows", file=path, remedy="record the data again")
+    stored, units = _stored(schema.metadata or {})
+    return Table(
+        columns=arrays,
+        metadata=stored,
+        path=path,
+        first_row=1,
+        units=units,
+        skipped=tuple(name for name in schema.names if name not in arrays),
+    )
+
+
+def _stored(metadata: Mapping[bytes, bytes]) -> tuple[dict[str, Any], dict[str, str]]:
+    """Returns metadata and units of a Parquet schema; of a file written by others, its plain key-value pairs."""
+    if _KEY in metadata:
+        try:
+            content = json.loads(metadata[_KEY])
+            return dict(content["meta"]), dict(content["units"])
+        except (ValueError, KeyError, TypeError):
+            pass
+    foreign = {key.decode(errors="replace"): value.decode(errors="replace") for key, value in metadata.items()}
+    return {key: value for key, value in foreign.items() if key not in _FOREIGN}, {}
+
+
+def _parquet_column(column: pa.ChunkedArray, name: str, path: Path) -> Column:
+    kind = column.type
+    if pa.types.is_dictionary(kind):
+        column = column.cast(kind.value_type)
+        kind = column.type
+    if pa.types.is_boolean(kind):
+        column = column.cast(pa.int8())
+    elif pa.types.is_string(kind) or pa.types.is_large_string(kind):
+        texts: Column = column.fill_null("").to_numpy().astype(object)
+        return texts
+    elif not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_null(kind)):
+        raise InputError(
+            f"a column of type {kind}", file=path, column=name, allowed="numbers (time in seconds) or text"
+        )
+    if kind != pa.float64():
+        column = column.cast(pa.float64(), safe=False)
+    # One chunk without nulls comes out as a view of Arrow's memory.
+    values: Column = column.chunk(0).to_numpy(zero_copy_only=False) if column.num_chunks == 1 else column.to_numpy()
+    return values
+
+
+def _write_parquet(
+    stream: BinaryIO, columns: Mapping[str, Column], metadata: Mapping[str, Any], units: Mapping[str, str]
+) -> None:
+    stored = json.dumps({"meta": plain(metadata), "units": dict(units)}).encode()
+    pq.write_table(pa.table(dict(columns)).replace_schema_metadata({_KEY: stored}), stream)

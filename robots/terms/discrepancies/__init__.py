@@ -1,0 +1,1 @@
+"""Generic model errors, fitted where no effect of the catalogue explains the residual."""

@@ -1,0 +1,54 @@
+"""Positions and torques whose clocks go apart: the one is logged later and later after the other, on all joints."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.robot import Robot
+from robots.terms.discrepancies.gain_drift import OverTime, half_waves, log_time
+from robots.terms.effects import Coefficient, Situation
+from robots.terms.effects.time_delay import lateness
+
+Array = NDArray[np.float64]
+
+KNOTS = 3
+# The change of torque per delay is a quotient over this [s], for friction turns round at once.
+OVER = 1e-3
+
+
+class ClockDrift(OverTime):
+    """-g(t) dtau_j / dt on every joint j, g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
+
+    A delay that stays is `time_delay`.
+    """
+
+    name: ClassVar[str] = "pattern:parting:0:even"
+    title: ClassVar[str] = "torque that is logged later than position by more or less as time goes on"
+
+    def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
+        """Describes the delays of the half waves."""
+        return tuple(Coefficient(f"delay_{k}", "s") for k in range(1, KNOTS + 1))
+
+    def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the change of torque per delay times each wave (N, n, KNOTS)."""
+        times = half_waves(log_time(situation), KNOTS)
+        return np.asarray(lateness(situation, OVER)[:, :, None] * times[:, None])
+
+    def describe(
+        self,
+        joint: int | None,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what is seen."""
+        late = half_waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients
+        return (
+            "The torque of all joints is logged later after the positions, or less late, as time goes on: by about "
+            f"{1000 * float(np.ptp(late)):.2g} ms over the logs. Two clocks that do not run alike do that."
+        )

@@ -1,0 +1,273 @@
+"""Families of free functions: what torque may depend on where no cause of the catalogue says how."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from robots.common.stretches import spans
+from robots.terms.discrepancies.gain_drift import half_waves, log_time
+from robots.terms.discrepancies.resonance import resonance
+from robots.terms.effect_bases.states import bristle
+from robots.terms.effects import Situation
+
+Array = NDArray[np.float64]
+
+HARMONICS = (1, 2, 3, 4)
+# Of what remembers velocity, of a sensor that creeps, and of a supply that sags [s].
+MEMORIES, CREEPS, SUPPLIES = (0.1, 0.3, 1.0, 3.0), (1.0, 3.0, 10.0, 30.0), (0.03, 0.15, 0.7)
+# Of grease that thins as it is worked [s].
+WORKED = (0.5, 2.0, 8.0)
+KNOTS, AGEING = 8, 3
+WHIRLING = 6  # joints at most beside the two
+# Changes of torque, as shares of its largest, within which a hysteresis turns round.
+STRAINS = (0.05, 0.2, 0.6)
+# A joint stands that is slower than this share of its RMS speed for so long [s]. What it feels when it goes changes
+# evenly between some times [s] from then on, and ends with the last.
+STANDS, RESTS, SINCE = 0.02, 0.1, (0.0, 0.1, 0.2, 0.3, 0.5, 0.8)
+
+
+@dataclass(frozen=True)
+class Family:
+    """Functions of one or two inputs.
+
+    Attributes:
+        columns: evaluates them (N, k), of what is seen, the joint (from 1), another one's number and the shape.
+        count: k.
+        words: what the residual torque does, with room for the other joint's name and the shape.
+        of: the joint's input (N,) that the shape's value is the largest size of, in the logs that it was found in: the
+            functions are the same ones in any other log.
+        unit: of that.
+    """
+
+    columns: Callable[[Situation, int, int, tuple[float, ...]], Array]
+    count: int
+    words: str
+    of: Callable[[Situation, int], Array] | None = None
+    unit: str = ""
+
+
+def _angle(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    q = s.q[:, other - 1]
+    return np.column_stack([f(h * q) for h in HARMONICS for f in (np.cos, np.sin)])
+
+
+def _angles(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    if other == joint:
+        return np.zeros((len(s), 16))
+    a, b = s.q[:, joint - 1], s.q[:, other - 1]
+    first = [f(h * a) for h in (1, 2) for f in (np.cos, np.sin)]
+    second = [f(h * b) for h in (1, 2) for f in (np.cos, np.sin)]
+    return np.column_stack([x * y for x in first for y in second])
+
+
+def _motion(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    if other == joint:
+        return np.zeros((len(s), 5))
+    v = s.dq[:, other - 1]
+    own = s.dq[:, joint - 1]
+    return np.column_stack([v, np.abs(v), v * np.abs(v), s.sign[:, other - 1], v * own])
+
+
+def _push(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    if other == joint:
+        return np.zeros((len(s), 3))
+    q, a = s.q[:, joint - 1], s.ddq[:, other - 1]
+    return np.column_stack([a, a * np.cos(q), a * np.sin(q)])
+
+
+def _whirl(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    columns = np.zeros((len(s), WHIRLING))
+    further = [k for k in range(s.q.shape[1]) if k + 1 not in (joint, other)][:WHIRLING] if other != joint else []
+    columns[:, : len(further)] = s.dq[:, other - 1, None] * s.dq[:, further]
+    return columns
+
+
+def _drag(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    return _products(s.q[:, joint - 1], s.dq[:, other - 1])
+
+
+def _posture(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    if other == joint:
+        return np.zeros((len(s), 8))
+    return _products(s.q[:, other - 1], s.dq[:, joint - 1])
+
+
+def _products(q: Array, v: Array) -> Array:
+    waves = [f(h * q) for h in (1, 2) for f in (np.cos, np.sin)]
+    return np.column_stack([wave * speed for wave in waves for speed in (v, v * v)])
+
+
+def _speed_of(s: Situation, joint: int) -> Array:
+    return np.asarray(np.abs(s.dq[:, joint - 1]))
+
+
+def _load_of(s: Situation, joint: int) -> Array:
+    return np.asarray(s.load[:, joint - 1])
+
+
+def _torque_of(s: Situation, joint: int) -> Array:
+    return np.asarray(s.torque[:, joint - 1])
+
+
+def _acceleration_of(s: Situation, joint: int) -> Array:
+    return np.asarray(s.ddq[:, joint - 1])
+
+
+def _speed(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    x = _speed_of(s, joint) / shape[0]
+    centres = (0.0, 0.05, 0.15, 0.35, 0.65, 1.0)
+    widths = (0.03, 0.06, 0.1, 0.2, 0.25, 0.3)
+    return np.column_stack([np.exp(-0.5 * ((x - c) / w) ** 2) for c, w in zip(centres, widths, strict=True)])
+
+
+def _load(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    x = _load_of(s, joint) / shape[0]
+    return np.column_stack([x, np.abs(x), x * np.abs(x), x**2, np.abs(x) ** 3])
+
+
+def _torque(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    x = _torque_of(s, joint) / shape[0]
+    return np.column_stack([np.tanh(x / 0.05), np.tanh(x / 0.2), x * np.abs(x), x**3, np.abs(x), x**2])
+
+
+def _acceleration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    x = _acceleration_of(s, joint) / shape[0]
+    return np.column_stack([np.abs(x), x * np.abs(x), x**3])
+
+
+def _memory(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    return _followers(s, s.dq[:, joint - 1], MEMORIES)
+
+
+def _worked(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    speed = np.abs(s.dq[:, joint - 1]) / shape[0]
+    before = _followers(s, speed, WORKED)
+    return np.hstack([before, before * speed[:, None]])
+
+
+def _creep(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    return _followers(s, s.torque[:, joint - 1], CREEPS)
+
+
+def _hysteresis(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    torque = _torque_of(s, joint) / shape[0]
+    rate = np.concatenate([np.gradient(torque[run], s.period) if run.stop - run.start > 1 else [0.0] for run in s.runs])
+    return np.column_stack([bristle(s.t, torque, rate, s.runs, length) for length in STRAINS])
+
+
+def _supply(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    power = np.sum(s.torque * s.dq, axis=1)
+    power = _followers(s, power / max(float(np.abs(power).max(initial=0.0)), 1e-300), SUPPLIES)
+    return s.torque[:, joint - 1, None] * np.hstack([power, np.abs(power)])
+
+
+def _followers(s: Situation, source: Array, memories: tuple[float, ...]) -> Array:
+    """What follows a source (N,) with some time constants [s], (N, k), each log anew, from its mean there.
+
+    From zero it would settle for as long, as a drift does that begins with the log.
+    """
+    columns = np.zeros((len(s), len(memories)))
+    for k, memory in enumerate(memories):
+        keep = float(np.exp(-s.period / memory))
+        for run in s.runs:
+            columns[run, k] = lfilter([1 - keep], [1.0, -keep], source[run], zi=[keep * source[run].mean()])[0]
+    return columns
+
+
+def _time(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    return half_waves(log_time(s), KNOTS)
+
+
+def _ageing(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    q = s.q[:, joint - 1]
+    slow = half_waves(log_time(s), AGEING)
+    return np.hstack([slow * wave[:, None] for wave in (np.cos(q), np.sin(q))])
+
+
+def _start(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    v = np.abs(s.dq[:, joint - 1])
+    still = v < STANDS * float(np.sqrt(np.mean(v**2)))
+    columns = np.zeros((len(s), len(SINCE) - 1))
+    for run in s.runs:
+        t, own = s.t[run], columns[run]
+        goes = [stop for start, stop in spans(still[run]) if (stop - start) * s.period >= RESTS and stop < len(t)]
+        for start, stop in pairwise([*goes, len(t)]):
+            since = t[start:stop] - t[start]
+            own[start:stop] = np.column_stack([np.interp(since, SINCE, peak) for peak in np.eye(len(SINCE))[:-1]])
+    return columns
+
+
+def _ringing(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    sources = np.column_stack([s.rigid[:, joint - 1], s.ddq[:, joint - 1]])
+    for run in s.runs:
+        sources[run] -= sources[run].mean(axis=0)
+    place, rate = resonance(s, sources, shape[0])
+    return np.column_stack([place[:, 0], rate[:, 0], place[:, 1], rate[:, 1]])
+
+
+def _vibration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    phase = 2 * np.pi * shape[0] * (s.t - s.origin)
+    pull = s.sensitivity("gravity")[:, joint - 1]
+    size = np.abs(pull).max(axis=0)
+    # An axis along gravity feels none of it, but for rounding.
+    pull = np.where(size > 1e-6 * max(float(size.max()), 1e-300), pull, 0.0)
+    if not float(size.max()) > 1e-9:
+        pull = np.ones((len(s), 1)) * [1.0, 0.0, 0.0]
+    waves = (np.cos(phase), np.sin(phase))
+    columns = [wave * pull[:, i % pull.shape[1]] for i in range(3) for wave in waves]
+    return np.column_stack([*columns, *waves])
+
+
+def _sway(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    phase = 2 * np.pi * shape[0] * (s.t - s.origin)
+    return np.column_stack([np.cos(phase), np.sin(phase)])
+
+
+def _turns(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
+    q, v, a = (x[:, joint - 1] for x in (s.q, s.dq, s.ddq))
+    waves = (np.cos(shape[0] * q), np.sin(shape[0] * q))
+    # What an error of the position of so many waves does through stiffness, friction and inertia.
+    return np.column_stack([wave * factor for factor in (np.ones(len(s)), v, v**2, a) for wave in waves])
+
+
+FAMILIES: dict[str, Family] = {
+    "angle": Family(_angle, 8, "depends on the position of {who}"),
+    "angles": Family(_angles, 16, "depends on its own position and that of {who} together"),
+    "motion": Family(_motion, 5, "depends on the velocity of {who}"),
+    "push": Family(_push, 3, "depends on the acceleration of {who}"),
+    "whirl": Family(_whirl, WHIRLING, "depends on the velocity of {who} times those of further joints"),
+    "drag": Family(_drag, 8, "depends on its own position and the velocity of {who} together"),
+    "posture": Family(_posture, 8, "depends on its own velocity and the position of {who} together"),
+    "speed": Family(_speed, 6, "depends on the speed of the joint", _speed_of, "rad/s or m/s"),
+    "load": Family(_load, 5, "depends on the load of the joint", _load_of, "N m or N"),
+    "torque": Family(_torque, 6, "depends on the torque of the joint, not in proportion", _torque_of, "N m or N"),
+    "acceleration": Family(
+        _acceleration,
+        3,
+        "depends on the acceleration of the joint, not in proportion",
+        _acceleration_of,
+        "rad/s2 or m/s2",
+    ),
+    "memory": Family(_memory, 4, "remembers the velocity of the joint for a while"),
+    "worked": Family(
+        _worked, 2 * len(WORKED), "depends on how fast the joint has moved before", _speed_of, "rad/s or m/s"
+    ),
+    "creep": Family(_creep, 4, "remembers the torque of the joint for a while"),
+    "hysteresis": Family(
+        _hysteresis, len(STRAINS), "differs as its torque grows and as it falls", _torque_of, "N m or N"
+    ),
+    "supply": Family(_supply, 6, "depends on its own torque and the power that all joints draw together"),
+    "time": Family(_time, KNOTS, "changes slowly with time"),
+    "ageing": Family(_ageing, 2 * AGEING, "depends on its own position, and changes slowly with time"),
+    "start": Family(_start, len(SINCE) - 1, "is another for a while after the joint has stood"),
+    "ringing": Family(_ringing, 4, "rings at {point} Hz after the motion"),
+    "vibration": Family(_vibration, 8, "vibrates at {point} Hz whatever the motion"),
+    "sway": Family(_sway, 2, "swings to and fro at {point} Hz whatever the motion"),
+    "turns": Family(_turns, 8, "repeats {point} times a turn of the joint and grows with its speed"),
+}

@@ -1,0 +1,71 @@
+"""What swings at the flange after its motion and pulls all joints at once, as liquid in a tank or a hose does."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.robot import Robot
+from robots.terms.discrepancies.resonance import resonance
+from robots.terms.effects import Coefficient, Effect, Shape, Situation
+
+Array = NDArray[np.float64]
+
+FREQUENCIES = tuple(float(f) for f in np.geomspace(0.4, 5.0, 24))
+_WAYS = ("level", "upright")
+
+
+class FlangeOscillator(Effect):
+    """-J(q)' f, f the force of masses that hang on weak springs at the flange and are driven by its acceleration.
+
+    x'' + 2 d w x' + w^2 x = -p'' along the level and the upright directions; f = m_1 w^2 x + m_2 w x', so that the
+    coefficients of the second column stand for another damping. The drives hold against f: a mass is positive.
+    """
+
+    name: ClassVar[str] = "pattern:swinging:0:even"
+    title: ClassVar[str] = "something that swings at the flange"
+    whole_robot: ClassVar[bool] = True
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("frequency", "Hz", 0.3, 6.0, "log", FREQUENCIES),)
+
+    def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
+        """Describes the masses, of what swings in phase and a quarter of a period late."""
+        return tuple(Coefficient(f"{phase}_{way}", "kg") for way in _WAYS for phase in ("mass", "late_mass"))
+
+    def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the torque of a unit mass, level and upright, in both phases (N, n, 4)."""
+        jacobian = situation.sensitivity("jacobian")[:, :3]
+        pulls = situation.cached("flange acceleration", lambda: _accelerations(situation))
+        X = np.empty((len(situation), situation.robot.n, 4))
+        for k, pull in enumerate(np.moveaxis(pulls, 1, 0)):
+            # The mass is driven by -p'' and the drives hold against its pull: the signs cancel.
+            for phase, force in enumerate(resonance(situation, pull, shape[0])):
+                X[:, :, 2 * k + phase] = np.einsum("tin,ti->tn", jacobian, force)
+        return X
+
+    def describe(
+        self,
+        joint: int | None,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what is seen."""
+        return (
+            "The residual torque of all joints looks like that of something at the flange that swings at "
+            f"{shape[0]:.3g} Hz after its motion, of some {np.abs(coefficients).max():.2g} kg."
+        )
+
+
+def _accelerations(situation: Situation) -> Array:
+    """The flange's acceleration [m/s2], level and upright parts (N, 2, 3)."""
+    velocity = np.einsum("tin,tn->ti", situation.sensitivity("jacobian")[:, :3], situation.dq)
+    acceleration = situation.derivatives(velocity)[0]
+    gravity = situation.gravity
+    size = np.linalg.norm(gravity, axis=1, keepdims=True)
+    up = np.where(size > 0, gravity / np.where(size > 0, size, 1.0), [0.0, 0.0, 1.0])
+    upright = up * np.sum(up * acceleration, axis=1, keepdims=True)
+    return np.stack([acceleration - upright, upright], axis=1)

@@ -1,0 +1,52 @@
+"""What pulls at the flange by where that is, as a hose, a cable or a balancer between it and the ceiling does."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.robot import Robot
+from robots.terms.effects import Coefficient, Effect, Situation
+
+Array = NDArray[np.float64]
+
+_WAYS = ("x", "y", "z")
+
+
+class FlangeSpring(Effect):
+    """-J(q)' f(p), f a force on the flange that is linear in the flange's place p: f = f0 + S p.
+
+    A steady pull downwards is a payload, which the base model has.
+    """
+
+    name: ClassVar[str] = "pattern:pulling:0:even"
+    title: ClassVar[str] = "something that pulls at the flange by where it is"
+    whole_robot: ClassVar[bool] = True
+
+    def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
+        """Describes the force at the middle of the motion, and how it changes with each coordinate."""
+        steady = (Coefficient(f"force_{way}", "N") for way in _WAYS)
+        return (*steady, *(Coefficient(f"stiffness_{way}{by}", "N/m") for by in _WAYS for way in _WAYS))
+
+    def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the torque of unit forces, steady and by each coordinate of the flange (N, n, 12)."""
+        arms = -np.swapaxes(situation.sensitivity("jacobian")[:, :3], 1, 2)  # (N, n, 3)
+        place = situation.sensitivity("flange").reshape(len(situation), 3)
+        return np.concatenate([arms, *(arms * place[:, k, None, None] for k in range(3))], axis=2)
+
+    def describe(
+        self,
+        joint: int | None,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what is seen."""
+        return (
+            "The residual torque of all joints looks like that of something that pulls at the flange by where it "
+            f"is, as a hose or a cable does: by up to {np.abs(coefficients[3:]).max():.2g} N/m."
+        )

@@ -1,0 +1,71 @@
+"""Torque that all joints log by the same share more or less as time goes on: a supply, one reference of all drives."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.robot import Robot
+from robots.terms.effects import Coefficient, Effect, Situation
+
+Array = NDArray[np.float64]
+
+KNOTS = 5
+FEWEST = 3  # joints
+
+
+class OverTime(Effect):
+    """What all joints share and changes slowly with time."""
+
+    whole_robot: ClassVar[bool] = True
+    depends_on: ClassVar[Literal["state", "time"]] = "time"
+
+    def joints(self, robot: Robot) -> tuple[int | None, ...]:
+        """Names the whole robot where it has joints enough for something to be one of all of them."""
+        return (None,) if robot.n >= FEWEST else ()
+
+
+class GainDrift(OverTime):
+    """tau_j g(t) on every joint j, g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
+
+    What heat makes of a motor's constant differs from joint to joint, and is `torque_constant_heat`.
+    """
+
+    name: ClassVar[str] = "pattern:fading:0:even"
+    title: ClassVar[str] = "torque of all joints that changes by the same share with time"
+
+    def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
+        """Describes the shares of the half waves."""
+        return tuple(Coefficient(f"share_{k}", "1") for k in range(1, KNOTS + 1))
+
+    def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the base model's torque times each wave (N, n, KNOTS)."""
+        return np.asarray(situation.torque[:, :, None] * half_waves(log_time(situation))[:, None])
+
+    def describe(
+        self,
+        joint: int | None,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what is seen."""
+        share = half_waves(np.linspace(0.0, 1.0, 201)) @ coefficients
+        return (
+            "The torque of all joints changes slowly with time, by the same share of each: over the logs it differs by "
+            f"{100 * float(np.ptp(share)):.2g} %. A supply, or what all amplifiers are measured by, does that."
+        )
+
+
+def half_waves(x: Array, count: int = KNOTS) -> Array:
+    """Gives half waves (N, count) of time x (N,), which goes from 0 to 1."""
+    return np.column_stack([np.cos(np.pi * k * x) for k in range(1, count + 1)])
+
+
+def log_time(situation: Situation) -> Array:
+    """Gives time (N,) from 0 at the first row to 1 at the last."""
+    return (situation.t - situation.t[0]) / max(float(situation.t[-1] - situation.t[0]), 1e-9)

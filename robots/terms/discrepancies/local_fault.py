@@ -1,0 +1,132 @@
+"""A spot in a joint's range where something catches or rubs: a damaged tooth, a dented bearing, a cable that snags."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.robot import Robot
+from robots.terms.base import force_unit
+from robots.terms.effects import Coefficient, JointEffect, Shape, Situation
+
+Array = NDArray[np.float64]
+
+WIDTHS = (0.015, 0.03, 0.06, 0.12)
+"""Standard widths of a scan's spots, as shares of the joint's range; closer ones are a ripple, wider ones a spring."""
+APART = 1.5
+"""Distance of a scan's spots, in widths."""
+NARROWEST, WIDEST = 0.004, 0.2
+"""Shares of the joint's range between which a spot is as wide as it is."""
+BINS = 1000
+"""Of the joint's range, by which all spots are ranked at once."""
+
+
+class Placed(JointEffect):
+    """What is at a place of a joint's range."""
+
+    def coordinate(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Gives the position."""
+        assert joint is not None
+        return f"position of joint {joint} [rad or m]", situation.q[:, joint - 1]
+
+    @staticmethod
+    def reach(situation: Situation, joint: int | None) -> tuple[float, float]:
+        """Gives where a joint's range begins, and its extent; zero for one that hardly moves."""
+        assert joint is not None
+        q = situation.q[:, joint - 1]
+        reach = float(np.ptp(q)) if len(q) else 0.0
+        return (float(q.min()), reach) if reach > 1e-3 else (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class LocalFault(Placed):
+    """tau = c exp(-((q - centre) / width)^2 / 2), times the direction of motion where it rubs.
+
+    Attributes:
+        odd: whether it turns round with the direction of motion.
+    """
+
+    odd: bool = False
+
+    shapes = (
+        Shape("centre", "rad", -np.inf, np.inf),
+        Shape("width", "rad", 0.0, np.inf, "log"),
+    )
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """A text that `build_pattern` reads."""
+        return f"pattern:spot:0:{'odd' if self.odd else 'even'}"
+
+    @property
+    def title(self) -> str:  # type: ignore[override]
+        """Its name for people."""
+        return f"a spot of the joint's range where something {'rubs' if self.odd else 'pushes'}"
+
+    def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
+        """Describes the torque at the spot."""
+        assert joint is not None
+        return (Coefficient("peak", force_unit(robot, joint - 1)),)
+
+    def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
+        """Lists spots all over the joint's range."""
+        low, reach = self.reach(situation, joint)
+        if not reach:
+            return ()
+        return tuple(
+            (float(low + reach * place), share * reach)
+            for share in WIDTHS
+            for place in np.arange(0.0, 1.0 + 1e-9, APART * share)
+        )
+
+    def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
+        """Keeps the spot within the joint's range."""
+        low, reach = self.reach(situation, joint)
+        return (low, low + reach), (NARROWEST * reach, WIDEST * reach)
+
+    def propose(
+        self, situation: Situation, joint: int | None, residual: Array, count: int = 8
+    ) -> tuple[tuple[float, ...], ...]:
+        """Ranks all spots at once, by what the residual has to do with each over its own size."""
+        assert joint is not None
+        grid = self.grid(situation, joint)
+        if len(grid) <= count:
+            return grid
+        low, reach = self.reach(situation, joint)
+        own = residual[:, joint - 1]
+        q = (situation.q[:, joint - 1] - low) / reach
+        turned = own * situation.sign[:, joint - 1] if self.odd else own
+        place = np.minimum((q * BINS).astype(int), BINS - 1)
+        told = np.bincount(place, weights=turned, minlength=BINS)
+        rows = np.bincount(place, weights=own != 0, minlength=BINS)
+        middles = (np.arange(BINS) + 0.5) / BINS * reach + low
+        centres, widths = np.array(grid).T
+        spots = np.exp(-0.5 * ((middles - centres[:, None]) / widths[:, None]) ** 2)
+        # A joint that stays at a level has it in its offset: what a spot is beside that is what it shows.
+        seen = spots - (spots @ rows / max(rows.sum(), 1.0))[:, None]
+        size = np.sqrt(np.maximum(seen**2 @ rows, 1e-12))
+        return tuple(grid[i] for i in np.argsort(-np.abs(seen @ told) / size)[:count])
+
+    def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the torque per unit of its peak (N, 1)."""
+        centre, width = shape
+        spot = np.exp(-0.5 * ((situation.q[:, joint - 1] - centre) / max(width, 1e-12)) ** 2)
+        return np.asarray((spot * situation.sign[:, joint - 1] if self.odd else spot)[:, None])
+
+    def describe(
+        self,
+        joint: int | None,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says where the spot is, how wide and how strong."""
+        what = "friction" if self.odd else "torque"
+        return (
+            f"The residual torque of joint {joint} looks like that of a spot at {shape[0]:.3g} {length}, "
+            f"{2 * shape[1]:.2g} {length} wide, with {coefficients[0]:.2g} {force} of {what}."
+        )

@@ -1,0 +1,121 @@
+"""What moves once and for all while the logs go on: a base that slips on its mount, a joint's zero that jumps."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.robot import Robot
+from robots.terms.base import length_unit
+from robots.terms.effect_bases.states import best_apart
+from robots.terms.effect_bases.sudden import Sudden
+from robots.terms.effects import Coefficient, Situation
+from robots.terms.effects.base_tilt import tilted_torque
+
+Array = NDArray[np.float64]
+
+
+CHANGES = 64
+"""Times through the data; of so many only the likeliest are scanned, for what acts on all joints takes much memory."""
+APART = 2
+"""Of those times as many beside one that is scanned are not: it is refined."""
+LEAST = 0.02
+"""Share of its torque's energy below which a change is taken to have that much."""
+
+
+class Step(Sudden):
+    """What acts on all joints from a time t_c on, and did not before."""
+
+    moments: ClassVar[int] = CHANGES
+
+    def propose(
+        self, situation: Situation, joint: int | None, residual: Array, count: int = 8
+    ) -> tuple[tuple[float, ...], ...]:
+        """Ranks all times at once, by what the residual has to do with all that is after each, over its own size."""
+        grid = self.grid(situation, joint)
+        if len(grid) <= count:
+            return grid
+        X = self.columns(situation, joint, (-np.inf,))
+        seen = (residual != 0)[:, :, None] * X
+        products = np.einsum("tjk,tj->tk", X, residual)
+        told, size = (np.cumsum(x[::-1], axis=0)[::-1] for x in (products, np.einsum("tjk,tjk->tk", seen, seen)))
+        rows = np.searchsorted(situation.t, np.ravel(grid))
+        # Of the last moments so little is seen that anything fits.
+        scores = np.sum(told[rows] ** 2 / np.maximum(size[rows], LEAST * size[:1] + 1e-300), axis=1)
+        return tuple(grid[i] for i in best_apart(scores, count, APART))
+
+
+def _after(columns: Array, situation: Situation, shape: tuple[float, ...]) -> Array:
+    """Keeps of columns (N, n, k) what is after the change."""
+    return np.where((situation.t >= shape[0])[:, None, None], columns, 0.0)
+
+
+class BaseStep(Step):
+    """(d rigid/dg) (g x e_k) a_k from t_c on, e_1 and e_2 level: `base_tilt` that begins while the robot moves."""
+
+    name: ClassVar[str] = "pattern:base_shift:0:even"
+    title: ClassVar[str] = "a base that tilts at one moment"
+    whole_robot: ClassVar[bool] = True
+
+    def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
+        """Describes the base's rotations about its two level axes."""
+        return Coefficient("tilt_1", "rad", -0.5, 0.5), Coefficient("tilt_2", "rad", -0.5, 0.5)
+
+    def joints(self, robot: Robot) -> tuple[int | None, ...]:
+        """Names the whole robot, if there is gravity."""
+        return (None,) if np.any(robot.chain.gravity) else ()
+
+    def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the torque of all joints per angle (N, n, 2)."""
+        return _after(tilted_torque(situation), situation, shape)
+
+    def describe(
+        self,
+        joint: int | None,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what is seen."""
+        angle = np.degrees(np.hypot(*coefficients))
+        return (
+            f"The residual torque of all joints looks like that of a base that tilts by {angle:.2g} deg at t = "
+            f"{shape[0]:.2f} s and stays so, as where its mount gives way."
+        )
+
+
+class ZeroStep(Step):
+    """(d rigid/dq_j) o from t_c on: `encoder_offset` that begins while the robot moves."""
+
+    name: ClassVar[str] = "pattern:zero_shift:0:even"
+    title: ClassVar[str] = "a joint zero that jumps at one moment"
+
+    def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
+        """Describes the offset."""
+        assert joint is not None
+        return (Coefficient("offset", length_unit(robot, joint - 1), -0.5, 0.5),)
+
+    def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the torque of all joints per offset of one (N, n, 1)."""
+        assert joint is not None
+        return _after(situation.sensitivity("position")[:, :, joint - 1 : joint], situation, shape)
+
+    def describe(
+        self,
+        joint: int | None,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what is seen."""
+        return (
+            f"The residual torque looks like that of a joint {joint} that stands {coefficients[0]:.2g} {length} "
+            f"further than its encoder says, from t = {shape[0]:.2f} s on, as where a coupling slips or a reference is "
+            "set anew."
+        )

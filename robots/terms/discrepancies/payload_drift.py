@@ -1,0 +1,53 @@
+"""A body at the flange that grows or shrinks as time goes on: a tank that empties, a coil of wire that unwinds."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.robot import Robot
+from robots.terms.discrepancies.gain_drift import OverTime, half_waves, log_time
+from robots.terms.effects import Coefficient, Situation
+
+Array = NDArray[np.float64]
+
+KNOTS = 3
+_PARTS = (("mass", "kg"), ("moment_x", "kg m"), ("moment_y", "kg m"), ("moment_z", "kg m"))
+
+
+class PayloadDrift(OverTime):
+    """Y_tool (m, m c) g(t), g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
+
+    A body that comes or goes at once is `payload_change`.
+    """
+
+    name: ClassVar[str] = "pattern:draining:0:even"
+    title: ClassVar[str] = "a body at the flange that changes slowly with time"
+
+    def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
+        """Describes mass and first moments of each half wave."""
+        return tuple(Coefficient(f"{part}_{k}", unit) for k in range(1, KNOTS + 1) for part, unit in _PARTS)
+
+    def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the torque of a unit body times each wave (N, n, 4 KNOTS)."""
+        body = situation.sensitivity("tool")[:, :, : len(_PARTS)]
+        times = half_waves(log_time(situation), KNOTS)
+        return np.concatenate([body * wave[:, None, None] for wave in times.T], axis=2)
+
+    def describe(
+        self,
+        joint: int | None,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what is seen."""
+        mass = half_waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients[:: len(_PARTS)]
+        return (
+            "The residual torque of all joints looks like that of a body at the flange that changes slowly with "
+            f"time, as a tank that empties or a coil that unwinds does: by {float(np.ptp(mass)):.2g} kg over the logs."
+        )

@@ -1,0 +1,85 @@
+"""Friction of all joints that differs from log to log: gears that are warmer or colder today, grease that is new."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.robot import Robot
+from robots.signals import UNKNOWN_PAUSE
+from robots.terms.discrepancies.gain_drift import OverTime
+from robots.terms.effects import Coefficient, Situation
+
+Array = NDArray[np.float64]
+
+SESSIONS = 6
+"""Sessions that are told apart; more of them are bunched, in order."""
+
+
+class SessionFriction(OverTime):
+    """tau_j = s_jk f_j in the session k, f_j the friction of the base model, which is that of the first one.
+
+    What one joint has from one moment on is `friction_step`; here each has its own share, in each session.
+    """
+
+    name: ClassVar[str] = "pattern:daily:0:odd"
+    title: ClassVar[str] = "friction of all joints that differs from log to log"
+
+    def joints(self, robot: Robot) -> tuple[int | None, ...]:
+        """Names the whole robot: no joint alone is another."""
+        return (None,)
+
+    def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
+        """Describes the shares of each session after the first, joint by joint."""
+        return tuple(
+            Coefficient(f"share_{k}_of_joint_{j}", "1", -1.0, 10.0)
+            for k in range(2, SESSIONS + 1)
+            for j in range(1, robot.n + 1)
+        )
+
+    def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
+        """Lists the one form that it has, where there is more than one session."""
+        return ((),) if len(_sessions(situation)) > 1 else ()
+
+    def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the base model's friction in each session after the first (N, n, (SESSIONS - 1) n)."""
+        n = situation.robot.n
+        X = np.zeros((len(situation), n, SESSIONS - 1, n))
+        for k, rows in enumerate(_sessions(situation)[1:]):
+            for j in range(n):
+                X[rows, j, k, j] = situation.friction[rows, j]
+        return X.reshape(len(situation), n, -1)
+
+    def describe(
+        self,
+        joint: int | None,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Says what is seen."""
+        shares = np.asarray(coefficients).reshape(SESSIONS - 1, -1)
+        k, j = np.unravel_index(int(np.argmax(np.abs(shares))), shares.shape)
+        most, way = shares[k, j], "more" if shares[k, j] > 0 else "less"
+        return (
+            "The friction of the joints differs from log to log, most on joint "
+            f"{j + 1} with {100 * abs(most):.2g} % {way} than in the first: they were warmer or colder, or something "
+            "was done to them between."
+        )
+
+
+def _sessions(situation: Situation) -> list[slice]:
+    """Gives the rows of each session: logs with a pause between that is shorter than `UNKNOWN_PAUSE` are one.
+
+    Logs whose pauses nobody noted may be of several days.
+    """
+    t, runs, least = situation.t, situation.runs, UNKNOWN_PAUSE - situation.period
+    begins = [0, *(b.start for a, b in pairwise(runs) if t[b.start] - t[a.stop - 1] > least)]
+    bunches = np.array_split(np.arange(len(begins)), min(len(begins), SESSIONS))
+    starts = [begins[int(bunch[0])] for bunch in bunches]
+    return [slice(a, b) for a, b in pairwise((*starts, len(situation)))]

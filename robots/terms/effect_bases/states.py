@@ -1,0 +1,146 @@
+"""What several effects share: heat that relaxes, a bristle that follows the motion, times at which things change."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from robots.robot import Robot
+from robots.terms.situations.situation import Situation
+
+Array = NDArray[np.float64]
+
+CHANGES = 24
+"""Change times that a scan tries: between two of them, no step loses more than a tenth of its energy."""
+
+
+STRAINED = 0.01
+"""Share of its largest speed at which a joint begins a log in motion, its bristle strained."""
+
+
+def relaxation(situation: Situation, source: Array, time_constant: float) -> Array:
+    """Integrates x' = source - x / time_constant from zero, exactly for the mean source between two samples.
+
+    In the pauses between logs the source is zero, and x decays by the real time that passes.
+
+    Args:
+        situation: the samples' times and logs.
+        source: (N,) per second.
+        time_constant: [s].
+
+    Returns:
+        x (N,): the source's unit times seconds.
+    """
+    x = np.zeros(len(source))
+    level, last = 0.0, float(situation.t[0])
+    for run in situation.runs:
+        t, u = situation.t[run], source[run]
+        level *= float(np.exp(-(t[0] - last) / time_constant))
+        x[run] = _relax(t, u, time_constant, level)
+        level, last = float(x[run.stop - 1]), float(t[-1])
+    return x
+
+
+def _relax(t: Array, u: Array, time_constant: float, level: float) -> Array:
+    if len(t) < 2:
+        return np.full(len(t), level)
+    steps = np.diff(t)
+    step = float(steps.mean())
+    if np.abs(steps - step).max() > 1e-3 * step:
+        # Uneven samples are rare, and heat is slow: an even grid of the finest step is as good.
+        even = np.linspace(t[0], t[-1], int(np.ceil((t[-1] - t[0]) / max(float(np.median(steps)), 1e-6))) + 1)
+        return np.interp(t, even, _relax(even, np.interp(even, t, u), time_constant, level))
+    decay = float(np.exp(-step / time_constant))
+    driven = np.concatenate([[0.0], (u[:-1] + u[1:]) / 2]) * (time_constant * (1.0 - decay))
+    driven[0] = level
+    return np.asarray(lfilter([1.0], [1.0, -decay], driven))
+
+
+def bristle(t: Array, q: Array, dq: Array, runs: tuple[slice, ...], length: float) -> Array:
+    """Follows Dahl's bristle: dz/dq = 1 - sign(dq) z / length, as z / length between -1 and 1.
+
+    Between two reversals the solution is closed: z goes to its limit as exp(-travel / length). Where the joint turns
+    between two samples is found by the parabola through them: the bristle may be shorter than that travel. At the start
+    of a log it is strained by the motion, or by nothing if the joint stands.
+
+    Args:
+        t: time (N,) [s].
+        q: positions of one joint (N,).
+        dq: its velocities (N,).
+        runs: the logs.
+        length: travel within which friction turns round [rad or m].
+
+    Returns:
+        (N,).
+    """
+    return np.concatenate([_bristle(t[run], q[run], dq[run], length) for run in runs])
+
+
+def _bristle(t: Array, q: Array, dq: Array, length: float) -> Array:
+    moving = np.flatnonzero(dq)
+    if not len(moving):
+        return np.zeros(len(q))
+    # A joint at rest keeps the direction it had.
+    way = np.sign(dq[moving[np.maximum(np.searchsorted(moving, np.arange(len(q)), side="right") - 1, 0)]])
+    turns = np.flatnonzero(np.diff(way))
+    before, after = np.abs(dq[turns]), np.abs(dq[turns + 1])
+    share = before / np.maximum(before + after, 1e-300)
+    places = np.concatenate([q[:1], q[turns] + 0.5 * dq[turns] * share * (t[turns + 1] - t[turns])])
+    directions = way[np.concatenate([[0], turns + 1])]
+    decays = np.exp(-np.abs(np.diff(places)) / length)
+    starts = np.empty(len(places))
+    z = float(directions[0]) if abs(dq[0]) > STRAINED * np.abs(dq).max() else 0.0
+    for k, (direction, decay) in enumerate(zip(directions.tolist(), [*decays.tolist(), 1.0], strict=True)):
+        starts[k] = z
+        z = direction + (z - direction) * decay
+    leg = np.repeat(np.arange(len(places)), np.diff(np.concatenate([[0], turns + 1, [len(q)]])))
+    return directions[leg] + (starts - directions)[leg] * np.exp(-np.abs(q - places[leg]) / length)
+
+
+def change_times(situation: Situation, count: int = CHANGES) -> tuple[float, ...]:
+    """Gives times at which something may have changed: evenly through the samples, and between the logs."""
+    N = len(situation)
+    inside = {int(N * (k + 0.5) / count) for k in range(count)} if 4 * count < N else set()
+    between = set(situation.starts[1:]) if len(situation.starts) <= 2 * count else set()
+    return tuple(float(situation.t[i]) for i in sorted(inside | between) if 0 < i < N)
+
+
+def best_apart(scores: Array, count: int, apart: int) -> list[int]:
+    """Picks the places of the highest scores (K,), the best first, more than `apart` places from each other."""
+    left = np.where(np.isnan(scores), -np.inf, scores)
+    chosen: list[int] = []
+    while len(chosen) < count and np.isfinite(left).any():
+        best = int(np.argmax(left))
+        chosen.append(best)
+        left[max(best - apart, 0) : best + apart + 1] = -np.inf
+    return chosen
+
+
+def spells(situation: Situation, durations: Sequence[float]) -> tuple[tuple[float, float], ...]:
+    """Gives spells of some lengths [s] within the logs: the start of each [s], every half of its length, and that."""
+    return tuple(
+        (float(start), duration)
+        for duration in durations
+        for run in situation.runs
+        for start in np.arange(situation.t[run.start], situation.t[run.stop - 1] - duration / 2, duration / 2)
+    )
+
+
+def moving_speed(situation: Situation, joint: int) -> tuple[float, float]:
+    """Gives the speeds (1 % and 100 %) that a joint reaches while it moves; zeros where it never does.
+
+    Slower than a ten-thousandth of its fastest is rest: a smoother's ripple.
+    """
+    speed = np.abs(situation.dq[:, joint - 1])
+    top = float(speed.max(initial=0.0))
+    moving = speed[speed > 1e-4 * top]
+    return (float(np.quantile(moving, 0.01)), top) if top > 1e-9 else (0.0, 0.0)
+
+
+def torque_reference(robot: Robot, joint: int) -> float:
+    """Gives a joint's torque limit, or 100 N m where it has none."""
+    limit = float(robot.limits.torque[joint - 1])
+    return limit if np.isfinite(limit) and limit > 0 else 100.0

@@ -1,0 +1,158 @@
+"""Effects that depend on this instant alone: one symbolic expression serves simulator, design and diagnosis."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.batch import BatchFunction, batch_function, builds_expressions
+from robots.terms.effect_bases.base import Effect, JointEffect, Place
+from robots.terms.situations.situation import Situation
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+NEWTON, LEAST_SLOPE = 20, 0.1
+"""Steps by which a reading is undone; and what it is taken to rise by at least, where it would fall."""
+
+
+class Instant(NamedTuple):
+    """What a static effect depends on, symbolic.
+
+    Attributes:
+        q: positions (n,) [rad or m].
+        dq: velocities (n,) [rad/s or m/s].
+        ddq: accelerations (n,) [rad/s2 or m/s2].
+        rigid: torque of the rigid body and the rotors (n,) [N m or N].
+        load: torque that passes the gears (n,) [N m or N]: `rigid` without the rotors'.
+        torque: torque of the whole base model (n,) [N m or N].
+        sign: sign of the velocities as the base model takes it (n,): smooth where that is.
+        shape: one value per entry of the effect's `shapes`.
+    """
+
+    q: casadi.SX
+    dq: casadi.SX
+    ddq: casadi.SX
+    rigid: casadi.SX
+    load: casadi.SX
+    torque: casadi.SX
+    sign: casadi.SX
+    shape: casadi.SX
+
+    @staticmethod
+    def symbols(joints: int, shapes: int) -> Instant:
+        """Makes symbols for so many joints and shape values."""
+        sizes = [*(joints for _ in Instant._fields[:-1]), shapes]
+        return Instant._make(casadi.SX.sym(name, size) for name, size in zip(Instant._fields, sizes, strict=True))
+
+    def of(self, joint: int) -> Instant:
+        """Picks one joint's scalars, counted from 0; the shape is for all."""
+        return Instant._make([*(symbol[joint] for symbol in self[:-1]), self.shape])
+
+
+class StaticEffect(Effect):
+    """An effect that depends on this instant alone: its columns are one symbolic expression.
+
+    The simulator, a design by automatic differentiation and the diagnosis share it.
+    """
+
+    @abstractmethod
+    def expression(self, robot: Robot, joint: Place, at: Instant) -> casadi.SX:
+        """Builds X (n, k), symbolic.
+
+        Args:
+            robot: the robot with n joints.
+            joint: where the effect acts, counted from 1; None for the whole robot.
+            at: what the columns are built from.
+        """
+
+    def function(self, robot: Robot, joint: Place) -> casadi.Function:
+        """Builds (q, dq, ddq, rigid, load, torque, sign, shape) -> X (n, k) as a CasADi function."""
+        at = Instant.symbols(robot.n, len(self.shapes))
+        X = self.expression(robot, joint, at)
+        return casadi.Function(self.name, list(at), [casadi.densify(X)], list(Instant._fields), ["X"])
+
+    def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates `expression` on all samples."""
+        s = situation
+        shapes = np.broadcast_to(np.asarray(shape, dtype=float), (len(s), len(self.shapes)))
+        return _evaluator(self, s.robot, joint)(s.q, s.dq, s.ddq, s.rigid, s.load, s.torque, s.sign, shapes)[0]
+
+
+class StaticJointEffect(StaticEffect, JointEffect):
+    """An effect of one joint on its own torque, that depends on this instant alone."""
+
+    @abstractmethod
+    def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
+        """Builds (1, k) from the joint's own scalars in `at`; all of `at.shape`."""
+
+    def expression(self, robot: Robot, joint: Place, at: Instant) -> casadi.SX:
+        """Places `row` into the joint's row."""
+        assert joint is not None
+        j = joint - 1
+        row = self.row(robot, joint, at.of(j))
+        X = casadi.SX(robot.n, row.shape[1])
+        X[j, :] = row
+        return X
+
+    def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates `row` on all samples."""
+        s, j = situation, joint - 1
+        shapes = np.broadcast_to(np.asarray(shape, dtype=float), (len(s), len(self.shapes)))
+        signals = (np.ascontiguousarray(a[:, j]) for a in (s.q, s.dq, s.ddq, s.rigid, s.load, s.torque, s.sign))
+        return _row_evaluator(self, s.robot, joint)(*signals, shapes)[0][:, 0]
+
+    def slopes(self, situation: Situation, joint: int, coefficients: Array, shape: tuple[float, ...]) -> Array:
+        """Evaluates how its torque changes with the base model's and with each shape value (N, 1 + s), exactly."""
+        s, j = situation, joint - 1
+        shapes, weights = (np.broadcast_to(np.asarray(x, dtype=float), (len(s), len(x))) for x in (shape, coefficients))
+        signals = (np.ascontiguousarray(a[:, j]) for a in (s.q, s.dq, s.ddq, s.rigid, s.load, s.torque, s.sign))
+        return _slope_evaluator(self, s.robot, joint)(*signals, shapes, weights)[0][:, 0]
+
+    def undone(
+        self, situation: Situation, joint: int, coefficients: Array, shape: tuple[float, ...], reading: Array
+    ) -> Array:
+        """Finds the base model's torque (N,) that is read as this (N,) with the effect, by Newton's method."""
+        torque = situation.torque.copy()
+        for _ in range(NEWTON):
+            now = replace(situation, torque=torque, _cache={})
+            off = torque[:, joint - 1] + self.local(now, joint, shape) @ coefficients - reading
+            slope = 1.0 + self.slopes(now, joint, coefficients, shape)[:, 0]
+            torque[:, joint - 1] -= off / np.maximum(slope, LEAST_SLOPE)
+        return torque[:, joint - 1]
+
+    columns = JointEffect.columns
+    acts_on = JointEffect.acts_on
+
+
+# Numpy, not compiled C: a column is a handful of operations, and a catalogue of them would take minutes to compile.
+@lru_cache(maxsize=512)
+@builds_expressions
+def _evaluator(effect: StaticEffect, robot: Robot, joint: Place) -> BatchFunction:
+    return batch_function(effect.function(robot, joint), "vectorised")
+
+
+@lru_cache(maxsize=512)
+@builds_expressions
+def _row_evaluator(effect: StaticJointEffect, robot: Robot, joint: int) -> BatchFunction:
+    at = Instant.symbols(1, len(effect.shapes))
+    row = effect.row(robot, joint, at)
+    return batch_function(casadi.Function(effect.name, list(at), [casadi.densify(row)]), "vectorised")
+
+
+@lru_cache(maxsize=512)
+@builds_expressions
+def _slope_evaluator(effect: StaticJointEffect, robot: Robot, joint: int) -> BatchFunction:
+    at = Instant.symbols(1, len(effect.shapes))
+    row = effect.row(robot, joint, at)
+    weights = casadi.SX.sym("coefficients", row.shape[1])
+    slopes = casadi.jacobian(row @ weights, casadi.vertcat(at.torque, at.shape))
+    return batch_function(casadi.Function(effect.name, [*at, weights], [casadi.densify(slopes)]), "vectorised")

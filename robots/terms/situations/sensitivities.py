@@ -1,0 +1,209 @@
+"""How the rigid-body torque changes with position, velocity, acceleration, gravity and a body on the flange."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.batch import BatchFunction, batch_function, builds_expressions
+from robots.common.errors import InputError
+from robots.geometry.chain import Chain
+from robots.geometry.symbolic import cleaned, symbolic_placement
+from robots.regressor import TorqueModel
+
+Array = NDArray[np.float64]
+CHUNK = 4096
+
+
+def evaluate(kind: str, model: TorqueModel, parameters: Array, q: Array, dq: Array, ddq: Array) -> Array:
+    """Evaluates one kind of `Situation.sensitivity`.
+
+    Args:
+        kind: a key of `KINDS`.
+        model: the torque model.
+        parameters: its standard parameters (p,).
+        q: positions (N, n).
+        dq: velocities (N, n).
+        ddq: accelerations (N, n).
+
+    Returns:
+        The sensitivity (N, r, c).
+
+    Raises:
+        InputError: an unknown kind.
+    """
+    if kind not in KINDS:
+        raise InputError(f"sensitivity {kind!r}", allowed=", ".join(KINDS))
+    evaluator = _evaluator(model.robot.chain, kind)
+    rigid = [i for i, column in enumerate(model.columns) if column.term == "rigid_body"]
+    pi = parameters[rigid] if rigid else np.zeros(10 * model.robot.n)
+    result = np.empty((len(q), *evaluator.output_shapes[0]))
+    # In chunks: the parameters, repeated for every sample of a long log, would not fit into memory.
+    for start in range(0, len(q), CHUNK):
+        rows = slice(start, min(start + CHUNK, len(q)))
+        repeated = np.broadcast_to(pi, (rows.stop - rows.start, len(pi)))
+        evaluator(q[rows], dq[rows], ddq[rows], repeated, out=(result[rows],))
+    return result
+
+
+@lru_cache(maxsize=64)
+@builds_expressions
+def _evaluator(chain: Chain, kind: str) -> BatchFunction:
+    n = chain.n
+    inputs = [casadi.SX.sym(name, size) for name, size in (("q", n), ("dq", n), ("ddq", n), ("pi", 10 * n))]
+    function = casadi.Function(kind, inputs, [casadi.densify(KINDS[kind](chain, *inputs))])
+    return batch_function(function)
+
+
+def rigid_torque(
+    chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, bodies: list[casadi.SX], gravity: casadi.SX
+) -> casadi.SX:
+    """Builds the Newton-Euler torque (n,) of bodies with the inertial parameters (10, k) each, (n, k) in all.
+
+    Args:
+        chain: the chain of n joints.
+        q: positions (n,).
+        dq: velocities (n,).
+        ddq: accelerations (n,).
+        bodies: per link, (10, k) inertial parameters about its frame; an empty matrix for none.
+        gravity: (3,) in the base frame [m/s2].
+    """
+    from robots.terms.rigid_body import _parameter_map
+
+    axes = [casadi.SX(cleaned(joint.axis)) for joint in chain.joints]
+    placements = [symbolic_placement(joint, q[i]) for i, joint in enumerate(chain.joints)]
+    omega, alpha, acceleration = casadi.SX(3, 1), casadi.SX(3, 1), -gravity
+    wrenches = []
+    for i, joint in enumerate(chain.joints):
+        rotation, offset = placements[i]
+        spun = casadi.cross(alpha, offset) + casadi.cross(omega, casadi.cross(omega, offset))
+        acceleration, omega, alpha = rotation.T @ (acceleration + spun), rotation.T @ omega, rotation.T @ alpha
+        if joint.kind == "revolute":
+            alpha = alpha + casadi.cross(omega, axes[i]) * dq[i] + axes[i] * ddq[i]
+            omega = omega + axes[i] * dq[i]
+        else:
+            acceleration = acceleration + 2 * casadi.cross(omega, axes[i]) * dq[i] + axes[i] * ddq[i]
+        wrenches.append(_parameter_map(omega, alpha, acceleration) @ bodies[i] if bodies[i].numel() else None)
+    width = max(body.shape[1] for body in bodies)
+    torque = casadi.SX(chain.n, width)
+    total = casadi.SX(6, width)
+    for i in range(chain.n - 1, -1, -1):
+        own = wrenches[i]
+        total = total if own is None else total + own
+        part = total[3:, :] if chain.joints[i].kind == "revolute" else total[:3, :]
+        torque[i, :] = axes[i].T @ part
+        rotation, offset = placements[i]
+        force = rotation @ total[:3, :]
+        total = casadi.vertcat(force, rotation @ total[3:, :] + casadi.skew(offset) @ force)
+    return torque
+
+
+def _torque(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX, gravity: casadi.SX) -> casadi.SX:
+    return rigid_torque(chain, q, dq, ddq, [pi[10 * i : 10 * i + 10] for i in range(chain.n)], gravity)
+
+
+def _position(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    return casadi.jacobian(_torque(chain, q, dq, ddq, pi, casadi.SX(chain.gravity)), q)
+
+
+def _velocity(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    return casadi.jacobian(_torque(chain, q, dq, ddq, pi, casadi.SX(chain.gravity)), dq)
+
+
+def _inertia(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    return casadi.jacobian(_torque(chain, q, dq, ddq, pi, casadi.SX(chain.gravity)), ddq)
+
+
+def _gravity(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    gravity = casadi.SX.sym("gravity", 3)
+    return casadi.jacobian(_torque(chain, q, dq, ddq, pi, gravity), gravity)
+
+
+def _tool(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    none = [casadi.SX(10, 0)] * (chain.n - 1)
+    carried = casadi.SX(cleaned(moved_body(chain.tip)))
+    return rigid_torque(chain, q, dq, ddq, [*none, carried], casadi.SX(chain.gravity))
+
+
+def _jacobian(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    poses, flange = _forward(chain, q)
+    columns = [
+        casadi.vertcat(casadi.cross(axis, flange - at), axis)
+        if kind == "revolute"
+        else casadi.vertcat(axis, casadi.SX(3, 1))
+        for kind, axis, at in poses
+    ]
+    return casadi.horzcat(*columns)
+
+
+def _flange(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    return _forward(chain, q)[1]
+
+
+def _links(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    return casadi.horzcat(*(casadi.vertcat(casadi.vec(turn.T), origin) for turn, origin in _frames(chain, q)))
+
+
+def _frames(chain: Chain, q: casadi.SX) -> list[tuple[casadi.SX, casadi.SX]]:
+    """Gives each link's rotation and origin in the base frame."""
+    rotation, origin = casadi.SX.eye(3), casadi.SX(3, 1)
+    frames = []
+    for i, joint in enumerate(chain.joints):
+        turn, offset = symbolic_placement(joint, q[i])
+        origin, rotation = origin + rotation @ offset, rotation @ turn
+        frames.append((rotation, origin))
+    return frames
+
+
+def _forward(chain: Chain, q: casadi.SX) -> tuple[list[tuple[str, casadi.SX, casadi.SX]], casadi.SX]:
+    """Gives each joint's kind, axis and origin, and the flange's place, in the base frame."""
+    frames = _frames(chain, q)
+    poses: list[tuple[str, casadi.SX, casadi.SX]] = [
+        (joint.kind, rotation @ casadi.SX(cleaned(joint.axis)), origin)
+        for joint, (rotation, origin) in zip(chain.joints, frames, strict=True)
+    ]
+    rotation, origin = frames[-1]
+    return poses, origin + rotation @ casadi.SX(chain.tip[:3, 3])
+
+
+def _moment(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    # The potential energy of gravity g is -g' S: it is linear in g, and the torque of g is its gradient.
+    total = casadi.SX(3, 1)
+    for i, (rotation, origin) in enumerate(_frames(chain, q)):
+        total = total + pi[10 * i] * origin + rotation @ pi[10 * i + 1 : 10 * i + 4]
+    return total
+
+
+def moved_body(tip: Array) -> Array:
+    """Builds the (10, 10) map of inertial parameters in the flange frame to those in the last link's frame."""
+    columns = []
+    for unit in np.eye(10):
+        mass, moment = unit[0], unit[1:4]
+        Ixx, Ixy, Ixz, Iyy, Iyz, Izz = unit[4:]
+        inertia = np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]])
+        R, p = tip[:3, :3], tip[:3, 3]
+        # With Sigma the second moments of mass, everything moves as a homogeneous matrix: T J T^T.
+        sigma = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+        rotated = R @ moment
+        moved_sigma = R @ sigma @ R.T + np.outer(rotated, p) + np.outer(p, rotated) + mass * np.outer(p, p)
+        moved = np.trace(moved_sigma) * np.eye(3) - moved_sigma
+        first = rotated + mass * p
+        columns.append([mass, *first, moved[0, 0], moved[0, 1], moved[0, 2], moved[1, 1], moved[1, 2], moved[2, 2]])
+    return np.array(columns).T
+
+
+KINDS: dict[str, Callable[..., casadi.SX]] = {
+    "position": _position,
+    "velocity": _velocity,
+    "inertia": _inertia,
+    "gravity": _gravity,
+    "tool": _tool,
+    "jacobian": _jacobian,
+    "flange": _flange,
+    "moment": _moment,
+    "links": _links,
+}

@@ -1,0 +1,303 @@
+"""What an effect may depend on: the motion, the base model's torque in it, and how that torque would change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from robots.common.errors import InputError
+from robots.robot import Robot
+from robots.terms.situations.of_model import rotor_inertias, sign_of, velocity_scale
+from robots.terms.situations.sensitivities import evaluate
+
+if TYPE_CHECKING:
+    from robots.regressor import TorqueModel
+
+Array = NDArray[np.float64]
+Kept = TypeVar("Kept")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Situation:
+    """What the robot did, all logs one after the other, and what the base model says of it.
+
+    Attributes:
+        model: the base model.
+        parameters: its standard parameters (p,), zero where a base parameter stands for several.
+        t: time [s], (N,): one clock for all logs.
+        starts: indices at which a new log begins, 0 first. Derivatives, filters and presliding states do not cross
+            them; heat does, cooling in the pause.
+        q: positions (N, n) [rad or m], free of noise.
+        dq: velocities (N, n) [rad/s or m/s].
+        ddq: accelerations (N, n) [rad/s2 or m/s2].
+        rigid: torque of rigid body and rotors (N, n) [N m or N].
+        friction: torque of the base model's friction (N, n) [N m or N].
+        torque: torque of the whole base model (N, n) [N m or N].
+        velocity_scale: (n,) v0 [rad/s or m/s] of the sign, tanh(dq / v0); 0 for the sharp sign.
+        parts: where logs carry different payloads, or the base stands otherwise than the robot's description says, the
+            situations that this one joins; `parameters` are the first's, and each has a model of its own gravity.
+        measured: torque as logged (N, n) [N m or N]; None where there is no log, and in models that are evaluated.
+        beyond: torque of other effects (N, n) [N m or N], for those that act on all of the torque; None for none.
+        borne: torque of other effects (N, n) that the gears bear besides the robot's own [N m or N]; None for none.
+        finer: the same logs before they were thinned; None where they were not.
+        since: moment from which the phase of what vibrates counts [s]; None for its own first.
+    """
+
+    model: TorqueModel
+    parameters: Array
+    t: Array
+    starts: tuple[int, ...]
+    q: Array
+    dq: Array
+    ddq: Array
+    rigid: Array
+    friction: Array
+    torque: Array
+    velocity_scale: Array
+    parts: tuple[Situation, ...] = ()
+    measured: Array | None = None
+    beyond: Array | None = None
+    borne: Array | None = None
+    finer: Finer | None = None
+    since: float | None = None
+    _cache: dict[object, Any] = field(default_factory=dict, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.model.robot
+
+    @property
+    def runs(self) -> tuple[slice, ...]:
+        """The logs' samples."""
+        return tuple(slice(a, b) for a, b in pairwise((*self.starts, len(self.t))))
+
+    @cached_property
+    def period(self) -> float:
+        """The median sample period within the logs [s]; 0 for a single sample."""
+        steps = np.concatenate([np.diff(self.t[run]) for run in self.runs])
+        return float(np.median(steps)) if len(steps) else 0.0
+
+    @property
+    def origin(self) -> float:
+        """The moment from which the phase of what vibrates counts [s]."""
+        return float(self.t[0]) if self.since is None else self.since
+
+    @property
+    def sampled(self) -> float:
+        """The median sample period of the logs before they were thinned [s]."""
+        return self.period if self.finer is None else self.finer.situation.period
+
+    @property
+    def whole(self) -> Array:
+        """All of the torque that is known (N, n) [N m or N]: the base model's, and that of other effects."""
+        return self.torque if self.beyond is None else self.torque + self.beyond
+
+    def beside(self, torque: Array | None) -> Situation:
+        """The same with torque of other effects (N, n), or as much at all times (n,) [N m or N]; None for none."""
+        return self._with("beyond", torque)
+
+    def bearing(self, torque: Array | None) -> Situation:
+        """The same with torque (N, n) [N m or N] that the gears bear besides the robot's own; None for none."""
+        return self._with("borne", torque)
+
+    def _with(self, name: str, torque: Array | None) -> Situation:
+        """The same with a torque that is known, at all samples too; what is kept for callers depends on neither."""
+        if torque is not None:
+            torque = np.broadcast_to(torque, self.q.shape)
+        if self.finer is None or torque is None:
+            return replace(self, **{name: torque})  # type: ignore[arg-type]
+        other = self.finer.situation
+        spread = np.empty_like(other.q)
+        for own, run in zip(other.runs, self.runs, strict=True):
+            spread[own] = np.column_stack([np.interp(other.t[own], self.t[run], x) for x in torque[run].T])
+        finer = replace(self.finer, situation=other._with(name, spread))
+        return replace(self, **{name: torque}, finer=finer)  # type: ignore[arg-type]
+
+    @cached_property
+    def gravity(self) -> Array:
+        """Gravity in the base frame at each sample (N, 3) [m/s2]."""
+        if self.parts:
+            return np.concatenate([part.gravity for part in self.parts])
+        return np.broadcast_to(np.asarray(self.robot.chain.gravity, dtype=float), (len(self), 3))
+
+    @cached_property
+    def sign(self) -> Array:
+        """The sign of the velocities as the base model takes it (N, n), low-passed where logs are thinned."""
+        if self.finer is not None:
+            return self.finer.thinned(self.finer.situation.sign)
+        return sign_of(self.dq, self.velocity_scale)
+
+    @cached_property
+    def rotors(self) -> Array:
+        """The rotors' inertias (2, n) [kg m2 or kg], see `rotor_inertias`."""
+        return rotor_inertias(self.model, self.parameters)
+
+    @cached_property
+    def load(self) -> Array:
+        """The torque that passes the gears (N, n) [N m or N]: the rigid body's without rotors, and what they bear."""
+        own = self.rigid - self.ddq * self.rotors.sum(axis=0)
+        return own if self.borne is None else own + self.borne
+
+    def friction_at(self, dq: Array) -> Array:
+        """Evaluates the base model's friction (N, n) [N m or N] at other velocities (N, n)."""
+        columns = [i for i, c in enumerate(self.model.columns) if c.term == "friction" and self.parameters[i]]
+        if not columns:
+            return np.zeros_like(self.q)
+        return self.model.torque(self.q, dq, self.ddq, self.parameters[columns], columns=columns)
+
+    def derivatives(self, values: Array) -> tuple[Array, Array]:
+        """Differentiates samples (N, ...) once and twice by time, within each log.
+
+        Central differences of sixth order, of second order near the ends and where samples are uneven.
+        """
+        first, second = np.zeros_like(values), np.zeros_like(values)
+        for run in self.runs:
+            t, x = self.t[run], values[run]
+            if len(t) < 3:
+                continue
+            first[run] = np.gradient(x, t, axis=0)
+            second[run] = np.gradient(first[run], t, axis=0)
+            steps = np.diff(t)
+            h = float(steps.mean())
+            if len(t) > 7 and np.abs(steps - h).max() < 1e-3 * h:
+                a, b, c = x[4:-2] - x[2:-4], x[5:-1] - x[1:-5], x[6:] - x[:-6]
+                first[run.start + 3 : run.stop - 3] = (45 * a - 9 * b + c) / (60 * h)
+                a, b, c = x[4:-2] + x[2:-4], x[5:-1] + x[1:-5], x[6:] + x[:-6]
+                second[run.start + 3 : run.stop - 3] = (270 * a - 27 * b + 2 * c - 490 * x[3:-3]) / (180 * h**2)
+        return first, second
+
+    def sensitivity(self, kind: str) -> Array:
+        """Evaluates how the base model's rigid-body torque would change; kept for the next caller.
+
+        Args:
+            kind: ``position`` d rigid/dq (N, n, n), ``velocity`` d rigid/d(dq) (N, n, n), ``inertia`` (N, n, n) without
+                rotors, ``gravity`` d rigid/d(gravity in the base frame) (N, n, 3), ``tool`` torque per inertial
+                parameter of a body on the flange, in its frame (N, n, 10), ``jacobian`` of the flange in the base
+                frame, linear then angular (N, 6, n), ``flange`` its place there (N, 3, 1), ``moment`` the first moment
+                of the links' masses there [kg m] (N, 3, 1), ``links`` of each link's frame there the rotation matrix,
+                row by row, and the origin [m] (N, 12, n).
+        """
+        if kind not in self._cache:
+            parts = [part.sensitivity(kind) for part in self.parts]
+            self._cache[kind] = np.concatenate(parts) if parts else self._evaluated(kind)
+        return self._cache[kind]
+
+    def _evaluated(self, kind: str) -> Array:
+        return evaluate(kind, self.model, self.parameters, self.q, self.dq, self.ddq)
+
+    def cached(self, key: object, compute: Callable[[], Kept]) -> Kept:
+        """Gives `compute()`, computed once per key: a state that several columns share."""
+        if key not in self._cache:
+            self._cache[key] = compute()
+        return cast(Kept, self._cache[key])
+
+
+@dataclass(frozen=True, eq=False)
+class Finer:
+    """Logs before they were thinned: what jumps between samples is evaluated there, and goes their torque's way.
+
+    Attributes:
+        situation: what the robot did, at all samples.
+        thinned: low-passes rows (N, ...) of those as the torque was, and thins them.
+    """
+
+    situation: Situation
+    thinned: Callable[[Array], Array]
+
+
+def with_finer(coarse: Situation, finer: Finer) -> Situation:
+    """Gives a situation of thinned logs whose friction is that of all samples, low-passed as their torque."""
+    friction = finer.thinned(finer.situation.friction)
+    return replace(coarse, friction=friction, torque=coarse.torque - coarse.friction + friction, finer=finer, _cache={})
+
+
+def situation(
+    model: TorqueModel,
+    parameters: ArrayLike,
+    t: ArrayLike,
+    q: ArrayLike,
+    dq: ArrayLike,
+    ddq: ArrayLike,
+    *,
+    starts: tuple[int, ...] = (0,),
+    columns: tuple[int, ...] | None = None,
+) -> Situation:
+    """Evaluates the base model on a motion.
+
+    Args:
+        model: the base model with p columns.
+        parameters: their values (p,), or those of `columns` only.
+        t: time [s], (N,).
+        q: positions (N, n), free of noise.
+        dq: velocities (N, n).
+        ddq: accelerations (N, n).
+        starts: indices at which a new log begins.
+        columns: indices of the model's columns that `parameters` are of; the others are zero.
+
+    Raises:
+        InputError: arrays that do not fit together.
+    """
+    times = np.asarray(t, dtype=float)
+    q, dq, ddq = (np.ascontiguousarray(np.atleast_2d(np.asarray(a, dtype=float))) for a in (q, dq, ddq))
+    given = np.asarray(parameters, dtype=float)
+    chosen = range(model.size) if columns is None else columns
+    if given.shape != (len(chosen),) or q.shape != (len(times), model.robot.n) or not q.shape == dq.shape == ddq.shape:
+        raise InputError(
+            f"{given.shape} parameters and motions of shape {q.shape}", allowed="arrays that fit the model"
+        )
+    full = np.zeros(model.size)
+    full[list(chosen)] = given
+    parts = {term: np.zeros_like(q) for term in ("rigid_body", "rotor_inertia", "friction", "other")}
+    for name in parts:
+        of_term = [
+            i for i, c in enumerate(model.columns) if full[i] and (c.term if c.term in parts else "other") == name
+        ]
+        if of_term:
+            parts[name] = model.torque(q, dq, ddq, full[of_term], columns=of_term)
+    rigid = parts["rigid_body"] + parts["rotor_inertia"]
+    return Situation(
+        model=model,
+        parameters=full,
+        t=times,
+        starts=tuple(int(start) for start in starts),
+        q=q,
+        dq=dq,
+        ddq=ddq,
+        rigid=rigid,
+        friction=parts["friction"],
+        torque=rigid + parts["friction"] + parts["other"],
+        velocity_scale=velocity_scale(model),
+    )
+
+
+def joined(parts: Sequence[Situation], model: TorqueModel | None = None) -> Situation:
+    """Joins situations of one robot on one clock; the parameters are those of the first.
+
+    Args:
+        parts: one or more; their bodies and gravities may differ.
+        model: the base model under the gravity of the robot's description; by default that of the first part.
+    """
+    model = model or parts[0].model
+    if len(parts) == 1 and parts[0].model is model:
+        return parts[0]
+    edges = np.cumsum([0, *(len(part) for part in parts[:-1])])
+    names = ("t", "q", "dq", "ddq", "rigid", "friction", "torque")
+    merged: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return replace(
+        parts[0],
+        model=model,
+        **merged,
+        starts=tuple(int(edge) + start for edge, part in zip(edges, parts, strict=True) for start in part.starts),
+        parts=tuple(parts),
+        _cache={},
+    )

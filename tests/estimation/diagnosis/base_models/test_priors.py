@@ -1,0 +1,68 @@
+"""Specification of what holds base parameters that a log leaves open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation import diagnose
+from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
+from estimation.diagnosis.base_models.priors import base_model_prior, solve_map
+from estimation.diagnosis.hypothesis_tests.problem_setup import fit_values
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.regressions.parameter_priors import GaussianPrior
+from robots.robot import Robot
+from robots.signals import Log
+
+
+def test_the_fit_is_that_of_rows_and_pull_together() -> None:
+    """Normal equations with a pull give least squares over the rows and one row a parameter more, written out."""
+    rng = np.random.default_rng(0)
+    Y, tau, target = rng.standard_normal((40, 3)), rng.standard_normal(40), np.array([1.0, -2.0])
+    weights = np.array([2.0, 5.0])
+    rows = np.vstack([Y, np.column_stack([np.diag(weights), np.zeros(2)])])
+    expected = np.linalg.lstsq(rows, np.concatenate([tau, weights * target]), rcond=None)[0]
+    assert solve_map(Y.T @ Y, Y.T @ tau, GaussianPrior(np.diag(weights**2), target)) == pytest.approx(
+        expected, rel=1e-9
+    )
+
+
+def test_a_direction_without_data_goes_to_the_target() -> None:
+    """A parameter whose column never acts takes the value that it is pulled to, the other that of the data."""
+    gram, cross = np.diag([100.0, 0.0]), np.array([300.0, 0.0])
+    values = solve_map(gram, cross, GaussianPrior(np.diag([1e-9, 1e-9]), np.array([7.0, 5.0])))
+    assert values == pytest.approx([3.0, 5.0], rel=1e-6)
+
+
+def test_a_standing_joint_does_not_make_another_motion_absurd(arm: Robot, arm_log: Callable[..., Log]) -> None:
+    """Fitted to a log in which joint 2 shakes by its encoder only, the model errs on a full motion by some torque RMS.
+
+    Least squares alone puts the shaking into friction of 1e4 times the joint's torque and more.
+    """
+    log = arm_log(torque_noise=0.02)
+    other = build_recording(arm, [arm_log(motion_seed=3, torque_noise=0.02)])
+    q = log.q.copy()
+    q[:, 1] = 0.3 + 1e-5 * np.random.default_rng(1).standard_normal(len(q))
+    recording = build_recording(arm, [replace(log, q=q, dq=None, ddq=None)])
+    baseline = build_baseline(base_parameters(arm, "polynomial", (0.001, 0.001)), recording)
+    scale = 0.02 * recording.tau.std(axis=0)
+    values = fit_values(baseline, scale, recording.unsure, recording.tau, base_model_prior(baseline, recording))
+    error = other.tau - baseline.base.torque(other.q, other.dq, other.ddq, values)
+    # Wrong by its own size is what the pull allows: three times for friction, which holds where joints are fast.
+    assert np.all(np.sqrt((error**2).mean(axis=0)) < 4 * np.sqrt((other.tau**2).mean(axis=0)))
+
+
+def test_what_a_description_lacks_is_not_taken_for_noise(arm: Robot, arm_log: Callable[..., Log]) -> None:
+    """Links fifty times as heavy as described, as under rotors that no file tells of: what is left is the noise.
+
+    Against noise as large as the torque the description would hold the fit. What it leaves would be slow, noise so slow
+    would make rows tell little, and the description hold it all the more.
+    """
+    light = replace(arm, inertia=arm.inertia / 50.0)
+    log, other = arm_log(torque_noise=0.02), arm_log(motion_seed=3, torque_noise=0.02)
+    result = diagnose(light, log, held_out=other)
+    noise = 0.02 * np.sqrt(np.mean(log.tau**2, axis=0) / np.mean(other.tau**2, axis=0))
+    assert np.all(result.baseline < 1.3 * noise)

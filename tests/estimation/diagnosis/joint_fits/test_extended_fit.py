@@ -1,0 +1,205 @@
+"""Specification of the fit of base model and effects together: what is said to be known of their coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
+from estimation.diagnosis.hypothesis_tests.scoring import accept
+from estimation.diagnosis.joint_fits.extended_fit import _covariance, _narrowed, dense, fit_extended
+from estimation.diagnosis.joint_fits.total_torque import effect_columns
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.recordings.recording import Recording
+from estimation.models.extension import find_effect
+from estimation.models.model import load_model
+from estimation.predictions.virtual_robot import virtual_robot
+from robots.robot import Robot
+from robots.signals import Log, Motion
+from robots.terms.effects import EFFECTS
+
+MIDDLE = 10.0
+
+
+@pytest.fixture(scope="module")
+def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
+    """A log of the arm without effects."""
+    return build_recording(arm, [arm_log(torque_noise=0.02)])
+
+
+def _estimable(problem: Problem, member: FittedEffect) -> np.ndarray:
+    """Which coefficients the rows determine: those whose unit row lies in the span of the scaled columns' rows."""
+    blocks = [problem.baseline.regressor, problem.baseline.nuisance]
+    known = np.concatenate([*blocks, dense(problem, member.hypothesis, member.shape)], axis=2)[::7]
+    flat = known.reshape(-1, known.shape[2])
+    norms = np.linalg.norm(flat, axis=0)
+    flat = flat / np.where(norms > 0, norms, 1.0)
+    _, sizes, rows = np.linalg.svd(flat, full_matrices=True)
+    null = rows[int(np.sum(sizes > 1e-6 * sizes[0])) :]
+    return np.linalg.norm(null, axis=0)[-len(member.coefficients) :] < 0.1
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "shape"),
+    [("payload_change", None, (MIDDLE, 1.0)), ("torque_sensor_drift", 1, None), ("friction_step", 2, (MIDDLE,))],
+)
+def test_what_a_log_leaves_open_has_no_interval(
+    recording: Recording,
+    pose_arm: Callable[..., Problem],
+    name: str,
+    joint: int | None,
+    shape: tuple[float, ...] | None,
+) -> None:
+    """An arm of parallel axes feels nothing of a moment along them, and a line's later stretches never begin."""
+    hypothesis = Hypothesis(EFFECTS[name], joint)
+    problem = pose_arm(recording)
+    point = shape or hypothesis.effect.grid(problem.situation, joint)[1]
+    columns = dense(problem, hypothesis, point)
+    posed = pose_arm(replace(recording, tau=recording.tau + 0.5 * columns[:, :, 0]))
+    member = refine(posed, hypothesis, point, accept(posed, ()))
+    fitted = fit_extended(posed, [member], {})
+    size = len(member.coefficients)
+    errors = np.sqrt(np.diag(fitted.model.extensions[0].covariance))[:size]
+    estimable = _estimable(posed, member)
+    np.testing.assert_array_equal(np.isfinite(errors), estimable)
+    assert errors[estimable].min() > 0
+    assert not fitted.effects[0][:size][~estimable].any()
+    assert estimable.sum() == {"payload_change": 4, "torque_sensor_drift": 2, "friction_step": 2}[name]
+
+
+@pytest.mark.parametrize(
+    ("effect", "joint", "known", "size"),
+    [("friction_step", 1, (), (0.5, 0.3)), ("payload_change", None, (1.0,), (0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0))],
+)
+def test_a_change_between_two_logs_is_within_the_pause(
+    arm: Robot,
+    arm_log: Callable[..., Log],
+    pose_arm: Callable[..., Problem],
+    effect: str,
+    joint: int | None,
+    known: tuple[float, ...],
+    size: tuple[float, ...],
+) -> None:
+    """Its interval is the pause, whichever end of it the search came to."""
+    first, hypothesis = arm_log(torque_noise=0.02), Hypothesis(EFFECTS[effect], joint)
+    logs = build_recording(arm, [first, replace(first, t=first.t + float(np.ptp(first.t)) + 30.0)])
+    ends, begins = (float(logs.t[at]) for at in (logs.starts[1] - 1, logs.starts[1]))
+    columns = dense(pose_arm(logs), hypothesis, (begins, *known))
+    posed = pose_arm(replace(logs, tau=logs.tau + columns @ np.array(size)))
+    member = refine(posed, hypothesis, (begins, *known), accept(posed, ()))
+    extension = fit_extended(posed, [member], {}).model.extensions[0]
+    error = float(np.sqrt(extension.covariance[len(size), len(size)]))
+    assert extension.shape[0] == pytest.approx((ends + begins) / 2)
+    assert 1.96 * error == pytest.approx((begins - ends) / 2, rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["pattern:load:0:even", "load_dependent_friction", "joint_elasticity"])
+def test_the_model_is_what_was_fitted(
+    arm: Robot, recording: Recording, pose_arm: Callable[..., Problem], tmp_path: Path, name: str
+) -> None:
+    """Its torque, from its file too, is that of base model and effect together, whatever the two take from each other.
+
+    A function of the load, as gravity is: the fit shares a torque between the two, and the base model's load is then
+    another than the one that the function was fitted in.
+    """
+    effect = find_effect(name)
+    hypothesis, problem = Hypothesis(effect, 1), pose_arm(recording)
+    shape = effect.grid(problem.situation, 1)[0]
+    columns = dense(problem, hypothesis, shape)
+    size = 0.2 * recording.tau[:, 0].std() / columns[:, 0].std(axis=0).max()
+    posed = pose_arm(replace(recording, tau=recording.tau + size * columns[:, :, 0]))
+    member = refine(posed, hypothesis, shape, accept(posed, ()))
+    fitted = fit_extended(posed, [member], {"gravities": []})
+    base = posed.baseline.regressor @ fitted.values[: posed.baseline.base.size]
+    own = dense(posed, hypothesis, member.shape) @ fitted.model.extensions[0].coefficients
+    motion = (recording.q, recording.dq, recording.ddq, recording.t)
+    fitted.model.save(tmp_path / "model.json")
+    for model in (fitted.model, load_model(tmp_path)):
+        np.testing.assert_allclose(model.torque(*motion), base + own, rtol=0, atol=1e-8 * recording.tau.std())
+        played = virtual_robot(model).torque(Motion(recording.t, *motion[:3]))
+        np.testing.assert_allclose(played, base + own, rtol=0, atol=1e-8 * recording.tau.std())
+    if effect.name.startswith("pattern"):
+        other = replace(fitted.model, felt=None).torque(*motion)
+        assert np.abs(other - base - own).max() > 1e-3 * recording.tau.std()
+
+
+def test_a_vibration_keeps_its_phase_in_a_later_motion(
+    recording: Recording, pose_arm: Callable[..., Problem], tmp_path: Path
+) -> None:
+    """What vibrates whatever the robot does is as far on its way in a log that begins later, from the file too."""
+    effect = find_effect("pattern:vibration:0:even")
+    hypothesis, problem = Hypothesis(effect, 1), pose_arm(recording)
+    wave = 0.2 * recording.tau[:, 0].std() * np.sin(2 * np.pi * 3.3 * recording.t + 0.4)
+    posed = pose_arm(replace(recording, tau=recording.tau + wave[:, None] * [1.0, 0.0]))
+    member = refine(posed, hypothesis, (3.3,), accept(posed, ()))
+    fitted = fit_extended(posed, [member], {"gravities": []})
+    fitted.model.save(tmp_path / "model.json")
+    later = slice(1013, None)
+    motion = [x[later] for x in (recording.q, recording.dq, recording.ddq, recording.t)]
+    for model in (fitted.model, load_model(tmp_path)):
+        told = (model.torque(*motion) - model.torque(*motion[:3]))[:, 0]
+        assert np.corrcoef(told, wave[later])[0, 1] > 0.99
+    (states, *_), _ = effect_columns(problem, replace(recording, **_rows(recording, later)), [member])
+    assert states.origin == recording.t[0]
+
+
+def _rows(recording: Recording, rows: slice) -> dict[str, object]:
+    """A recording's fields on some of its rows."""
+    names = ("t", "q", "dq", "ddq", "tau", "unsure", "clear")
+    return {"starts": (0,), **{name: getattr(recording, name)[rows] for name in names}}
+
+
+def test_no_log_knows_a_delay_better_than_its_formula(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
+) -> None:
+    """A delay of 10 ms that the noise tells to three per cent is stated to the formula's 5 % and the noise's own."""
+    recording = build_recording(arm, [arm_log(torque_noise=0.002)])
+    hypothesis = Hypothesis(EFFECTS["time_delay"], None)
+    delay = 0.01
+    problem = pose_arm(recording)
+    columns = dense(problem, hypothesis, (delay,))
+    posed = pose_arm(replace(recording, tau=recording.tau + delay * columns[:, :, 0]))
+    member = refine(posed, hypothesis, (0.008,), accept(posed, ()))
+    extension = fit_extended(posed, [member], {}).model.extensions[0]
+    (value,), error = extension.coefficients, float(np.sqrt(extension.covariance[0, 0]))
+    by_noise = np.sqrt(member.scatter / member.group.gram[0, 0])
+    assert by_noise < 0.04 * delay
+    assert (0.05 * value) ** 2 + (0.5 * by_noise) ** 2 < error**2 < (0.05 * value) ** 2 + (2 * by_noise) ** 2
+
+
+def test_a_column_that_is_hardly_one_is_left_open() -> None:
+    """Two columns as if alone, and a third of 1e-170 that the data say nothing of, without an overflow."""
+    matrix = np.random.default_rng(0).normal(size=(50, 3)) * [1.0, 1.0, 1e-170]
+    covariance, lost = _covariance(matrix)
+    assert covariance[:2, :2] == pytest.approx(np.linalg.inv(matrix[:, :2].T @ matrix[:, :2]))
+    assert np.isfinite(covariance).all()
+    assert lost.tolist() == [False, False, True]
+
+
+@pytest.mark.parametrize("variance", [4.0, 0.01, np.inf])
+def test_what_is_one_quantity_told_twice_is_known_as_well_as_the_other(variance: float) -> None:
+    """The error of the second falls to what it may be, none rises, and the covariance stays one."""
+    covariance = np.array([[0.25, 0.1 if np.isinf(variance) else 0.4 * np.sqrt(variance)], [0.0, variance]])
+    covariance[1, 0] = covariance[0, 1]
+    narrowed = _narrowed(covariance, 1, 0.3)
+    assert narrowed[0, 0] == 0.25
+    assert narrowed[1, 1] == pytest.approx(min(variance, 0.09))
+    assert np.linalg.eigvalsh(narrowed).min() > 0
+    if np.isfinite(variance):
+        correlations = [c[0, 1] / np.sqrt(c[0, 0] * c[1, 1]) for c in (covariance, narrowed)]
+        assert correlations[1] == pytest.approx(correlations[0])
+
+
+@pytest.mark.parametrize("name", ["time_delay", "current_lag"])
+def test_a_delay_and_its_reversals_differ_by_what_a_factor_allows(name: str) -> None:
+    """A factor of 1.6 either way of 2 ms, 1.25 to 3.2 ms, is an interval of 95 %."""
+    ((coefficient, shape, apart),) = EFFECTS[name].ties(np.array([2e-3]))
+    assert (coefficient, shape) == (0, 0)
+    assert apart == pytest.approx((3.2e-3 - 1.25e-3) / 2 / 1.96)
+    assert EFFECTS["stribeck"].ties(np.array([1.0])) == ()

@@ -1,0 +1,253 @@
+"""Specification of the frequencies above the bands: what shows there, how much it tells, and noise that repeats."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.refinement import refine
+from estimation.diagnosis.hypothesis_tests.scoring import accept, score
+from estimation.diagnosis.joint_fits.extended_fit import fit_extended
+from estimation.diagnosis.noise_models.frequency_bands import TRANSITION
+from estimation.diagnosis.noise_models.high_frequency_band import WIDER
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.recordings.periods import Cycle
+from estimation.diagnosis.recordings.recording import Recording, cut_recording, join_recordings
+from robots.regressor import default_model
+from robots.robot import Robot
+from robots.signals import Log
+from robots.terms.discrepancies.patterns import Pattern, build_pattern
+from robots.terms.effects import EFFECTS
+
+RIPPLE = Hypothesis(EFFECTS["torque_ripple"], 1)
+SHAPE = (150.0, 0.0, 0.0)
+NOISE = 0.1  # of the torque, white [N m]
+SIZE = 0.02  # of the ripple, a fifth of it
+SHAKEN = 17.3  # [Hz]
+
+
+@pytest.fixture(scope="module")
+def clean(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
+    """A log of the arm without torque noise that passes as one of a coarse encoder."""
+    return replace(build_recording(arm, [arm_log(torque_noise=0.0)]), floor=np.full(2, 1e-11), cycles=(None,))
+
+
+@pytest.fixture(scope="module")
+def recording(clean: Recording) -> Recording:
+    """The same with white torque noise of a known size."""
+    return replace(clean, tau=clean.tau + NOISE * np.random.default_rng(1).standard_normal(clean.tau.shape))
+
+
+def _rippled(recording: Recording) -> Recording:
+    tau = recording.tau.copy()
+    tau[:, 0] += SIZE * np.cos(SHAPE[0] * recording.q[:, 0])
+    return replace(recording, tau=tau)
+
+
+def _cosine(problem: Problem) -> tuple[float, float]:
+    """Size of the ripple's cosine beside the base model, that of nothing else, and its standard error."""
+    group = problem.measured(RIPPLE, SHAPE)
+    return float(group.cross[0] / group.gram[0, 0]), float(group.gram[0, 0] ** -0.5)
+
+
+def test_a_ripple_tells_its_energy_over_the_noise(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
+    """What is told above the band is the wave's energy between the two cut-offs, over the noise's.
+
+    In the rows that count: not where the direction of motion is not known, nor at the ends, where the filter begins. A
+    quarter is lost where white noise happens to look like a burst of it.
+    """
+    below, both = (pose_arm(_rippled(recording), wider=wider) for wider in (None, WIDER))
+    cutoffs = below.whitening.bands[0].cutoff, both.upper.whitening.bands[0].cutoff  # type: ignore[union-attr]
+    assert cutoffs[0] < 12.0
+    assert cutoffs[1] > 2 * cutoffs[0]
+    spectrum = np.fft.rfft(np.cos(SHAPE[0] * recording.q[:, 0]))
+    f = np.fft.rfftfreq(len(recording), recording.step)
+    half = 1 - TRANSITION / 2  # of a cut-off, where the filter passes half
+    spectrum[(f < half * cutoffs[0]) | (f > half * cutoffs[1])] = 0.0
+    wave = np.fft.irfft(spectrum, len(recording))
+    wave[recording.unsure[:, 0]] = 0.0
+    edge = round(7.2 / cutoffs[0] / recording.step)
+    (_, slow), (size, error) = _cosine(below), _cosine(both)
+    assert error**-2 - slow**-2 == pytest.approx(0.75 * np.sum(wave[edge:-edge] ** 2) / NOISE**2, rel=0.2)
+    assert abs(size - SIZE) < 4 * error  # fails wrongly once in 16,000
+
+
+@pytest.mark.parametrize("name", ["torque_ripple", "asymmetric_friction"])
+def test_the_slope_has_the_products_of_an_effect_with_the_residual(
+    recording: Recording, pose_arm: Callable[..., Problem], name: str
+) -> None:
+    """In the bands, and above them of what is fast: what moments and orders are ranked by is what they explain."""
+    problem = pose_arm(_rippled(recording), wider=WIDER)
+    hypothesis, shape = (RIPPLE, SHAPE) if name == "torque_ripple" else (Hypothesis(EFFECTS[name], 1), ())
+    slope = problem.slope_of(hypothesis.effect)
+    joints, columns = problem.columns_of(hypothesis, shape)
+    products = np.sum([part.T @ slope[:, j] for j, part in zip(joints, columns, strict=True)], axis=0)
+    group = problem.measured(hypothesis, shape)
+    # The first rows of a log are filtered another way.
+    np.testing.assert_allclose(products, group.cross, atol=0.05 * np.sqrt(np.diag(group.gram)).max())
+    if hypothesis is RIPPLE:
+        assert abs(group.cross[0]) > 4 * np.sqrt(group.gram[0, 0])
+
+
+def test_what_shakes_the_arm_is_no_inertia(arm: Robot, recording: Recording, pose_arm: Callable[..., Problem]) -> None:
+    """The arm answers to a vibration above the band: an inertia that was fitted to the answer would take most of it."""
+    model = default_model(arm)
+    wave = np.sin(2 * np.pi * SHAKEN * recording.t)
+    answer = np.zeros_like(recording.ddq)
+    answer[:, 0] = -1.0 * wave
+    moves = [model.torque(recording.q, recording.dq, a, model.nominal) for a in (recording.ddq + answer, recording.ddq)]
+    tau = recording.tau + moves[0] - moves[1]
+    tau[:, 0] += SIZE * wave
+    problem = pose_arm(replace(recording, ddq=recording.ddq + answer, tau=tau), wider=WIDER)
+    vibration = Hypothesis(build_pattern("pattern:vibration:0:even"), 1)  # type: ignore[arg-type]
+    assert problem.whitening.bands[0].cutoff < SHAKEN < problem.upper.whitening.bands[0].cutoff  # type: ignore[union-attr]
+    known, taken = (problem.upper.columns(wave[:, None], 0, bare=bare) for bare in (True, False))  # type: ignore[union-attr]
+    assert np.sum(taken**2) < 0.3 * np.sum(known**2)
+    found = refine(
+        problem, vibration, vibration.effect.propose(problem.situation, 1, problem.steepest, 4)[0], accept(problem, ())
+    )
+    assert found.shape[0] == pytest.approx(SHAKEN, abs=0.01)
+    # As if nothing but noise were about it: by the wave's own energy, over that of the noise.
+    assert found.gain == pytest.approx(SIZE**2 * np.sum(known**2), rel=0.3)
+    assert found.gain > 30.0  # noise does as much once in 10,000
+
+
+def test_only_fast_effects_are_measured_there(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
+    """An effect by acceleration has no rows above the band; what is slow has next to nothing of its energy there."""
+    problem = pose_arm(recording, wider=WIDER)
+    assert problem.measured(RIPPLE, SHAPE).above[0].shape[1] == 4
+    assert not problem.measured(Hypothesis(EFFECTS["encoder_offset"], 1), ()).above
+    assert problem.upper is not None
+    slow = np.sin(recording.t)[:, None]
+    assert np.sum(problem.upper.columns(slow, 0) ** 2) < 1e-3 * np.sum(problem.whitening.apply(slow, 0) ** 2)
+
+
+def test_found_beside_it_a_ripple_is_taken_off(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
+    """Once accepted, it leaves nothing of itself, neither in the data nor in the null."""
+    problem = pose_arm(_rippled(recording), wider=WIDER, draws=200)
+    group = problem.measured(RIPPLE, SHAPE)
+    accepted = accept(problem, (group,))
+    assert accepted.gain > 15.0
+    # Its noise is of unit variance: the error of a variance of 800 numbers is 5 %.
+    assert accepted.nulls.var() == pytest.approx(1.0, abs=0.2)
+    assert score(problem, group, accepted).gain == pytest.approx(0.0, abs=1e-3)
+
+
+def test_the_extended_model_knows_it_as_well(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
+    """What is above the band makes the standard errors of coefficients smaller, by as much as in a score or more."""
+    told, extended = [], []
+    for wider in (None, WIDER):
+        problem = pose_arm(_rippled(recording), wider=wider)
+        member = refine(problem, RIPPLE, SHAPE, accept(problem, ()), effort=0)
+        told.append(np.sqrt(np.sum(score(problem, member.group, accept(problem, ())).root ** 2, axis=0)))
+        extension = fit_extended(problem, [member], {}).model.extensions[0]
+        extended.append(np.sqrt(np.diag(extension.covariance)[:4]))
+    assert np.all(told[1] < 0.5 * told[0])
+    # They count what is not known of the shape, too, which is less above the band.
+    assert np.all(extended[1] / extended[0] < 1.4 * told[1] / told[0])
+
+
+@pytest.mark.parametrize("cut_off", [0, 30])
+@pytest.mark.parametrize("same", [True, False])
+def test_noise_that_repeats_with_the_motion_tells_less(
+    clean: Recording, pose_arm: Callable[..., Problem], same: bool, cut_off: int
+) -> None:
+    """Rounding that is alike in five repetitions counts as one: what a ripple tells is a fifth.
+
+    So it is where the ends of the log were cut off, and the fifth is not whole. The noise of some 60 frequencies is
+    known to 13 %; the chance of more than a half is 1 in 10,000.
+    """
+    period = len(clean) // 5
+    noise = np.random.default_rng(3).standard_normal((5 * period, 2))
+    rows = slice(0, 5 * period - cut_off)
+    cycle = Cycle(0, rows.stop, period * clean.step, 5)
+    told = []
+    for repeated in (np.tile(noise[:period], (5, 1)), noise) if same else (noise, noise[::-1]):
+        log = cut_recording(clean, rows)
+        problem = pose_arm(replace(log, tau=log.tau + NOISE * repeated[rows], cycles=(cycle,)), wider=WIDER)
+        assert problem.upper is not None
+        told.append(float(np.sum(problem.upper.columns(np.cos(SHAPE[0] * log.q[:, :1]), 0) ** 2)))
+    assert told[1] / told[0] == pytest.approx(5.0 if same else 1.0, rel=0.5)
+
+
+@pytest.mark.parametrize("periods", [0.0, 2.95])
+def test_noise_is_levelled(clean: Recording, pose_arm: Callable[..., Problem], periods: float) -> None:
+    """Noise that grows with the frequency, as unknown accelerations make it, is of unit density above the band.
+
+    So it is in a log that repeats its motion, but not a whole number of times.
+    """
+    rng = np.random.default_rng(5)
+    noise = NOISE * rng.standard_normal(clean.tau.shape)
+    noise += np.gradient(np.gradient(rng.standard_normal(clean.tau.shape), axis=0), axis=0) * 0.3
+    cycle = Cycle(0, len(clean), len(clean) * clean.step / periods, 2) if periods else None
+    problem = pose_arm(replace(clean, tau=clean.tau + noise, cycles=(cycle,)), wider=WIDER)
+    assert problem.upper is not None
+    wide = problem.upper.whitening
+    for j, above in enumerate(problem.upper.joints):
+        assert above is not None
+        power = np.abs(np.fft.rfft(above.residual)) ** 2 / np.count_nonzero(above.counts)
+        f = np.fft.rfftfreq(len(above.residual), clean.step * wide.stride)
+        edges = np.linspace(1.1 * problem.whitening.bands[j].cutoff, 0.8 * wide.bands[j].cutoff, 5)
+        # Each part has 60 frequencies or more.
+        for low, high in pairwise(edges):
+            assert power[(f >= low) & (f < high)].mean() == pytest.approx(1.0, abs=0.4)
+
+
+def test_a_log_in_which_a_joint_stands_levels_no_noise(clean: Recording, pose_arm: Callable[..., Problem]) -> None:
+    """Twice as long a log of the other joint's motion after it: this one's noise above its band is of unit density.
+
+    The mean of some 500 frequencies has a standard error of 5 %.
+    """
+    rng = np.random.default_rng(6)
+    noisy = replace(clean, tau=clean.tau + NOISE * rng.standard_normal(clean.tau.shape))
+    whole = noisy
+    for k in (1, 2):
+        stands = replace(
+            clean,
+            t=clean.t + 100.0 * k,
+            dq=clean.dq * [0.0, 1.0],
+            ddq=clean.ddq * [0.0, 1.0],
+            tau=clean.tau + [3.0, 0.0] + NOISE * rng.standard_normal(clean.tau.shape),
+            unsure=clean.unsure | np.array([True, False]),
+        )
+        whole = join_recordings(whole, stands)
+    upper = pose_arm(whole, wider=WIDER).upper
+    assert upper is not None
+    above = upper.joints[0]
+    assert above is not None
+    power = np.abs(np.fft.rfft(above.residual)) ** 2 / np.count_nonzero(above.counts)
+    f = np.fft.rfftfreq(len(above.residual), clean.step * upper.whitening.stride)
+    cutoffs = [above.passing.cutoff / (1 - TRANSITION / 2), 15.0]
+    assert cutoffs[0] > 20.0
+    assert power[(f > cutoffs[1]) & (f < 0.8 * cutoffs[0])].mean() == pytest.approx(1.0, abs=0.4)
+
+
+def test_a_vibration_above_the_band_is_told(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
+    """A steady torque between the two cut-offs shows beside accelerations that are not known there."""
+    size = 0.03
+    cutoffs = [pose_arm(recording, wider=WIDER).whitening.bands[0].cutoff]
+    cutoffs.append(pose_arm(recording, wider=WIDER).upper.whitening.bands[0].cutoff)  # type: ignore[union-attr]
+    frequency = float(np.mean(cutoffs)) * (1 - TRANSITION / 2)
+    wave = np.cos(2 * np.pi * frequency * (recording.t - recording.t[0]))
+    tau = recording.tau.copy()
+    tau[:, 0] += size * wave
+    vibration = Hypothesis(Pattern("vibration"), 1)
+    gains = []
+    for wider in (None, WIDER):
+        problem = pose_arm(replace(recording, tau=tau), wider=wider)
+        found = score(problem, problem.measured(vibration, (frequency,)), accept(problem, ()))
+        gains.append(found.gain)
+    energy = len(recording) * size**2 / 2 / NOISE**2
+    assert gains[0] < 20.0
+    # A log of 20 s is too short to tell a line from the noise about it, of which it then is a part: that is a few times
+    # as strong. What is left is more than any noise explains, eight functions having 8 of that on average.
+    assert 35.0 < gains[1] < energy
+    coefficients = found.bounded(np.full(8, -np.inf), np.full(8, np.inf))[1]
+    told = problem.situation, 1, (frequency,)
+    assert np.corrcoef(Pattern("vibration").local(*told) @ coefficients, wave)[0, 1] > 0.9

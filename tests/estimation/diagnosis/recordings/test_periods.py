@@ -1,0 +1,82 @@
+"""Specification of the search for repeated motion and its projection on harmonics."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.recordings.periods import find_cycle, project_on_harmonics
+
+STEP = 0.004
+
+
+def _motion(period: float, duration: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    t = STEP * np.arange(round(duration / STEP))
+    w = 2 * np.pi / period * np.arange(1, 6)
+    a, b = rng.normal(size=(2, 5, 2))
+    s, c = np.sin(np.outer(t, w)), np.cos(np.outer(t, w))
+    return (
+        s @ a + c @ b,
+        c @ (a * w[:, None]) - s @ (b * w[:, None]),
+        -(s @ (a * w[:, None] ** 2)) - c @ (b * w[:, None] ** 2),
+    )
+
+
+@pytest.mark.parametrize("period", [10.0, 7.3219, 3.14159])
+def test_a_period_is_found_sharper_than_a_sample(period: float) -> None:
+    """The period of a repeated motion is found to a hundredth of a sample, whole multiple of the step or not."""
+    q, _, _ = _motion(period, 42.0)
+    cycle = find_cycle(q, STEP)
+    assert cycle is not None
+    assert cycle.period == pytest.approx(period, abs=0.01 * STEP)
+    assert cycle.count == int(42.0 / period)
+
+
+def test_a_motion_that_never_returns_has_no_period() -> None:
+    """Harmonics whose common period is longer than the log are no repetition."""
+    q, _, _ = _motion(100.0, 60.0)
+    assert find_cycle(q, STEP) is None
+
+
+def test_a_period_is_found_behind_an_approach() -> None:
+    """An approach that does not repeat, before four repetitions, is left out of the cycle."""
+    q, _, _ = _motion(8.0, 32.0)
+    approach = np.linspace(0, 1, 1000)[:, None] ** 2 * (q[0] - 0.5) + 0.5 * np.linspace(0, 1, 1000)[:, None] ** 2
+    cycle = find_cycle(np.vstack([approach, q]), STEP)
+    assert cycle is not None
+    assert cycle.period == pytest.approx(8.0, abs=0.01 * STEP)
+    assert cycle.start >= 900
+
+
+def test_the_projection_is_free_of_encoder_noise() -> None:
+    """Accelerations of the projection err by less than a hundredth of those of differences of the counted positions."""
+    q, dq, ddq = _motion(10.0, 60.0)
+    count = 2 * np.pi / 2**17
+    counted = np.round(q / count) * count
+    cycle = find_cycle(counted, STEP)
+    assert cycle is not None
+    (found_q, found_dq, found_ddq), known, _ = project_on_harmonics(counted, STEP, cycle)
+    rows = slice(cycle.start, cycle.stop)
+    # Rounding has a standard deviation of count / sqrt(12); the mean over six passes and few harmonics has far less.
+    assert np.abs(found_q - q[rows]).max() < 0.3 * count
+    assert np.sqrt(np.mean((found_dq - dq[rows]) ** 2)) < 1e-4
+    differences = np.gradient(np.gradient(counted, STEP, axis=0), STEP, axis=0)
+    assert np.std(found_ddq - ddq[rows]) < 0.01 * np.std(differences[rows] - ddq[rows])
+    assert np.all(known >= 0.5)
+
+
+@pytest.mark.parametrize("period", [10.0, 7.3219])
+@pytest.mark.parametrize("rounded", [True, False])
+def test_the_noise_of_the_mean_over_repetitions_is_told(period: float, rounded: bool) -> None:
+    """Its density is that of the error, within a third: an eighth of a single one's, but rounded alike it stays."""
+    q, _, _ = _motion(period, 8 * period)
+    count = 2 * np.pi / 2**17
+    noise = count * np.random.default_rng(1).standard_normal(q.shape)
+    counted = np.round(q / count) * count if rounded else q + noise
+    cycle = find_cycle(counted, STEP)
+    assert cycle is not None
+    _, _, density = project_on_harmonics(counted, STEP, cycle)
+    # Where repetitions begin between samples each is rounded anew.
+    repeats = 1 if rounded and period == 10.0 else cycle.count
+    assert density == pytest.approx(2 * STEP * (counted - q).var(axis=0) / repeats, rel=1 / 3)

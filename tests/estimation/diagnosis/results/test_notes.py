@@ -1,0 +1,78 @@
+"""Specification of the notes on a diagnosis that need no robot."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from estimation.diagnosis.findings import Finding, Gain, Parameter
+from estimation.diagnosis.results.notes import LITTLE, WORSE, beside_larger, turning_joints, unsure_gain, worse_joints
+
+
+def test_joints_that_the_extension_makes_worse_are_told() -> None:
+    """By more than a tenth of their error and a thousandth of the torque; never joints that nobody has seen."""
+    before = np.array([0.050, 0.050, 0.0005, 0.050, np.nan])
+    after = np.array([0.051, 0.074, 0.0012, 0.080, np.nan])
+    (note,) = worse_joints(before, after)
+    assert note == "The extended model errs more than the base model on joints 2 (5 -> 7.4 %), 4 (5 -> 8 %)."
+    assert WORSE * 0.05 < 0.074
+    assert 0.0005 + LITTLE > 0.0012
+    assert worse_joints(before[:1], after[:1]) == []
+    (one,) = worse_joints(before[1:2], after[1:2])
+    assert "on joint 1 (5 -> 7.4 %)" in one
+
+
+def test_rows_at_rest_explain_an_error_that_is_far_larger_with_them() -> None:
+    """Where several rows do not count and the error of all is twice that of those that do, their share is told."""
+    counts = np.ones((1000, 4), dtype=bool)
+    counts[:400, 0] = counts[:350, 1] = counts[:400, 2] = counts[:2, 3] = False
+    after = np.array([0.025, 0.025, 0.025, 0.025])
+    (note,) = turning_joints(np.array([0.31, 0.08, 0.04, 0.30]), after, counts)
+    assert note.startswith("Joints 1, 2: in 35 to 40 % of the unseen rows the joint rests or turns round.")
+    (one,) = turning_joints(np.array([0.31, 0.04, 0.04, 0.30]), after, counts)
+    assert one.startswith("Joint 1: in 40 % of the unseen rows")
+    assert turning_joints(np.full(4, np.nan), after, counts) == []
+    assert turning_joints(after, after, counts) == []
+
+
+def test_a_name_of_which_nothing_is_determined_is_no_more_than_likely() -> None:
+    """Where its gain is not sure either; not of one with a parameter that is determined, nor without a name."""
+
+    def finding(effect: str, *determined: bool) -> Finding:
+        parameters = tuple(
+            Parameter(name="p", value=1.0, unit="1", standard_error=1.0, ci95=(0.0, 2.0), determined=known)
+            for known in determined
+        )
+        gain = Gain(nrmse_before=0.04, nrmse_after=0.036, ci95=(-0.01, 0.014))
+        told = {"p_value": 0.0, "delta_bic": 90.0, "rivals": (), "sentence": "", "visible": 1.0, "coordinate": ""}
+        return Finding(effect=effect, joint=2, parameters=parameters, gain=gain, **told)
+
+    open_ = unsure_gain(finding("stribeck", False, False))
+    assert open_.startswith("The gain of stribeck of joint 2 on unseen data is not sure")
+    assert open_.endswith("the name is no more than the likeliest for it.")
+    for other in (finding("stribeck", False, True), finding("unexplained", False), finding("stribeck")):
+        assert unsure_gain(other).endswith("its interval begins below zero.")
+
+
+def test_what_is_as_small_as_formulas_leave_is_told_all_the_same() -> None:
+    """Beside the name that does most there, with the share; nothing where there is none, or nothing beside it."""
+    step, delay, friction, spring = (
+        SimpleNamespace(
+            hypothesis=SimpleNamespace(label=label, effect=SimpleNamespace(alike=label == "a delay")),
+            group=SimpleNamespace(joints=tuple(gains)),
+            gain_on=lambda joints, gains=gains: sum(gains.get(j, 0.0) for j in joints),
+        )
+        for label, gains in (
+            ("a step", {2: 300.0}),
+            ("a delay", {1: 900.0, 2: 900.0}),
+            ("a friction", {2: 5000.0}),
+            ("a spring", {1: 9000.0, 2: 600.0}),
+        )
+    )
+    (note,) = beside_larger(step, [spring, friction])
+    assert note.startswith("a step stands out of the noise, too, but explains 6.0 % of what a friction does on joint 3")
+    (note,) = beside_larger(delay, [friction])
+    assert note.startswith("a delay stands out of the noise, too, but not beyond what a friction may leave")
+    assert beside_larger(None, [friction]) == ()
+    assert beside_larger(step, []) == ()

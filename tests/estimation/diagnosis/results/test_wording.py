@@ -1,0 +1,167 @@
+"""Specification of what a finding says of its parameters and of its place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.findings import Finding, Gain, Parameter
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.results.wording import _parameters, _roughly, _stopped, _when, no_part
+from estimation.models.extension import Extension
+from robots.robot import Robot
+from robots.terms.effects import EFFECTS
+
+
+@pytest.mark.parametrize(
+    ("effect", "shape", "value", "interval", "roughly"),
+    [
+        ("thermal_friction", 0, 113.0, (80.0, 161.0), True),
+        ("thermal_friction", 0, 113.0, (95.0, 134.0), False),
+        ("load_dependent_friction", 0, 0.0, (-0.2, 0.2), True),
+        ("load_dependent_friction", 0, 0.8, (0.7, 0.9), False),
+        ("friction_step", 0, 2000.0, (1999.9, 2000.1), False),
+        ("friction_step", 0, 2.0, (1.7, 2.3), True),
+        # A dead centre is a place: a fifth of one near zero is nothing.
+        ("spring", 1, 0.01, (-0.1, 0.1), False),
+        # Of what the data say nothing, the error itself tells.
+        ("thermal_friction", 0, 113.0, (-np.inf, np.inf), False),
+    ],
+)
+def test_a_fifth_of_a_value_or_of_a_second(
+    effect: str, shape: int, value: float, interval: tuple[float, float], roughly: bool
+) -> None:
+    """A nonlinear parameter is known roughly where its interval is wider, a moment by the clock."""
+    assert _roughly(EFFECTS[effect].shapes[shape], value, interval) is roughly
+
+
+@pytest.mark.parametrize(
+    ("effect", "shape", "value", "stopped"),
+    [
+        ("presliding_hysteresis", 0, 0.2, True),
+        ("presliding_hysteresis", 0, 1e-5, True),
+        ("presliding_hysteresis", 0, 0.19, False),
+        ("backlash", 1, 0.3, False),  # what it is where nothing is said
+        ("torque_constant_saturation", 0, 1.0, False),  # a power, and no size
+    ],
+)
+def test_a_size_at_its_bound_is_not_determined(effect: str, shape: int, value: float, stopped: bool) -> None:
+    """However narrow its interval is, cut at the bound as it is."""
+    assert _stopped(EFFECTS[effect].shapes[shape], value) is stopped
+
+
+def test_an_interval_holds_what_machines_may_have(arm: Robot) -> None:
+    """What the data leave open below zero is no stiffness; a value that is rough stays so, however little is left."""
+    hypothesis = Hypothesis(EFFECTS["stribeck"], 1)
+    member = FittedEffect(hypothesis, (0.05, 1.0), None, 100.0, np.array([7.9]), 3, 1.0)  # type: ignore[arg-type]
+    extension = Extension(
+        effect="stribeck",
+        joint=1,
+        shape=member.shape,
+        coefficients=member.coefficients,
+        covariance=np.diag([5.3, 0.001, 0.4]) ** 2,
+    )
+    fitted: Any = SimpleNamespace(model=SimpleNamespace(extensions=[extension]))
+    torque, _, exponent = _parameters(arm, member, fitted, 0, np.array([False, True, True]))
+    assert torque.ci95 == (0.0, pytest.approx(7.9 + 1.96 * 5.3))
+    assert exponent.ci95[0] >= EFFECTS["stribeck"].shapes[1].lower
+    assert not exponent.determined
+
+
+@pytest.mark.parametrize(("error", "told"), [(0.02, True), (0.3, False)])
+def test_levers_that_are_perhaps_none_have_no_dead_centre(arm: Robot, error: float, told: bool) -> None:
+    """An angle is told, however narrow its interval, where the ratio beside it is surely more than zero."""
+    coefficients = np.array([400.0, -300.0, 0.0, 900.0])
+    member = FittedEffect(Hypothesis(EFFECTS["spring"], 1), (0.3, -2.9), None, 100.0, coefficients, 6, 1.0)  # type: ignore[arg-type]
+    covariance = np.diag([4.0, 3.0, 0.0, 9.0, error, 0.1]) ** 2
+    extension = Extension(
+        effect="spring", joint=1, shape=member.shape, coefficients=coefficients, covariance=covariance
+    )
+    fitted: Any = SimpleNamespace(model=SimpleNamespace(extensions=[extension]))
+    centre = _parameters(arm, member, fitted, 0, np.ones(6, dtype=bool))[-1]
+    assert centre.name == "dead_centre"
+    assert centre.determined is told
+    assert bool(np.isfinite(centre.ci95).all()) is told
+
+
+def test_what_is_no_part_of_the_model_says_so() -> None:
+    """A free function that errs, and a name that unseen data refuted: neither may be taken for a cause."""
+    finding = Finding(
+        effect="joint_elasticity",
+        joint=2,
+        parameters=(Parameter(name="x", value=1.0, unit="1", standard_error=0.1, ci95=(0.8, 1.2), determined=True),),
+        p_value=1e-9,
+        delta_bic=50.0,
+        gain=Gain(nrmse_before=0.02, nrmse_after=0.03, ci95=(-0.02, -0.01), joints=(2, 3)),
+        rivals=(("backlash", 3.0),),
+        sentence="It winds up.",
+        visible=0.5,
+    )
+    refuted = no_part(finding)
+    assert (refuted.effect, refuted.joint, refuted.parameters, refuted.rivals) == ("unexplained", 2, (), ())
+    assert "looks like a gear that winds up under load" in refuted.sentence
+    assert "no part of it" in refuted.sentence
+    assert "do not bear that function out" in no_part(finding_of("pattern:load:0:odd", finding)).sentence
+
+
+def finding_of(pattern: str, finding: Finding) -> Finding:
+    """The same as an unexplained pattern."""
+    return replace(finding, effect="unexplained", pattern=pattern)
+
+
+def test_a_gain_elsewhere_is_told_with_its_joints() -> None:
+    """What is wrong with one joint and shows on others is told on those; on its own it needs no word."""
+    gain = Gain(nrmse_before=0.02, nrmse_after=0.01, ci95=(0.0, 0.02))
+    bare: Any = {"effect": "encoder_offset", "parameters": (), "p_value": 0.0, "delta_bic": 9.0, "rivals": ()}
+    bare |= {"sentence": "", "visible": 1.0}
+    told = {
+        joints: Finding(joint=4, gain=replace(gain, joints=joints), **bare).elsewhere
+        for joints in ((), (4,), (5, 6), (5,))
+    }
+    assert told == {(): "", (4,): "", (5, 6): " of joints 5, 6", (5,): " of joint 5"}
+
+
+@pytest.mark.parametrize("effect", ["thermal_friction", "load_heat"])
+@pytest.mark.parametrize(
+    ("falls", "believed"),
+    [
+        ((3.0, 1.0), True),
+        ((-1.0, 2.0), True),  # slow motion rubs more, fast motion less
+        ((-3.3, -1.6), False),
+        ((-3.3, 0.2), False),  # more at all speeds of a joint of 10 rad/s
+        ((3.3, -0.2), True),
+    ],
+)
+def test_what_warms_up_gains_no_friction(arm: Robot, effect: str, falls: tuple[float, float], believed: bool) -> None:
+    """One kind of friction may rise while the other falls; where it rises at all speeds, it is no heat."""
+    shape = tuple(400.0 if own.name == "time_constant" else 0.0 for own in EFFECTS[effect].shapes)
+    fast = replace(arm, limits=replace(arm.limits, velocity=np.full(arm.n, 10.0)))
+    assert EFFECTS[effect].believable(fast, 1, np.array(falls), shape) is believed
+
+
+def test_a_change_is_told_at_its_time_or_between_two() -> None:
+    """As well as the interval says."""
+    sentence = "The payload grew by 0.2 kg at t = 210.37 s."
+    sure = Parameter(
+        name="change_time", value=210.37, unit="s", standard_error=0.01, ci95=(210.3, 210.4), determined=True
+    )
+    assert _when(sentence, [sure]) == sentence
+    rough = replace(sure, ci95=(59.72, 361.04), determined=False)
+    assert _when(sentence, [rough]) == "The payload grew by 0.2 kg between t = 59.7 and 361.0 s."
+    assert _when(sentence, [replace(rough, ci95=(-np.inf, np.inf))]) == sentence
+
+
+def test_a_push_whose_edges_are_not_told_lasted_at_least_so_long() -> None:
+    """Where one of start and duration may be anything; both within an interval are told as they are."""
+    sentence = "Something pushed the arm from t = 43.04 s for 4 s: joint 1 felt 1.26 N m."
+    start = Parameter(name="start", value=43.04, unit="s", standard_error=0.03, ci95=(42.9, 43.1), determined=True)
+    duration = replace(start, name="duration", value=3.95, ci95=(3.6, 4.4))
+    assert _when(sentence, [start, duration]) == sentence
+    open_ = replace(start, ci95=(-np.inf, np.inf), determined=False)
+    told = _when(sentence, [open_, duration])
+    assert told == "Something pushed the arm from t = 43.0 to 47.0 s at least: joint 1 felt 1.26 N m."

@@ -1,0 +1,96 @@
+"""Specification of how base model and effects found are brought into line before the next search."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.refinement import refine
+from estimation.diagnosis.hypothesis_tests.scoring import accept
+from estimation.diagnosis.noise_models.whitening import Whitening
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.searches.refit import base_torque_changed, noise_decreased, refit
+from robots.plants import simulate
+from robots.robot import Robot
+from robots.signals import Log, Motion
+from robots.terms.effects import EFFECTS
+
+LOST = 0.25
+"""Of the shoulder's largest torque."""
+
+
+def test_torque_that_is_cut_off_does_not_draw_the_base_model(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
+) -> None:
+    """Fitted to a log with flat tops, the base model is too low there; settled, it is right to a hundredth.
+
+    The log is cut with its noise, of which the tops then keep what is negative.
+    """
+    recording = build_recording(arm, [arm_log(torque_noise=0.05)])
+    true = recording.tau[:, 0]
+    limit = (1 - LOST) * np.abs(true).max()
+    tau = recording.tau.copy()
+    tau[:, 0] = np.clip(true, -limit, limit)
+    problem = pose_arm(replace(recording, tau=tau))
+    fitted = problem.situation.torque[:, 0]
+    hypothesis = Hypothesis(EFFECTS["current_clipping"], 1)
+    member = refine(problem, hypothesis, (0.8 * float(np.abs(fitted).max()),), accept(problem, ()))
+    settled = refit(problem, [member])
+    cut = np.abs(true) > limit
+    assert 0.03 < cut.mean() < 0.3
+    whole = pose_arm(recording)
+
+    def error(torque: np.ndarray) -> float:
+        """Root mean square difference from the fit to the whole torque where it was cut off [N m]."""
+        return float(np.sqrt(np.mean((torque - whole.situation.torque[:, 0])[cut] ** 2)))
+
+    assert error(fitted) > 1.0
+    assert error((problem.baseline.regressor @ settled.values)[:, 0]) < 0.05
+    assert settled.extra is not None
+    np.testing.assert_allclose(settled.extra[:, 1], 0.0)
+    kept = ~recording.unsure[:, 0]
+    assert settled.residual[kept, 0].std() < whole.remainder[kept, 0].std() < problem.remainder[kept, 0].std() / 1.5
+
+
+def test_little_is_searched_anew_where_it_changes_what_was_found(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
+) -> None:
+    """Tops of the torque, cut off by a seventh, move the base model by less than counts, and the cut by more."""
+    recording = build_recording(arm, [arm_log(torque_noise=0.05)])
+    limit = 0.85 * np.abs(recording.tau[:, 0]).max()
+    tau = recording.tau.copy()
+    tau[:, 0] = np.clip(tau[:, 0], -limit, limit)
+    problem = pose_arm(replace(recording, tau=tau))
+    level = 0.85 * 1.06 * float(np.abs(problem.situation.torque[:, 0]).max())
+    member = refine(problem, Hypothesis(EFFECTS["current_clipping"], 1), (level,), accept(problem, ()))
+    values = refit(problem, [member]).values
+    assert not base_torque_changed(problem, values, [])
+    assert base_torque_changed(problem, values, [member])
+    assert not base_torque_changed(
+        problem, problem.parameters_without_payload[list(problem.baseline.base.independent)], [member]
+    )
+
+
+def test_a_search_is_done_again_where_the_slow_part_of_the_noise_is_smaller(
+    arm: Robot, arm_plant: Callable, fourier_motion: Callable[..., Motion], pose_arm: Callable[..., Problem]
+) -> None:
+    """Noise as fast as before, of a quarter less power at rest, is calmer; a change of some per cent is none."""
+    problem = pose_arm(
+        build_recording(arm, [simulate(arm_plant(torque_noise=0.05), fourier_motion(arm, duration=30.0))])
+    )
+    known = problem.whitening
+
+    def less(power: float) -> Whitening:
+        """The same noise but for what the first joint has at rest."""
+        first = known.coefficients[0]
+        gain = (1.0 - first.sum()) / np.sqrt(power)
+        return replace(known, coefficients=(first + (1.0 - first.sum() - gain) / len(first), *known.coefficients[1:]))
+
+    assert noise_decreased(problem, less(0.75))
+    assert not noise_decreased(problem, less(0.9))
+    assert not noise_decreased(problem, less(1.3))
+    assert noise_decreased(problem, replace(known, scale=0.9 * known.scale))

@@ -1,0 +1,41 @@
+"""Specification of a body at the flange that changes slowly: pinocchio's torque of it, times the mass that is left."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimation.models.extension import find_effect
+from robots import load_robot
+from robots.robot import Robot
+from robots.terms.discrepancies.patterns import is_of_time
+from robots.terms.discrepancies.payload_drift import PayloadDrift
+from robots.terms.effects import Situation
+from tests.estimation.diagnosis.pinocchio_chains import torque_of_mass
+
+COM = np.array([0.03, -0.02, 0.1])  # [m] in the flange's frame
+
+
+def test_a_tank_that_empties_is_within_its_columns(swept: Situation) -> None:
+    """Its torque is met to a twelfth of the largest, at the ends of the waves, and what it lost is told to a tenth."""
+    t = swept.t - swept.t[0]
+    kilogramme = torque_of_mass(swept.robot, 1.0, COM, swept.q, swept.dq, swept.ddq)
+    lost = 2.0 * np.exp(-t / 6.0)
+    extra = kilogramme * lost[:, None]
+    # The base model has a payload that stays.
+    stays = swept.sensitivity("tool")[:, :, :4]
+    X = np.concatenate([PayloadDrift().columns(swept, None), stays], axis=2)
+    rows = X.reshape(-1, X.shape[2])
+    values = np.linalg.lstsq(rows, extra.ravel(), rcond=None)[0]
+    np.testing.assert_allclose(rows @ values, extra.ravel(), atol=0.08 * np.abs(extra).max())
+    told = PayloadDrift().describe(None, values[:-4])
+    assert float(told.split("does: by ")[1].split(" kg")[0]) == pytest.approx(np.ptp(lost), rel=0.1)
+
+
+def test_it_is_of_a_whole_robot_and_goes_by_time(arm: Robot) -> None:
+    """A model file names it; two joints cannot tell a body from what each of them does."""
+    found = find_effect(PayloadDrift.name)
+    assert isinstance(found, PayloadDrift)
+    assert is_of_time(found)
+    assert found.joints(load_robot("ur10")) == (None,)
+    assert found.joints(arm) == ()
