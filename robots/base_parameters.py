@@ -166,9 +166,10 @@ def find_base_parameters(
     neglected = float(np.linalg.norm(scaled - scaled[:, independent] @ combination, axis=0).max())
     if neglected > _ROUNDING:
         log.warning(
-            "%s: axes that are nearly parallel, at right angles or through one point are taken to be so "
-            "(%.1e of the regressor is neglected); angles that its description rounds, "
-            "such as 1.5708 for pi / 2, make them so",
+            (
+                "%s: axes that are nearly parallel, perpendicular or intersecting are treated as exactly so (%.1e of "
+                "the regressor is neglected). Usual cause: rounded angles in the description, such as 1.5708 for pi / 2"
+            ),
             model.robot.name,
             neglected,
         )
@@ -219,8 +220,8 @@ def _confirm(singular_values: Array, kept: int) -> None:
     rank = int(np.sum(singular_values > _ROUNDING * singular_values[0]))
     if kept > rank:
         raise NotIdentifiableError(
-            f"{kept} base parameters by QR, {rank} by SVD: columns that differ by rounding were kept",
-            remedy="state a larger tolerance",
+            f"{kept} base parameters by QR, {rank} by SVD: columns that differ only by rounding were kept",
+            remedy="use a larger tolerance",
         )
 
 

@@ -125,7 +125,9 @@ class Motion(_Samples):
             offset = 0.0
             if shift:
                 if len(before) < 2:
-                    raise InputError(f"motion {index - 1} has one sample: its step is unknown", remedy="set the times")
+                    raise InputError(
+                        f"motion {index - 1} has one sample, so its time step is unknown", remedy="set the start times"
+                    )
                 offset = float(times[-1][-1] + (before.t[-1] - before.t[-2]) - motion.t[0])
             times.append(motion.t + offset)
         parts = (np.concatenate([getattr(motion, name) for motion in motions]) for name in ("q", "dq", "ddq"))

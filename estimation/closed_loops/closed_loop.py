@@ -45,7 +45,7 @@ class Controller:
         for name in ("proportional", "derivative"):
             gains = np.array(getattr(self, name), dtype=float)
             if gains.ndim != 1 or not (np.isfinite(gains) & (gains >= 0)).all():
-                raise InputError(f"{name} gains {gains}", allowed="numbers that are zero or more, one a joint")
+                raise InputError(f"{name} gains {gains}", allowed="numbers that are zero or more, one per joint")
             object.__setattr__(self, name, gains)
         if self.proportional.shape != self.derivative.shape:
             raise InputError(f"{len(self.proportional)} and {len(self.derivative)} gains", allowed="one each a joint")
@@ -133,7 +133,8 @@ class ClosedLoop:
             state = outcome[:, -1]
             if not np.isfinite(state).all() or np.abs(state[:n] - reference.q).min(axis=0).max() > 1e3:
                 raise SolverError(
-                    "the simulated closed loop is not stable", remedy="state the controller's gains, or start from WLS"
+                    "the simulated closed loop is not stable",
+                    remedy="state the real controller's gains, or start from a WLS fit",
                 )
         path = np.concatenate(states, axis=1)
         # Accelerations are those of the steps: at a sample, the mean of the steps before and after.

@@ -182,7 +182,10 @@ class PhysicallyConsistent(WeightedLeastSquares):
         eigenvalues = normalised_eigenvalues(standard[units.bodies]) if len(units.bodies) else np.zeros((0, 4))
         if not (eigenvalues > 0).all():
             link = int(np.argmin(eigenvalues.min(axis=1))) + 1
-            raise SolverError(f"physically consistent fit: link {link} is no body", remedy="give a larger pull weight")
+            raise SolverError(
+                f"physically consistent fit: the parameters of link {link} are not those of a physical body",
+                remedy="use a larger prior weight",
+            )
         margins = problem.rows @ (standard / units.scale)
         alone = (np.count_nonzero(rows, axis=1) == 1) & (margins < AT)
         flat = np.flatnonzero((eigenvalues < AT).any(axis=1)) + 1

@@ -129,7 +129,7 @@ class ConstrainedLeastSquares(WeightedLeastSquares):
         if self.total_mass is not None:
             bodies = body_columns(model)
             if not len(bodies):
-                raise InputError("a total mass, but the model has no links", remedy="leave it out")
+                raise InputError("a total mass, but the model has no links", remedy="remove the total mass")
             row = np.zeros((1, model.size))
             row[0, bodies[:, 0]] = 1.0
             rows = np.vstack([rows, row])
@@ -171,11 +171,11 @@ def _solve(matrix: Array, target: Array, rows: Array, lower: Array, upper: Array
     try:
         problem.solve(solver=cvxpy.CLARABEL, max_threads=1)
     except cvxpy.error.SolverError as error:
-        raise SolverError(f"constrained fit: {error}", remedy="check the bounds' sizes") from error
+        raise SolverError(f"constrained fit: {error}", remedy="check the bounds") from error
     if problem.status in (cvxpy.INFEASIBLE, cvxpy.INFEASIBLE_INACCURATE):
-        raise InfeasibleError("constrained fit: no parameters obey all bounds", remedy="loosen the bounds")
+        raise InfeasibleError("constrained fit: no parameters obey all bounds", remedy="relax the bounds")
     if problem.status not in (cvxpy.OPTIMAL, cvxpy.OPTIMAL_INACCURATE):
-        raise SolverError(f"constrained fit: Clarabel ended with {problem.status}", remedy="check the bounds' sizes")
+        raise SolverError(f"constrained fit: Clarabel ended with {problem.status}", remedy="check the bounds")
     return np.asarray(x.value, dtype=float)
 
 

@@ -64,4 +64,4 @@ def _solve(matrix: Array, right: Array) -> Array:
     try:
         return solve_scaled(matrix, right)
     except np.linalg.LinAlgError as error:
-        raise SolverError("instrumental variables: the instruments tell nothing of some parameters") from error
+        raise SolverError("instrumental variables: the instruments are not correlated with some parameters") from error

@@ -60,7 +60,7 @@ def _updated(source: Path, robot: Robot, inertia: Array) -> Element:
     try:
         root = ElementTree.fromstring(source.read_bytes())
     except (OSError, ElementTree.ParseError) as error:
-        raise InputError(f"cannot be read again: {error}", file=source) from error
+        raise InputError(f"the written URDF could not be read back: {error}", file=source) from error
     links = {link.get("name"): link for link in root.findall("link")}
     moving = set(robot.joint_names)
     bodies: dict[str | None, str | None] = {}

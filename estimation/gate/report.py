@@ -82,8 +82,8 @@ class GateReport:
         """Refuses the log with its first reason and the number of the others.
 
         Raises:
-            NotIdentifiableError: nothing is wrong with the log but that no joint's torque follows from its motion.
-            InputError: anything else that would be fitted wrongly.
+            NotIdentifiableError: the only fault is that the motion does not explain any joint's torque.
+            InputError: any other fault that would spoil the fit.
         """
         reasons = self.of("refuse")
         if not reasons:
@@ -101,19 +101,19 @@ class GateReport:
         )
 
     def usable(self, log: Log) -> tuple[Log, ...]:
-        """Leaves out spikes and stale rows, and cuts the log at its gaps, so that nothing is interpolated across them.
+        """Removes outliers and repeated rows, and splits the log at its gaps.
 
         Args:
             log: the log that was checked.
 
         Returns:
-            Its stretches of 20 samples or more; the log itself where nothing is wrong with it.
+            Its parts of 20 samples or more; the log itself if it has no fault.
 
         Raises:
             InputError: another log, or nothing is left.
         """
         if len(log) != self.samples:
-            raise InputError(f"{len(log)} rows", allowed=f"{self.samples}, as the log that was checked")
+            raise InputError(f"{len(log)} rows", allowed=f"{self.samples} rows, as in the checked log")
         log = self.on_time(log)
         if self.parts == ((0, len(log)),) and not len(self.spikes) and not len(self.stale):
             return (log,)
@@ -122,11 +122,11 @@ class GateReport:
         parts = [np.arange(first, stop)[kept[first:stop]] for first, stop in self.parts]
         logs = tuple(pick_rows(log, part) for part in parts if len(part) >= FEWEST)
         if not logs:
-            raise InputError("no stretch of the log is long enough", file=self.log or None, allowed=f"{FEWEST} rows")
+            raise InputError("no part of the log is long enough", file=self.log or None, allowed=f"{FEWEST} rows")
         return logs
 
     def on_time(self, log: Log) -> Log:
-        """Gives the log that was checked at the times at which its rows were measured."""
+        """Gives the checked log with corrected time stamps."""
         return log if np.array_equal(self.t, log.t) else replace(log, t=self.t)
 
     def summary(self) -> str:

@@ -177,11 +177,11 @@ def _predictable(prepared: Sequence[Prepared], choice: Choice) -> NDArray[np.boo
         return np.asarray(moves & varies & follows)
     if not varies.any():
         raise NotIdentifiableError(
-            "no joint's torque varies", remedy="record the torque of the moving arm, and check what tau1.. hold"
+            "no joint's torque varies", remedy="record the torque of the moving arm, and check the meaning of tau1.."
         )
     raise NotIdentifiableError(
         "no joint's torque can be predicted from its motion",
-        allowed="left-out torque errors below its standard deviation",
+        allowed="held-out torque errors below the torque's standard deviation",
         remedy="check units and signs of q and tau, and that the arm moves",
     )
 

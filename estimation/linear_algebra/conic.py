@@ -88,7 +88,7 @@ class ConicProgram:
         solution = clarabel.DefaultSolver(upper, scale * linear, matrix, offset, cones, settings).solve()
         status = str(solution.status)
         if status in ("PrimalInfeasible", "AlmostPrimalInfeasible"):
-            raise InfeasibleError(f"{what}: no parameters obey all constraints", remedy="loosen the bounds")
+            raise InfeasibleError(f"{what}: no parameters obey all constraints", remedy="relax the bounds")
         if status not in ("Solved", "AlmostSolved"):
-            raise SolverError(f"{what}: Clarabel ended with {status}", remedy="check the data and the bounds' sizes")
+            raise SolverError(f"{what}: Clarabel ended with {status}", remedy="check the data and the bounds")
         return np.asarray(solution.x)

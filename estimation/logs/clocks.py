@@ -91,12 +91,12 @@ def put_on_clock(logs: Sequence[Log], held_out: Sequence[Log]) -> ClockedLogs:
 
 
 _OVERLAP = (
-    "The logs overlap in time: each began its clock anew. They count one after the other in the order given, {:.0f} s "
-    "apart; what heats, drifts or happens between them is known as well as that is."
+    "The logs overlap in time, so each one has its own clock. They are taken one after the other in the given order, "
+    "{:.0f} s apart. Results on heating and drift depend on this assumption."
 )
 _UNDATED = (
-    "The held-out logs overlap the others in time: they count as recorded {:.0f} s after them. What changes with time "
-    "may be otherwise there: where they speak against it, it is kept all the same."
+    "The held-out logs overlap the others in time. They are taken as recorded {:.0f} s later. Time-dependent findings "
+    "are kept even if the held-out logs contradict them."
 )
 
 
@@ -138,9 +138,9 @@ def before_it(logs: Sequence[Log], motion: Log, start: float, shifts: Sequence[f
         late = [log for log in placed if log.t[0] > begun.t[0]]
         if late:
             raise InputError(
-                "a log of what came before that comes after the motion",
+                "a log given as earlier motion (--before) starts after the predicted motion",
                 file=late[0].metadata.get("file", late[0].name or None),
-                allowed="logs that end before the motion begins, on one clock, or that each begin their clock anew",
+                allowed="logs that end before the motion starts, or logs that each have their own clock",
             )
         return sorted(placed, key=lambda log: float(log.t[0])), ""
     *earlier, last = on_one_clock([*logs, motion])
@@ -148,11 +148,11 @@ def before_it(logs: Sequence[Log], motion: Log, start: float, shifts: Sequence[f
     return [replace(log, t=log.t + shift) for log in earlier], _ANEW.format(UNKNOWN_PAUSE)
 
 
-_ANEW = "the clocks of those logs and the motion's each began anew: they count in the order given, {:.0f} s apart"
+_ANEW = "each of these logs has its own clock: they are taken in the given order, {:.0f} s apart"
 
 _LATER = (
-    "The log overlaps in time those that the model was fitted to, in which something changed: it counts as recorded "
-    "{:.0f} s after them."
+    "The log overlaps in time with those of the model's fit, and the model changes with time. The log is taken as "
+    "recorded {:.0f} s after them."
 )
 
 
@@ -163,9 +163,11 @@ def _refuse_copies(logs: Sequence[Log], held_out: Sequence[Log]) -> None:
             if _same(log, other):
                 unseen = i < len(logs) <= k
                 raise InputError(
-                    "the held-out log is one of the logs that are fitted to" if unseen else "the log is given twice",
+                    "the held-out log is also one of the logs for the fit" if unseen else "the log is given twice",
                     file=log.metadata.get("file", log.name or None),
-                    remedy="hold out a log of another motion" if unseen else "name it once: it would count double",
+                    remedy="hold out a log of another motion"
+                    if unseen
+                    else "give it once; otherwise it would count twice",
                 )
 
 

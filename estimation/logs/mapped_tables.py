@@ -124,7 +124,7 @@ def _converted(
     if entry.unit == "%":
         if entry.rated is None:
             raise InputError(
-                f"the mapping gives {quantity.prefix} in % without `rated`",
+                f"the mapping states {quantity.prefix} in % but lacks `rated`",
                 file=table.path,
                 column=name,
                 remedy="state the rated values [N m, N or A] of all joints",
@@ -189,7 +189,7 @@ def _value(table: Table, name: str) -> Column:
     if name not in table.columns:
         present = ", ".join((*table.names, *table.skipped))
         raise InputError(
-            "the mapping names a column that is not there",
+            "the mapping names a column that the file does not have",
             file=table.path,
             column=name,
             allowed=present[:300] + (" ..." if len(present) > 300 else ""),

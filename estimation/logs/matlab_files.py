@@ -126,7 +126,7 @@ def _read_new(path: Path) -> dict[str, NDArray[Any]]:
 def _unreadable(path: Path, error: Exception) -> InputError:
     text = str(error).splitlines()
     return InputError(
-        f"not a MAT file that can be read ({text[0] if text else type(error).__name__})",
+        f"the MAT file cannot be read ({text[0] if text else type(error).__name__})",
         file=path,
-        remedy="save it again in MATLAB, as arrays or a structure of arrays: tables and time series cannot be read",
+        remedy="save numeric arrays or a structure of arrays; MATLAB tables and time series are not supported",
     )

@@ -110,7 +110,9 @@ def read_logs(
     def read(path: str | PathLike[str], mapping: LogMapping | str | PathLike[str] | None) -> Log:
         real = os.path.realpath(path)
         if real in seen:
-            raise InputError("the log is given twice", file=path, remedy="name each log once: it would count double")
+            raise InputError(
+                "the log is given twice", file=path, remedy="give each log once; otherwise it would count twice"
+            )
         seen.add(real)
         log = read_log(path, n, mapping=mapping, joints=joints)
         if logs and log.n != logs[0].n:

@@ -132,7 +132,9 @@ def read_gear_load(data: Mapping[str, Any], robot: Robot) -> ExtraGearLoad:
         effect, joint = find_effect(str(item["effect"])), item["joint"]
         values = [np.array(item[key], dtype=float) for key in ("shape", "coefficients")]
         if not effect.borne or joint not in effect.joints(robot):
-            raise InputError(f"borne_by_gears: {effect.name} on joint {joint}", allowed="an effect that gears bear")
+            raise InputError(
+                f"borne_by_gears: {effect.name} on joint {joint}", allowed="an effect whose torque loads the gear"
+            )
         sizes = (len(effect.shapes),), (len(effect.parameters(robot, joint)),)
         if tuple(v.shape for v in values) != sizes or not all(np.isfinite(v).all() for v in values):
             raise InputError(f"borne_by_gears: values of {effect.name} that do not fit it")

@@ -76,7 +76,7 @@ def require_described(data: Mapping[str, Any]) -> None:
     """
     if "limits" not in data:
         raise InputError(
-            "has effects, but not the robot's limits, to which some of them refer",
+            "the model has effects but lacks the robot's limits, which some of them need",
             remedy="it was written by another version: diagnose the logs again",
         )
 

@@ -60,7 +60,9 @@ class MethodTable:
 
     def summary(self) -> str:
         """Gives a line per estimator: error per joint, their mean, what it determines, and its time."""
-        lines = ["unseen error over torque, standard deviations [%]; mean; parameters determined; seconds"]
+        lines = [
+            "error on held-out data / torque, standard deviations [%] per joint; mean; determined parameters; time"
+        ]
         for row in self.rows:
             if row.problem:
                 lines.append(f"  {row.method:12} {row.problem}")

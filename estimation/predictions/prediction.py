@@ -105,11 +105,11 @@ class Prediction:
         """Gives the error per joint, where torque was logged."""
         samples = len(self.motion)
         if self.measured is None:
-            return f"torques of {samples} samples; the log has none to compare with"
+            return f"torques of {samples} samples; the log has no torques to compare with"
         limited = f"below {self.cutoff:.3g} Hz"
         lines = [
             f"torques of {samples} samples",
-            f"  joint                  error RMS   over RMS   std over std  {limited:>14}  within the 95 % band",
+            f"  joint                  error RMS     / RMS       std / std  {limited:>14}   in the 95 % band",
         ]
         columns = (self.error_rms, self.nrmse, self.relative_spread, self.band_limited_spread, self.band_coverage)
         for j, (name, rms, *shares) in enumerate(zip(self.joint_names, *columns, strict=True), start=1):
@@ -188,7 +188,7 @@ def predict(
     robot = model.robot
     if log.n != robot.n:
         raise InputError(
-            f"{log.n} joints", file=log.metadata.get("file"), allowed=f"{robot.n}, as the model of {robot.name} has"
+            f"{log.n} joints", file=log.metadata.get("file"), allowed=f"{robot.n}, as in the model of {robot.name}"
         )
     cutoff = float(model.provenance.get("cutoff_hz", 10.0))
     motion = smooth(resample(log.t, log.q), _smoother(model, cutoff))
@@ -242,17 +242,26 @@ def warmed(model: Model, before: Sequence[Log], log: Log, later: float) -> tuple
     """
     if not model.keeps_heat:
         if before:
-            raise InputError("the model has no heat", remedy="fit one with oed thermal, or leave out what came before")
+            raise InputError(
+                "the model has no thermal part",
+                remedy="use a model of oed thermal, or remove the earlier logs (--before)",
+            )
         return [], ""
     if not before:
         return [], COLD
     shifts = [clock_of(model, own)[0] for own in before]
     placed, anew = before_it(before, log, float(log.t[0]) + later, shifts)
     count = "one log" if len(before) == 1 else f"{len(before)} logs"
-    return placed, f"heat: warmed by {count} before, beginning cold{f'; {anew}' if anew else ''}"
+    return (
+        placed,
+        (
+            f"thermal friction: initial temperatures from {count} before; the first is assumed to start "
+            f"cold{f'; {anew}' if anew else ''}"
+        ),
+    )
 
 
-COLD = "heat: the motion is taken to begin cold; --before says what warmed the robot"
+COLD = "thermal friction: the robot is assumed cold at the start; give earlier logs with --before if it was warm"
 
 
 def _smoother(model: Model, cutoff: float) -> Smoother:

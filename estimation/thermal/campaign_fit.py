@@ -66,8 +66,8 @@ def fit_campaign(
         model: where to begin; identified from the logs by default.
         sensor: where joint temperatures, if any, were measured: ``motor`` or ``housing``.
         width: of the short times [s].
-        start: ``ambient`` or ``free``. Where a campaign does not start cold, friction at T0 is extrapolated: `free`
-            finds it only if cooling or several powers are in the logs. A contradiction is told.
+        start: ``ambient`` or ``free``. If a campaign does not start cold, friction at T0 is
+            extrapolated: `free` finds it only with cooling phases or several powers. A contradiction gives a note.
         seed: of the thermal searches.
         progress: is told how far it is.
 
@@ -129,7 +129,11 @@ class _Turns:
             bar.update(2.0 + rounds, f"friction changed by {change:.1e}")
             if change < SETTLED:
                 break
-        notes = [] if change < SETTLED else [f"The turns ended at a change of {change:.1e}, before they had settled."]
+        notes = (
+            []
+            if change < SETTLED
+            else [f"The alternating fit stopped before it converged (last relative change {change:.1e})."]
+        )
         notes += sorted({note for fit in fits if fit is not None for note in fit.notes})
         notes += self._warm(fits, options)
         final = [None if fit is None else self._unit(fit) for fit in fits]
@@ -161,7 +165,7 @@ class _Turns:
         for j, (sums, fit) in enumerate(zip(self.condensed.joints, fits, strict=True)):
             if fit is not None:
                 tried = fit_thermal(self._runs(j, sums), starts=1, **{**options, "start": "auto"})
-                found += [note for note in tried.notes if "does not start" in note]
+                found += [note for note in tried.notes if "does not start at ambient temperature" in note]
         return found
 
     def _solve_linear(self) -> None:

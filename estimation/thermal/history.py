@@ -64,7 +64,7 @@ def _rest(
         raise InputError(
             "logs that overlap in time",
             file=None if log is None else log.metadata.get("file"),
-            allowed="one clock for all logs, those before ending before the next begins",
+            allowed="logs on one clock, each ending before the next begins",
         )
     first = None if around is None else float(np.ravel(around)[0])
     return [

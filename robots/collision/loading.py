@@ -99,6 +99,7 @@ def _warn(robot: Robot, capsules: tuple[Capsule, ...], reason: str) -> None:
     if assumed and key not in _warned:
         _warned.add(key)
         message = (
-            f"{robot.name}: the shapes of its links are assumed ({reason}{', '.join(assumed)}), no source backs them"
+            f"{robot.name}: the link shapes for collision checks are assumed values without a source "
+            f"({reason}{', '.join(assumed)})"
         )
         warnings.warn(message, AssumedValueWarning, stacklevel=3)

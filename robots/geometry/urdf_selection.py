@@ -77,7 +77,7 @@ def select(tree: _Tree, tip: str | None, joints: Sequence[str] | None, locked: M
             f"the joint lies on the chain but mimics {follower.mimic and follower.mimic[0]!r}",
             file=tree.file,
             joint=follower.name,
-            allowed="joints that move by themselves",
+            allowed="joints that move independently",
             remedy="choose the moving joints by name (joints), or lock it (locked)",
         )
     return Selection(moving=moving, tip=tip or _flange(tree, moving), locked=values)
@@ -112,7 +112,7 @@ def _by_names(tree: _Tree, names: Sequence[str], tip: str | None, locked: Mappin
     moving = tuple(_known(tree, name) for name in names)
     for joint in moving:
         if not joint.moves:
-            raise InputError("a fixed joint cannot be a moving one", file=tree.file, joint=joint.name)
+            raise InputError("a fixed joint cannot be selected as a moving joint", file=tree.file, joint=joint.name)
         if joint.name in locked:
             raise InputError("the joint is both moving and locked", file=tree.file, joint=joint.name)
         if list(names).count(joint.name) > 1:

@@ -94,7 +94,7 @@ class PlantHeat:
         for piece in pieces[1:]:
             rest = float(piece.edges[0]) - last
             if rest < -1e-9:
-                raise InputError("a motion that begins before the last one ends", allowed="times that go on [s]")
+                raise InputError("a motion begins before the last one ends", allowed="increasing times [s]")
             if rest > 1e-9:
                 steps.append(np.array([rest]))
                 powers.append(np.zeros((1, piece.power.shape[1])))

@@ -69,7 +69,9 @@ def load_plant(path: str | PathLike[str], robot: Robot) -> Plant:
         thermal = config.thermal
         heat = None if thermal is None else plant_heat(robot, **thermal.model_dump())
         if heat is not None and any(e.effect == "thermal_friction" for e in config.effects):
-            raise InputError("both thermal and the effect thermal_friction", column="thermal", allowed="one of them")
+            raise InputError(
+                "both thermal and the effect thermal_friction", column="thermal", allowed="only one of them"
+            )
         plant = nominal_plant(
             robot,
             friction=config.friction,

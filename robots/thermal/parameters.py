@@ -49,7 +49,13 @@ ALPHA = ThermalParameter(
     name="alpha", unit="1/K", lower=-0.2, upper=0.0, typical=-0.01, positive=False, meaning="slope of the friction"
 )
 BETA = ThermalParameter(
-    name="beta", unit="1", lower=0.2, upper=5.0, typical=1.0, positive=True, meaning="friction at T0 over its reference"
+    name="beta",
+    unit="1",
+    lower=0.2,
+    upper=5.0,
+    typical=1.0,
+    positive=True,
+    meaning="friction at T0 divided by its reference",
 )
 
 

@@ -176,7 +176,7 @@ def _finding(value: float, error: float, joint: int | None, period: float, joint
         severity="warning" if abs(value) > period else "info",
         text=f"{who} {verb} the position by {1e3 * abs(value):.3g} ms ({abs(value) / period:.2g} samples, "
         f"standard error {1e3 * error:.2g} ms)",
-        action="friction and damping take it up: log both on one clock, or shift the torque back",
+        action="a delay distorts friction and damping: log position and torque on one clock, or shift the torque",
         value=value,
         unit="s",
         joint=joint,

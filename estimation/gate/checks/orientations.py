@@ -68,9 +68,10 @@ def check_orientations(robot: Robot, rows: Rows, spread: Array) -> list[Finding]
         Finding(
             name="position_sign",
             severity="refuse" if better > CERTAIN else "warning",
-            text=f"{robot.joint_names[joint]} seems to turn the other way than the robot's description says: with its "
-            f"position{' and torque' if with_torque else ''} turned, errors are {smaller:.3g} % smaller",
-            action="turn its sign in a mapping (`sign: -1`), or correct the description",
+            text=f"{robot.joint_names[joint]} seems to turn opposite to the robot's description: with opposite sign "
+            f"of its "
+            f"position{' and torque' if with_torque else ''} errors are {smaller:.3g} % smaller",
+            action="set `sign: -1` for it in a mapping (--mapping), or correct the description",
             value=smaller,
             unit="%",
             column=f"q{joint + 1}",

@@ -59,10 +59,9 @@ def check_repeats(log: Log, columns: Columns) -> tuple[list[Finding], NDArray[np
                 name="repeated_rows",
                 severity="warning" if share > REPEATED else "info",
                 text=f"{100 * share:.3g} % of the rows repeat the row before while the arm moves",
-                action="these rows are left out; have the logger write each message once"
+                action="these rows are ignored; make the logger write each message once"
                 if len(copies)
-                else "repeated positions are left out of the smoothing; "
-                "have the logger write each message once if there are many",
+                else "repeated positions are ignored in the smoothing; make the logger write each message once",
                 value=100 * share,
                 unit="%",
                 row=first + 2,
@@ -121,8 +120,8 @@ def _stuck(columns: Columns, moving: NDArray[np.bool_]) -> list[Finding]:
                 Finding(
                     name="stuck",
                     severity="warning",
-                    text=f"holds one value for {length + 1} rows while the arm moves, and jumps then",
-                    action="the log is cut there; repair the logger",
+                    text=f"keeps one value for {length + 1} rows while the arm moves, and then jumps",
+                    action="the log is split there; repair the logger",
                     value=float(length + 1),
                     unit="rows",
                     column=f"{prefix}{joint + 1}",

@@ -67,8 +67,11 @@ def check_resolution(columns: Columns) -> list[Finding]:
                 Finding(
                     name="quantised_position",
                     severity="warning" if travel / step < COARSE_POSITION / 5 else "info",
-                    text=f"steps of {step:.3g}, {travel / step:.0f} of them in its whole range",
-                    action="smoothed before it is differentiated; log positions with more digits",
+                    text=(
+                        f"coarse resolution: steps of {step:.3g}, only {travel / step:.0f} of them over the whole "
+                        f"motion"
+                    ),
+                    action="the position is smoothed before differentiation; log positions with more digits",
                     value=step,
                     unit="rad or m",
                     column=f"q{joint + 1}",
@@ -83,8 +86,10 @@ def check_resolution(columns: Columns) -> list[Finding]:
                 Finding(
                     name="quantised_torque",
                     severity="warning" if step > spread else "info",
-                    text=f"steps of {step:.3g}, {100 * step / spread:.3g} % of its standard deviation",
-                    action="counts as noise; log it with more digits",
+                    text=(
+                        f"coarse resolution: steps of {step:.3g}, {100 * step / spread:.3g} % of its standard deviation"
+                    ),
+                    action="treated as noise; log it with more digits",
                     value=step,
                     unit="A" if name == "i" else "N m or N",
                     column=f"{name}{joint + 1}",
@@ -134,11 +139,11 @@ def check_clipping(columns: Columns) -> list[Finding]:
                 Finding(
                     name="zero_torque" if off else "clipped",
                     severity="warning",
-                    text=f"piles up at {' and '.join(f'{value:.6g}' for value in at_limit)}: "
+                    text=f"stays at {' and '.join(f'{value:.6g}' for value in at_limit)}: "
                     f"{100 * share:.3g} % of the rows, up to {run} in a row",
-                    action="leave the rows out in which the drive is off"
+                    action="remove the rows in which the drive is off"
                     if off
-                    else "leave these rows out, or record a slower motion that stays below the limit",
+                    else "the signal is probably saturated: remove these rows, or record a slower motion",
                     value=100 * share,
                     unit="%",
                     column=f"{name}{joint + 1}",

@@ -74,10 +74,11 @@ def check_signs(
             Finding(
                 name="torque_sign",
                 severity="refuse" if sure else "warning",
-                text=f"by this torque the joint has an inertia of {found.inertia:.3g} (standard error "
-                f"{found.inertia_error:.2g}) and its friction takes {found.loss:.3g} W "
-                f"({found.loss_error:.2g}): " + ("its sign is turned" if sure else "it drives where it should brake"),
-                action="turn the sign of the torque, or of the position, of this joint: `sign: -1` in a mapping",
+                text=f"implausible: with this torque the joint's inertia is {found.inertia:.3g} (standard error "
+                f"{found.inertia_error:.2g}) and its friction power is {found.loss:.3g} W "
+                f"({found.loss_error:.2g}): "
+                + ("its sign is inverted" if sure else "it accelerates instead of braking"),
+                action="set `sign: -1` for the torque, or the position, of this joint in a mapping (--mapping)",
                 value=found.loss,
                 unit="W",
                 column=f"{name}{joint}",
@@ -91,9 +92,10 @@ def _against_time(found: JointPhysics, name: str, joint: int) -> Finding:
     return Finding(
         name="negative_friction",
         severity="refuse",
-        text=f"friction gives {-found.loss:.3g} W (standard error {found.loss_error:.2g}) instead of taking power, "
-        "while the inertia is positive: the time runs backward, or the friction was compensated beyond its size",
-        action="check the order of the rows and what the torque column holds",
+        text=f"friction delivers {-found.loss:.3g} W (standard error {found.loss_error:.2g}) instead of consuming "
+        f"power, "
+        "but the inertia is positive: time runs backwards, or friction was overcompensated",
+        action="check the order of the rows and the meaning of the torque column",
         value=found.loss,
         unit="W",
         column=f"{name}{joint}",
@@ -122,9 +124,9 @@ def _external(found: JointPhysics, name: str, joint: int) -> Finding:
     return Finding(
         name="moved_by_others",
         severity="refuse",
-        text=f"this torque holds the joint against gravity but does not accelerate it: it has an inertia of "
-        f"{found.inertia:.3g} by it (standard error {found.inertia_error:.2g})",
-        action="record a motion that the drives make, not one by hand or of another arm",
+        text=f"this torque balances gravity but does not accelerate the joint: the estimated inertia is "
+        f"{found.inertia:.3g} (standard error {found.inertia_error:.2g})",
+        action="record a motion made by the drives, not one guided by hand",
         value=found.inertia,
         unit="kg m2",
         column=f"{name}{joint}",

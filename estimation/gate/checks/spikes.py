@@ -123,7 +123,7 @@ def check_spikes(columns: Columns) -> tuple[list[Finding], NDArray[np.intp]]:
         columns: of the log.
 
     Returns:
-        The findings, and the rows in which any column sticks out.
+        The findings, and the rows with an outlier in any column.
     """
     findings: list[Finding] = []
     rows: list[NDArray[np.intp]] = []
@@ -136,11 +136,10 @@ def check_spikes(columns: Columns) -> tuple[list[Finding], NDArray[np.intp]]:
             Finding(
                 name="spikes",
                 severity="refuse" if many and prefix == "q" else "warning",
-                text=f"{len(found)} row{'s stick' if len(found) > 1 else ' sticks'} out of "
-                f"{'their' if len(found) > 1 else 'its'} neighbours, the first with "
-                f"{float(column[found[0]]):.6g} between {float(column[found[0] - 1]):.6g} and "
-                f"{float(column[found[0] + 1]):.6g}",
-                action="repair the logger: too many to leave out" if many else "these rows are left out",
+                text=f"{len(found)} outlier{'s' if len(found) > 1 else ''}, the first with "
+                f"{float(column[found[0]]):.4g} between {float(column[found[0] - 1]):.4g} and "
+                f"{float(column[found[0] + 1]):.4g}",
+                action="too many to ignore: repair the logger" if many else "these rows are ignored",
                 value=float(len(found)),
                 unit="rows",
                 column=f"{prefix}{joint + 1}",

@@ -73,14 +73,14 @@ def check_stalls(log: Log) -> Stalls:
         even, late = log.t, none
     if not len(late) + len(left_out):
         return Stalls((), log.t, none)
-    done = [f"{len(late)} are put back evenly"] if len(late) else []
-    done += [f"{len(left_out)}, with others missing, are left out"] if len(left_out) else []
+    done = [f"{len(late)} are moved to uniform times"] if len(late) else []
+    done += [f"{len(left_out)} are ignored because others are missing"] if len(left_out) else []
     finding = Finding(
         name="late_rows",
         severity="warning" if len(late) + len(left_out) > FEW * len(log) else "info",
-        text=f"the logger stalled {f'{len(begins)} times' if len(begins) > 1 else 'once'}, for up to "
-        f"{steps[begins].max():.3g} s, and then wrote rows faster than they were measured",
-        action=f"of these rows {' and '.join(done)}; have the controller stamp them",
+        text=f"the logger stopped {f'{len(begins)} times' if len(begins) > 1 else 'once'}, for up to "
+        f"{steps[begins].max():.3g} s, and then wrote the delayed rows with late time stamps",
+        action=f"of these rows, {' and '.join(done)}; let the controller write the time stamps",
         value=float(len(late) + len(left_out)),
         unit="rows",
         column="t",
@@ -105,8 +105,8 @@ def _rounded(log: Log, period: float) -> Stalls | None:
     finding = Finding(
         name="rounded_times",
         severity="info",
-        text=f"times are those of rows {1e3 * step:.4g} ms apart, rounded to {1e3 * resolution:.3g} ms",
-        action="rows are put at even times; have more digits written",
+        text=f"times are rounded to {1e3 * resolution:.3g} ms; the sample period is {1e3 * step:.4g} ms",
+        action="rows are moved to uniform times; log the time with more digits",
         value=1e3 * resolution,
         unit="ms",
         column="t",

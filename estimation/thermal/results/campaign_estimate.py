@@ -51,7 +51,7 @@ class CampaignEstimate:
 
     def summary(self) -> str:
         """Gives each joint's error with and without heat, and its time constants."""
-        lines = ["  joint   error with heat   without     slow / fast at full power   cold over warm"]
+        lines = ["  joint   error with heat   without     slow / fast at full power   cold / warm"]
         for j, fit in enumerate(self.thermal):
             head = f"  {j + 1:5} {self.residual_rms[j]:14.4g} {self.residual_without[j]:11.4g}"
             if fit is None:

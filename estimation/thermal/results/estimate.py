@@ -232,7 +232,9 @@ def load_thermal_model(path: str | PathLike[str]) -> ThermalModel:
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
         if data["format"] != FORMAT or data["format_version"] != 1:
-            raise InputError("is no thermal model file of this version", file=file, allowed=f'"format": "{FORMAT}"')
+            raise InputError("is not a thermal model file of this version", file=file, allowed=f'"format": "{FORMAT}"')
         return build_thermal_model(data["model"])
     except (UnicodeDecodeError, json.JSONDecodeError, AttributeError, KeyError, TypeError) as error:
-        raise InputError(f"is no thermal model file: {type(error).__name__} {error}", file=file) from error
+        raise InputError(
+            f"is not a thermal model file, or is damaged ({type(error).__name__}: {error})", file=file
+        ) from error

@@ -99,10 +99,10 @@ def _slow(
     bound = slow_bound(
         search.problem, solution, search.free, search.weights, search.prior, powers[0], slow.value, info.colour
     )
-    why = "The log is too short for" if slow.value > longest / 1.5 else "The data hardly determine"
+    why = "The data are too short for" if slow.value > longest / 1.5 else "The data do not determine"
     text = (
-        f"{why} the {slow.name}: {longest / 60:.3g} min of data, an estimate of {slow.value / 60:.3g} min. It is "
-        f"above {bound / 60:.3g} min (95 %, profile likelihood)."
+        f"{why} the {slow.name}. It is "
+        f"at least {bound / 60:.3g} min (95 %, profile likelihood); the longest run has {longest / 60:.3g} min."
     )
     return {slow.name: bound}, [text]
 
@@ -111,18 +111,18 @@ def _remarks(search: Search, solution: Solution, parameters: tuple[Quantity, ...
     remarks = []
     for r in warm:
         start = ", ".join(f"{value:.1f}" for value in search.layout.start_at(solution.coordinates, r))
-        remarks.append(f"{search.runs[r].name} does not start at the surroundings' temperature but at {start} degC.")
+        remarks.append(f"{search.runs[r].name} does not start at ambient temperature; estimated start: {start} degC.")
     lower, upper = search.layout.bounds()
     for i, parameter in enumerate(search.kind.parameters):
         edge = min(abs(solution.coordinates[i] - lower[i]), abs(solution.coordinates[i] - upper[i]))
         if search.free[i] and edge < 1e-3 and not (parameter.lower == 0.0 and parameter.name != "alpha"):
             value = search.layout.values_at(solution.coordinates)[parameter.name]
-            remarks.append(f"{parameter.name} is at its bound, {value:.4g}.")
+            remarks.append(f"{parameter.name} is at its bound {value:.3g}.")
     lost = [p.name for p in parameters if not p.determined and p.name not in search.structure.conventions]
     if lost and not search.structure.conventions:
         remarks.append(f"Not determined by these runs: {', '.join(lost)}.")
     if not solution.success:
-        remarks.append(f"The solver did not confirm a minimum: {solution.status}.")
+        remarks.append("The fit stopped before it converged; check its plot.")
     return remarks
 
 

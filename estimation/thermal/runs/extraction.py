@@ -62,7 +62,7 @@ def friction_signal(model: Model, log: Log) -> FrictionSignal:
     require_plain([log], HEAT)
     own = np.array([column.term == "friction" for column in model.parameters])
     if not own.any():
-        raise InputError("a model without friction", allowed="one whose terms have friction")
+        raise InputError("a model without friction", allowed="a model with a friction term")
     tau = torque_of(model.robot, log)
     motion = smooth(resample(log.t, log.q), float(model.provenance.get("cutoff_hz", 10.0)))
     parts = []

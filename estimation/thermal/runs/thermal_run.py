@@ -71,7 +71,7 @@ class ThermalRun:
             known = np.isfinite(friction)
             if np.isinf(friction).any() or not np.all(np.isfinite(cold[known]) & (cold[known] != 0.0)):
                 raise self._error(
-                    "a friction torque has no cold friction to be compared with", "cold_friction", "not zero"
+                    "a friction torque was measured where the cold friction is zero", "cold_friction", "not zero"
                 )
             object.__setattr__(self, "friction", friction)
         if not np.all(np.isfinite(weight) & (weight > 0.0)):
@@ -97,9 +97,9 @@ class ThermalRun:
             object.__setattr__(self, "ambient", around)
             self._check_fahrenheit()
         if not self.has_friction and not any(np.isfinite(values).any() for values in readings.values()):
-            raise self._error("neither friction nor temperatures were measured", "friction", "one of them")
+            raise self._error("the run has neither friction nor temperatures", "friction", "one of them")
         if self.power is None and self.has_friction:
-            raise self._error("friction is known, but not the power that it takes", "power", "watts")
+            raise self._error("the run has friction but no friction power", "power", "watts")
 
     @property
     def has_friction(self) -> bool:

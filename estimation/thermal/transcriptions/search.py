@@ -126,7 +126,10 @@ class Search:
         usable = [solution for solution in found if np.isfinite(solution.cost)]
         best = min(usable, key=lambda solution: solution.cost, default=None)
         if best is None:
-            raise SolverError("thermal model: no start led to a minimum", remedy="check units of power and torque")
+            raise SolverError(
+                "thermal model: the fit converged from none of its starting points",
+                remedy="check the units of power and torque",
+            )
         return best
 
     def reweighted(self, solution: Solution) -> Solution:

@@ -48,11 +48,11 @@ def check_names(names: Sequence[str], line: str, path: Path, row: int) -> None:
     """
     if len(names) == 1 and " " in line.strip():
         raise InputError(
-            "columns are separated by spaces",
+            "the columns are separated by spaces",
             file=path,
             row=row,
             allowed="commas, semicolons or tabs",
-            remedy="export the file with commas",
+            remedy="export the file with commas as separators",
         )
     if all(is_number(name) for name in names):
         raise InputError(
@@ -123,7 +123,7 @@ def find_fault(
             return InputError(f"not a line of a CSV file ({error})", file=path, row=row)
         if len(cells) != len(names):
             return InputError(
-                f"{len(cells)} cells, but the header has {len(names)} columns",
+                f"{len(cells)} values, but the header has {len(names)} columns",
                 file=path,
                 row=row,
                 allowed=f"{len(names)} cells",

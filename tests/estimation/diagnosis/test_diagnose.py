@@ -184,7 +184,7 @@ def test_noise_that_is_a_third_of_the_torque_is_said(arm: Robot, fourier_motion:
     )
     result = diagnose(arm, loud, candidates=("payload_change",), friction=SIMPLE)
     assert result.verdict == "none"
-    (note,) = (note for note in result.notes if "counts as noise" in note)
+    (note,) = (note for note in result.notes if "treated as noise" in note)
     assert note.startswith("Joint 2: ")
 
 

@@ -204,7 +204,7 @@ def test_a_pull_moves_no_value_without_widening_its_interval(arm, arm_log):
     # The residual, and with it the noise, is that of the pulled fit.
     np.testing.assert_allclose(np.sqrt(np.diag(rest)), np.sqrt(np.diag(free.model.covariance)), rtol=0.5)
     assert (np.abs(moved) <= np.sqrt(np.diag(pulled.model.covariance))).all()
-    assert any("what it moves each value by" in text for text in pulled.warnings)
+    assert any("the shift by the regularisation" in text for text in pulled.warnings)
 
 
 def test_parameters_at_their_bounds_are_named(arm, arm_log):

@@ -49,7 +49,7 @@ def test_only_logs_that_overlap_are_moved() -> None:
     both = put_on_clock([early, unseen], [])
     assert both.dated
     assert [log.t[0] for log in both.logs] == [0.0, pytest.approx(61.0)]
-    assert "in the order given" in both.notes[0]
+    assert "in the given order" in both.notes[0]
 
 
 def test_a_copy_is_refused() -> None:
@@ -57,7 +57,7 @@ def test_a_copy_is_refused() -> None:
     log = replace(_log(0.0, 11), name="first")
     with pytest.raises(InputError, match="given twice"):
         put_on_clock([log, replace(log, t=log.t + 20.0)], [])
-    with pytest.raises(InputError, match="fitted to"):
+    with pytest.raises(InputError, match="also one of the logs for the fit"):
         put_on_clock([log], [log])
     assert log.tau is not None
     again = replace(log, tau=log.tau + 1.0)

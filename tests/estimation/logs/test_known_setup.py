@@ -181,6 +181,6 @@ def test_what_does_not_know_a_payload_or_a_gravity_refuses_it(
     """One error that names the column, before any work."""
     log = build(0)
     changed = replace(log, **{stated: TILTED if stated == "gravity" else point_mass(MASS, CENTRE)})
-    with pytest.raises(InputError, match=f"states a {stated}, which .* does not know") as caught:
+    with pytest.raises(InputError, match=f"states a {stated}, which .* cannot use") as caught:
         use(upright, two[1].model, changed)
     assert caught.value.column == stated

@@ -75,7 +75,7 @@ def test_a_log_of_positions_is_enough(model, arm_log):
     assert np.isnan(blind.error_rms).all()
     assert np.isnan(blind.nrmse).all()
     assert blind.to_dict()["nrmse"] == [None, None]
-    assert "none to compare with" in blind.summary()
+    assert "no torques to compare with" in blind.summary()
     assert np.array_equal(blind.predicted, predict(model, log).predicted)
 
 

@@ -92,7 +92,7 @@ def test_a_gear_bears_the_spring_behind_it(robot: Robot) -> None:
 def test_an_effect_of_the_past_is_refused(robot: Robot) -> None:
     """A limit that is watched instant by instant cannot count heat."""
     model = default_model(robot, velocity_scale=WIDTH)
-    with pytest.raises(InputError, match="depends on the past"):
+    with pytest.raises(InputError, match="depends on the motion's history"):
         TorqueLimit(model, model.nominal, robot.limits.torque, effects=(HEAT,))
 
 

@@ -71,7 +71,7 @@ def done(robot: Path, logs: Path, tmp_path_factory: pytest.TempPathFactory) -> P
     result = CliRunner().invoke(app, [str(part) for part in line])
     assert result.exit_code == 0, result.output
     assert "slow / fast" in result.output
-    assert "only their ratios are determined" in result.output
+    assert "only the ratios of alpha to heat exchanges" in result.output
     return out
 
 
@@ -114,7 +114,7 @@ def test_what_warmed_the_robot_needs_a_model_with_heat(
 ) -> None:
     """--before with a model without heat, or with logs that come later, is refused with code 2."""
     line = ("predict", "--log", logs / "0.parquet", "--before", logs / "1.parquet", "--out", tmp_path / "tau.csv")
-    for model, message in ((experiment, "the model has no heat"), (done, "overlap in time")):
+    for model, message in ((experiment, "the model has no thermal part"), (done, "overlap in time")):
         ended = run(*line, "--model", model)
         assert ended.code == 2
         assert message in ended.err
