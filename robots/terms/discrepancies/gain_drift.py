@@ -34,7 +34,7 @@ class GainDrift(OverTime):
     """
 
     name: ClassVar[str] = "pattern:fading:0:even"
-    title: ClassVar[str] = "torque of all joints that changes by the same share with time"
+    title: ClassVar[str] = "common gain drift of all torque signals"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the shares of the half waves."""
@@ -56,8 +56,9 @@ class GainDrift(OverTime):
         """Says what is seen."""
         share = half_waves(np.linspace(0.0, 1.0, 201)) @ coefficients
         return (
-            "The torque of all joints changes slowly with time, by the same share of each: over the logs it differs by "
-            f"{100 * float(np.ptp(share)):.2g} %. A supply, or what all amplifiers are measured by, does that."
+            "The torque signals of all joints change slowly with time by the same factor; the total change over the "
+            "logs is "
+            f"{100 * float(np.ptp(share)):.2g} %. Likely cause: the supply, or a common reference of the amplifiers."
         )
 
 

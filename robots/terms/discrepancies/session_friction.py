@@ -26,7 +26,7 @@ class SessionFriction(OverTime):
     """
 
     name: ClassVar[str] = "pattern:daily:0:odd"
-    title: ClassVar[str] = "friction of all joints that differs from log to log"
+    title: ClassVar[str] = "friction that differs between logs"
 
     def joints(self, robot: Robot) -> tuple[int | None, ...]:
         """Names the whole robot: no joint alone is another."""
@@ -67,9 +67,9 @@ class SessionFriction(OverTime):
         k, j = np.unravel_index(int(np.argmax(np.abs(shares))), shares.shape)
         most, way = shares[k, j], "more" if shares[k, j] > 0 else "less"
         return (
-            "The friction of the joints differs from log to log, most on joint "
-            f"{j + 1} with {100 * abs(most):.2g} % {way} than in the first: they were warmer or colder, or something "
-            "was done to them between."
+            "The friction of the joints differs between the logs, most on joint "
+            f"{j + 1} with {100 * abs(most):.2g} % {way} than in the first log. Likely cause: another temperature, or "
+            f"maintenance between the logs."
         )
 
 

@@ -66,7 +66,7 @@ class Backlash(Effect):
     """
 
     name: ClassVar[str] = "backlash"
-    title: ClassVar[str] = "play in the gear (backlash)"
+    title: ClassVar[str] = "gear backlash"
     loaded: ClassVar[bool] = True
     kicks: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
@@ -182,8 +182,9 @@ class Backlash(Effect):
     ) -> str:
         """Says what the values mean."""
         return (
-            f"The gear of joint {joint} has a play of {2 * coefficients[0]:.3g} {length}: its link changes sides when "
-            f"the load changes sign."
+            f"The gear of joint {joint} has {2 * coefficients[0]:.3g} {length} of backlash; the link moves through it "
+            f"when "
+            "the load changes sign."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

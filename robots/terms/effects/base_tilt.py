@@ -33,7 +33,7 @@ class BaseTilt(Effect):
     """
 
     name: ClassVar[str] = "base_tilt"
-    title: ClassVar[str] = "a base that is not level"
+    title: ClassVar[str] = "tilted base"
     borne: ClassVar[bool] = True
     whole_robot: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = OWN
@@ -86,7 +86,7 @@ class BaseTilt(Effect):
     ) -> str:
         """Says what the values mean."""
         angle = np.degrees(np.hypot(*coefficients[:2]))
-        return f"The base is tilted by {angle:.3g} deg: gravity does not pull where the description says."
+        return f"The base is tilted by {angle:.3g} deg relative to the robot's description."
 
 
 def upright(robot: Robot) -> bool:

@@ -42,7 +42,7 @@ class ExternalContact(Effect):
     """
 
     name: ClassVar[str] = "external_contact"
-    title: ClassVar[str] = "an external contact"
+    title: ClassVar[str] = "external contact"
     borne: ClassVar[bool] = True
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
@@ -179,25 +179,26 @@ class ExternalContact(Effect):
         if on_body(shape):
             push = float(np.linalg.norm(coefficients[:3]))
             return (
-                f"Something pushed the arm {when}, as a force of {push:.3g} N at one place of body {shape[4]:.0f} does "
-                "that stays the same (its mean, along the base's axes; the signs are those of the arm's push against "
-                "it)."
+                f"Something pushed the arm {when}, with a constant force of {push:.3g} N at one place of body "
+                f"{shape[4]:.0f} "
+                "(mean values, along the base's axes; the signs are those of the arm's reaction)."
             )
         if on_the_flange(shape):
-            # What no joint feels of them is none, or rounding.
+            # A part that no joint feels is zero, or rounding.
             push, turn = (float(np.linalg.norm(part)) for part in (coefficients[:3], coefficients[3:6]))
             sizes = (("force", push, "N"), ("moment", turn, "N m"))
             least = NONE * max(push, turn)
             told = [f"a {word} of {size:.3g} {unit}" for word, size, unit in sizes if size > least]
             return (
-                f"Something pushed the flange {when}, with {' and '.join(told)} that stayed the same (means, along the "
-                "base's axes; the signs are those of the arm's push against it)."
+                f"Something pushed the flange {when}, with {' and '.join(told)}, constant (mean values, along the "
+                f"base's "
+                "axes; the signs are those of the arm's reaction)."
             )
         size = np.abs(coefficients)
         most, last = int(np.argmax(size)) + 1, int(np.flatnonzero(size > 0.05 * size.max())[-1]) + 1
         return (
-            f"Something pushed the arm {when}: joint {most} felt {size.max():.3g} {force}, and joint {last} is the "
-            "last that felt it."
+            f"Something pushed the arm {when}. The largest torque is {size.max():.3g} {force} on joint {most}; joint "
+            f"{last} is the last that shows it."
         )
 
 

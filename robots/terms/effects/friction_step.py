@@ -21,7 +21,7 @@ class FrictionStep(Sudden, JointEffect):
     """tau = (a sign(dq) + b dq) from the time t_c on."""
 
     name: ClassVar[str] = "friction_step"
-    title: ClassVar[str] = "friction that changed at one moment"
+    title: ClassVar[str] = "sudden change of friction"
     rivals: ClassVar[tuple[str, ...]] = ("thermal_friction", "load_heat", "payload_change", "external_contact")
     experiments: ClassVar[tuple[str, ...]] = ("pause", "repeat")
 

@@ -35,7 +35,7 @@ class HandGuiding(Effect):
     """
 
     name: ClassVar[str] = "hand_guiding"
-    title: ClassVar[str] = "an external force that moved the robot (by hand)"
+    title: ClassVar[str] = "robot guided by hand (external force)"
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
     passing: ClassVar[bool] = True
@@ -114,8 +114,9 @@ class HandGuiding(Effect):
     ) -> str:
         """Says what the values mean."""
         return (
-            f"An external force moved the robot from t = {shape[0]:.2f} s to {shape[1]:.2f} s, as a hand does: the "
-            f"drives carried its weight, not its friction and inertia."
+            f"An external force, such as a hand, moved the robot from t = {shape[0]:.2f} s to {shape[1]:.2f} s. The "
+            f"drives "
+            "carried its weight, but not its friction and inertia."
         )
 
 

@@ -29,7 +29,7 @@ class JointCoupling(StaticEffect):
     """
 
     name: ClassVar[str] = "joint_coupling"
-    title: ClassVar[str] = "drives that run through each other (coupling)"
+    title: ClassVar[str] = "coupled drives of neighbouring joints"
     sharp: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("way", "", -1.0, 1.0, "linear", WAYS, default=1.0, beside=True, choices=WAYS),
@@ -87,9 +87,9 @@ class JointCoupling(StaticEffect):
         """Says what the values mean."""
         assert joint is not None
         return (
-            f"Joints {joint - 1} and {joint} drag each other: the motion of one costs torque of the other "
+            f"Joints {joint - 1} and {joint} are coupled: motion of one needs torque of the other "
             f"({coefficients[1]:.3g} and {coefficients[2]:.3g} {force} s/{length}, {coefficients[3]:.3g} {force} of "
-            f"Coulomb friction of their {'difference' if shape and shape[0] < 0 else 'sum'})."
+            f"Coulomb friction on their {'difference' if shape and shape[0] < 0 else 'sum'})."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

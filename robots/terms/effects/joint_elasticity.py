@@ -43,7 +43,7 @@ class JointElasticity(Effect):
     """
 
     name: ClassVar[str] = "joint_elasticity"
-    title: ClassVar[str] = "a gear that winds up under load (elasticity)"
+    title: ClassVar[str] = "joint elasticity (compliant gear)"
     loaded: ClassVar[bool] = True
     kicks: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
@@ -106,7 +106,7 @@ class JointElasticity(Effect):
     ) -> str:
         """Says what the values mean."""
         return (
-            f"The gear of joint {joint} winds up under load, with a stiffness of "
+            f"The gear of joint {joint} is elastic, with a stiffness of "
             f"{1.0 / max(coefficients[0], 1e-12):.3g} {force}/{length}."
         )
 

@@ -41,12 +41,12 @@ class Spring(StaticJointEffect):
     """
 
     name: ClassVar[str] = "spring"
-    title: ClassVar[str] = "a spring or cable on the joint"
+    title: ClassVar[str] = "spring or cable on the joint"
     borne: ClassVar[bool] = True
     preloads: ClassVar[bool] = True
     vague: ClassVar[str] = (
-        "A spring or cable acts on joint {joint}; how stiff it is where, these logs do not tell: gravity resembles "
-        "much of it."
+        "A spring or cable acts on joint {joint}. These logs do not determine its stiffness, because gravity has a "
+        "similar effect."
     )
     shapes: ClassVar[tuple[Shape, ...]] = (LEVER, CENTRE)
     rivals: ClassVar[tuple[str, ...]] = ("base_tilt", "torque_ripple", "asymmetric_friction", "encoder_offset")
@@ -126,7 +126,7 @@ class Spring(StaticJointEffect):
     ) -> str:
         """Says what the values mean."""
         if _has_lever(shape):
-            # Ratio and dead centre are told with their intervals: of many pairs all do about as well.
+            # Ratio and dead centre are given with their intervals; many pairs fit about equally well.
             return f"A spring between two levers acts on joint {joint}."
         return (
             f"A spring or cable acts on joint {joint}: {coefficients[0]:.3g} {force}/{length} at the middle of its "

@@ -58,7 +58,7 @@ class TimeDelay(Late):
     """
 
     name: ClassVar[str] = "time_delay"
-    title: ClassVar[str] = "torque that is logged later than position"
+    title: ClassVar[str] = "delay between torque and position"
     whole_robot: ClassVar[bool] = True
     alike: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (SHIFT,)
@@ -88,7 +88,7 @@ class TimeDelay(Late):
     ) -> str:
         """Says what the values mean."""
         which = "later" if coefficients[0] > 0 else "earlier"
-        return f"Torque is logged {1000 * abs(coefficients[0]):.2f} ms {which} than position, on all joints."
+        return f"Torque is logged {1000 * abs(coefficients[0]):.3g} ms {which} than position, on all joints."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the rate of torque of the joint where it is largest."""

@@ -47,7 +47,7 @@ class TorqueRipple(StaticJointEffect):
     """
 
     name: ClassVar[str] = "torque_ripple"
-    title: ClassVar[str] = "torque ripple per turn of gear or motor"
+    title: ClassVar[str] = "torque ripple of gear or motor"
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("order", "periods per turn", 2.5, HIGHEST["m"], "linear"),
         Shape("late", "s", -0.01, 0.01, "linear", (0.0,), default=0.0),
@@ -162,9 +162,9 @@ class TorqueRipple(StaticJointEffect):
     ) -> str:
         """Says what the values mean."""
         size, share = np.hypot(*coefficients[:2]), 100 * np.hypot(*coefficients[2:])
-        often = f"{shape[0]:.4g} times a turn" if length == "rad" else f"every {2000 * np.pi / shape[0]:.4g} mm"
+        often = f"{shape[0]:.4g} times per turn" if length == "rad" else f"every {2000 * np.pi / shape[0]:.4g} mm"
         much = f"{size:.3g} {force} and {share:.2g} % of its {'motor torque' if shape[2] else 'load'}"
-        return f"The torque of joint {joint} ripples by {much} up and down, {often}."
+        return f"The torque of joint {joint} ripples with an amplitude of {much}, {often}."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the angle within the ripple's period."""

@@ -25,7 +25,7 @@ class TorqueSensorDrift(JointEffect):
     """
 
     name: ClassVar[str] = "torque_sensor_drift"
-    title: ClassVar[str] = "a torque sensor's zero that drifts"
+    title: ClassVar[str] = "zero drift of a torque sensor"
     depends_on: ClassVar[Literal["state", "time"]] = "time"
     passing: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
@@ -72,7 +72,7 @@ class TorqueSensorDrift(JointEffect):
     ) -> str:
         """Says what the values mean."""
         places = np.concatenate([[0.0], np.cumsum(coefficients)])
-        return f"The torque zero of joint {joint} wanders over {np.ptp(places):.3g} {force}."
+        return f"The torque zero of joint {joint} drifts by {np.ptp(places):.3g} {force}."
 
 
 STRETCHES = 16

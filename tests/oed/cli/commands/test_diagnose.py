@@ -77,7 +77,7 @@ def test_its_files_are_of_use(done: Path) -> None:
     model = load_model(done / "model.json")
     assert [extension.effect for extension in model.extensions] == ["friction_step"]
     page = (done / "report.html").read_text()
-    assert "friction that changed at one moment" in page
+    assert "sudden change of friction" in page
     assert "Simulated motion" in page
     assert "smallest effect size" in page
 

@@ -40,7 +40,7 @@ def view():
     base = random.normal(size=(N, 2))
     bend = np.column_stack([np.zeros(N), np.exp(-np.abs(speed) / 0.1) * np.sign(speed)])
     finding = FindingView(
-        title="more friction at low speed (Stribeck)",
+        title="Stribeck friction",
         sentence="Joint 2 needs 1 N m more than its Coulomb friction to break away.",
         joint=2,
         parameters=(
