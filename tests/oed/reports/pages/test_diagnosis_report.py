@@ -279,4 +279,4 @@ def test_the_page_of_a_plan():
     assert "0.4 / 0.8" in text
     assert "on joint 3: joint hardly moves." in text
     assert "hidden" in text
-    assert "more friction at low speed" in page.warnings[0]
+    assert "Stribeck friction" in page.warnings[0]
