@@ -146,7 +146,7 @@ class Log(_Samples):
         dq: joint velocities [rad/s], (N, n).
         ddq: joint accelerations [rad/s^2], (N, n).
         temperature: joint temperatures [degC], (N, n); NaN where a sensor was silent.
-        ambient: temperature of the surroundings [degC], (N,); NaN where the sensor was silent.
+        ambient: ambient temperature [degC], (N,); NaN where the sensor was silent.
         qlink: positions behind the gears [rad], (N, n); NaN throughout for a joint that has no encoder there.
         segment: whole number of the part of an experiment, (N,).
         cycle: whole number of the repetition of an experiment, (N,).

@@ -192,7 +192,7 @@ def _assigned(references: Sequence[Motion], parts: Sequence[FittedRows]) -> list
         last = float(t[-1])
         found.append(references[min(index, len(references) - 1)])
     if index != len(references) - 1:
-        raise InputError(f"{len(references)} references", allowed=f"{index + 1}, one a log")
+        raise InputError(f"{len(references)} references", allowed=f"{index + 1}, one per log")
     return found
 
 

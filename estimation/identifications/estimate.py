@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MODEL = "model.json"
-# Above this ratio of honest to white-noise standard errors the summary warns.
+# Above this ratio of robust to white-noise standard errors the summary warns.
 COLOURED = 2.0
 
 
@@ -58,7 +58,7 @@ class JointFit:
 
     @property
     def nrmse(self) -> float:
-        """Left-out error over torque RMS."""
+        """Left-out error divided by torque RMS."""
         return self.held_out_rms / self.torque_rms if self.torque_rms else np.inf
 
 
@@ -73,7 +73,7 @@ class Estimate:
         white_noise_errors: standard errors (b,) that white noise would have: too small where noise is coloured.
         t: times (N,) of the fitted rows [s].
         dq: joint velocities (N, n) of the fitted rows.
-        measured: torque (N, n) of the fitted rows, less that of known payloads [N m or N].
+        measured: torque (N, n) of the fitted rows, minus that of known payloads [N m or N].
         predicted: by the model (N, n).
         dropped_rows: rows of the logs that repeated an old position.
         gates: what the gate found in each log; empty where it was not asked.
@@ -221,6 +221,6 @@ class Estimate:
 
 
 def colour_of(errors: Array, white: Array, determined: NDArray[np.bool_]) -> float:
-    """Gives the median ratio of honest to white-noise errors (b,) of the determined parameters; 1 without any."""
+    """Gives the median ratio of robust to white-noise errors (b,) of the determined parameters; 1 without any."""
     known = determined & (white > 0)
     return float(np.median(errors[known] / white[known])) if known.any() else 1.0

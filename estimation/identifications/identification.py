@@ -76,7 +76,7 @@ def identify(
         candidates: settings that the data choose from.
         check: whether each log passes the gate first, which refuses what would be fitted wrongly and cuts at gaps.
         seed: of the noise drawn to correct the standard errors.
-        progress: is told how far it is.
+        progress: receives the progress.
 
     Returns:
         The estimate.

@@ -170,7 +170,7 @@ def _gear(table: Table, mapping: LogMapping, joint: int, joints: int) -> float:
 
 
 def _columns(entry: PerJoint, mapping: LogMapping, joints: int, present: set[str]) -> list[str]:
-    """The columns of one quantity, one a joint."""
+    """The columns of one quantity, one per joint."""
     pattern = entry.columns[0]
     if len(entry.columns) > 1 or (joints == 1 and pattern in present):
         return list(entry.columns)

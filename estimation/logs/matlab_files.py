@@ -25,7 +25,7 @@ def read_matlab(path: Path, wanted: Callable[[str], bool]) -> Table:
 
     Args:
         path: the file.
-        wanted: tells by name which columns to keep.
+        wanted: selects by name which columns to keep.
 
     Raises:
         InputError: no MAT file, or nothing numeric in it.
@@ -44,7 +44,7 @@ def columns_of(variables: Mapping[str, NDArray[Any]], path: Path, wanted: Callab
     Args:
         variables: the arrays by name.
         path: where they are from.
-        wanted: tells by name which columns to keep.
+        wanted: selects by name which columns to keep.
 
     Raises:
         InputError: no array, or none as long as the others.

@@ -34,7 +34,7 @@ def read_npz(path: Path, wanted: Callable[[str], bool]) -> Table:
 
     Args:
         path: the file.
-        wanted: tells by name which columns to keep.
+        wanted: selects by name which columns to keep.
 
     Raises:
         InputError: no archive of arrays, or one that holds objects.

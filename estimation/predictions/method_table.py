@@ -1,4 +1,4 @@
-"""Estimators against each other on the same logs and the same unseen data."""
+"""Estimators against each other on the same logs and the same held-out data."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class MethodRow:
 
     Attributes:
         method: its name.
-        unseen: standard deviation of the error over that of the torque on unseen data (n,); NaN where it failed.
+        unseen: standard deviation of the error over that of the torque on held-out data (n,); NaN where it failed.
         determined: share of parameters that it determines.
         seconds: of processor time.
         problem: why it failed; empty where it did not.
@@ -110,7 +110,7 @@ def compare_methods(
         logs: what is fitted.
         methods: names of estimators; all by default.
         held_out: unseen logs; by default the last of several logs, or the last stretch of a single one.
-        progress: is told how far it is.
+        progress: receives the progress.
         options: of `identify`.
 
     Returns:

@@ -55,7 +55,7 @@ class Prediction:
 
     @property
     def error_rms(self) -> Array:
-        """RMS of measured less predicted torque (n,); NaN without measurement."""
+        """RMS of measured minus predicted torque (n,); NaN without measurement."""
         if self.measured is None:
             return np.full(self.predicted.shape[1], np.nan)
         return np.sqrt(np.mean((self.measured - self.predicted) ** 2, axis=0))
@@ -172,8 +172,8 @@ def predict(
             or a gravity that it states counts. Where it overlaps in time the logs in which a model's change was found,
             it counts as recorded after them (`clock_of`).
         thermal: this model with its thermal models: friction falls as the motion heats the joints.
-        start: temperatures of each joint's zones at first [degC]; those of the surroundings by default.
-        ambient: temperature of the surroundings where the log does not state it [degC]; each model's by default.
+        start: temperatures of each joint's zones at first [degC]; ambient temperature by default.
+        ambient: ambient temperature where the log does not state it [degC]; each model's by default.
         later: how much later [s] than its own clock says the log counts; by default what `clock_of` says.
         before: logs of what the robot did before, for a model whose effects keep heat: without any it begins cold.
             With `later` their times are as they count (`warmed`). Beside `thermal`, `start` says what was before.

@@ -38,7 +38,7 @@ class Rows:
 
     Attributes:
         motion: smoothed, at the log's own times.
-        tau: measured torque (N, n), as it was logged, less that of a known payload.
+        tau: measured torque (N, n), as it was logged, minus that of a known payload.
         mask: (N, n), zero where a row of a joint does not count.
         gravity: (3,) in the base frame [m/s2]; None as the robot's description says.
         held: joints (n,) that stand here and move in another log: no prediction is judged by them; None for none.

@@ -69,7 +69,7 @@ def fit_campaign(
         start: ``ambient`` or ``free``. If a campaign does not start cold, friction at T0 is
             extrapolated: `free` finds it only with cooling phases or several powers. A contradiction gives a note.
         seed: of the thermal searches.
-        progress: is told how far it is.
+        progress: receives the progress.
 
     Returns:
         The estimate.
@@ -158,7 +158,7 @@ class _Turns:
         )
 
     def _warm(self, fits: Sequence[ThermalEstimate | None], options: dict[str, Any]) -> list[str]:
-        """Says which joints do not start at the surroundings' temperature although they were taken to."""
+        """Says which joints do not start at ambient temperature although they were taken to."""
         if options["start"] != "ambient":
             return []
         found = []

@@ -21,13 +21,13 @@ def start_temperatures(
 ) -> list[Array | None]:
     """Follows the joints through earlier logs, and rests between them, up to a time.
 
-    The first log begins at the surroundings' temperature.
+    The first log begins at ambient temperature.
 
     Args:
         model: torque model with thermal models.
         before: logs of what the robot did, on one clock; their torques are not used.
         until: when the motion of interest begins [s].
-        ambient: temperature of the surroundings where logs do not state it [degC]; that of each model by default.
+        ambient: ambient temperature where logs do not state it [degC]; that of each model by default.
 
     Returns:
         Temperatures of each joint's zones (n,) [degC]; None for a joint whose friction does not change.

@@ -50,7 +50,7 @@ def choose_thermal(
         start: see `fit_thermal`; settled once, by the first model that can tell.
         starts: see `fit_thermal`.
         seed: see `fit_thermal`.
-        progress: is told how far it is.
+        progress: receives the progress.
 
     Returns:
         The comparison.

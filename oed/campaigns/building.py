@@ -66,14 +66,14 @@ def campaign(
         collision: keep the stages free of collisions, where the robot's bodies are described: the quick excitation is
             designed so, the warm-up drives only as much of its range as is free, friction sweeps stay in the free
             stretch of their joint, and moves go around.
-        ambient: temperature of the surroundings [degC].
+        ambient: ambient temperature [degC].
         cold_friction: friction of the cold robot over that of the description, for the expected temperatures: above 1
             where the description is of the warm robot.
         thermal: models of the joints; by default the published ones, if there are any.
         seed: of the quick design.
         workers: processes of the quick design.
         executor: runs the quick design's searches.
-        progress: is told how far it is.
+        progress: receives the progress.
 
     Returns:
         The campaign; all its stages keep all limits by their own samples.

@@ -101,7 +101,7 @@ def record(
         plant: the virtual robot; by default that of the robot's own description.
         seed: of the noise.
         force: whether existing logs may be replaced.
-        progress: is told how far it is.
+        progress: receives the progress.
 
     Returns:
         The names of the files.

@@ -46,7 +46,7 @@ class Campaign:
         stages: the distinct stages.
         slots: what runs when.
         thermal: models of the joints; None where none are known.
-        ambient: temperature of the surroundings [degC].
+        ambient: ambient temperature [degC].
         cold_friction: friction of the cold robot over that of the description, for the expected temperatures.
         torque_margin: share of the torque limits that friction and warm-up stages leave free.
         notes: what a user should know: what was shortened, what could not be checked.

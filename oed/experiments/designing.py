@@ -116,7 +116,7 @@ def design(
         solver: the local solver: `InteriorPoint` by default, or `Ipopt`.
         workers: processes; as many as cores by default.
         executor: runs the starts instead of processes of its own.
-        progress: is told how far it is.
+        progress: receives the progress.
 
     Returns:
         The design, checked by its own samples.

@@ -1,4 +1,4 @@
-"""Friction sweeps: one joint to and fro at constant speeds, between jerk-limited ramps (thesis section 2.4)."""
+"""Friction sweeps: one joint back and forth at constant speeds, between jerk-limited ramps (thesis section 2.4)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The warm-up: all joints to and fro at full speed at once, each in its own time (thesis section 2.4.1)."""
+"""The warm-up: all joints back and forth at full speed at once, each in its own time (thesis section 2.4.1)."""
 
 from __future__ import annotations
 

@@ -73,8 +73,8 @@ class PlantHeat:
 
     Attributes:
         models: of each joint (n,); None for one whose friction does not change.
-        ambient: temperature of the surroundings [degC].
-        start: temperature of all zones when the robot is switched on [degC]; that of the surroundings by default.
+        ambient: ambient temperature [degC].
+        start: temperature of all zones when the robot is switched on [degC]; ambient temperature by default.
         thermometers: what the log sees of it: ``none``, ``ambient``, or ``all``, the joints too.
     """
 
@@ -150,8 +150,8 @@ def plant_heat(
         robot: the robot.
         known: whether joints have the published models of this robot, see `robots.thermal.known_thermal`.
         joints: model and parameters by joint, counted from 1; ``beta`` is 1 by default. They go before published ones.
-        ambient: temperature of the surroundings [degC].
-        start: temperature of all zones when the robot is switched on [degC]; that of the surroundings by default.
+        ambient: ambient temperature [degC].
+        start: temperature of all zones when the robot is switched on [degC]; ambient temperature by default.
         thermometers: what the log sees of it.
 
     Raises:

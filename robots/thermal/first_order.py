@@ -12,7 +12,7 @@ from robots.thermal.parameters import ALPHA, BETA, Inputs, ThermalParameter, cap
 
 @dataclass(frozen=True, kw_only=True)
 class FirstOrder(ThermalModel):
-    """One zone that gives its heat to the surroundings.
+    """One zone that gives its heat to the environment.
 
         C dT/dt = W (alpha (T - T0) + beta) - K (T - Te)
 

@@ -34,7 +34,7 @@ class Inputs(NamedTuple):
 
     Attributes:
         power: W, power that the friction would take at the temperature T0 [W].
-        ambient: temperature of the surroundings Te [degC].
+        ambient: ambient temperature Te [degC].
         T3: reading of a thermocouple beside the joint [degC]; None where there is none.
         drives: 1 where the drives are powered, 0 where not.
     """

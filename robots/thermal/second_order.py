@@ -13,7 +13,7 @@ from robots.thermal.parameters import ALPHA, BETA, Inputs, ThermalParameter, cap
 
 @dataclass(frozen=True, kw_only=True)
 class SecondOrder(PairExponential, ThermalModel):
-    """Zone 1 is heated by friction and gives heat to zone 2, which gives it to the surroundings.
+    """Zone 1 is heated by friction and gives heat to zone 2, which passes it to the environment.
 
         C1 dT1/dt = W (alpha (T1 - T0) + beta) - K1 (T1 - T2)
         C2 dT2/dt = K1 (T1 - T2) - K2 (T2 - Te)

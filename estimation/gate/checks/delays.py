@@ -135,7 +135,7 @@ def _refined(rows: Rows, fit: JointFit, joint: int, search: _Search) -> Delay:
 
 
 def delay_findings(delays: list[Delay | None], period: float) -> list[Finding]:
-    """Judges the delays (n,): one finding where the joints agree, else one a joint."""
+    """Judges the delays (n,): one finding where the joints agree, else one per joint."""
     told = {
         joint: delay
         for joint, delay in enumerate(delays, start=1)

@@ -13,7 +13,7 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-# A joint whose left-out torque is predicted hardly better than by a constant says nothing of its parameters.
+# A joint whose held-out torque is predicted hardly better than by a constant is not identified.
 HOPELESS = 0.9
 # A joint of which less than half of the torque's variance follows from the motion, and of whose own parameters none is
 # told apart from zero by so many standard errors, is no better.

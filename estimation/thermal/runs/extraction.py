@@ -33,7 +33,7 @@ class FrictionSignal:
     Attributes:
         t: times (N,) [s].
         dq: velocities (N, n).
-        friction: measured torque less that of the rigid body, rotor and offset (N, n) [N m or N].
+        friction: measured torque minus that of the rigid body, rotor and offset (N, n) [N m or N].
         cold: friction torque of the model's own polynomial (N, n).
         counts: whether a joint moves fast enough for its friction to have a sign (N, n).
         log: where it came from.

@@ -34,7 +34,7 @@ class ThermalRun:
         temperatures: readings (N,) [degC] by zone (``T``, ``T1``, ``T2``), or by place: ``motor`` or ``joint`` (where
             heat is produced), ``housing`` (the outermost zone); NaN where the sensor was silent.
         T3: a thermocouple beside the joint (N,) [degC]: an input of the advanced model.
-        ambient: temperature of the surroundings, a number or (N,) [degC]; None where it was not measured.
+        ambient: ambient temperature, a number or (N,) [degC]; None where it was not measured.
         drives: 1 from each time to the next in which the drives were powered, a number or (N,).
         weight: number of samples behind each friction value, a number or (N,).
         name: for messages.

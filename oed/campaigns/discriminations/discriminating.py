@@ -66,7 +66,7 @@ def discriminate(
         home: pose (n,) at both ends of all motions; by default `Limits.home`.
         velocity_fraction: share of the velocity limits to use.
         seed: of the reference motion.
-        progress: is told of each kind.
+        progress: receives the progress of each kind.
 
     Raises:
         InputError: an effect or joint that there is not, values out of range, dynamics that are not known.

@@ -70,7 +70,7 @@ class Board:
         Args:
             searches: how many will tell.
             steps: of each.
-            progress: is told the sum of the steps, and the best value.
+            progress: receives the sum of the steps, and the best value.
             task: what the work is called.
             sign: -1 where the smaller value, which is the better, stands for a criterion that is to be large.
         """

@@ -68,7 +68,7 @@ def _facts(campaign: Campaign) -> tuple[Fact, ...]:
             Fact(
                 label="Highest expected temperature",
                 value=f"{peak.max():.0f} °C",
-                note=f"joint {int(peak.argmax()) + 1}, surroundings {campaign.ambient:g} °C",
+                note=f"joint {int(peak.argmax()) + 1}, ambient {campaign.ambient:g} °C",
             )
         )
     return tuple(facts)

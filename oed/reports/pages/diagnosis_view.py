@@ -28,7 +28,7 @@ class FindingView:
         parameters: name, value, unit, lower and upper end of the 95 % interval (not finite where not determined).
         p_value: probability of an effect this strong under noise alone.
         delta_bic: how much better the model is with it.
-        before: error over torque RMS without it, on held-out data.
+        before: error divided by torque RMS without it, on held-out data.
         after: with it.
         interval: 95 % interval of the difference.
         rivals: title and how much worse in BIC, the closest first.
@@ -38,7 +38,7 @@ class FindingView:
         residual_before: of that joint without the finding (N,).
         residual_after: with all findings (N,).
         of: what before and after are the error of.
-        unit: of the residuals where they are no torques.
+        unit: of the residuals if they are not torques.
         elsewhere: joints on which before and after are, where those are not its own; begins with a space, or is empty.
         named: whether it is an effect of the catalogue.
         rough: names of the parameters that are not well determined.
@@ -71,7 +71,7 @@ class DiagnosisView:
     """A diagnosis as the report shows it.
 
     Attributes:
-        robot: its name for people.
+        robot: its name in reports.
         verdict: none, named, ambiguous or unexplained.
         findings: strongest first.
         joint_names: names (n,).
@@ -80,7 +80,7 @@ class DiagnosisView:
         measured: torque (N, n).
         base: the base model's (N, n).
         extended: the extended model's (N, n).
-        nrmse_before: error over torque RMS per joint on held-out data (n,).
+        nrmse_before: error divided by torque RMS per joint on held-out data (n,).
         nrmse_after: with what was found (n,).
         nrmse_every: the same with every row counted (n,); NaN where it is not known.
         unseen: which data are held out.

@@ -116,10 +116,10 @@ def binned(x: Array, values: Array) -> tuple[Array, Array, Array]:
 def gain_picture(
     before: ArrayLike, after: ArrayLike, *, joint_names: Sequence[str] | None = None, name: str = "gain"
 ) -> Picture:
-    """Shows the error on unseen data per joint, base and extended model.
+    """Shows the error on held-out data per joint, base and extended model.
 
     Args:
-        before: error over torque RMS of the base model (n,).
+        before: error divided by torque RMS of the base model (n,).
         after: of the extended model (n,).
         joint_names: names (n,).
         name: the stem of the file name.

@@ -110,7 +110,7 @@ def residual_picture(
     """Shows how the residual of each joint is spread, how long it remembers, and how it depends on velocity.
 
     Args:
-        residual: measured less predicted torque, (N, n), uniform in time; NaN where there is none.
+        residual: measured minus predicted torque, (N, n), uniform in time; NaN where there is none.
         velocity: joint velocities [rad/s or m/s], (N, n).
         period: sample period [s].
         joint_names: names, (n,).

@@ -32,7 +32,7 @@ def read_table(path: str | PathLike[str], *, wanted: Callable[[str], bool] | Non
 
     Args:
         path: the file.
-        wanted: tells by name which columns to read, all by default; the others are named in ``Table.skipped`` and may
+        wanted: selects by name which columns to read, all by default; the others are named in ``Table.skipped`` and may
             hold anything.
 
     Returns:

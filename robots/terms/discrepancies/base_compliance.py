@@ -62,7 +62,7 @@ class BaseCompliance(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         if coefficients[int(np.argmax(np.abs(coefficients[:2])))] < 0:
             return (
                 "The residual torque of all joints changes with the moment of the robot's weight about its base. The "

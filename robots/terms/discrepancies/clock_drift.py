@@ -46,7 +46,7 @@ class ClockDrift(OverTime):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         late = half_waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients
         return (
             "The delay between logged torque and position changes with time, on all joints: by about "

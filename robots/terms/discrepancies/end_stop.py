@@ -41,7 +41,7 @@ class EndStop(Placed):
 
     @property
     def title(self) -> str:  # type: ignore[override]
-        """Its name for people."""
+        """The effect's title."""
         return f"contact {'below' if self.below else 'above'} a position of the joint"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:

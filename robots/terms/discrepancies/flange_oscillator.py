@@ -53,7 +53,7 @@ class FlangeOscillator(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         return (
             "The residual torque of all joints matches a load at the flange that swings at "
             f"{shape[0]:.3g} Hz, with a mass of about {np.abs(coefficients).max():.2g} kg."

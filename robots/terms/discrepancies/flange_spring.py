@@ -45,7 +45,7 @@ class FlangeSpring(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         return (
             f"The residual torque of all joints matches an elastic force on the flange that depends on its position, "
             f"such as a hose or cable: up to {np.abs(coefficients[3:]).max():.2g} N/m."

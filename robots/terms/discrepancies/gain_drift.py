@@ -53,7 +53,7 @@ class GainDrift(OverTime):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         share = half_waves(np.linspace(0.0, 1.0, 201)) @ coefficients
         return (
             "The torque signals of all joints change slowly with time by the same factor; the total change over the "

@@ -43,7 +43,7 @@ class GainStep(Sudden, JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         change = f"{100 * abs(coefficients[0]):.2g} % {'more' if coefficients[0] > 0 else 'less'}"
         return (
             f"The residual torque of joint {joint} matches a torque signal logged {change} from t = {shape[0]:.2f} s "

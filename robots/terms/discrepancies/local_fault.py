@@ -62,7 +62,7 @@ class LocalFault(Placed):
 
     @property
     def title(self) -> str:  # type: ignore[override]
-        """Its name for people."""
+        """The effect's title."""
         return f"local {'friction' if self.odd else 'torque'} at one position of the joint"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:

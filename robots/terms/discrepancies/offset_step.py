@@ -80,7 +80,7 @@ class BaseStep(Step):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         angle = np.degrees(np.hypot(*coefficients))
         return (
             f"The residual torque of all joints matches a sudden tilt of the base by {angle:.2g} deg at t = "
@@ -113,7 +113,7 @@ class ZeroStep(Step):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         return (
             f"The residual torque matches a joint {joint} that stands {coefficients[0]:.2g} {length} "
             f"further than its encoder says, from t = {shape[0]:.2f} s on. Likely cause: a slipping coupling or a new "

@@ -30,7 +30,7 @@ PREFIX = "pattern:"
 RINGING = tuple(float(f) for f in np.geomspace(0.5, 8.0, 13))
 TURNS = tuple(float(h) for h in (*range(5, 33), 40, 48, 64))
 SLOWEST, RUBBING = 0.6, 2.0
-# Swings of a torque that goes to and fro by itself: fewer than so many in the data are a drift.
+# Swings of a torque that goes back and forth by itself: fewer than so many in the data are a drift.
 SWINGS = 5.0
 SWAYING = ("vibration", "sway")
 # What acts on all joints at once.
@@ -78,7 +78,7 @@ class Pattern(JointEffect):
 
     @property
     def title(self) -> str:  # type: ignore[override]
-        """Its name for people."""
+        """The effect's title."""
         return self.sentence(None)
 
     @property
@@ -108,7 +108,7 @@ class Pattern(JointEffect):
         return tuple(Coefficient(f"function_{i + 1}", "") for i in range(FAMILIES[self.kind].count))
 
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
-        """Lists the frequencies of what goes to and fro half a resolution apart; else the family's own points.
+        """Lists the frequencies of what goes back and forth half a resolution apart; else the family's own points.
 
         An input is measured by its largest size here.
         """
@@ -138,7 +138,7 @@ class Pattern(JointEffect):
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks the frequencies of what goes to and fro by the residual's spectrum over that of its surroundings."""
+        """Ranks the frequencies of what goes back and forth by the residual's spectrum over that of its surroundings."""
         grid = self.grid(situation, joint)
         if self.kind not in SWAYING or len(grid) <= count:
             return grid
@@ -243,7 +243,7 @@ def is_plain(effect: object) -> bool:
 
 
 def is_oscillation(effect: object) -> bool:
-    """Whether a pattern goes to and fro in time, not with the motion: where in its swing it is elsewhere is open."""
+    """Whether a pattern goes back and forth in time, not with the motion: where in its swing it is elsewhere is open."""
     return isinstance(effect, Pattern) and effect.kind in SWAYING
 
 

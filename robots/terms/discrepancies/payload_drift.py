@@ -45,7 +45,7 @@ class PayloadDrift(OverTime):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         mass = half_waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients[:: len(_PARTS)]
         return (
             f"The residual torque of all joints matches a payload that changes slowly with time, such as a tank that "

@@ -62,7 +62,7 @@ class SessionFriction(OverTime):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         shares = np.asarray(coefficients).reshape(SESSIONS - 1, -1)
         k, j = np.unravel_index(int(np.argmax(np.abs(shares))), shares.shape)
         most, way = shares[k, j], "more" if shares[k, j] > 0 else "less"

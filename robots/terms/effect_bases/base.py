@@ -29,7 +29,7 @@ class Effect(ABC):
 
     Attributes:
         name: its name in a diagnosis.
-        title: its name for people.
+        title: its name in reports.
         whole_robot: whether it acts on the robot as a whole; its joint is then None.
         rare: whether it is to be thought of last: it resembles a common effect, and robots seldom have it.
         depends_on: ``state`` where one and the same motion always meets it, ``time`` where it comes, goes or builds up.

@@ -51,7 +51,7 @@ class AsymmetricFriction(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         way = "forward" if coefficients[0] + coefficients[1] > 0 else "backward"
         return (
             f"Joint {joint} has more friction {way}. The difference from the mean of both directions is "

@@ -84,7 +84,7 @@ class BaseTilt(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         angle = np.degrees(np.hypot(*coefficients[:2]))
         return f"The base is tilted by {angle:.3g} deg relative to the robot's description."
 

@@ -109,7 +109,7 @@ class CurrentClipping(JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return f"The torque of joint {joint} is limited to {shape[0]:.3g} {force}, the drive's current limit."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

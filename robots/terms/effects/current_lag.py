@@ -49,7 +49,7 @@ class CurrentLag(Late, JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         late = 1000 * coefficients[0]
         return f"The torque of joint {joint} is logged {late:.3g} ms late. Likely cause: a filter in its drive."
 

@@ -51,7 +51,7 @@ class EncoderEccentricity(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         size = np.hypot(*coefficients)
         return f"The encoder of joint {joint} has an error with an amplitude of {size:.3g} {length}, once per turn."
 

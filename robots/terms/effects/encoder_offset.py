@@ -43,7 +43,7 @@ class EncoderOffset(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return f"The true position of joint {joint} is {coefficients[0]:.3g} {length} larger than its encoder value."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

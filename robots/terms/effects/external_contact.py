@@ -174,7 +174,7 @@ class ExternalContact(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         when = f"from t = {shape[0]:.2f} s for {shape[1]:.2g} s"
         if on_body(shape):
             push = float(np.linalg.norm(coefficients[:3]))

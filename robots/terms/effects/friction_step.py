@@ -45,7 +45,7 @@ class FrictionStep(Sudden, JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         coulomb, viscous = coefficients[:2]
         change = "changed" if coulomb * viscous < 0 else "rose" if coulomb + viscous > 0 else "fell"
         if change == "fell":

@@ -112,7 +112,7 @@ class HandGuiding(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
             f"An external force, such as a hand, moved the robot from t = {shape[0]:.2f} s to {shape[1]:.2f} s. The "
             f"drives "

@@ -84,7 +84,7 @@ class JointCoupling(StaticEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         assert joint is not None
         return (
             f"Joints {joint - 1} and {joint} are coupled: motion of one needs torque of the other "

@@ -104,7 +104,7 @@ class JointElasticity(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
             f"The gear of joint {joint} is elastic, with a stiffness of "
             f"{1.0 / max(coefficients[0], 1e-12):.3g} {force}/{length}."

@@ -85,7 +85,7 @@ class LoadDependentFriction(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         back = (
             ""
             if not shape or shape[0] == ALIKE

@@ -50,7 +50,7 @@ class LoadHeat(HeatEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
             f"The friction of joint {joint} falls as its motor current heats the joint, also at rest. The thermal time "
             f"constant is {shape[0]:.0f} s."

@@ -57,7 +57,7 @@ class LoadStribeck(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         than = "more" if coefficients[0] > 0 else "less"
         return (
             f"Joint {joint} needs {100 * abs(coefficients[0]):.3g} % of its load {than} to break away. The difference "

@@ -73,7 +73,7 @@ class PayloadChange(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         change = "increased" if coefficients[0] > 0 else "decreased"
         return f"The payload {change} by {abs(coefficients[0]):.3g} kg at t = {shape[0]:.2f} s."
 

@@ -77,7 +77,7 @@ class PositionDependentFriction(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         size, peak = np.hypot(*coefficients), np.arctan2(coefficients[1], coefficients[0]) / shape[0]
         often = f"{shape[0]:.3g} times per turn" if length == "rad" else f"every {2000 * np.pi / shape[0]:.4g} mm"
         return (

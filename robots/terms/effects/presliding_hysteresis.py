@@ -66,7 +66,7 @@ class PreslidingHysteresis(JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
             f"After each reversal, {coefficients[0]:.3g} {force} of the friction of joint {joint} change sign "
             f"gradually, "

@@ -47,7 +47,7 @@ class ShearThinning(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
             f"The viscous friction of joint {joint} grows with the power {shape[0]:.2g} of the speed. Likely cause: "
             "shear-thinning grease."

@@ -124,7 +124,7 @@ class Spring(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         if _has_lever(shape):
             # Ratio and dead centre are given with their intervals; many pairs fit about equally well.
             return f"A spring between two levers acts on joint {joint}."

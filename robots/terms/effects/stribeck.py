@@ -69,7 +69,7 @@ class Stribeck(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
             f"Joint {joint} needs {coefficients[0]:.3g} {force} more than its Coulomb friction to break away. The "
             f"difference "

@@ -80,7 +80,7 @@ class ThermalFriction(HeatEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
             f"The friction of joint {joint} falls as it warms up: {coefficients[0]:.3g} {force} Coulomb and "
             f"{coefficients[1]:.3g} {force} s/{length} viscous friction per kJ of stored friction heat. The thermal "

@@ -86,7 +86,7 @@ class TimeDelay(Late):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         which = "later" if coefficients[0] > 0 else "earlier"
         return f"Torque is logged {1000 * abs(coefficients[0]):.3g} ms {which} than position, on all joints."
 

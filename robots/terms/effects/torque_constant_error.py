@@ -45,7 +45,7 @@ class TorqueConstantError(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
             f"The logged torque of joint {joint} is wrong by {100 * coefficients[0]:+.3g} %. Likely cause: a wrong "
             f"torque constant."

@@ -46,7 +46,7 @@ class TorqueConstantHeat(HeatEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         than = "less" if coefficients[0] > 0 else "more"
         return (
             f"The motor of joint {joint} gives {than} torque per ampere as it warms up, with a time constant of "

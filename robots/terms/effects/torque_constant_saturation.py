@@ -69,7 +69,7 @@ class TorqueConstantSaturation(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         exponent, torque = shape
         at = f"{torque:.3g} {force}" if torque > 0 else "the torque limit"
         return (

@@ -46,7 +46,7 @@ class TorqueCrosstalk(JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         shares = " and ".join(f"{100 * c:.3g} %" for c in coefficients)
         return f"The torque signal of joint {joint} contains {shares} of the torque of its neighbours."
 

@@ -160,7 +160,7 @@ class TorqueRipple(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         size, share = np.hypot(*coefficients[:2]), 100 * np.hypot(*coefficients[2:])
         often = f"{shape[0]:.4g} times per turn" if length == "rad" else f"every {2000 * np.pi / shape[0]:.4g} mm"
         much = f"{size:.3g} {force} and {share:.2g} % of its {'motor torque' if shape[2] else 'load'}"

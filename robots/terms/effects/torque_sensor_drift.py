@@ -70,7 +70,7 @@ class TorqueSensorDrift(JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         places = np.concatenate([[0.0], np.cumsum(coefficients)])
         return f"The torque zero of joint {joint} drifts by {np.ptp(places):.3g} {force}."
 
