@@ -1,4 +1,4 @@
-"""What a robot's YAML file may hold: keys, types, units and the sources of its values."""
+"""Schema of a robot's YAML file: keys, types, units and the sources of values."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from robots.common.files import existing_file
 from robots.robot import Robot
 
 CATALOG = Path(__file__).parent / "catalog"
-_warned: set[str] = set()  # robots whose assumed values this process was told of
+_warned: set[str] = set()  # robots whose assumed values were already reported in this process
 
 
 def catalogue() -> tuple[str, ...]:

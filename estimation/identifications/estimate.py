@@ -140,7 +140,7 @@ class Estimate:
             )
         if self.dropped_rows:
             rows = "row repeats" if self.dropped_rows == 1 else "rows repeat"
-            found.append(f"{self.dropped_rows} {rows} an old position and were ignored.")
+            found.append(f"{self.dropped_rows} {rows} an old position (ignored).")
         return tuple(found)
 
     def summary(self) -> str:

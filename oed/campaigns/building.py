@@ -49,7 +49,7 @@ def campaign(
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Campaign:
-    """Plans a campaign: what heats a robot through and tells its parameters and its friction on the way.
+    """Plans a campaign that warms the robot up and measures its parameters and friction meanwhile.
 
     A heating cycle is an excitation, friction sweeps of every joint at constant speeds both ways, posed so that gravity
     does no work on the joint where the arm allows, and a warm-up of all joints at full speed over 80 % of their ranges

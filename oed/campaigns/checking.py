@@ -1,4 +1,4 @@
-"""What every stage must keep: the limits by its own numbers, torque by the nominal dynamics, and rest at home."""
+"""Checks of each stage: kinematic limits, torque by the nominal dynamics, and rest in the home pose."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fits the stages of a heating cycle into its time: what gives way, in which order, and what is said about it."""
+"""Fits the stages of a heating cycle into its time, and notes what was shortened."""
 
 from __future__ import annotations
 

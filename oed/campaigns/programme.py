@@ -1,4 +1,4 @@
-"""What a campaign consists of: how many cycles of what, and how long."""
+"""The programme of a campaign: number, kind and duration of its cycles."""
 
 from __future__ import annotations
 

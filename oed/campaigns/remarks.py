@@ -1,4 +1,4 @@
-"""What a user must know of a campaign before playing it."""
+"""Notes on a campaign that a user must know before playing it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NARROWED = 0.99
 
 
 def remarks_on(stages: Sequence[Stage], planner: Planner, known: KnownThermal | None) -> tuple[str, ...]:
-    """Says what was changed, what could not be checked, and what the stages come too close to.
+    """Lists changes, missing checks, and collisions or small margins of the stages.
 
     Args:
         stages: the stages, with their margins.

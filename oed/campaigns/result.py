@@ -113,19 +113,19 @@ class Campaign:
         )
 
     def check(self) -> tuple[Stage, ...]:
-        """Measures all stages anew by their samples.
+        """Checks all stages again, from their samples.
 
         Returns:
             The stages with their margins.
 
         Raises:
-            InfeasibleError: a stage that passes a limit or is not at rest at home at its ends.
+            InfeasibleError: a stage exceeds a limit or does not start and end at rest in the home pose.
         """
         torque = TorqueCheck(self.robot, self.torque_margin)
         return tuple(checked(stage, self.robot, self.home, torque) for stage in self.stages)
 
     def summary(self) -> str:
-        """Says in a few lines what runs, how hot it gets, and what to know."""
+        """Lists the stages, the expected heating, and notes."""
         programme = self.programme
         lines = [f"{self.robot.name}: {self.duration / 60:.1f} min, {self.cycles} cycles, {self.samples} samples"]
         for stage in self.stages:

@@ -1,4 +1,4 @@
-"""What runs when."""
+"""Schedule of a campaign."""
 
 from __future__ import annotations
 

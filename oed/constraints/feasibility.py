@@ -1,4 +1,4 @@
-"""Whether limits in space leave an experiment any room: told before a solver starts, with the number that would do."""
+"""Checks before the solver starts whether workspace limits allow any experiment, and which limit would."""
 
 from __future__ import annotations
 

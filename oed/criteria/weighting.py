@@ -92,7 +92,7 @@ class Weighting:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prior:
-    """What an earlier identification knows.
+    """Information from an earlier identification.
 
     Attributes:
         names: of its parameters (p,).

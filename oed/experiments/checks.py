@@ -1,4 +1,4 @@
-"""What is wrong with a design's options or limits is told before any search."""
+"""Checks of a design's options and limits before the search."""
 
 from __future__ import annotations
 

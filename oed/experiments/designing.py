@@ -189,7 +189,7 @@ def design(
         home=safety.home,
         weighting=weighting,
     )
-    # The experiment's frame is laid out first: whatever is wrong with a limit or a pose shows before the long work.
+    # Home pose and limits are checked first, so that errors appear before the long search.
     rest = FourierSeries.from_coefficients(np.zeros((robot.n, 2 * harmonics + 1)), base_frequency)
     rest = replace(rest, offsets=problem.centre)
     assemble(rest, limits, period=robot.period, home=safety.home, strokes=strokes)

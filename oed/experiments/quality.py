@@ -1,4 +1,4 @@
-"""What a motion tells of the parameters."""
+"""Information of a motion on the parameters."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from robots.signals import Motion
 
 @dataclass(frozen=True, kw_only=True)
 class Quality:
-    """What a part of the experiment tells of the parameters.
+    """Information of a part of the experiment on the parameters.
 
     Attributes:
         part: which segments, such as ``fourier`` or ``whole``.

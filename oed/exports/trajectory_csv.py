@@ -172,7 +172,7 @@ def _check_derivatives(motion: Motion, table: Table) -> None:
     """Compares each step with the trapezoidal rule, whose error the change of the next derivative bounds."""
     step = np.diff(motion.t)[:, None]
     change = np.abs(np.diff(motion.ddq, axis=0))
-    # The acceleration may rise and fall again within a step: the steps around it tell how fast it can.
+    # The acceleration may rise and fall within one step; the steps around it bound how fast.
     padded = np.pad(change, ((1, 1), (0, 0)), mode="edge")
     change = np.maximum(change, np.maximum(padded[:-2], padded[2:]))
     checks = (

@@ -1,4 +1,4 @@
-"""What every trajectory can do: tell its kinematics at given times, and become a sampled motion."""
+"""The interface of trajectories: kinematics at given times, and a sampled motion."""
 
 from __future__ import annotations
 

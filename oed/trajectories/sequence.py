@@ -35,7 +35,7 @@ class Segment:
         joint: the joint it is about, counted from 1, or None.
 
     Raises:
-        InputError: the kind is none of those.
+        InputError: the kind is unknown.
     """
 
     kind: str

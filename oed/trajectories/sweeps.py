@@ -132,7 +132,7 @@ def friction_sweep(
 
     Travel grows with speed and is centred on the pose, shifted where the range ends. Between levels of different travel
     the joint moves to where the next begins. Where the range is too short for the time at a level, the time shortens,
-    down to `SHORTEST_PLATEAU`; where it is too short even for that, the speed gives way. The plateaus tell.
+    down to `SHORTEST_PLATEAU`; if it is too short even for that, the speed is reduced. See the plateaus.
 
     Args:
         limits: bounds of all joints.

@@ -1,4 +1,4 @@
-"""What stands around a robot: boxes, planes such as the floor, and capsules, all fixed in the base frame."""
+"""Obstacles: boxes, planes such as the floor, and capsules, all fixed in the base frame."""
 
 from __future__ import annotations
 

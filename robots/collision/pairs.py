@@ -1,4 +1,4 @@
-"""Which bodies can meet: neighbours are left out, and whatever touches by its construction."""
+"""Pairs of bodies that can collide, without neighbours and pairs that touch by construction."""
 
 from __future__ import annotations
 

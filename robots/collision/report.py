@@ -1,4 +1,4 @@
-"""What a motion's check for collisions came to."""
+"""Result of the collision check of a motion."""
 
 from __future__ import annotations
 

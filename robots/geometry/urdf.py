@@ -230,7 +230,7 @@ class UrdfTree:
             )
         velocity = np.inf if limit.velocity is None else limit.velocity
         effort = np.inf if limit.effort is None else limit.effort
-        # Both zero is what exporters write, and what URDF assumes, where nothing was filled in.
+        # Exporters write zeros, and URDF assumes them, if the values are unknown.
         if joint.type == "continuous" or limit.lower == limit.upper == 0.0:
             return -np.inf, np.inf, velocity, effort
         if limit.lower >= limit.upper:

@@ -11,7 +11,7 @@ from typing import Protocol
 from robots.common.errors import InputError
 from robots.geometry.urdf_xml import UrdfJoint, UrdfLink
 
-_LISTED = 12  # a humanoid has dozens of tips; more than these help nobody
+_LISTED = 12  # a humanoid has dozens of tips; a longer list does not help
 
 
 class _Tree(Protocol):
@@ -35,7 +35,7 @@ class Selection:
 
 
 def nearest(name: str, choices: Iterable[str]) -> str | None:
-    """A remedy that names what was probably meant.
+    """A remedy that names the most similar choice.
 
     Args:
         name: what was found.

@@ -1,4 +1,4 @@
-"""What a virtual robot has besides its model: an effect of the catalogue with its true size and shape."""
+"""Effects of a virtual robot beyond its model: an effect of the catalogue with its true size and shape."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ class Warmth:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlantHeat:
-    """What a plant's joints do with the heat of their friction.
+    """Friction heat of a plant's joints.
 
     Attributes:
         models: of each joint (n,); None for one whose friction does not change.

@@ -1,4 +1,4 @@
-"""What every thermal model of a joint says of itself: the contract, and all that follows from its heat balance."""
+"""Interface of the thermal models of a joint, and everything that follows from the heat balance."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class ThermalModel(ABC):
 
     Args:
         alpha: relative change of friction per degree [1/K], zero or less.
-        beta: friction at T0 over its reference, 1 but for errors of the fit.
+        beta: friction at T0 divided by its reference; 1 except for errors of the fit.
         ambient: ambient temperature Te where none is given [degC].
         reference: T0, the temperature at which the cold friction holds [degC]; ``ambient`` by default.
 
@@ -163,7 +163,7 @@ class ThermalModel(ABC):
         u = Inputs(checked_power(power), self._ambient(ambient), third, np.asarray(drives, dtype=np.float64))
         shape = np.broadcast_shapes(*(np.shape(value) for value in u if value is not None))
         size, p = self.state_count(), self.values
-        # Without surroundings at zero the constant part would swallow digits of A.
+        # The ambient temperature is set to zero, because a large constant part would cost digits of A.
         still = Inputs(u.power, 0.0, None if third is None else 0.0, 0.0)
         homogeneous = self.rates({**p, "T0": 0.0}, [0.0] * size, still)
         A, b = np.empty((*shape, size, size)), np.empty((*shape, size))

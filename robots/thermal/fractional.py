@@ -171,7 +171,7 @@ def memory_weights(nu: Any, count: int) -> list[Any]:
     grid, rates = _grid(count), memory_rates(count).tolist()
     of: Any = math if isinstance(nu, float | int) else casadi
     scale = of.sin(math.pi * nu) / math.pi * grid.step
-    # What the rule leaves out at both ends are geometric series: slower rates count as constant, and faster ones,
+    # The rule omits geometric series at both ends: slower rates count as constant, and faster ones,
     # which have long settled, by what they add at rest.
     down, up = of.exp(-(1.0 - nu) * grid.step), of.exp(-nu * grid.step)
     slower = scale * rates[1] ** (1.0 - nu) * down / (1.0 - down)

@@ -18,7 +18,7 @@ PAUSE = 20.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ThermalPath:
-    """What a joint's heat did during a motion.
+    """Thermal state of a joint during a motion.
 
     Attributes:
         t: times (N,) [s].

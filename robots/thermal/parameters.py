@@ -1,4 +1,4 @@
-"""What a thermal model says of its parameters, and what acts on it."""
+"""Parameters and inputs of a thermal model."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ThermalParameter:
 
 
 class Inputs(NamedTuple):
-    """What acts on a joint: numbers, arrays or CasADi expressions.
+    """Inputs of a joint's thermal model: numbers, arrays or CasADi expressions.
 
     Attributes:
         power: W, power that the friction would take at the temperature T0 [W].

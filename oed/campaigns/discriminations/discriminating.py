@@ -1,4 +1,4 @@
-"""The experiment that tells two possible causes apart, for a robot of which there is no log.
+"""Design of an experiment that distinguishes two possible causes, before any log exists.
 
 Of each kind of experiment, T-optimality asks how much of either cause base model and rival would leave in the noise
 (Atkinson and Fedorov 1975): here of the very motion that is written, the reference included.
@@ -31,7 +31,7 @@ from robots.terms.effects import EFFECTS, EXPERIMENTS
 Array = NDArray[np.float64]
 
 REFERENCES = 6
-"""Reference motions that are drawn at most; the one that tells most is taken."""
+"""Largest number of random reference motions; the most informative one is used."""
 SHARE = 0.02
 """Noise as a share of each joint's torque RMS, where it is not stated."""
 SHARP = 1e-3
@@ -50,10 +50,10 @@ def discriminate(
     seed: int = 0,
     progress: Progress = SILENT,
 ) -> Discrimination:
-    """Finds the experiment that tells two effects apart, before there is any log.
+    """Finds the experiment that distinguishes two effects best, before any log exists.
 
     A reference motion within the robot's limits, the best of several, is followed by each kind of experiment. The kind
-    that tells the smallest effects apart is taken, of those that are sure without a change by hand where there are any,
+    that distinguishes the smallest effects is used. Kinds that need no manual change are preferred if they are sure,
     and the best of its variants.
 
     Args:
@@ -174,7 +174,7 @@ def _planned(reference: Run, level: Array, workshop: Workshop) -> Problem:
 
 
 def _choose(problem: Problem, places: list[tuple[str, int | None]], reference: Run) -> tuple[Hypothesis, Hypothesis]:
-    """Puts rivals without a joint where the reference alone tells them least, of the joints where both show."""
+    """Chooses the joint of rivals without one: where both act and the reference alone distinguishes them least."""
     robot = problem.situation.robot
     joints = [EFFECTS[name].joints(robot) if joint is None else (joint,) for name, joint in places]
     common = [joint for joint in joints[0] if joint in joints[1]]

@@ -1,4 +1,4 @@
-"""The experiment that tells two causes apart: its motions, its chance, and its files."""
+"""Result: an experiment that distinguishes two causes, its probability of success, and its files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How well an experiment tells two effects apart: the chance, and whether any experiment could."""
+"""Probability that an experiment distinguishes two effects, and whether any experiment could."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Instance:
 
 
 class Judge:
-    """Says how well an experiment tells two hypotheses apart."""
+    """Quantifies how well an experiment distinguishes two hypotheses."""
 
     def __init__(self, problem: Problem, pair: tuple[Hypothesis, Hypothesis], size: float) -> None:
         self.pair = pair

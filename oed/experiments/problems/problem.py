@@ -56,7 +56,7 @@ class FourierProblem:
     weighting: Weighting = field(default_factory=Weighting)
 
     def __getstate__(self) -> dict[str, object]:
-        # What is derived, compiled code above all, is rebuilt in the process that needs it.
+        # Derived data, such as compiled code, are rebuilt in the process that needs them.
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
     def __setstate__(self, state: dict[str, object]) -> None:

@@ -86,7 +86,7 @@ class Design:
 
     @property
     def effects(self) -> tuple[PlantEffect, ...]:
-        """What the robot was said to have beyond its description."""
+        """The effects beyond the robot's description that the design assumed."""
         return tuple(
             PlantEffect(
                 effect=e["effect"], joint=e["joint"], coefficients=tuple(e["coefficients"]), shape=tuple(e["shape"])
@@ -262,7 +262,7 @@ class Design:
         return cls(**read_design(folder, robot, criterion))
 
     def metadata(self) -> dict[str, Any]:
-        """What the trajectory file says of itself."""
+        """Metadata of the trajectory file."""
         return {
             "robot": self.robot.origin or self.robot.name,
             "period": self.robot.period,

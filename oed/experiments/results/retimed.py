@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TorqueUse:
-    """What a timing asks of the motors, by the nominal model with friction.
+    """Motor torques of a timing, by the nominal model with friction.
 
     Attributes:
         peak: largest magnitude of each joint, (n,) [N m, or N of a prismatic joint].
@@ -59,7 +59,7 @@ class TorqueUse:
 
 @dataclass(frozen=True, kw_only=True)
 class RetimedExperiment:
-    """A path with a new timing, and what both timings tell of the parameters.
+    """A path with a new timing, and the information of both timings on the parameters.
 
     Attributes:
         robot: what it is for.
@@ -114,7 +114,7 @@ class RetimedExperiment:
         return "\n".join(lines)
 
     def check(self) -> tuple[Margin, ...]:
-        """Measures all margins anew from the samples of the motion."""
+        """Computes all margins from the samples of the motion."""
         return measured_margins(self.robot, self.motion, self.base)
 
     def to_frame(self) -> pd.DataFrame:

@@ -29,13 +29,13 @@ Array = NDArray[np.float64]
 SLOWER = (1.0, 0.85, 0.7, 0.5, 0.35, 0.2)
 # From each bound in space [m], of a home pose that had to be moved.
 HOME_ROOM = 0.008
-# The share of a limit on root mean squares that the optimised part may use: moves to and from it need some, too.
+# Fraction of an RMS limit that the optimised part may use; the moves to and from it need the rest.
 MOVES = 0.98
 
 
 @dataclass(frozen=True, kw_only=True)
 class Safety:
-    """What an experiment must keep besides position, velocity, acceleration and jerk.
+    """Limits of an experiment besides position, velocity, acceleration and jerk.
 
     Attributes:
         torque: the torque limit, where it is known.

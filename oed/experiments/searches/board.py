@@ -1,4 +1,4 @@
-"""How searches in other processes tell how far they are: one small file each, in a folder that goes away."""
+"""Progress of searches in other processes: one small file each, in a temporary folder."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Board:
     folder: Path
 
     def teller(self, number: int) -> Callable[[int, float], None]:
-        """Gives the function that one search tells its steps and best value."""
+        """Gives the function by which one search reports its steps and best value."""
 
         def tell(done: int, best: float) -> None:
             fresh = self.folder / f"{number}.new"
@@ -65,10 +65,10 @@ class Board:
     @staticmethod
     @contextmanager
     def watched(searches: int, steps: int, progress: Progress, task: str, sign: float = 1.0) -> Iterator[Board]:
-        """Opens a board and passes on what it says until the work is over.
+        """Opens a board and reports its progress until the work is over.
 
         Args:
-            searches: how many will tell.
+            searches: number of searches.
             steps: of each.
             progress: receives the sum of the steps, and the best value.
             task: what the work is called.

@@ -74,7 +74,7 @@ def design_page(design: Design) -> Page:
 
 
 def quality_section(qualities: tuple[Quality, ...]) -> Section:
-    """Shows what each part tells of the parameters."""
+    """Shows the information of each part on the parameters."""
     rows = []
     for quality in qualities:
         data = quality.to_dict()

@@ -1,4 +1,4 @@
-"""What a log or a planned experiment could show: a table of effects by joints, and the page of a plan."""
+"""Detection limits of a log or a planned experiment: a table of effects by joints, and the page of a plan."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robots.terms.effects import EFFECTS
 CLEAR = 0.02
 """Share of the torque below which a limit counts as small: what robot models commonly leave."""
 ALL = 1.0
-"""Share of the torque from which a size is none."""
+"""Fraction of the torque from which an effect size counts as impossible."""
 MUCH = 2.0
 """If the worst-case limit exceeds the usual one by this factor, it is shown as well."""
 

@@ -1,4 +1,4 @@
-"""A diagnosis as its page tells it: words, tables and curves, free of the objects that they come from."""
+"""The content of a diagnosis report: words, tables and curves, independent of the objects they come from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of an experiment that tells two possible causes apart."""
+"""The report of an experiment that distinguishes two possible causes."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ def save_retime_report(result: RetimedExperiment, given: Motion, folder: ResultF
 
 
 def retime_page(result: RetimedExperiment, given: Motion) -> Page:
-    """Builds the page: what the new timing gained and what it cost."""
+    """Builds the page: gain and cost of the new timing."""
     robot, retimed = result.robot, result.retimed
     before, after = result.before.to_dict()["cond_Y"], result.after.to_dict()["cond_Y"]
     name, joint, share = retimed.peak

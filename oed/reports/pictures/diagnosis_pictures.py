@@ -32,7 +32,7 @@ def cause_picture(
     unit: str = "N m",
     name: str = "cause",
 ) -> Picture:
-    """Shows what the model left before and what it leaves with the cause, against the coordinate that shows it best.
+    """Shows the residual without and with an effect over the coordinate that shows it best.
 
     Args:
         label: the coordinate with its unit.

@@ -1,4 +1,4 @@
-"""Pictures of what a model explains of the torque, and of what it leaves."""
+"""Figures of measured and predicted torque, and of the residual."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def residual_picture(
     kinds: Sequence[str] | None = None,
     name: str = "residual",
 ) -> Picture:
-    """Shows how the residual of each joint is spread, how long it remembers, and how it depends on velocity.
+    """Shows distribution, autocorrelation and velocity dependence of each joint's residual.
 
     Args:
         residual: measured minus predicted torque, (N, n), uniform in time; NaN where there is none.

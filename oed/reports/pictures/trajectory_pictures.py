@@ -1,4 +1,4 @@
-"""Pictures of a designed motion: what the joints do, how much it tells, and how close it comes to the limits."""
+"""Figures of a designed motion: motion of the joints, information content, and margins to the limits."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def segment_spans(segments: Sequence[Mapping[str, Any]]) -> tuple[Span, ...]:
 
 
 def spectrum_picture(parts: Mapping[str, ArrayLike], *, name: str = "spectrum") -> Picture:
-    """Shows the singular values of the regressor: what the motion tells about each direction of the parameters.
+    """Shows the singular values of the regressor: the excitation of each direction of the parameters.
 
     Args:
         parts: singular values of each part of an experiment, and of the whole, each (m,), in any order.
@@ -179,7 +179,7 @@ def margins_picture(
     }
     for margin in margins:
         quantity = "position" if _is_position(margin) else margin.quantity
-        # Of a range with two ends, the middle is as far from a limit as the joint can be.
+        # In a range with two ends, the middle is the farthest from both limits.
         scale = 2.0 if quantity == "position" and ranges[margin.joint] == 2 else 1.0
         use = 100.0 * (1.0 - scale * margin.slack_fraction) if np.isfinite(margin.limit) else np.nan
         row = used.setdefault(quantity, np.full(count, np.nan))

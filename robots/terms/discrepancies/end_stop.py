@@ -24,7 +24,7 @@ RANGE = (0.02, 0.98)
 class EndStop(Placed):
     """tau = (k + d dq) x beyond a place c, x = (q - c) there; or short of it, x = (c - q).
 
-    What is met gives way in proportion (k), and takes energy by how deep it is (d), as a buffer of rubber does.
+    The stop has a stiffness k and a damping d that grows with the depth, as a rubber buffer has.
 
     Attributes:
         below: whether it is met at positions short of the place.

@@ -1,4 +1,4 @@
-"""Families of free functions: what torque may depend on where no cause of the catalogue says how."""
+"""Families of free functions for torque errors without a known cause."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 HARMONICS = (1, 2, 3, 4)
 # Of what remembers velocity, of a sensor that creeps, and of a supply that sags [s].
 MEMORIES, CREEPS, SUPPLIES = (0.1, 0.3, 1.0, 3.0), (1.0, 3.0, 10.0, 30.0), (0.03, 0.15, 0.7)
-# Of grease that thins as it is worked [s].
+# time constants of grease that thins as it is worked [s].
 WORKED = (0.5, 2.0, 8.0)
 KNOTS, AGEING = 8, 3
 WHIRLING = 6  # joints at most beside the two

@@ -1,4 +1,4 @@
-"""What swings at the flange after its motion and pulls all joints at once, as liquid in a tank or a hose does."""
+"""A load that swings at the flange, such as liquid in a tank or a hose, and acts on all joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What pulls at the flange by where that is, as a hose, a cable or a balancer between it and the ceiling does."""
+"""An elastic force on the flange that depends on its position: a hose, a cable or a balancer."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _WAYS = ("x", "y", "z")
 class FlangeSpring(Effect):
     """-J(q)' f(p), f a force on the flange that is linear in the flange's place p: f = f0 + S p.
 
-    A steady pull downwards is a payload, which the base model has.
+    A constant downward force is a payload, which the base model contains.
     """
 
     name: ClassVar[str] = "pattern:pulling:0:even"

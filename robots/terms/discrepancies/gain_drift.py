@@ -30,7 +30,7 @@ class OverTime(Effect):
 class GainDrift(OverTime):
     """tau_j g(t) on every joint j, g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
 
-    What heat makes of a motor's constant differs from joint to joint, and is `torque_constant_heat`.
+    The temperature dependence of a torque constant differs between joints; see `torque_constant_heat`.
     """
 
     name: ClassVar[str] = "pattern:fading:0:even"

@@ -20,7 +20,7 @@ MOST = 0.5
 class GainStep(Sudden, JointEffect):
     """tau = e tau_j from the time t_c on.
 
-    What heat makes of a motor's constant comes little by little, and is `torque_constant_heat`.
+    The temperature dependence of a torque constant is gradual; see `torque_constant_heat`.
     """
 
     name: ClassVar[str] = "pattern:switch:0:even"

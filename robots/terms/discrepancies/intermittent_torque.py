@@ -1,4 +1,4 @@
-"""What comes and goes whatever the robot does: a brake that drags for a while, a machine that pushes in its cycle."""
+"""Intermittent torques, independent of the motion: a brake that drags for some time, a machine with a cycle."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ class IntermittentTorque(JointEffect):
 class PeriodicTorque(OverTime):
     """J(q)' f p(t - k T - t_0) for all k: a force on the flange, constant in the base frame, that comes every T s.
 
-    It is told from the motion by its period: one with which the motion repeats as well is none.
+    Its period distinguishes it from the motion; a period of the motion itself is excluded.
     """
 
     name: ClassVar[str] = "pattern:recurring:0:even"
@@ -124,7 +124,7 @@ class PeriodicTorque(OverTime):
         )
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
-        """Keeps the period and what a push lasts what they are."""
+        """Bounds the period and the duration of a push."""
         first, last = float(situation.t[0]), float(situation.t[-1])
         longest = max((last - first) / (TIMES - 1.0), 2 * SHORTEST)
         return (0.5 * SHORTEST, longest), (first, last), (0.5 * BRIEFEST, 0.6 * longest)
@@ -132,7 +132,7 @@ class PeriodicTorque(OverTime):
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks all of the grid by sums of what the residual says of a force, folded over each period."""
+        """Ranks the grid by the force that the residual shows, folded over each period."""
         force = np.einsum("tin,tn->ti", situation.sensitivity("jacobian")[:, :3], residual)
         bins = ((situation.t - situation.t[0]) / BIN).astype(int)
         sums = np.column_stack([np.bincount(bins, weights=column) for column in force.T])

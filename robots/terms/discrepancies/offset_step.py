@@ -1,4 +1,4 @@
-"""What moves once and for all while the logs go on: a base that slips on its mount, a joint's zero that jumps."""
+"""Lasting steps during the logs: a base that slips on its mount, a joint zero that jumps."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Step(Sudden):
         products = np.einsum("tjk,tj->tk", X, residual)
         told, size = (np.cumsum(x[::-1], axis=0)[::-1] for x in (products, np.einsum("tjk,tjk->tk", seen, seen)))
         rows = np.searchsorted(situation.t, np.ravel(grid))
-        # Of the last moments so little is seen that anything fits.
+        # The data after the last candidate times are too short for a fit.
         scores = np.sum(told[rows] ** 2 / np.maximum(size[rows], LEAST * size[:1] + 1e-300), axis=1)
         return tuple(grid[i] for i in best_apart(scores, count, APART))
 

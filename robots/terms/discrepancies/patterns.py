@@ -1,4 +1,4 @@
-"""What a model error looks like when no cause of the catalogue explains it: which joint, of which inputs, how."""
+"""Description of a model error without a known cause: its joint, its inputs and its shape."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ SLOWEST, RUBBING = 0.6, 2.0
 # Swings of a torque that goes back and forth by itself: fewer than so many in the data are a drift.
 SWINGS = 5.0
 SWAYING = ("vibration", "sway")
-# What acts on all joints at once.
+# Effects on all joints at once.
 WHOLE: tuple[Effect, ...] = (
     FlangeOscillator(),
     FlangeSpring(),
@@ -45,7 +45,7 @@ WHOLE: tuple[Effect, ...] = (
     PeriodicTorque(),
     SessionFriction(),
 )
-# What is at a place of a joint's range, or comes at a moment.
+# Effects at a position of a joint, or at a time.
 SINGLE: tuple[Effect, ...] = (
     LocalFault(),
     LocalFault(odd=True),
@@ -138,7 +138,7 @@ class Pattern(JointEffect):
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks the frequencies of what goes back and forth by the residual's spectrum over that of its surroundings."""
+        """Ranks frequencies by the ratio of the residual's spectrum to its local level."""
         grid = self.grid(situation, joint)
         if self.kind not in SWAYING or len(grid) <= count:
             return grid
@@ -174,7 +174,7 @@ class Pattern(JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the residual depends on."""
+        """Describes the dependence of the residual."""
         text = self.sentence(joint, shape)
         if self.kind != "turns" or length == "rad":
             return text
@@ -183,7 +183,7 @@ class Pattern(JointEffect):
         )
 
     def sentence(self, joint: int | None, shape: tuple[float, ...] = ()) -> str:
-        """Says in words which joint's residual depends on what."""
+        """Describes in words the dependence of a joint's residual."""
         where = f"of joint {joint}" if joint else "of the joint"
         who = f"joint {self.other}" if self.other and self.other != joint else "its own joint"
         point = f"{shape[0]:.3g}" if shape else ""
@@ -243,7 +243,7 @@ def is_plain(effect: object) -> bool:
 
 
 def is_oscillation(effect: object) -> bool:
-    """Whether a pattern goes back and forth in time, not with the motion: where in its swing it is elsewhere is open."""
+    """Whether a pattern oscillates in time, not with the motion: its phase in other logs is unknown."""
     return isinstance(effect, Pattern) and effect.kind in SWAYING
 
 

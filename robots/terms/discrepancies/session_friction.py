@@ -16,7 +16,7 @@ from robots.terms.effects import Coefficient, Situation
 Array = NDArray[np.float64]
 
 SESSIONS = 6
-"""Sessions that are told apart; more of them are bunched, in order."""
+"""Largest number of separate sessions; more of them are grouped, in order."""
 
 
 class SessionFriction(OverTime):
@@ -76,7 +76,7 @@ class SessionFriction(OverTime):
 def _sessions(situation: Situation) -> list[slice]:
     """Gives the rows of each session: logs with a pause between that is shorter than `UNKNOWN_PAUSE` are one.
 
-    Logs whose pauses nobody noted may be of several days.
+    Logs without known pauses may be from several days.
     """
     t, runs, least = situation.t, situation.runs, UNKNOWN_PAUSE - situation.period
     begins = [0, *(b.start for a, b in pairwise(runs) if t[b.start] - t[a.stop - 1] > least)]

@@ -1,4 +1,4 @@
-"""What the parameters of an effect say of themselves: its coefficients, and what shapes its columns."""
+"""Parameters of an effect: linear coefficients, and shape parameters of its columns."""
 
 from __future__ import annotations
 

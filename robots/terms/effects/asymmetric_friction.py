@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 class AsymmetricFriction(StaticJointEffect):
     """tau = a |dq| + b dq^2: viscous direction-dependent friction.
 
-    Coulomb friction that differs is the base model's torque offset, and cannot be told from it.
+    A difference of Coulomb friction is equivalent to the torque offset, which the base model contains.
     """
 
     name: ClassVar[str] = "asymmetric_friction"

@@ -58,7 +58,7 @@ class BaseTilt(Effect):
         return (None,) if np.any(robot.chain.gravity) else ()
 
     def leaves(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
-        """Gives half of it for an upright first axis whose own moments are too small to be told: they show."""
+        """Gives half of it for an upright first axis whose own moments are too small to be determined."""
         hidden = joint == 0 and upright(robot) and not any(shape)
         return 0.5 if hidden else super().leaves(robot, joint, shape)
 

@@ -1,4 +1,4 @@
-"""An encoder that is mounted a little turned."""
+"""An encoder that is mounted with an offset."""
 
 from __future__ import annotations
 

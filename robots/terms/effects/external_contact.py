@@ -25,7 +25,7 @@ HOLD = 0.1  # of one that lasts
 LONGER = (1.0, 2.0, 4.0, 8.0)
 FROM = (0.0, 0.5, 1.0)
 ALONE = 0.05  # share of what a joint feels below which others feel nothing
-NONE = 1e-6  # share of force or moment [N or N m] below which the other is none
+NONE = 1e-6  # ratio of force to moment, or the reverse, below which the smaller one counts as zero
 WRENCH = tuple(f"mean_{what}_{k}" for what in ("force", "moment") for k in "xyz")
 # Of a force F at the place r of a body, the first along the base's axes, the second along the body's.
 PLACED = tuple(f"place_{i}_force_{k}" for i in "xyz" for k in "xyz")
@@ -158,7 +158,7 @@ class ExternalContact(Effect):
         last = np.searchsorted(situation.t, starts + 0.9 * durations)
         energies = (sums[last] - sums[first]) ** 2
         for duration in np.unique(durations):
-            # What slow noise makes of long windows, and fast noise of short ones: the median of a chi-square.
+            # Noise of long and short windows differs; the median of a chi-square normalises both.
             own = energies[durations == duration]
             usual = np.array([np.median(some) / 0.455 if len(some := of[of > 0]) else 0.0 for of in own.T])
             energies[durations == duration] = np.divide(own, usual, out=np.zeros_like(own), where=usual > 0)

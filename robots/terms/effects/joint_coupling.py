@@ -24,8 +24,8 @@ class JointCoupling(StaticEffect):
     """Of joint k and j = k - 1: tau_j = I ddq_k + a dq_k + F s, tau_k = I ddq_j + b dq_j + w F s.
 
     s = sign(dq_j + w dq_k). The rotor of a drive that passes through another (Gautier 1995). Rotors and seals that both
-    motions turn give a = b; each is free, so that drag one way is seen as well. The way w is -1 where the description's
-    axes of both joints turn the seal between them against each other. Counted at the outer joint.
+    motions turn give a = b; each is free, so that coupling in one direction is found as well. The way w is -1 where the
+    description's axes of both joints turn the seal between them against each other. Counted at the outer joint.
     """
 
     name: ClassVar[str] = "joint_coupling"

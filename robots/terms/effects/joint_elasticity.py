@@ -66,7 +66,7 @@ class JointElasticity(Effect):
         return tuple((_stiffness(situation, joint, f, rotor), rotor) for rotor in rotors for f in SCANNED)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the resonance within what gears have, and the rotor near what is known of it."""
+        """Bounds the resonance to usual gears, and the rotor to values near the known one."""
         assert joint is not None
         rotor = rotor_bounds(situation, joint)
         softest = _stiffness(situation, joint, LOWEST, rotor[1])

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 SLOWER = 12.0
-"""Times the gear's time constant, with which the housing that it heats goes cold: only a log of hours tells which."""
+"""Time constant of the housing, as a multiple of the gear's; only a log of hours would determine it."""
 MIDDLE = 400.0
 FADES = 5.0
 """Largest fading times the heat kept with a middling time constant: friction is as good as gone there."""
@@ -116,6 +116,6 @@ def heat(situation: Situation, joint: int, time_constant: float) -> Array:
         power = np.maximum(situation.friction[:, j] * situation.dq[:, j], 0.0)
         return relaxation(situation, power, time_constant) / 1000.0
 
-    # The points of the grid come again and again; those of a search are as many as they are brief.
+    # Grid points are used repeatedly and cached; points of a search are used once.
     known = time_constant in ThermalFriction.shapes[0].grid
     return situation.cached(("heat", joint, time_constant), integrate) if known else integrate()

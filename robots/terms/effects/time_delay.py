@@ -20,13 +20,13 @@ SMALL = 1e-5  # [s]
 SHORTEST = 1e-4
 """Delay [s] below which there is none: how friction turns round within a sample is not known that well."""
 APART = 1.6
-# What motion has above the frequencies that are known of it is late, too: a delay is told short by some per cent.
+# Motion above the known frequencies is delayed as well, so a delay is underestimated by some per cent.
 INEXACT = 0.05
 SHIFT = Shape("reversals_late", "s", -0.02, 0.02, "linear", (-0.003, -0.001, -0.0002, 0.0002, 0.001, 0.003, 0.008))
 
 
 class Late(Effect):
-    """Torque that is logged late: reversals, its shape, and all else, its coefficient, tell one delay."""
+    """Delay of the logged torque; the shape follows from reversals, the coefficient from all other data."""
 
     lags: ClassVar[bool] = True
     blurs: ClassVar[bool] = True
@@ -115,7 +115,7 @@ def lateness(situation: Situation, shift: float) -> Array:
             before[run], dq[run] = torque(past), velocity(past)
         return (before - smooth + situation.friction_at(dq) - situation.friction) / step
 
-    # Joints share the points of the grid; those of a search are as many as they are brief.
+    # Joints share the grid points, which are cached; points of a search are used once.
     own = situation.cached(("lateness", shift), evaluate) if shift in SHIFT.grid else evaluate()
     if situation.beyond is None:
         return own

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-# The base model's torque, of which the formula is a power, has itself taken some of the error.
+# The formula is a power of the base model's torque, which contains some of the error itself.
 INEXACT = 0.1
 
 

@@ -26,9 +26,9 @@ WAVES = 2.0
 HIGHEST = {"rad": 1000.0, "m": 10_000.0}
 """Highest order per turn, and wave number of a linear axis [rad/m]: four waves a turn of a screw with 3 mm of lead."""
 LARGEST = 1600
-"""Orders on the grid at most: more than a joint tells over a turn and a half."""
+"""Largest number of orders on the grid: more than a joint resolves over one and a half turns."""
 ABOUT = 201
-"""Points of the spectrum, four a resolution, that tell how much is usual about an order."""
+"""Points of the spectrum, four per resolution, for the usual level around an order."""
 APART = 2
 """Orders of the grid, two a resolution, beside one that is scanned: they are the same line."""
 

@@ -20,8 +20,8 @@ class TorqueSensorDrift(JointEffect):
     """tau = sum_k b_k clip((t' - t_0 - k d) / d, 0, 1): a zero that goes by b_k during the k-th stretch of length d.
 
     One stretch as long as the data is a straight line; more of them follow a zero that wanders. It stays where the data
-    end, t' = min(t, t_1): nobody knows where it goes from there. A stretch of which the data have less than half is
-    none: what little they show of it would say anything.
+    end, t' = min(t, t_1), because later drift is unknown. A stretch with less than half of its length in the data is
+    left out, because it is not determined.
     """
 
     name: ClassVar[str] = "torque_sensor_drift"
