@@ -149,7 +149,10 @@ class Estimate:
         lines = [
             f"{model.robot.name}: {len(model.names)} base parameters from {len(self.t)} samples; "
             f"{self.choice.smoother.text}",
-            "  joint                 torque RMS   fitted   held out   constant    nominal  noise floor",
+            (
+                "  joint                 torque RMS   fitted   held out   constant    nominal  noise floor   (errors "
+                "in % of torque RMS)"
+            ),
         ]
         for joint in self.joints:
             shares = [

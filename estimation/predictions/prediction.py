@@ -109,12 +109,13 @@ class Prediction:
         limited = f"below {self.cutoff:.3g} Hz"
         lines = [
             f"torques of {samples} samples",
-            f"  joint                  error RMS     / RMS       std / std  {limited:>14}   in the 95 % band",
+            f"  joint                  error RMS  rel. RMS       rel. std  {limited:>14}   in the 95 % band",
         ]
         columns = (self.error_rms, self.nrmse, self.relative_spread, self.band_limited_spread, self.band_coverage)
         for j, (name, rms, *shares) in enumerate(zip(self.joint_names, *columns, strict=True), start=1):
             share, spread, slow, covered = (f"{100 * v:.2f} %" if np.isfinite(v) else "–" for v in shares)
             lines.append(f"  {j} {name[:18]:18} {rms:12.4g} {share:>10} {spread:>14} {slow:>15} {covered:>21}")
+        lines.append("  rel.: error divided by torque; last column: share of the errors within the 95 % band")
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:

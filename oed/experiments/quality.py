@@ -17,6 +17,9 @@ from robots.robot import Robot
 from robots.signals import Motion
 
 
+_LABELS = {"fourier": "Fourier series", "sinusoid": "velocity strokes", "whole": "whole experiment"}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Quality:
     """Information of a part of the experiment on the parameters.
@@ -30,6 +33,12 @@ class Quality:
     part: str
     samples: int
     singular_values: tuple[float, ...]
+
+    @property
+    def label(self) -> str:
+        """The part's name in reports."""
+        kind, *rest = self.part.split(" ", 1)
+        return " ".join([_LABELS.get(kind, kind), *rest])
 
     def value(self, criterion: str | Criterion) -> float:
         """Evaluates a criterion."""

@@ -131,21 +131,22 @@ class Design:
     def summary(self) -> str:
         """Describes the experiment, its quality and its margins in a few lines."""
         lines = [
-            f"{self.robot.name}: {self.motion.duration:.1f} s, {len(self.motion)} samples at "
-            f"{1e3 * self.robot.period:g} ms, {self.base.size} parameters",
+            f"{self.robot.name}: experiment of {self.motion.duration:.1f} s for {self.base.size} parameters, "
+            f"{len(self.motion)} samples at {1e3 * self.robot.period:g} ms",
         ]
         for quality in self.qualities:
             values = quality.to_dict()
             if values["cond_Y"] is None:
-                lines.append(f"  {quality.part:8} does not determine all parameters")
+                usual = " (normal)" if quality.part == "sinusoid" else ""
+                lines.append(f"  {quality.label:16} alone: not all parameters are determined{usual}")
             else:
                 lines.append(
-                    f"  {quality.part:8} cond(Y) {values['cond_Y']:.2f}, log det(Y'Y) {values['log_det_YtY']:.1f}, "
+                    f"  {quality.label:16} cond(Y) {values['cond_Y']:.3g}, log det(Y'Y) {values['log_det_YtY']:.1f}, "
                     f"smallest singular value {values['smallest_singular_value_Y']:.3g}"
                 )
         finals = ", ".join(f"{island.initial:.4g} -> {island.final:.4g} ({island.status})" for island in self.islands)
         searches = "1 search" if len(self.islands) == 1 else f"{len(self.islands)} searches"
-        lines.append(f"  {self.criterion.name} of one period, in {searches}: {finals}")
+        lines.append(f"  optimisation of {self.criterion.name} over one period, {searches}: {finals}")
         tightest = min((m for m in self.margins if np.isfinite(m.limit)), key=lambda m: m.slack_fraction, default=None)
         if tightest is not None:
             lines.append(

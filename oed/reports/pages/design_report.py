@@ -80,7 +80,7 @@ def quality_section(qualities: tuple[Quality, ...]) -> Section:
         data = quality.to_dict()
         rows.append(
             (
-                quality.part,
+                quality.label,
                 quality.samples,
                 data["cond_Y"],
                 None if data["cond_Y"] is None else data["cond_Y"] ** 2,
@@ -104,7 +104,7 @@ def quality_section(qualities: tuple[Quality, ...]) -> Section:
                 "singular value."
             ),
         ),
-        pictures=(spectrum_picture({quality.part: _shown(quality) for quality in qualities}),),
+        pictures=(spectrum_picture({quality.label: _shown(quality) for quality in qualities}),),
         tables=(table,),
     )
 
