@@ -22,6 +22,9 @@ from robots.common.errors import InputError
 from robots.common.tables.table import Table
 from robots.signals import FloatArray, Log
 
+LISTED = 10
+"""Columns of a file that an error message lists."""
+
 
 def read_log(
     path: str | PathLike[str],
@@ -167,14 +170,20 @@ def _checked_names(table: Table) -> dict[str, Quantity]:
         quantities[name] = quantity
     if "t" not in quantities:
         raise InputError(
-            "the column is missing",
+            f"the column is missing (found: {_listed(table)})",
             file=table.path,
             column="t",
             row=_header_row(table),
             allowed="t (seconds), q1.. and tau1.. or i1..",
-            remedy="rename or add it",
+            remedy="rename the columns, or describe them in a mapping (--mapping)",
         )
     return quantities
+
+
+def _listed(table: Table) -> str:
+    """Lists the first columns of a file, unknown ones first."""
+    names = [*table.skipped, *table.names]
+    return ", ".join(names[:LISTED]) + (f", ... ({len(names)} columns)" if len(names) > LISTED else "")
 
 
 def _count_joints(table: Table, quantities: Mapping[str, Quantity], n: int | None) -> int:
@@ -191,14 +200,14 @@ def _count_joints(table: Table, quantities: Mapping[str, Quantity], n: int | Non
             continue
         for joint in range(1, max(joints, 1) + 1):
             if joint not in found and quantity.complete:
-                others = ", ".join(f"{quantity.prefix}{other}" for other in sorted(found)) or "none"
                 raise InputError(
-                    f"the column is missing (present: {others})",
+                    f"the column is missing (found: {_listed(table)})",
                     file=table.path,
                     column=f"{quantity.prefix}{joint}",
                     row=_header_row(table),
                     allowed=f"one column for each of q1..q{joints}" if joints else "q1..qn",
-                    remedy="record the joint, or leave out all columns of this quantity" if found else None,
+                    remedy="rename the columns, or describe them in a mapping (--mapping)"
+                    + (f"; or remove all columns {quantity.prefix}1.." if found and quantity.prefix != "q" else ""),
                 )
         extra = sorted(found - set(range(1, joints + 1)))
         if extra:

@@ -16,7 +16,6 @@ from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Motion
 
-
 _LABELS = {"fourier": "Fourier series", "sinusoid": "velocity strokes", "whole": "whole experiment"}
 
 
