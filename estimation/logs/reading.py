@@ -180,9 +180,11 @@ def _checked_names(table: Table) -> dict[str, Quantity]:
     return quantities
 
 
-def _listed(table: Table) -> str:
-    """Lists the first columns of a file, unknown ones first."""
-    names = [*table.skipped, *table.names]
+def _listed(table: Table, prefix: str = "") -> str:
+    """Lists columns of a file, unknown ones first, then those of a prefix."""
+    names = [*table.skipped, *(name for name in table.names if name.startswith(prefix))]
+    if not names:
+        return "none"
     return ", ".join(names[:LISTED]) + (f", ... ({len(names)} columns)" if len(names) > LISTED else "")
 
 
@@ -201,7 +203,7 @@ def _count_joints(table: Table, quantities: Mapping[str, Quantity], n: int | Non
         for joint in range(1, max(joints, 1) + 1):
             if joint not in found and quantity.complete:
                 raise InputError(
-                    f"the column is missing (found: {_listed(table)})",
+                    f"the column is missing (found: {_listed(table, quantity.prefix)})",
                     file=table.path,
                     column=f"{quantity.prefix}{joint}",
                     row=_header_row(table),

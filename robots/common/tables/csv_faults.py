@@ -123,7 +123,7 @@ def find_fault(
             return InputError(f"not a line of a CSV file ({error})", file=path, row=row)
         if len(cells) != len(names):
             return InputError(
-                f"{len(cells)} values, but the header has {len(names)} columns",
+                f"{len(cells)} cells, but the header has {len(names)} columns",
                 file=path,
                 row=row,
                 allowed=f"{len(names)} cells",
