@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 ROUNDS, NEWTON_ROUNDS, NEWTON_STEPS = 12, 3, 3
 # Samples handed to CasADi's loop at a time.
 CHUNK = 1000
-# Of a controller that nobody declared [rad/s].
+# Bandwidth of an undeclared controller [rad/s].
 BANDWIDTH = 60.0
 
 

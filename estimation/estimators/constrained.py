@@ -19,7 +19,7 @@ from estimation.regressions.standard_parameters import body_columns, largest_spe
 from robots.common.errors import InfeasibleError, InputError, SolverError
 from robots.regressor import TorqueModel
 
-# Pulls what the data leave open towards the description, or a plausible arm; far below what they say of the rest.
+# Weak prior for undetermined directions: the description, or a plausible arm. Far below the data's information.
 FAINT = 1e-8
 # A parameter within this share of its own scale of a bound lies at it.
 AT = 1e-6

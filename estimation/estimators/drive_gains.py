@@ -19,7 +19,7 @@ from robots.signals import Motion
 ROUNDS = 8
 # Gains have settled when none moves by more than this share.
 SETTLED = 1e-6
-# Of the smallest to the largest eigenvalue of the scaled normal equations: below it some gain is not told.
+# Ratio of smallest to largest eigenvalue of the scaled normal equations, below which a gain is undetermined.
 REGULAR = 1e-13
 
 

@@ -99,7 +99,7 @@ class ReweightedLeastSquares(WeightedLeastSquares):
 
 
 class Huber(ReweightedLeastSquares):
-    """rho quadratic up to the tuning and linear beyond: outliers pull with a bounded force (Huber 1964)."""
+    """rho quadratic up to the tuning and linear beyond: outliers have a bounded influence (Huber 1964)."""
 
     name = "huber"
 

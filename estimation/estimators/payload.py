@@ -59,7 +59,7 @@ class Payload:
 
     @property
     def eigenvalues(self) -> Array:
-        """Of the normalised pseudo-inertia (4,): all positive for a body that can exist."""
+        """Eigenvalues of the normalised pseudo-inertia (4,): all positive for a physically possible body."""
         return normalised_eigenvalues(self.parameters)
 
 

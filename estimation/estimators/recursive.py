@@ -111,7 +111,7 @@ class Stream:
     def covariance(self) -> Array:
         """Covariance of the estimate now (b, b), the weights being inverse noise variances up to one common factor.
 
-        White noise is taken for granted: where the residual is coloured it is too small.
+        White noise is assumed: if the residual is correlated in time, it is too small.
         """
         values, inverse = self.solution()
         misfit = max(self._misfit - float(values @ self.right), 0.0)

@@ -1,4 +1,4 @@
-"""What estimators share that simulate the identified robot under its controller."""
+"""Shared part of estimators that simulate the identified robot under its controller."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ PULL = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class Loop:
-    """What is known of the control loop that made the logs.
+    """The control loop of the logs, as far as it is known.
 
     Attributes:
         controller: None for a stiff one with the model's own feedforward.

@@ -58,7 +58,7 @@ def standard_parameters(model: Model, inertia: Array | None = None) -> Array:
         raise InputError("the model's parameters are not the robot's base parameters", remedy="identify it again")
     own = [i for i, column in enumerate(base.columns) if column.term == "rigid_body"]
     grouping = base.grouping[np.ix_(own, rigid)]
-    # What is grouped with a rotor's inertia stays with the link: a URDF knows no rotors.
+    # Parameters grouped with a rotor's inertia stay with the link, because a URDF has no rotors.
     return _nearest(grouping, model.values[own], described)
 
 

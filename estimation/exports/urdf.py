@@ -68,7 +68,7 @@ def _updated(source: Path, robot: Robot, inertia: Array) -> Element:
     for _, child, name in ends:
         if name in moving:
             bodies[child] = name
-    # What hangs on a moved link without a moving joint between moves with it.
+    # Links that are rigidly attached to a moved link move with it.
     pending = list(bodies)
     while pending:
         parent = pending.pop()

@@ -1,4 +1,4 @@
-"""What the gate says of a log."""
+"""Result of the checks of a log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an identification found, how sure it is, and how well it predicts what it has not seen."""
+"""Result of an identification: parameters, uncertainty, and errors on held-out data."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ COLOURED = 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class JointFit:
-    """How well one joint's torque is explained, beside what would flatter or shame it.
+    """Torque errors of one joint, with reference values.
 
     Attributes:
         joint: counted from 1.

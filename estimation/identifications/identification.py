@@ -63,7 +63,7 @@ def identify(
 
     Positions are smoothed and differentiated without phase lag; smoothing, regularisation and the sharpness of the
     friction's sign are chosen by predicting blocks of the logs from the rest. Torque is fitted as it was logged. The
-    standard errors survive coloured noise.
+    standard errors allow for correlated noise.
 
     Args:
         robot: the robot.

@@ -10,7 +10,7 @@ from robots.common.errors import InfeasibleError, SolverError
 
 Array = NDArray[np.float64]
 
-# A faint pull on what the data leave open is far below the data's own cost, and must be resolved all the same.
+# A weak prior on undetermined directions is far below the data's cost, but must still be resolved.
 TOLERANCE = 1e-10
 
 

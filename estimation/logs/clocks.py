@@ -1,4 +1,4 @@
-"""Logs whose clocks each began anew, put on one."""
+"""Puts logs with separate clocks on one clock."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ OWN = 1.0
 
 
 def on_one_clock(logs: Sequence[Log], pause: float = UNKNOWN_PAUSE) -> list[Log]:
-    """Puts logs that each began at a time of their own one after the other, in the order given.
+    """Puts logs with separate clocks one after the other, in the given order.
 
-    What depends on the time between logs, such as heat, is then known as well as the pause is.
+    Effects that depend on the time between logs, such as heat, are then as uncertain as the pause.
 
     Args:
         logs: in the order in which they were recorded.
@@ -65,10 +65,10 @@ class ClockedLogs:
 
 
 def put_on_clock(logs: Sequence[Log], held_out: Sequence[Log]) -> ClockedLogs:
-    """Puts logs on one clock where their own times say that they are on none.
+    """Puts logs on one clock if their times overlap.
 
-    Two recordings of one robot cannot overlap: where they do, each began its clock anew. Held-out logs that overlap the
-    others count as recorded after them.
+    Two recordings of one robot cannot overlap in time: if they do, each has its own clock. Held-out logs that overlap
+        the others count as recorded after them.
 
     Args:
         logs: to fit to, in the order in which they were recorded where they overlap.
@@ -101,9 +101,10 @@ _UNDATED = (
 
 
 def later_by(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
-    """How much later than its own clock says a log counts beside those that a model was fitted to, and a word on that.
+    """Time shift of a log relative to those of a model's fit, and a note on it.
 
-    Two recordings of one robot cannot overlap: one that does began its clock anew, and counts as recorded after them.
+    Two recordings of one robot cannot overlap in time: a log that does has its own clock, and counts as recorded after
+        them.
 
     Args:
         logs: of the model's fit, as its provenance describes them; those of older files state no start.
@@ -125,7 +126,7 @@ def later_by(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
 
 
 def before_it(logs: Sequence[Log], motion: Log, start: float, shifts: Sequence[float]) -> tuple[list[Log], str]:
-    """Puts logs of what a robot did before a motion on the clock of that, and says what that takes for granted.
+    """Puts logs of earlier motions on the clock of a motion, and gives a note on the assumption.
 
     Args:
         logs: of what came before, in the order in which they were recorded where their clocks each began anew.

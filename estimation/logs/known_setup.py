@@ -19,7 +19,7 @@ from robots.terms.situations.sensitivities import moved_body
 Array = NDArray[np.float64]
 
 HEAT = "a thermal model"
-"""What does not know payloads and gravities, for `require_plain`."""
+"""Models without payloads and gravity vectors, for `require_plain`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ def load_of(robot: Robot, log: Log) -> Load | None:
     return Load(_rigid_body(robot.under(log.gravity)), moved_body(robot.chain.tip) @ log.payload)
 
 
-# What was compiled for a model is kept by the model.
+# The model keeps its compiled functions.
 @lru_cache(maxsize=16)
 def _rigid_body(robot: Robot) -> TorqueModel:
     return TorqueModel(robot, (RigidBody(),))

@@ -24,7 +24,7 @@ _FIELDS = {
     "segment": "segment",
     "cycle": "cycle",
 }
-# What the gear does to a motor-side value: positions shrink, torques grow.
+# Conversion of motor-side values by the gear: positions are divided, torques multiplied.
 _GEARED = {"q": -1, "dq": -1, "ddq": -1, "qlink": -1, "tau": 1, "current": 0, "temperature": 0}
 
 

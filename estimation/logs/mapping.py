@@ -69,7 +69,7 @@ class Single(Config):
 
 
 class LogMapping(Config):
-    """What a foreign log's columns mean.
+    """The meaning of a foreign log's columns.
 
     Attributes:
         time: the column of time.

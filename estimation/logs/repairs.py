@@ -1,4 +1,4 @@
-"""What a reader mends in a log without a guess: rows that were written twice."""
+"""Repairs by the reader that need no guess: rows that were written twice."""
 
 from __future__ import annotations
 

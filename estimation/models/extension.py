@@ -1,4 +1,4 @@
-"""What was added to a model: effects with their shapes, coefficients and uncertainty."""
+"""Extensions of a model: effects with their shapes, coefficients and uncertainty."""
 
 from __future__ import annotations
 
@@ -159,9 +159,9 @@ def find_effect(name: str) -> Effect:
 def extension_torque(
     extensions: Sequence[Extension], felt: Situation, own: Situation | None = None, bearing: ExtraGearLoad | None = None
 ) -> Array:
-    """Evaluates the extensions of a model in what its base model says of a motion (N, n) [N m or N].
+    """Evaluates the torque (N, n) [N m or N] of a model's extensions.
 
-    What acts on all of the torque comes after the others: what makes it late, then what cuts it off.
+    Effects on the total torque come after the others: first delays, then the current limit.
 
     Args:
         extensions: the effects.

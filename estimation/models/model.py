@@ -174,7 +174,7 @@ class Model:
                 "term": column.term,
                 "value": float(value),
                 "unit": column.unit,
-                # A number that JSON cannot hold, and that nobody should trust, is left out.
+                # A number that is not finite cannot be written as JSON and is left out.
                 "standard_error": float(error) if known else None,
                 "determined": bool(known),
                 "stands_for": formula,

@@ -51,7 +51,7 @@ def build_robot(data: Mapping[str, Any]) -> Robot:
     """Reads what `describe_robot` wrote; what older files do not state is unknown.
 
     Raises:
-        InputError: values that no robot has.
+        InputError: values that are impossible for a robot.
     """
     joints = tuple(Joint(**joint) for joint in data["joints"])
     n, limits = len(joints), data.get("limits", {})
@@ -82,6 +82,6 @@ def require_described(data: Mapping[str, Any]) -> None:
 
 
 def _array(values: Any, n: int, unknown: float) -> Array:
-    """What JSON cannot hold was written as null, and what a file does not state is as unknown."""
+    """Null stands for numbers that JSON cannot hold; missing entries are unknown."""
     given = [None] * n if values is None else values
     return np.array([number(value, unknown) for value in given])

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Of a single log, the last part is what the methods have not seen: a stretch of its own, never shuffled samples.
+# In a single log, the last part is held out: one contiguous part, never shuffled samples.
 SEEN = 0.7
 
 
@@ -103,7 +103,7 @@ def compare_methods(
     progress: Progress | None = None,
     **options: Any,
 ) -> MethodTable:
-    """Identifies with several estimators and predicts data that none of them has seen.
+    """Identifies with several estimators and predicts held-out data.
 
     Args:
         robot: the robot.

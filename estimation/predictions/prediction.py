@@ -218,9 +218,9 @@ def predict(
 
 
 def clock_of(model: Model, log: Log) -> tuple[float, str]:
-    """How much later [s] than its clock says a log counts for a model that something changed in, and a word on that.
+    """Time shift [s] of a log for a model that changes with time, and a note on it.
 
-    What comes, goes or builds up does so on the clock of the logs that the model was fitted to (`later_by`).
+    Time-dependent effects refer to the clock of the logs of the model's fit (`later_by`).
     """
     if not any(extension.source.depends_on == "time" for extension in model.extensions):
         return 0.0, ""
@@ -228,9 +228,9 @@ def clock_of(model: Model, log: Log) -> tuple[float, str]:
 
 
 def warmed(model: Model, before: Sequence[Log], log: Log, later: float) -> tuple[list[Log], str]:
-    """Puts logs of what warmed a robot before another on the clock of a model, and says what that takes for granted.
+    """Puts earlier logs that warmed the robot up on a model's clock, and gives a note on the assumption.
 
-    Nothing is to be said of a model that keeps no heat.
+    A model without thermal effects needs no note.
 
     Args:
         model: with the effects.
@@ -266,7 +266,7 @@ COLD = "thermal friction: the robot is assumed cold at the start; give earlier l
 
 
 def _smoother(model: Model, cutoff: float) -> Smoother:
-    """What smooths another motion as the model's data were; a low-pass in place of a period's harmonics."""
+    """The smoother of the model's data for another motion; a low-pass instead of harmonics."""
     smoothing = model.provenance.get("smoothing")
     kind = smoothing.get("kind") if isinstance(smoothing, Mapping) else None
     return SmoothingSpline(cutoff) if kind == SmoothingSpline.name else LowPass(cutoff)

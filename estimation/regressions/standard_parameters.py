@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 # Eigenvalues of a described pseudo-inertia below this share of its trace are lifted: thin rods and point masses, and
 # files that breach the triangle inequality, would pull towards bodies that cannot exist.
 THIN = 0.02
-# Radius of gyration of a link that nobody describes, as a share of its length and of the arm's.
+# Radius of gyration of a link without description, as a fraction of its length and of the arm's.
 OWN_SHARE, ARM_SHARE = 0.2, 0.05
 GRAVITY = 9.81
 # Speeds, as shares of the largest, at which friction must not drive the joint.
@@ -74,11 +74,11 @@ def body_columns(model: TorqueModel) -> NDArray[np.intp]:
 
 
 def reference_bodies(robot: Robot, mass: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Gives a body per link that can exist: the description's, mended where it is degenerate, or a plausible one.
+    """Gives a physically possible body per link: the description's, corrected if degenerate, or a plausible one.
 
     Args:
         robot: the robot.
-        mass: of an arm that nobody describes [kg].
+        mass: of an arm without description [kg].
 
     Returns:
         Parameters (n, 10), and whether the description states them (n,).
@@ -105,7 +105,7 @@ def reference_bodies(robot: Robot, mass: float) -> tuple[Array, NDArray[np.bool_
 
 
 def nonnegative_rows(model: TorqueModel, speed: Array) -> Array:
-    """Lists what must not be negative: rotor inertias, Coulomb and viscous friction, and the torque of all friction.
+    """Lists quantities that must not be negative: rotor inertias, Coulomb and viscous friction, and the total friction.
 
     Of a friction polynomial, f1 and f2 must be positive, and the whole must brake at every speed that was seen: its
     higher coefficients alone may have either sign, as measured curves that flatten show.

@@ -1,4 +1,4 @@
-"""Covariance of least squares under coloured noise that is correlated across joints."""
+"""Covariance of least squares under noise that is correlated in time and across joints."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def covariance(
     Returns:
         The covariance (p, p).
     """
-    # Of a long log the fit eats too little of the noise to matter.
+    # In a long log, the fit removes too little of the noise to matter.
     long = sum(part.rows for part in parts) > MOST_CORRECTED
     seen: Sequence[Part | Averages] = parts
     lost = np.zeros_like(inverse)

@@ -1,4 +1,4 @@
-"""By how much the torque lags the position: a delay that a fit would take for damping and friction."""
+"""Delay of the torque behind the position, which a fit would take for damping and friction."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ def delay_findings(delays: list[Delay | None], period: float) -> list[Finding]:
         and abs(delay.value) > max(SURE * delay.error, LONG * period)
         and (delay.saved > WORTH if abs(delay.value) <= max(SAMPLES * period, SECONDS) else _shared(delay, delays))
     }
-    # A delay of the whole log shows in all joints alike, and may then be shorter than one joint by itself could tell.
+    # A delay common to all joints can be detected at a shorter value than one of a single joint.
     known = [
         delay
         for delay in delays

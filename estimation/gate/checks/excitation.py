@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 
 # A joint whose held-out torque is predicted hardly better than by a constant is not identified.
 HOPELESS = 0.9
-# A joint of which less than half of the torque's variance follows from the motion, and of whose own parameters none is
-# told apart from zero by so many standard errors, is no better.
+# A joint is badly excited if less than half of its torque variance follows from the motion and none of its parameters
+# differs from zero by this many standard errors.
 WEAK, FAINTLY = 0.7, 10.0
 # An error above this share of the torque's standard deviation is worth a warning by itself.
 POOR = 0.3

@@ -15,9 +15,9 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Below this unexplained share of the torque nothing is turned.
+# Below this unexplained fraction of the torque, directions count as right.
 WELL = 0.1
-# How much better (mean log error) the torques must be explained with a joint turned to be told, and to be beyond doubt.
+# Improvement (mean log error) with a joint's sign inverted, for a warning and for a refusal.
 BETTER, CERTAIN = 0.2, 0.5
 # Rows that are enough to see it, and rows and a ridge that rule most joints out: less than half of `BETTER` on those.
 ROWS, FEW, RIDGE = 1500, 500, 1e-5

@@ -103,7 +103,7 @@ def _stuck(columns: Columns, moving: NDArray[np.bool_]) -> list[Finding]:
             # With a share p of equal neighbours, N rows hold a run of log(N) / log(1/p) by chance; thrice that is not.
             chance = np.log(len(column)) / np.log(1.0 / max(share, 1.0 / len(column)))
             usual = JUMP * float(np.quantile(steps[:: max(1, len(steps) // 50_000)], 0.99))
-            # What hung may have stood for a part of that: rows in which the arm moves count.
+            # The arm may have rested for a part of that: only rows in which it moves count.
             starts, stops = ends(held)
             passed = np.concatenate([[0], np.cumsum(moving)])
             long = passed[stops] - passed[starts] >= max(3.0 * chance, FEWEST)

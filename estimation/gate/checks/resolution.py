@@ -34,7 +34,7 @@ def lattice_step(values: Array) -> float:
     chosen = values[:: max(1, len(values) // SAMPLES)]
     distinct = np.unique(chosen)
     if len(distinct) < 3 or len(distinct) > 0.9 * len(chosen):
-        # As many values as samples: a lattice, if any, is finer than what can be told.
+        # As many values as samples: a resolution step, if any, is too small to be detected.
         return 0.0
     scale = max(float(np.abs(distinct).max()), 1e-300)
     distances = np.diff(distinct)
@@ -44,7 +44,7 @@ def lattice_step(values: Array) -> float:
     step = float(np.quantile(distances, 0.01))
     multiples = distances / step
     near = np.abs(multiples - np.round(multiples)) < 0.05
-    # Rounding in the file blurs high multiples: only the low ones can tell.
+    # Rounding in the file blurs high multiples: only low ones are used.
     low = multiples < 10.5
     if not low.any() or near[low].mean() < 0.95:
         return 0.0
@@ -108,7 +108,7 @@ def check_clipping(columns: Columns) -> list[Finding]:
     Args:
         columns: of the log.
 
-    A joint that rests or is off at exactly zero is told as such.
+    A joint that rests or is off at exactly zero is reported as such.
     """
     findings = []
     name = columns.prefix

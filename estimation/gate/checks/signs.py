@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 # a spring or a balancer that the model lacks can look like it.
 SURE, CLEAR = 5.0, 15.0
 # Power of friction, over that of the joint, below minus this drives; and how much worse (mean log variance) all torques
-# are explained when a torque is turned, for it to be right, or wrong, beyond doubt.
+# are explained when a torque's sign is inverted, for it to be certainly right or wrong.
 DRIVES, TURNED = 0.2, 0.3
 # A torque below this share of the joint's limit is hardly one.
 FAINT = 0.01
@@ -34,7 +34,7 @@ def check_signs(
     gains: Array,
     name: str,
 ) -> list[Finding]:
-    """Finds torques whose inertia is negative, or whose friction drives, with nothing that speaks against it.
+    """Finds torques with a negative inertia or a driving friction, without contrary evidence.
 
     Args:
         robot: with n joints.
@@ -57,7 +57,7 @@ def check_signs(
         heavy, lossy = ratios[joint - 1]
         negative = heavy < -SURE and lossy < SURE / 2
         drives = lossy < -SURE and heavy < SURE / 2 and -found.loss > DRIVES * found.power
-        # The other joints see the same links: a turned torque would fit them better the other way.
+        # The other joints see the same links: a torque of wrong sign would fit them better when inverted.
         others = any(agreed[: joint - 1] + agreed[joint:])
         if lossy < -CLEAR and heavy > SURE and -found.loss > DRIVES * found.power:
             findings.append(_against_time(found, name, joint))

@@ -25,12 +25,12 @@ FILLED = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Stalls:
-    """What a logger that stalled did to a log.
+    """Effects of a stalled logger on a log.
 
     Attributes:
         findings: none where it did not.
-        t: times (N,) [s] at which the rows were measured, as far as that can be told.
-        lost: rows of which it cannot.
+        t: times (N,) [s] at which the rows were measured, as far as they can be reconstructed.
+        lost: rows whose times cannot be reconstructed.
     """
 
     findings: tuple[Finding, ...]
@@ -90,7 +90,7 @@ def check_stalls(log: Log) -> Stalls:
 
 
 def _rounded(log: Log, period: float) -> Stalls | None:
-    """Puts rows at even times where those that are told are no more than these, rounded; None elsewhere."""
+    """Gives uniform times if the logged ones are these, rounded; None otherwise."""
     steps = np.diff(log.t)
     resolution = float(steps.min())
     if np.abs(steps / resolution - np.round(steps / resolution)).max() > WHOLE:
@@ -98,7 +98,7 @@ def _rounded(log: Log, period: float) -> Stalls | None:
     rows = np.arange(len(log))
     even = np.polynomial.Polynomial.fit(rows, log.t, 1)(rows)
     off = float(np.abs(log.t - even).max())
-    # Whole steps are even as they are; and what is rounded to a small part of one is as good as even.
+    # Whole steps are uniform already, and rounding to a small fraction of a step does no harm.
     if not FINE * period < off <= resolution or not _fits(log, even, rows[1::2]):
         return None
     step = float(even[1] - even[0])

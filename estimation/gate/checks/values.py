@@ -10,16 +10,16 @@ from estimation.gate.finding import Finding
 from estimation.gate.report import FEWEST
 from robots.signals import Log
 
-# Beyond these, whatever the unit, a position or a torque is none.
+# Values beyond these are impossible for a position or a torque in any unit.
 ABSURD_Q, ABSURD_TAU = 1e6, 1e8
 # Parameters of a joint and its link, and rows that each of them deserves.
 PER_JOINT, ROWS_PER_PARAMETER = 14, 10
-# Rows by which most columns are told apart.
+# Number of rows that distinguishes most columns.
 LOOKED_AT = 50
 
 
 def too_little(log: Log, timing: Timing) -> Finding:
-    """Refuses a log of which the smoothing leaves too little."""
+    """Refuses a log that is too short after smoothing."""
     longest = max(stop - first for first, stop in timing.parts)
     return Finding(
         name="short",
@@ -139,7 +139,7 @@ def constant_torques(columns: Columns) -> list[Finding]:
 
 
 def notes_of_reader(log: Log) -> list[Finding]:
-    """What the reader did to the file."""
+    """Changes that the reader made."""
     return [
         Finding(
             name=str(note["name"]),

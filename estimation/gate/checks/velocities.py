@@ -71,7 +71,7 @@ def _fault(likeness: float, size: float) -> str | None:
 
 
 def _common_factor(robot: Robot, likeness: Array, size: Array, moves: NDArray[np.bool_]) -> Finding | None:
-    """A factor that all joints share tells which unit is wrong."""
+    """A common factor of all joints identifies the wrong unit."""
     sure = moves & (likeness > LIKE)
     if not sure.any():
         return None

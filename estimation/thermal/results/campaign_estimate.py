@@ -1,4 +1,4 @@
-"""What a campaign's fit of rigid body, friction and heat found."""
+"""Result of a campaign's fit of rigid body, friction and thermal models."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a thermal fit found, how sure it is, and what it cannot know."""
+"""Result of a thermal fit: parameters, uncertainty, and undetermined quantities."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class ThermalEstimate:
         """Finds a parameter or a combination by its name.
 
         Raises:
-            InputError: there is none of that name.
+            InputError: the name is unknown.
         """
         everything = (*self.parameters, *self.combinations)
         for quantity in everything:
@@ -130,7 +130,7 @@ class ThermalEstimate:
         return float(np.sqrt(np.mean(error**2) / np.mean(np.concatenate([run.measured for run in parts]) ** 2)))
 
     def summary(self) -> str:
-        """Says what is determined and what is not."""
+        """Lists determined and undetermined quantities."""
         head = f"{self.model.name} thermal model from {self.rows} measurements"
         if np.isfinite(self.residual):
             head += f", friction error {100 * self.residual:.2f} % of its RMS"

@@ -1,4 +1,4 @@
-"""What a finished thermal search says: values, standard errors, combinations and remarks."""
+"""Evaluation of a finished thermal fit: values, standard errors, combinations and notes."""
 
 from __future__ import annotations
 

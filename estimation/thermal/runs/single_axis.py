@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 STEADY = 0.02
 # ... for at least so many samples.
 SHORTEST = 10
-# Scaled columns that are this close to dependent are not told apart by the data.
+# Scaled columns this close to linear dependence are not separately determined.
 DEPENDENT = 1e-7
 
 
@@ -68,7 +68,7 @@ def fit_single_axis(
 
     Raises:
         InputError: arrays of other shapes.
-        NotIdentifiableError: a motion that does not tell the effects apart, such as one at a single speed.
+        NotIdentifiableError: a motion that does not determine the effects separately, such as one at a single speed.
     """
     position, v, a, torque = _arrays(q, dq, ddq, tau)
     forward, backward = v > 0.0, v < 0.0

@@ -1,4 +1,4 @@
-"""What is known of one heating or cooling of one joint, checked once."""
+"""Data of one heating or cooling of one joint, checked once."""
 
 from __future__ import annotations
 

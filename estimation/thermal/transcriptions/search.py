@@ -67,7 +67,7 @@ class Search:
             self.free[i] = parameter.name not in self.structure.fixed
         for r, run in enumerate(self.runs):
             zones = self.layout.start_slots(r)
-            # A thermometer tells where its zone starts.
+            # A thermometer gives the start temperature of its zone.
             seen = self.start == "auto" and bool(run.readings(self.kind))
             self.free[zones] = self.start == "free" or seen
             self.free[self.layout.ambient_slot(r)] = run.ambient is None

@@ -1,4 +1,4 @@
-"""What a set of runs can determine at all: which parameters are searched, which are conventions, and why."""
+"""Parameters that a set of runs can determine: which are searched, which are conventions, and why."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ RESTED, QUIET = 120.0, 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class Structure:
-    """What is searched and what is not.
+    """Searched and fixed parameters.
 
     Attributes:
         fixed: values of the parameters that are not searched.
         conventions: those among them that stand for what the data do not determine.
         scaled: parameters that mean something only together with a convention.
-        notes: what a reader must know.
+        notes: assumptions and limitations.
     """
 
     fixed: Mapping[str, float]
@@ -65,7 +65,7 @@ def find_structure(
             remedy="fit them separately",
         )
     if not any(run.has_friction for run in runs):
-        # Without friction data its slope acts through the heat alone, where nothing tells it from a heat exchange.
+        # Without friction data, its slope acts only through the heat, where it is equivalent to a heat exchange.
         if "alpha" not in known:
             known["alpha"] = 0.0
             notes.append(
