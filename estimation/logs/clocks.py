@@ -68,7 +68,7 @@ def put_on_clock(logs: Sequence[Log], held_out: Sequence[Log]) -> ClockedLogs:
     """Puts logs on one clock if their times overlap.
 
     Two recordings of one robot cannot overlap in time: if they do, each has its own clock. Held-out logs that overlap
-        the others count as recorded after them.
+    the others count as recorded after them.
 
     Args:
         logs: to fit to, in the order in which they were recorded where they overlap.
@@ -104,7 +104,7 @@ def later_by(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
     """Time shift of a log relative to those of a model's fit, and a note on it.
 
     Two recordings of one robot cannot overlap in time: a log that does has its own clock, and counts as recorded after
-        them.
+    them.
 
     Args:
         logs: of the model's fit, as its provenance describes them; those of older files state no start.
