@@ -12,7 +12,7 @@ from scipy.linalg import null_space
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.wls import WeightedLeastSquares
 from estimation.regressions.covariances import FAINT as OPEN
-from estimation.regressions.covariances import Equations, honest_covariance, regressor_rows
+from estimation.regressions.covariances import Equations, regressor_rows, robust_covariance
 from estimation.regressions.regression_data import RegressionData
 from estimation.regressions.regularisation import regularisation
 from estimation.regressions.standard_parameters import body_columns, largest_speed, nonnegative_rows, scaling
@@ -155,7 +155,7 @@ def _covariance(data: RegressionData, values: Array, weights: Array, grouping: A
         )
         for part in data.parts
     ]
-    return honest_covariance(equations, weights, gram, (inverse + inverse.T) / 2)
+    return robust_covariance(equations, weights, gram, (inverse + inverse.T) / 2)
 
 
 def _solve(matrix: Array, target: Array, rows: Array, lower: Array, upper: Array) -> Array:

@@ -13,7 +13,7 @@ from estimation.closed_loops.closed_loop import ClosedLoop, Controller, inertia_
 from estimation.estimators.base import Array
 from estimation.estimators.consistent import PhysicallyConsistent
 from estimation.estimators.wls import WeightedLeastSquares
-from estimation.regressions.covariances import Equations, honest_covariance, regressor_rows
+from estimation.regressions.covariances import Equations, regressor_rows, robust_covariance
 from estimation.regressions.moments import Moments
 from estimation.regressions.position_noise import smoothed_noise
 from estimation.regressions.regression_data import FittedRows, RegressionData
@@ -152,7 +152,7 @@ class Instruments:
             moments = simulated_moments(self.data, part, motion, mask)
             total = moments if total is None else total + moments
         assert total is not None
-        return honest_covariance(equations, weights, np.tensordot(weights, total.gram, axes=1))
+        return robust_covariance(equations, weights, np.tensordot(weights, total.gram, axes=1))
 
 
 def instrumented_moments(data: RegressionData, part: FittedRows, motion: Motion, mask: Array) -> tuple[Array, Array]:

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 # Fewer samples than this carry no derivatives.
 FEWEST = 20
 # Findings of a log that is in order and still does not determine what is asked for.
-UNTOLD = frozenset({"badly_excited"})
+NO_INFORMATION = frozenset({"badly_excited"})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,7 +90,7 @@ class GateReport:
             return
         first = reasons[0]
         more = f" (and {len(reasons) - 1} more: {', '.join(_names(reasons[1:]))})" if len(reasons) > 1 else ""
-        kind = NotIdentifiableError if all(reason.name in UNTOLD for reason in reasons) else InputError
+        kind = NotIdentifiableError if all(reason.name in NO_INFORMATION for reason in reasons) else InputError
         raise kind(
             f"{first.text}{more}",
             file=self.log or None,

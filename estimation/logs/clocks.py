@@ -100,7 +100,7 @@ _UNDATED = (
 )
 
 
-def later_by(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
+def clock_shift_between(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
     """Time shift of a log relative to those of a model's fit, and a note on it.
 
     Two recordings of one robot cannot overlap in time: a log that does has its own clock, and counts as recorded after
@@ -125,7 +125,9 @@ def later_by(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
     return float(last + UNKNOWN_PAUSE - log.t[0]), _LATER.format(UNKNOWN_PAUSE)
 
 
-def before_it(logs: Sequence[Log], motion: Log, start: float, shifts: Sequence[float]) -> tuple[list[Log], str]:
+def earlier_logs_on_clock(
+    logs: Sequence[Log], motion: Log, start: float, shifts: Sequence[float]
+) -> tuple[list[Log], str]:
     """Puts logs of earlier motions on the clock of a motion, and gives a note on the assumption.
 
     Args:

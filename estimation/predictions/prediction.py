@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.logs.clocks import before_it, later_by
+from estimation.logs.clocks import clock_shift_between, earlier_logs_on_clock
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
 from estimation.preprocessing import LowPass, Smoother, SmoothingSpline, resample, smooth
@@ -171,11 +171,11 @@ def predict(
         model: an identified model.
         log: positions over time; its torque, if any, is compared with the prediction and not used otherwise. A payload
             or a gravity that it states counts. Where it overlaps in time the logs in which a model's change was found,
-            it counts as recorded after them (`clock_of`).
+            it counts as recorded after them (`clock_shift`).
         thermal: this model with its thermal models: friction falls as the motion heats the joints.
         start: temperatures of each joint's zones at first [degC]; ambient temperature by default.
         ambient: ambient temperature where the log does not state it [degC]; each model's by default.
-        later: how much later [s] than its own clock says the log counts; by default what `clock_of` says.
+        later: how much later [s] than its own clock says the log counts; by default what `clock_shift` says.
         before: logs of what the robot did before, for a model whose effects keep heat: without any it begins cold.
             With `later` their times are as they count (`warmed`). Beside `thermal`, `start` says what was before.
 
@@ -197,7 +197,7 @@ def predict(
     if thermal is None:
         states = (motion.q, motion.dq, motion.ddq)
         if later is None:
-            later = clock_of(model, log)[0]
+            later = clock_shift(model, log)[0]
             before = warmed(model, before, log, later)[0]
         smoother, clock = _smoother(model, cutoff), motion.t + later
         earlier = [smooth(resample(own.t, own.q), smoother) for own in before]
@@ -217,14 +217,14 @@ def predict(
     )
 
 
-def clock_of(model: Model, log: Log) -> tuple[float, str]:
+def clock_shift(model: Model, log: Log) -> tuple[float, str]:
     """Time shift [s] of a log for a model that changes with time, and a note on it.
 
-    Time-dependent effects refer to the clock of the logs of the model's fit (`later_by`).
+    Time-dependent effects refer to the clock of the logs of the model's fit (`clock_shift_between`).
     """
     if not any(extension.source.depends_on == "time" for extension in model.extensions):
         return 0.0, ""
-    return later_by(model.provenance.get("logs", ()), log)
+    return clock_shift_between(model.provenance.get("logs", ()), log)
 
 
 def warmed(model: Model, before: Sequence[Log], log: Log, later: float) -> tuple[list[Log], str]:
@@ -236,7 +236,7 @@ def warmed(model: Model, before: Sequence[Log], log: Log, later: float) -> tuple
         model: with the effects.
         before: the logs, in the order in which they were recorded where their clocks each began anew.
         log: the motion.
-        later: how much later [s] than its own clock says that counts (`clock_of`).
+        later: how much later [s] than its own clock says that counts (`clock_shift`).
 
     Raises:
         InputError: logs that come after the motion; any, of a model that keeps no heat.
@@ -250,8 +250,8 @@ def warmed(model: Model, before: Sequence[Log], log: Log, later: float) -> tuple
         return [], ""
     if not before:
         return [], COLD
-    shifts = [clock_of(model, own)[0] for own in before]
-    placed, anew = before_it(before, log, float(log.t[0]) + later, shifts)
+    shifts = [clock_shift(model, own)[0] for own in before]
+    placed, anew = earlier_logs_on_clock(before, log, float(log.t[0]) + later, shifts)
     count = "one log" if len(before) == 1 else f"{len(before)} logs"
     return (
         placed,

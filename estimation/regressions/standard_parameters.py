@@ -92,7 +92,7 @@ def reference_bodies(robot: Robot, mass: float) -> tuple[Array, NDArray[np.bool_
     described = np.isfinite(inertia).all(axis=1) & (inertia[:, 0] > 0)
     for link in range(robot.n):
         if described[link]:
-            bodies[link] = _mended(inertia[link], 0.01 * arm)
+            bodies[link] = _corrected_body(inertia[link], 0.01 * arm)
         else:
             own, centre = mass / robot.n, ends[link] / 2
             spread = (OWN_SHARE * lengths[link] + ARM_SHARE * arm) ** 2
@@ -165,7 +165,7 @@ def _size(body: Array) -> tuple[float, float]:
     return float(body[0]), float(np.sqrt(np.trace(pseudo[:3, :3]) / body[0]))
 
 
-def _mended(body: Array, shortest: float) -> Array:
+def _corrected_body(body: Array, shortest: float) -> Array:
     """Lifts the eigenvalues of a body's normalised pseudo-inertia to a share of their sum."""
     mass = float(body[0])
     pseudo = pseudo_inertia(body) / mass

@@ -89,14 +89,14 @@ def fit_campaign(
         bar.update(1.0, "condensing")
         condensed = condense(begin, data, width)
         bar.update(2.0, "fitting")
-        return _Turns(begin, condensed, sensor).run(
+        return _AlternatingFit(begin, condensed, sensor).run(
             bar, {"order": order, "alpha": alpha, "fixed": dict(fixed or {}), "start": start, "seed": seed}
         )
     finally:
         bar.finish()
 
 
-class _Turns:
+class _AlternatingFit:
     """The two fits that take turns."""
 
     def __init__(self, model: Model, condensed: Condensed, sensor: str) -> None:

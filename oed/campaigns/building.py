@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.campaigns.checking import TorqueCheck, checked
-from oed.campaigns.clearing import Clearing
+from oed.campaigns.clearing import CollisionFreeRanges
 from oed.campaigns.excitation import excitation_stage
 from oed.campaigns.fitting import fit_stages
 from oed.campaigns.planning import Planner
 from oed.campaigns.programme import Programme
-from oed.campaigns.remarks import remarks_on
+from oed.campaigns.remarks import campaign_notes
 from oed.campaigns.result import Campaign
 from oed.campaigns.stages import Stage
 from oed.campaigns.timetable import make_timetable
@@ -116,14 +116,14 @@ def campaign(
         excitation = checked(excitation, robot, home, torque)
     listener.start(f"planning a campaign for {robot.name}", None)
     try:
-        clearing = Clearing(bodies, home) if bodies is not None else None
-        if clearing is not None and not clearing.possible:
+        free_ranges = CollisionFreeRanges(bodies, home) if bodies is not None else None
+        if free_ranges is not None and not free_ranges.possible:
             if bodies is not None and bodies.pairs:
                 notes.append(
                     "The home pose collides in the collision model, so collisions of the stages could not be avoided."
                 )
-            clearing = None
-        planner = Planner(robot=robot, limits=limits, home=home, torque=torque, clearing=clearing)
+            free_ranges = None
+        planner = Planner(robot=robot, limits=limits, home=home, torque=torque, free_ranges=free_ranges)
         stages = [_power_on_stage(plan, home, robot.period)] if plan.power_on else []
         if excitation is not None:
             stages.append(excitation)
@@ -138,7 +138,7 @@ def campaign(
             raise InputError(f"{len(known.models)} thermal models", allowed=f"{robot.n}, one per joint")
         if known is not None:
             known = replace(known, models=tuple(replace(model, ambient=ambient) for model in known.models))
-        notes += remarks_on(stages, planner, known)
+        notes += campaign_notes(stages, planner, known)
     finally:
         listener.finish()
     return Campaign(

@@ -31,7 +31,7 @@ STRETCH_STEPS = 181
 """Positions of a joint at which a stretch is looked at."""
 
 
-class Clearing:
+class CollisionFreeRanges:
     """Finds room for motions of one robot.
 
     Args:

@@ -11,11 +11,11 @@ from oed.campaigns.planning import ALIGNED, Planner
 from oed.campaigns.stages import Stage
 from robots.thermal import KnownThermal
 
-NARROWED = 0.99
+SHOWN_REDUCTION = 0.99
 """Part of what was asked below which a joint's warm-up range counts as narrowed."""
 
 
-def remarks_on(stages: Sequence[Stage], planner: Planner, known: KnownThermal | None) -> tuple[str, ...]:
+def campaign_notes(stages: Sequence[Stage], planner: Planner, known: KnownThermal | None) -> tuple[str, ...]:
     """Lists changes, missing checks, and collisions or small margins of the stages.
 
     Args:
@@ -27,7 +27,7 @@ def remarks_on(stages: Sequence[Stage], planner: Planner, known: KnownThermal | 
         Sentences, collisions first.
     """
     collisions = [remark for stage in stages for remark in _collisions(stage, planner)]
-    others = [remark for stage in stages for remark in _remarks(stage, planner)]
+    others = [remark for stage in stages for remark in _notes(stage, planner)]
     return (*collisions, *others, *_unknown(planner, known))
 
 
@@ -45,7 +45,7 @@ def _collisions(stage: Stage, planner: Planner) -> Iterator[str]:
     )
 
 
-def _remarks(stage: Stage, planner: Planner) -> Iterator[str]:
+def _notes(stage: Stage, planner: Planner) -> Iterator[str]:
     torque = planner.torque
     share = stage.details.get("acceleration_share", 1.0)
     if share < 1.0:
@@ -57,7 +57,7 @@ def _remarks(stage: Stage, planner: Planner) -> Iterator[str]:
                 f"{margin.joint}; {100 * torque.margin:g} % are required."
             )
     asked = stage.details.get("range", 0.0)
-    narrow = [j for j, part in enumerate(stage.details.get("ranges", []), start=1) if part < NARROWED * asked]
+    narrow = [j for j, part in enumerate(stage.details.get("ranges", []), start=1) if part < SHOWN_REDUCTION * asked]
     if narrow:
         parts = ", ".join(f"{100 * stage.details['ranges'][j - 1]:.0f} %" for j in narrow)
         yield (

@@ -54,7 +54,7 @@ def refuse_others(context: typer.Context) -> None:
         )
 
 
-def discriminating(
+def design_discriminating(
     robot: Robot,
     rivals: str,
     *,

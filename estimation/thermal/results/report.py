@@ -31,7 +31,7 @@ def report(search: Search, solution: Solution, warm: tuple[int, ...]) -> Thermal
     scales = _slopes(search, at)
     parameters = _parameters(search, model, np.sqrt(np.maximum(np.diag(covariance), 0.0)) * np.abs(scales))
     bounds, notes = _slow(search, solution, info, combinations, powers)
-    notes = [*search.structure.notes, *notes, *_remarks(search, solution, parameters, warm)]
+    notes = [*search.structure.notes, *notes, *_notes(search, solution, parameters, warm)]
     predicted = search.problem.predict(solution.coordinates, solution.states)
     white = search.weights * (predicted - search.problem.measured)
     likelihood = float(-0.5 * white @ white + np.log(search.weights / np.sqrt(2 * np.pi)).sum())
@@ -107,7 +107,7 @@ def _slow(
     return {slow.name: bound}, [text]
 
 
-def _remarks(search: Search, solution: Solution, parameters: tuple[Quantity, ...], warm: tuple[int, ...]) -> list[str]:
+def _notes(search: Search, solution: Solution, parameters: tuple[Quantity, ...], warm: tuple[int, ...]) -> list[str]:
     remarks = []
     for r in warm:
         start = ", ".join(f"{value:.1f}" for value in search.layout.start_at(solution.coordinates, r))

@@ -16,10 +16,10 @@ from estimation.diagnosis.experiment_plans.next_experiment import VARIANTS
 from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from oed.campaigns.discriminations.discrimination import Discrimination, Judged
-from oed.campaigns.discriminations.judging import STEP, Judge, require_separable
+from oed.campaigns.discriminations.discrimination import Discrimination, DiscriminationScore
+from oed.campaigns.discriminations.judging import STEP, Discriminator, require_separable
 from oed.campaigns.discriminations.rivals import parse_rivals
-from oed.campaigns.discriminations.separating import Run, Workshop
+from oed.campaigns.discriminations.separating import ExperimentBuilder, Run
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InfeasibleError, InputError, NotIdentifiableError
 from robots.common.progress import SILENT, Progress
@@ -80,32 +80,32 @@ def discriminate(
     if not (np.isfinite(velocity_fraction) and 0.0 < velocity_fraction <= 1.0):
         raise InputError(f"found the velocity fraction {velocity_fraction}", allowed="above 0, up to 1")
     model = default_model(robot, friction=friction, velocity_scale=SHARP)
-    workshop = Workshop(find_base_parameters(model), home=home, velocity_fraction=velocity_fraction, seed=seed)
-    reference = workshop.runs()[0]
-    base = workshop.base.model
+    builder = ExperimentBuilder(find_base_parameters(model), home=home, velocity_fraction=velocity_fraction, seed=seed)
+    reference = builder.runs()[0]
+    base = builder.base.model
     if level is None:
         m, nominal = reference.motion, np.nan_to_num(base.nominal)
         level = SHARE * np.sqrt(np.mean(base.torque(m.q, m.dq, m.ddq, nominal) ** 2, axis=0))
-    problem = _planned(reference, level, workshop)
+    problem = _planned(reference, level, builder)
     pair = _choose(problem, places, reference)
-    judge = Judge(problem, pair, size)
+    judge = Discriminator(problem, pair, size)
     best = judge("reference", (reference,))
     for draw in range(1, REFERENCES):
-        other = Workshop(workshop.base, home=home, velocity_fraction=velocity_fraction, seed=seed + draw)
+        other = ExperimentBuilder(builder.base, home=home, velocity_fraction=velocity_fraction, seed=seed + draw)
         drawn = judge("reference", other.runs())
         if drawn.merit > best.merit:
-            workshop, reference, best = other, other.runs()[0], drawn
+            builder, reference, best = other, other.runs()[0], drawn
     index = next((h.joint - 1 for h in pair if h.joint is not None), int(np.argmax(np.ptp(reference.motion.q, axis=0))))
-    judged: dict[str, Judged] = {}
+    judged: dict[str, DiscriminationScore] = {}
     runs: dict[str, tuple[Run, ...]] = {}
     progress.start("kinds of experiment", len(MAKERS))
     try:
         for number, (kind, make) in enumerate(MAKERS.items(), start=1):
             try:
-                runs[kind] = workshop.runs(make(workshop.room, index, 0), kind)
+                runs[kind] = builder.runs(make(builder.room, index, 0), kind)
                 judged[kind] = judge(kind, runs[kind])
             except InfeasibleError as error:
-                judged[kind] = Judged.impossible(kind, str(error))
+                judged[kind] = DiscriminationScore.impossible(kind, str(error))
             progress.update(number, kind)
     finally:
         progress.finish()
@@ -117,7 +117,7 @@ def discriminate(
     kind = max(runs, key=lambda name: judged[name].merit)
     for variant in range(1, VARIANTS if kind in VARIED else 1):
         try:
-            varied = workshop.runs(MAKERS[kind](workshop.room, index, variant), kind)
+            varied = builder.runs(MAKERS[kind](builder.room, index, variant), kind)
         except InfeasibleError:
             continue
         better = judge(kind, varied)
@@ -135,7 +135,7 @@ def discriminate(
         size=size,
         settings={
             "friction": friction,
-            "home": workshop.home.tolist(),
+            "home": builder.home.tolist(),
             "velocity_fraction": velocity_fraction,
             "seed": seed,
         },
@@ -155,15 +155,15 @@ def _level(noise: ArrayLike | None, robot: Robot) -> Array | None:
     return level
 
 
-def _planned(reference: Run, level: Array, workshop: Workshop) -> Problem:
+def _planned(reference: Run, level: Array, builder: ExperimentBuilder) -> Problem:
     """Poses the diagnosis of the reference motion at `STEP`, the white part of the noise averaged over each step."""
     part = reference.parts(STEP)[0]
     sensors = Sensors()
-    every = max(round(STEP / workshop.period), 1)
+    every = max(round(STEP / builder.period), 1)
     share = sensors.coloured_share
     kept = (1.0 - share) / every + share
     thinned = Sensors(coloured_share=share / kept, correlation_time=sensors.correlation_time)
-    model = workshop.base.model
+    model = builder.base.model
     return planned_problem(
         model,
         np.asarray(model.nominal),
@@ -192,7 +192,7 @@ def _choose(problem: Problem, places: list[tuple[str, int | None]], reference: R
         if len(options) == 1:
             return pair
         try:
-            merit = Judge(problem, pair, SHARE)("reference", (reference,)).energy
+            merit = Discriminator(problem, pair, SHARE)("reference", (reference,)).energy
         except NotIdentifiableError as error:
             failed = error
             continue

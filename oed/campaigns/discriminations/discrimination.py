@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Judged:
+class DiscriminationScore:
     """One kind of experiment, judged.
 
     Attributes:
@@ -49,7 +49,7 @@ class Judged:
     note: str = ""
 
     @classmethod
-    def impossible(cls, kind: str, note: str) -> Judged:
+    def impossible(cls, kind: str, note: str) -> DiscriminationScore:
         """A kind that the limits forbid."""
         return cls(kind=kind, resolves=0.0, energy=-1.0, duration=0.0, runs=0, shares=(0, 0), visible=(0, 0), note=note)
 
@@ -96,7 +96,7 @@ class Discrimination:
     kind: str
     what: str
     runs: tuple[Run, ...]
-    ranking: tuple[Judged, ...]
+    ranking: tuple[DiscriminationScore, ...]
     alone: float
     noise: Array
     size: float

@@ -14,7 +14,7 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.power import chance_to_resolve
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.linear_algebra.orthonormal import orthonormal
-from oed.campaigns.discriminations.discrimination import Judged
+from oed.campaigns.discriminations.discrimination import DiscriminationScore
 from oed.campaigns.discriminations.separating import Run
 from robots.common.errors import NotIdentifiableError
 
@@ -42,7 +42,7 @@ class Instance:
     mixtures: Array
 
 
-class Judge:
+class Discriminator:
     """Quantifies how well an experiment distinguishes two hypotheses."""
 
     def __init__(self, problem: Problem, pair: tuple[Hypothesis, Hypothesis], size: float) -> None:
@@ -50,7 +50,7 @@ class Judge:
         self.instances = [item for hypothesis in pair for item in instances(problem, hypothesis, size)]
         self.grams = Grams(problem, self.instances)
 
-    def __call__(self, kind: str, runs: tuple[Run, ...]) -> Judged:
+    def __call__(self, kind: str, runs: tuple[Run, ...]) -> DiscriminationScore:
         """Judges an experiment by the worse of the two truths, each the median over its shapes and mixtures."""
         gram = self.grams.of([part for run in runs for part in run.parts(STEP)])
         energies: list[float] = []
@@ -74,7 +74,7 @@ class Judge:
             shares.append(share)
             alone.append(own)
         energy = min(energies)
-        return Judged(
+        return DiscriminationScore(
             kind=kind,
             resolves=chance_to_resolve(energy),
             energy=energy,
@@ -134,7 +134,7 @@ def instances(problem: Problem, hypothesis: Hypothesis, size: float) -> list[Ins
     return found
 
 
-def require_separable(pair: tuple[Hypothesis, Hypothesis], judged: Sequence[Judged]) -> None:
+def require_separable(pair: tuple[Hypothesis, Hypothesis], judged: Sequence[DiscriminationScore]) -> None:
     """Refuses a pair of effects that no experiment can distinguish from the base model or from each other.
 
     Raises:

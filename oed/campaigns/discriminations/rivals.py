@@ -20,7 +20,8 @@ def parse_rivals(rivals: str | Sequence[str], robot: Robot) -> list[tuple[str, i
     texts = [part.strip() for part in (rivals.split(",") if isinstance(rivals, str) else rivals)]
     if len(texts) != 2 or not all(texts):
         raise InputError(
-            f"found {len([t for t in texts if t])} effects to distinguish", allowed="two, such as stribeck:2,backlash:2"
+            f"--discriminate needs two effects, found {len([t for t in texts if t])}",
+            allowed="such as stribeck:2,backlash:2",
         )
     places = [_place(text, robot) for text in texts]
     if places[0][1] is None or places[1][1] is None:

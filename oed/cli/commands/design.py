@@ -139,10 +139,10 @@ def design(
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         if discriminate is not None:
-            from oed.cli.discriminating import discriminating, refuse_others
+            from oed.cli.discriminating import design_discriminating, refuse_others
 
             refuse_others(context)
-            summary, data = discriminating(
+            summary, data = design_discriminating(
                 robot_from(robot, tip, joints, lock),
                 discriminate,
                 noise=numbers("--noise", noise),

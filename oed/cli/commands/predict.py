@@ -56,14 +56,14 @@ def predict(
     with console.working() as progress:
         from estimation import load_model, read_log
         from estimation import predict as run
-        from estimation.predictions.prediction import clock_of
+        from estimation.predictions.prediction import clock_shift
 
         identified = load_model(model)
         robot = identified.robot
         read = read_log(log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names)
         (recorded,) = with_known_setup([read], payload, gravity)
         progress.start("predicting", None)
-        later, clock = clock_of(identified, recorded)
+        later, clock = clock_shift(identified, recorded)
         heat = _heat(model, identified, recorded, before or [], ambient, mapping, later)
         result = run(identified, recorded, later=later, **heat.options)
         result.save(out, band=band, force=force)

@@ -31,7 +31,7 @@ class Board:
 
     folder: Path
 
-    def teller(self, number: int) -> Callable[[int, float], None]:
+    def reporter(self, number: int) -> Callable[[int, float], None]:
         """Gives the function by which one search reports its steps and best value."""
 
         def tell(done: int, best: float) -> None:

@@ -94,7 +94,7 @@ def _search(task: _Task) -> Found:
         task.solver,
         task.seed,
         task.number,
-        tell=task.board.teller(task.number),
+        tell=task.board.reporter(task.number),
         deadline=task.deadline,
         halted=lambda: task.board.stopped,
     )

@@ -70,12 +70,12 @@ def _verdict(view: DiagnosisView) -> str:
     if view.verdict == "unexplained":
         # A free function does not name a cause, whatever its gain.
         helps = any(finding.interval[0] > 0 and finding.named for finding in view.findings)
-        part = "The error is explained in part." if helps else _STANDS_OUT
+        part = "The error is explained in part." if helps else _NO_KNOWN_CAUSE
         return f"{part} {first}{more}"
     return f"{first}{more}"
 
 
-_STANDS_OUT = "The residual is not noise, but no effect of the catalogue explains it."
+_NO_KNOWN_CAUSE = "The residual is not noise, but no effect of the catalogue explains it."
 
 
 def _facts(view: DiagnosisView) -> tuple[Fact, ...]:

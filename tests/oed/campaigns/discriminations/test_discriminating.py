@@ -12,10 +12,10 @@ import pytest
 from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from oed.campaigns.discriminations.discriminating import discriminate
-from oed.campaigns.discriminations.discrimination import Discrimination, Judged
+from oed.campaigns.discriminations.discrimination import Discrimination, DiscriminationScore
 from oed.campaigns.discriminations.judging import require_separable
 from oed.campaigns.discriminations.rivals import parse_rivals
-from oed.campaigns.discriminations.separating import Workshop
+from oed.campaigns.discriminations.separating import ExperimentBuilder
 from oed.exports import read_trajectory
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InfeasibleError, InputError, NotIdentifiableError
@@ -35,9 +35,9 @@ def found(two: Robot) -> Discrimination:
 
 
 @pytest.fixture(scope="module")
-def workshop(two: Robot) -> Workshop:
+def workshop(two: Robot) -> ExperimentBuilder:
     """Makes motions for the small robot."""
-    return Workshop(find_base_parameters(default_model(two, velocity_scale=1e-3)), seed=3)
+    return ExperimentBuilder(find_base_parameters(default_model(two, velocity_scale=1e-3)), seed=3)
 
 
 def pendulum() -> Robot:
@@ -61,7 +61,7 @@ def pendulum() -> Robot:
 
 
 @pytest.mark.parametrize("kind", sorted(MAKERS))
-def test_every_kind_keeps_all_limits_and_rests_at_home(kind: str, workshop: Workshop, two: Robot) -> None:
+def test_every_kind_keeps_all_limits_and_rests_at_home(kind: str, workshop: ExperimentBuilder, two: Robot) -> None:
     """Whatever the kind, each run begins and ends at rest at home and passes no limit, the torque's included."""
     for run in workshop.runs(MAKERS[kind](workshop.room, 1, 0)):
         m, limits = run.motion, two.limits
@@ -155,7 +155,7 @@ def test_an_effect_that_its_rival_imitates_everywhere_is_refused() -> None:
     """Where in every kind that can be made the rival leaves nothing, both are named, and the kinds that were tried."""
     pair = (Hypothesis(EFFECTS["spring"], 2), Hypothesis(EFFECTS["base_tilt"], None))
     aliases = [
-        Judged(
+        DiscriminationScore(
             kind=kind,
             resolves=0.0,
             energy=0.0,
