@@ -102,7 +102,7 @@ def thermal_page(
             Fact(label="Smallest gain", value=f"{100 * gain[worst]:.0f} %", note=f"joint {worst + 1}"),
             Fact(label="Iterations (dynamics, thermal model)", value=estimate.rounds),
         ),
-        warnings=(*_notes(estimate), *_still(fits)),
+        warnings=(*estimate.joint_notes, *_still(fits)),
         sections=tuple(sections),
         footer=footer(),
     )
@@ -112,17 +112,6 @@ def _open_text(names: Sequence[str]) -> str:
     if not names:
         return "All thermal parameters are determined."
     return f"These logs determine time constants and friction ratios, but not {', '.join(names)}."
-
-
-def _notes(estimate: CampaignEstimate) -> tuple[str, ...]:
-    """Notes, with the joints they apply to unless they apply to all."""
-    fits = estimate.thermal
-    moving = sum(fit is not None for fit in fits)
-    found = []
-    for note in estimate.notes:
-        joints = [str(j) for j, fit in enumerate(fits, start=1) if fit is not None and note in fit.notes]
-        found.append(f"Joint {', '.join(joints)}: {note}" if 0 < len(joints) < moving else note)
-    return tuple(found)
 
 
 def _still(fits: Sequence[ThermalEstimate | None]) -> tuple[str, ...]:
