@@ -85,9 +85,9 @@ def inertia_matrices(base: BaseParameters, values: Array, motion: Motion, count:
 class ClosedLoop:
     """Simulates base parameters under a controller.
 
-    The step is an implicit midpoint rule in which inertia and the smooth torques are taken at the predicted midpoint,
-    and the controller's damping and dry friction at the unknown velocity itself: Coulomb friction may hold a joint, and
-    costs no small steps. Second order in the step.
+    The integration is an implicit midpoint rule of second order. Inertia and smooth torques are evaluated at the
+    predicted midpoint, the controller's damping and dry friction at the unknown velocity. Coulomb friction can
+    therefore hold a joint without small steps.
 
     Args:
         base: base parameters of the model (b).

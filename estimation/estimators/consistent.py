@@ -150,7 +150,7 @@ class PhysicallyConsistent(WeightedLeastSquares):
         if pull not in ("entropic", "euclidean"):
             raise InputError(f"pull {pull!r}", allowed="entropic, euclidean")
         if weight is not None and not (np.isfinite(weight) and weight > 0):
-            raise InputError(f"a pull of weight {weight}", allowed="a positive number, or None")
+            raise InputError(f"a prior of weight {weight}", allowed="a positive number, or None")
         self.pull, self.weight = pull, weight
         self.boxes = None if boxes is None else {int(link): _box(link, corners) for link, corners in boxes.items()}
 

@@ -41,9 +41,9 @@ def export_urdf(model: Model, path: str | Path, *, robot: Robot | None = None, f
 def urdf_text(model: Model, robot: Robot | None = None) -> str:
     """Writes the URDF of `export_urdf` as text.
 
-    Where the robot came from a URDF, its file is kept, meshes and all, and only inertials change: the link that a joint
-    moves gets all the inertia that moves with it, and links that are fixed to it, or locked, lose theirs. Any other
-    robot gets a plain chain.
+    If the robot came from a URDF, its file is kept with its meshes, and only the inertials change. The link that a
+    joint moves gets all the inertia that moves with it; links fixed or locked to it lose theirs. Any other robot gets a
+    plain chain.
     """
     known = robot or model.robot
     inertia = standard_parameters(model, None if robot is None else np.asarray(robot.inertia))

@@ -37,15 +37,15 @@ class GateReport:
         findings: the worst first.
         parts: (first, stop) sample indices of the stretches without a gap, and in which no column hung; what lies
             between is not bridged.
-        spikes: indices of single rows that stick out of their neighbours, which a fit must leave out.
-        stale: indices of rows that are not of their time, which a fit must leave out: those that repeat the row before
-            while the arm moves, where they are many, and those that were written late, it cannot be told by how much.
-        t: times of the rows [s], those that were written late set back where it can.
-        delay: by which the torque lags the position (n,) [s], NaN where the log does not tell.
+        spikes: indices of outliers in single rows, which a fit must leave out.
+        stale: indices of rows with wrong times, which a fit must leave out: repetitions of the row before while the arm
+            moves, if they are many, and rows that were written late by an unknown time.
+        t: times of the rows [s], corrected for rows that were written late, if possible.
+        delay: by which the torque lags the position (n,) [s], NaN if the log does not determine it.
         delay_error: its standard error (n,) [s].
-        unexplained: torque error on stretches that the fit had not seen over the torque's standard deviation (n,), by
+        unexplained: torque error on held-out data divided by the torque's standard deviation (n,), by
             a quick fit of rigid body and friction; NaN without torque.
-        information: what the log tells of each joint's own parameters: inertia or friction losses over their standard
+        information: evidence for each joint's own parameters: inertia or friction losses over their standard
             errors, the larger of the two (n,); NaN without torque.
     """
 

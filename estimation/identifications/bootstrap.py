@@ -101,11 +101,11 @@ def bootstrap(
 ) -> Bootstrap:
     """Refits to resampled data, and compares the scatter with the stated standard errors.
 
-    Whole logs are drawn where there are eight or more, whole periods where the motion repeats itself eight times or
-    more, else moving blocks of a thirtieth of the data: what stays together keeps the noise's colour, whatever it is.
-    Normal equations are sums over rows, so that a refit is a sum and a solution, without a pass over the data. The
-    refits are those of least squares without regularisation, smoothing and weights as the estimate has them. With K
-    blocks the scatter is multiplied by sqrt(K / (K - 1)), and is itself uncertain by a share of 1 / sqrt(2 K).
+    Whole logs are drawn if there are eight or more, whole periods if the motion repeats eight times or more, otherwise
+    moving blocks of a thirtieth of the data. The blocks preserve the noise's correlation in time. Normal equations are
+    sums over rows, so that a refit is a sum and a solution, without a pass over the data. The refits are those of least
+    squares without regularisation, smoothing and weights as the estimate has them. With K blocks the scatter is
+    multiplied by sqrt(K / (K - 1)), and is itself uncertain by a share of 1 / sqrt(2 K).
 
     Args:
         robot: the robot.

@@ -205,10 +205,10 @@ class Comparison:
         return chosen.without(weights, trial.ridge, trial.pull)
 
     def band(self, smoother: Smoother, blocks: Sides, trial: Trial) -> tuple[Array, Array]:
-        """Half-width (n,) that holds `BAND` of the left-out errors, and the share that it holds on unseen blocks (n,).
+        """Half-width (n,) that contains `BAND` of the held-out errors, and its coverage on other blocks (n,).
 
-        Each block's share is counted with the quantile of the other blocks' errors: what a user sees who takes the
-        band to a motion of the same kind (a split conformal interval, block by block).
+        Each block's coverage is counted with the quantile of the other blocks' errors, as for a new motion of the same
+        kind (a split conformal interval, block by block).
         """
         values = iter(self._without(blocks.fitted.columns(self._columns(trial.scales).tolist()), trial))
         rows = self._rows(smoother)

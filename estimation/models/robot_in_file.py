@@ -23,8 +23,8 @@ _BY_JOINT = ("rotor_inertia", "gear_ratio", "torque_constant")
 def describe_robot(robot: Robot) -> dict[str, Any]:
     """Writes a robot as plain data.
 
-    Terms need its chain alone. Effects refer to more of it: a spring to the middle of a joint's range, saturation to
-    the torque limit, what the load does to the rotor that the base model does not tell from the link.
+    Terms need only its chain. Effects need more: a spring the middle of a joint's range, saturation the torque limit,
+    load-dependent effects the rotor inertia that the base model does not separate from the link.
     """
     joints = [
         {

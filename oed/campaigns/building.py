@@ -51,21 +51,20 @@ def campaign(
 ) -> Campaign:
     """Plans a campaign that warms the robot up and measures its parameters and friction meanwhile.
 
-    A heating cycle is an excitation, friction sweeps of every joint at constant speeds both ways, posed so that gravity
-    does no work on the joint where the arm allows, and a warm-up of all joints at full speed over 80 % of their ranges
-    (thesis sections 2.4 and 5.1). Jerk-limited moves join them; every stage begins and ends at rest at home, so that
-    stages can be played in any order. Where they do not fit into the cycle, first the friction stage gives way, then
-    the warm-up, and the notes say so.
+    A heating cycle has three stages (thesis sections 2.4 and 5.1): an excitation, a friction stage and a warm-up. The
+    friction stage moves each joint at constant speeds in both directions, if possible in a pose in which gravity does
+    no work on it. The warm-up moves all joints at full speed over 80 % of their ranges. Jerk-limited moves join them.
+    Every stage starts and ends at rest in the home pose, so stages can be played in any order. If they do not fit into
+    the cycle, the friction stage is shortened first, then the warm-up; the notes say so.
 
     Args:
         robot: the robot.
         programme: what to run how often; 24 cycles of 5 min by default.
         design: the excitation, or its folder; a quick one is designed by default. Its first pose is home.
         velocity_fraction: of the velocity limits that may be used.
-        torque_margin: share of the torque limits kept for what the nominal dynamics are wrong by.
-        collision: keep the stages free of collisions, where the robot's bodies are described: the quick excitation is
-            designed so, the warm-up drives only as much of its range as is free, friction sweeps stay in the free
-            stretch of their joint, and moves go around.
+        torque_margin: share of the torque limits kept as reserve for errors of the nominal dynamics.
+        collision: keep the stages free of collisions, if the robot's bodies are described. The quick excitation avoids
+            them, warm-up and friction stages use only the free part of the ranges, and moves go around obstacles.
         ambient: ambient temperature [degC].
         cold_friction: friction of the cold robot over that of the description, for the expected temperatures: above 1
             where the description is of the warm robot.
@@ -80,7 +79,7 @@ def campaign(
 
     Raises:
         InputError: options out of range, a design for another robot.
-        InfeasibleError: a limit of zero, stages that pass a limit, or a cycle that is too short.
+        InfeasibleError: a limit of zero, stages that exceed a limit, or a cycle that is too short.
     """
     plan = programme or Programme()
     for name, value, allowed, good in (

@@ -23,9 +23,8 @@ STEPS = 10
 def fit_stages(planner: Planner, programme: Programme, excitation: Stage | None) -> tuple[list[Stage], tuple[str, ...]]:
     """Plans friction and warm-up stages that fit into the cycle.
 
-    The warm-up keeps its time as long as it can: first the times at constant speed of the friction stage are shortened,
-    down to `LEAST_PLATEAU`, then the warm-up, down to half of what was asked. What little is left over goes to the
-    warm-up.
+    First, the times at constant speed of the friction stage are shortened, down to `LEAST_PLATEAU`. Then the warm-up is
+    shortened, down to half of its requested time. Remaining time goes to the warm-up.
 
     Args:
         planner: plans the stages.

@@ -57,14 +57,14 @@ def retime(
 ) -> Retimed:
     """Runs through the path of a motion as fast as the limits allow, at rest at both ends.
 
-    The path is split where it has to rest (see `split_path`). Each piece, a cubic spline, is timed by TOPP-RA (Pham
-    and Pham 2018), the law averaged over a short window (`TimeLaw`) to end without acceleration and keep the jerk
-    limits, sampled at the controller's period, and stretched until its own samples keep every limit. Friction enters
-    at the speed of the solution before, for the algorithm knows torque that is quadratic in speed only.
+    The path is split where it has to rest (see `split_path`). Each piece, a cubic spline, is timed by TOPP-RA (Pham and
+    Pham 2018). The time law is averaged over a short window (`TimeLaw`), to end without acceleration and to respect the
+    jerk limits. It is sampled at the controller's period and stretched until its samples respect every limit. Friction
+    uses the speed of the previous solution, because the algorithm allows only torques quadratic in speed.
 
-    TOPP-RA knows no jerk, and averaging pays for it dearly. So `refine` goes on from there, and, from one rest of a
-    motion to the next, from the motion's own timing too; the fastest is kept. A motion whose own timing keeps the
-    limits thus never becomes slower, and its path is kept exactly.
+    TOPP-RA has no jerk limits, and averaging costs time. Therefore `refine` improves the result and, between two rests
+    of a motion, also the motion's own timing; the fastest is kept. A motion whose own timing respects the limits never
+    becomes slower, and its path is kept exactly.
 
     Args:
         path: a motion, or waypoints (W, n) [rad].

@@ -115,9 +115,9 @@ def plan_warm_up(
 ) -> WarmUp:
     """Plans a warm-up of all joints at full speed over a part of their ranges, back and forth.
 
-    Each joint goes as fast as its velocity, acceleration and jerk allow, as often as whole cycles fit in the move, and
-    spends what is left at its turns, evenly: speed and travel are not reduced. All joints start at the lower ends of
-    their strokes, and end there, together.
+    Each joint moves as fast as its velocity, acceleration and jerk limits allow, for as many whole cycles as fit. The
+    remaining time is distributed evenly over its reversals; speed and travel are not reduced. All joints start and end
+    together at the lower ends of their strokes.
 
     Args:
         limits: bounds of all joints.

@@ -30,8 +30,8 @@ STRAY, BESIDE = 10.0, 20
 def check_repeats(log: Log, columns: Columns) -> tuple[list[Finding], NDArray[np.intp]]:
     """Counts rows that repeat the row before in every column although the arm moves, and columns that got stuck.
 
-    Where there are many that no encoder's steps explain, the rows are given, too: a logger that asks more often than
-    the controller answers has what is new when it is new, and then old positions and torques at later times.
+    If there are many that the encoder's resolution does not explain, their rows are returned. A logger that polls
+    faster than the controller answers writes old positions and torques with later times.
 
     Args:
         log: the log.

@@ -90,7 +90,7 @@ class IntermittentTorque(JointEffect):
     ) -> str:
         """Describes the finding in one sentence."""
         return (
-            f"The residual torque of joint {joint} looks like that of {coefficients[0]:.2g} {force} of additional "
+            f"The residual torque of joint {joint} matches {coefficients[0]:.2g} {force} of additional "
             f"friction from t = {shape[0]:.1f} s for {shape[1]:.2g} s, and not before or after. Likely cause: a "
             f"dragging brake."
         )
@@ -185,7 +185,7 @@ class PeriodicTorque(OverTime):
     ) -> str:
         """Describes the finding in one sentence."""
         return (
-            f"The residual torque of all joints looks like that of a force of {np.linalg.norm(coefficients):.2g} N "
+            f"The residual torque of all joints matches a force of {np.linalg.norm(coefficients):.2g} N "
             f"on the flange that comes every {shape[0]:.3g} s for {shape[2]:.2g} s, independent of the motion. Likely "
             f"cause: another machine."
         )

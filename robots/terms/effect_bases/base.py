@@ -1,4 +1,4 @@
-"""What an effect beyond the base model must say of itself to be played, found, named and added to a model.
+"""Interface of effects beyond the base model.
 
 A term of `robots.terms` belongs to every robot's model. An effect is what a robot may have besides: it acts on one
 joint or on the whole robot, is linear in a few coefficients once its shape is given, and may depend on the past. The

@@ -52,9 +52,9 @@ class Late(Effect):
 class TimeDelay(Late):
     """tau(t - d) - tau(t): the logged torque lags the logged position by d, on all joints alike.
 
-    It is d times a difference quotient over d', which the base model's torque and velocities of a moment before say:
-    Coulomb friction turns round within less than a sample, and a joint that sticks breaks loose in one, so that neither
-    follows from rates. d' = d where all is as it should be.
+    It is d times a difference quotient over d', computed from the base model's torque and velocities shortly before.
+    Rates are not sufficient, because Coulomb friction changes sign, and a sticking joint breaks loose, within one
+    sample. With a correct model d' = d.
     """
 
     name: ClassVar[str] = "time_delay"
