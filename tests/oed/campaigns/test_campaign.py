@@ -199,7 +199,7 @@ def test_a_design_is_read_from_its_folder(er3a: Robot, er3a_design: Design, tmp_
 def test_a_design_beyond_the_limits_is_refused(er3a: Robot, er3a_design: Design) -> None:
     """An excitation that passes a limit of this robot is refused with joint and number."""
     slow = dataclasses.replace(er3a, limits=er3a.limits.scaled(velocity=0.5))
-    with pytest.raises(InfeasibleError, match="excitation stage passes its velocity limit"):
+    with pytest.raises(InfeasibleError, match="excitation stage exceeds the velocity limit"):
         oed.campaign(slow, design=er3a_design)
 
 

@@ -67,7 +67,7 @@ def test_the_floor_that_would_do_is_stated(robot):
 
 def test_a_floor_above_the_first_joint_is_named(robot):
     """A floor above the foot is told as such, with the height of the first joint."""
-    with pytest.raises(InfeasibleError, match=r"'floor' at 0.4 m lies above the first joint, at 0.3215 m"):
+    with pytest.raises(InfeasibleError, match=r"'floor' at 0.4 m is above the first joint, which is at 0.3215 m"):
         check_feasible(robot, _limits(robot, obstacles=(floor(0.4),)), HOME)
 
 

@@ -70,7 +70,7 @@ def test_without_a_design_a_quick_one_is_made(run: Callable[..., Any], robot: Pa
     ("arguments", "code", "words"),
     [
         (("--cycles", -1), 2, "cycles"),
-        (("--cycles", 0), 2, "nothing"),
+        (("--cycles", 0), 2, "empty"),
         (("--duty", "0,50"), 2, "duties"),
         (("--duty", "much"), 2, "--duty much"),
         (("--cycle-time", 0), 2, "cycle_time"),
