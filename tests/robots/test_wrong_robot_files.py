@@ -31,10 +31,11 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
     path = tmp_path / "robot.txt"
     path.write_text("hello")
     with pytest.raises(
-        InputError, match=r"robot\.txt: does not end like that of a robot file; allowed: \.urdf, \.yaml or \.yml"
+        InputError,
+        match=r"robot\.txt: the file name does not end like that of a robot file; allowed: \.urdf, \.yaml or \.yml",
     ):
         load_robot(path)
-    with pytest.raises(InputError, match="does not end like that of a robot file"):
+    with pytest.raises(InputError, match="the file name does not end like that of a robot file"):
         load_robot(tmp_path)
 
 
@@ -80,7 +81,7 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
         ("name: pair", "name: pair\nurdf: a.urdf", None, "either 'geometry' or 'urdf'"),
         ("name: pair", "name: pair\nperiod: 0", "period", "greater than 0"),
         ("name: pair", "name: pair\nperiod: true", "period", "found True"),
-        ("name: pair", "name: pair\nname: two", "name", "row 2: the key stands twice"),
+        ("name: pair", "name: pair\nname: two", "name", "row 2: the key appears twice"),
     ],
 )
 def test_a_wrong_yaml_is_refused(old, new, column, message, write):

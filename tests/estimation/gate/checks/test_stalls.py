@@ -30,7 +30,7 @@ def test_rows_that_waited_are_put_back(good):
     result = check_stalls(replace(log, t=late))
     (finding,) = result.findings
     assert (finding.name, finding.severity) == ("late_rows", "warning")
-    assert "stalled 4 times" in finding.text
+    assert "stopped 4 times" in finding.text
     assert not len(result.lost)
     np.testing.assert_allclose(result.t, log.t, atol=1e-9)
 
