@@ -217,12 +217,16 @@ class Discrimination:
 
     def summary(self) -> str:
         """Describes the experiment and its alternatives in a few lines."""
-        lines = [self.why, "  kind           probability [%]   size for 95 %   duration [s]"]
+        lines = [
+            f"{self.why}.",
+            f"  {'kind':18}  {'prob. [%]':>10}   {'size [%]':>13}   {'duration [s]':>12}",
+        ]
         for judged in self.ranking:
             least = judged.smallest(self.size)
             least_text = "-" if least is None else f"{100 * least:.2g}"
             value = judged.note or f"{100 * judged.resolves:10.0f}   {least_text:>13}   {judged.duration:12.0f}"
             lines.append(f"  {judged.kind:18}  {value}")
+        lines.append("  prob.: of the right decision; size: effect with 95 % probability, in % of the torque")
         for file, run in zip(self.files, self.runs, strict=True):
             load = f", payload {run.payload:.3g} kg" if run.payload else ""
             tilt = ", base tilted by 15 degrees" if run.gravity is not None else ""

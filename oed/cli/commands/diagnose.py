@@ -178,7 +178,9 @@ def _limits(
     summary = [
         f"{len(found)} pairs of effect and joint: {named} would be found and named at 2 % of the joint's torque RMS, "
         f"{hidden} cannot be found with this motion at any size",
-        "  effect                       joint   found [%]   worst case named [%]   closest rival",
+        "  found: smallest effect, in % of the joint's torque RMS, that is found with 95 % probability",
+        "  worst case: the same for the least visible shape; named: also distinguished from other effects",
+        f"  {'effect':28} {'joint':>5} {'found [%]':>11} {'worst case':>10} {'named [%]':>11}   closest rival",
     ]
     summary += [
         f"  {limit.effect:28} {limit.joint or 'all':>5} {_percent(limit.detectable):>11} "
