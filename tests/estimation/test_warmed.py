@@ -92,5 +92,5 @@ def test_what_comes_after_or_warms_nothing_is_refused(warming: Model, motion: Lo
         predict(warming, motion, before=[after])
     plain = replace(warming, extensions=())
     assert warmed(plain, [], motion, 0.0) == ([], "")
-    with pytest.raises(InputError, match="no heat"):
+    with pytest.raises(InputError, match="no thermal part"):
         predict(plain, motion, before=[motion])

@@ -257,8 +257,8 @@ def test_nearly_right_angles_are_no_failure(size, catalogue_robot, states, caplo
 
 
 def test_a_tolerance_below_rounding_is_refused(catalogue_robot):
-    """Where the singular values show a lower rank than the columns kept, the error says to state a larger tolerance."""
-    with pytest.raises(NotIdentifiableError, match=r"by QR, \d+ by SVD.*state a larger tolerance"):
+    """Where the singular values show a lower rank than the columns kept, the error says to use a larger tolerance."""
+    with pytest.raises(NotIdentifiableError, match=r"by QR, \d+ by SVD.*use a larger tolerance"):
         find_base_parameters(rigid(catalogue_robot("ur10")), tolerance=1e-18)
 
 

@@ -104,7 +104,7 @@ def test_a_log_that_began_its_clock_anew_is_predicted_as_after_the_change(
     anew = replace(unseen, t=unseen.t - unseen.t[0] + 0.5)
     later, word = clock_shift(model, anew)
     assert later == pytest.approx(model.provenance["logs"][0]["duration"] + UNKNOWN_PAUSE - 0.5)
-    assert "counts as recorded 60 s after" in word
+    assert "taken as recorded 60 s after" in word
     np.testing.assert_allclose(predict(model, anew).predicted, predict(model, unseen).predicted, rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(predict(model, anew).motion.t, predict(model, unseen).motion.t - 99.5, atol=1e-6)
     assert clock_shift(model, unseen) == clock_shift(replace(model, extensions=()), anew) == (0.0, "")
