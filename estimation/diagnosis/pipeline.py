@@ -121,7 +121,7 @@ def diagnose(
         told = DiagnosisInputs(
             problem=problem,
             selection=selection,
-            judgement=judgement,
+            verdict=judgement,
             limits=limits,
             excess=residual_shares(problem),
             logs=tuple(data),

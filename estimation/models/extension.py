@@ -114,9 +114,9 @@ def write_gear_load(bearing: ExtraGearLoad) -> dict[str, Any]:
     """Writes what gears bear of a model's extensions as plain data for `model.json`."""
     weights = [
         {"effect": w.effect.name, "joint": w.joint, "shape": list(w.shape), "coefficients": w.coefficients.tolist()}
-        for w in bearing.weights
+        for w in bearing.sources
     ]
-    return {"how": bearing.how, "weights": weights}
+    return {"how": bearing.path, "weights": weights}
 
 
 def read_gear_load(data: Mapping[str, Any], robot: Robot) -> ExtraGearLoad:
@@ -131,7 +131,7 @@ def read_gear_load(data: Mapping[str, Any], robot: Robot) -> ExtraGearLoad:
     for item in data["weights"]:
         effect, joint = find_effect(str(item["effect"])), item["joint"]
         values = [np.array(item[key], dtype=float) for key in ("shape", "coefficients")]
-        if not effect.borne or joint not in effect.joints(robot):
+        if not effect.loads_gear or joint not in effect.joints(robot):
             raise InputError(
                 f"borne_by_gears: {effect.name} on joint {joint}", allowed="an effect whose torque loads the gear"
             )
@@ -180,7 +180,7 @@ def extension_torque(
 
 
 def _stage(effect: Effect) -> int:
-    return 2 if effect.last else int(effect.blurs)
+    return 2 if effect.acts_on_total_torque else int(effect.smooths_friction_sign)
 
 
 def _described(effect: Effect, robot: Robot, joint: int | None, shape: tuple[float, ...]) -> list[tuple[str, str]]:

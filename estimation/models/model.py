@@ -94,7 +94,7 @@ class Model:
     @property
     def keeps_heat(self) -> bool:
         """Whether what came before a motion acts in it still."""
-        return any(extension.source.keeps for extension in self.extensions)
+        return any(extension.source.has_thermal_memory for extension in self.extensions)
 
     def torque(
         self,
@@ -142,7 +142,7 @@ class Model:
             earlier = [situation(model, known, m.t, m.q, m.dq, m.ddq) for m in before]
             return replace(joined([*earlier, situation(model, known, *arrays)], self.torque_model), since=self.since)
 
-        cut = any(extension.source.last for extension in self.extensions)
+        cut = any(extension.source.acts_on_total_torque for extension in self.extensions)
         extended = extension_torque(self.extensions, state(felt), state(parameters) if cut else None, self.bearing)
         return own + extended[-len(own) :]
 

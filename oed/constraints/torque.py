@@ -65,10 +65,10 @@ class TorqueLimit(PointwiseLimit):
         total = symbolic(*symbols) @ casadi.SX(pi)
         borne = casadi.SX.zeros(model.robot.n)
         for effect in self.effects:
-            if effect.term.borne:
+            if effect.term.loads_gear:
                 borne += effect.expression(model, pi, *symbols)
         for effect in self.effects:
-            if not effect.term.borne:
+            if not effect.term.loads_gear:
                 total += effect.expression(model, pi, *symbols, borne=borne)
         total += borne
         torque = total[limited.tolist()] / casadi.SX((1 - margin) * bound[limited])

@@ -189,7 +189,7 @@ def _limit(
 def _certain_share(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> float:
     """Gives the share of an effect's energy that counts, where joints tell it by reversals."""
     told = per_joint_evidence(problem, hypothesis, shape, accept(problem, ()))
-    return float(np.sum(told.sure * told.gram) / np.sum(told.gram)) if told.gram.any() else 1.0
+    return float(np.sum(told.certain_share * told.gram) / np.sum(told.gram)) if told.gram.any() else 1.0
 
 
 def _toughest(
@@ -213,8 +213,8 @@ def _note(problem: Problem, hypothesis: Hypothesis) -> str:
 
     What acts for a moment may do so in a rest.
     """
-    if hypothesis.effect.passing:
-        resting = float(np.mean(problem.recording.unsure.all(axis=1)))
+    if hypothesis.effect.transient:
+        resting = float(np.mean(problem.recording.sign_unknown.all(axis=1)))
         if resting > RESTING:
             return RESTS.format(100 * resting)
     duration = float(problem.recording.t[-1] - problem.recording.t[0])

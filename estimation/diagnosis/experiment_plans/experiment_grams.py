@@ -71,7 +71,7 @@ class Grams:
         self.model: TorqueModel = problem.situation.model
         # A base that is tilted shows parameters that the logs do not: they take a part of what it shows of a cause.
         gravity = np.asarray(self.model.robot.chain.gravity, dtype=float)
-        fields = [field for field in problem.recording.fields if field is not None]
+        fields = [field for field in problem.recording.gravity_fields if field is not None]
         tilted = [gravity + np.linalg.norm(gravity) * axis for axis in level_axes(gravity)] if gravity.any() else []
         self.base = find_base_parameters(self.model, gravities=[*fields, *tilted])
         self.columns = self.base.independent
@@ -135,7 +135,7 @@ class Grams:
             rows += len(part.motion)
             t0 = float(now.t[-1]) + 60.0
         base = np.concatenate(bases)
-        plain = replace(self.problem.whitening, gaps=no_masked_rows(base.shape[1]), weights=None, levels=None)
+        plain = replace(self.problem.whitening, masked=no_masked_rows(base.shape[1]), weights=None, levels=None)
         whitening = replace(plain, starts=tuple(starts))
         return self._gram(base, [np.concatenate(parts) for parts in effects], whitening)
 

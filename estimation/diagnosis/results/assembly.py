@@ -61,7 +61,7 @@ class DiagnosisInputs:
 
     problem: Problem
     selection: Selection
-    judgement: Verdict
+    verdict: Verdict
     limits: tuple[Limit, ...]
     excess: Array
     logs: tuple[Log, ...]
@@ -75,19 +75,19 @@ class DiagnosisInputs:
 def assemble(robot: Robot, told: DiagnosisInputs) -> Diagnosis:
     """Fits the extended model, measures it on unseen data, and puts the findings into words."""
     problem = told.problem
-    judgement = replace(told.judgement, kept=complete_effects(problem, told.judgement.kept))
+    judgement = replace(told.verdict, named=complete_effects(problem, told.verdict.named))
     held = validate_on_held_out(
         judgement,
         lambda members, gone: measure_held_out(robot, problem, members, told.held_out, told.seed + 3, gone),
         partial(_is_beyond, told),
         partial(equivalent_shapes, problem),
-        lambda member: member.worth(problem.rows),
+        lambda member: member.local_bic_gain(problem.rows),
         partial(_unnamed, robot, told),
     )
-    members, founds, seen = held.members, held.founds, held.seen
+    members, founds, seen = held.effects, held.findings, held.measured
     twisted = _compliances(told, seen)
     # Where nothing else is left, a name that unseen data refuted shows at least where something is unexplained.
-    spoiling = held.spoiling or (() if members or twisted else held.refuted)
+    spoiling = held.rejected_discrepancies or (() if members or twisted else held.refuted)
     verdict = judgement.verdict
     if len(members) > len(founds) or spoiling:
         verdict = "unexplained"
@@ -117,7 +117,7 @@ def assemble(robot: Robot, told: DiagnosisInputs) -> Diagnosis:
             no_part(word_finding(robot, problem, member, fit, i, p_value, None, gain))
             for i, (member, p_value, gain) in enumerate(spoiling, start=len(members))
         )
-    unseen, apart = seen.unseen, findings[len(members) :]
+    unseen, apart = seen.errors, findings[len(members) :]
     if twisted and not members and not spoiling:
         verdict = "named"
     findings += tuple(windup.finding for windup in twisted)
@@ -151,7 +151,7 @@ def assemble(robot: Robot, told: DiagnosisInputs) -> Diagnosis:
             *faster_joints(problem, seen),
             *farther_joints(problem, seen, findings),
             *held.notes,
-            *beside_larger(told.selection.slight, members),
+            *beside_larger(told.selection.strongest_unaccepted, members),
             *lost,
         ),
         trace=_trace(unseen, [seen.coordinates[i] for i in order], twisted),
@@ -169,11 +169,11 @@ def _is_beyond(told: DiagnosisInputs, effect: Effect) -> bool:
 
     Where it is not known when they were recorded, they say nothing of what comes with time.
     """
-    if any(f.member.hypothesis.effect is effect and f.member.group.by_reversals for f in told.selection.found):
+    if any(f.effect.hypothesis.effect is effect and f.effect.group.by_reversals for f in told.selection.found):
         return True
     if not told.held_out:
         return False
-    return effect.passing or (not told.dated and effect.depends_on == "time")
+    return effect.transient or (not told.dated and effect.depends_on == "time")
 
 
 def _unnamed(
@@ -196,7 +196,7 @@ def _compliances(told: DiagnosisInputs, seen: HeldOutResult) -> tuple[MeasuredCo
         return ()
     now, unseen = told.problem.situation, None
     if any(log.qlink is not None for log in told.held_out):
-        other = cut_recording(seen.whole, slice(seen.first, len(seen.whole)))
+        other = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
         there = build_situation(other, now.model, told.problem.parameters_without_payload)
         unseen = (there, other, told.held_out)
     return measure_gear_compliance(now, told.problem.recording, told.logs, false_alarm=told.false_alarm, unseen=unseen)
@@ -207,7 +207,7 @@ def _next(problem: Problem, founds: Sequence[SelectedEffect]) -> NextExperiment 
     for found in founds:
         close = [rival for rival, worse in found.rivals if worse < CLOSE]
         if close:
-            return plan_next(problem, [found.member, *close])
+            return plan_next(problem, [found.effect, *close])
     return None
 
 
@@ -233,7 +233,7 @@ def _provenance(told: DiagnosisInputs) -> dict[str, object]:
         "velocity_scales": [float(v) for v in problem.situation.velocity_scale],
         "seed": told.seed,
         "false_alarm": told.false_alarm,
-        "residual_rms": np.sqrt(np.mean(problem.remainder**2, axis=0)).tolist(),
+        "residual_rms": np.sqrt(np.mean(problem.base_residual**2, axis=0)).tolist(),
         "torque_rms": torque.tolist(),
         "gravities": [list(gravity) for gravity in problem.baseline.base.gravities],
     }

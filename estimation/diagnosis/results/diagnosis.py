@@ -120,9 +120,9 @@ class Diagnosis:
             lines.append(f"    unseen error{finding.elsewhere} {before} -> {after} of the {of}{beside} (fall {fall} %)")
             # Coefficients of a free function mean nothing each.
             parameters = finding.parameters if finding.effect != "unexplained" else ()
-            if known := [parameter.told for parameter in parameters if parameter.determined]:
+            if known := [parameter.text for parameter in parameters if parameter.determined]:
                 lines.append(f"    95 % intervals: {list_parameters(known)}")
-            if open_ := [parameter.told for parameter in parameters if not parameter.determined]:
+            if open_ := [parameter.text for parameter in parameters if not parameter.determined]:
                 lines.append(f"    not well determined by these logs: {list_parameters(open_)}")
             close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]
             if close:

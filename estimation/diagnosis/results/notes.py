@@ -68,7 +68,7 @@ def notes_of(
         )
     told_of = {finding.joint for finding in findings if finding.effect == CLIPPING.name}
     for j in sorted({*range(1, recording.n + 1)} - told_of):
-        if CLIPPING.chance(problem.sees(CLIPPING), j, recording.tau) < CERTAIN:
+        if CLIPPING.chance(problem.state_for(CLIPPING), j, recording.tau) < CERTAIN:
             notes.append(_AT_LIMIT.format(j, float(np.abs(recording.tau[:, j - 1]).max())))
     strange = _strange(problem, after)
     notes += strange.values()
@@ -132,10 +132,10 @@ def unsure_gain(finding: Finding) -> str:
 
 def _strange(problem: Problem, after: Array) -> dict[int, str]:
     """Says where the model predicts logs far worse than it fits them: there is more in them than was found."""
-    counts = ~problem.recording.unsure
+    counts = ~problem.recording.sign_unknown
     number = np.maximum(counts.sum(axis=0), 1)
     torque = np.sqrt((problem.recording.tau**2 * counts).sum(axis=0) / number)
-    fitted = np.sqrt((problem.remainder**2 * counts).sum(axis=0) / number) / np.maximum(torque, 1e-12)
+    fitted = np.sqrt((problem.base_residual**2 * counts).sum(axis=0) / number) / np.maximum(torque, 1e-12)
     far = np.flatnonzero(after > np.maximum(STRANGE * fitted, FAR))
     return {int(j): _STRANGE.format(j + 1, 100 * after[j], 100 * fitted[j]) for j in far}
 
@@ -185,7 +185,7 @@ def faster_joints(problem: Problem, seen: HeldOutResult) -> list[str]:
     """Says which joints are faster on unseen data than their friction's polynomial was fitted for."""
     if seen.whole is problem.recording or not any(column.symbol == "f4" for column in problem.baseline.base.columns):
         return []
-    unseen = cut_recording(seen.whole, slice(seen.first, len(seen.whole)))
+    unseen = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
     known, there = (np.abs(recording.dq).max(axis=0) for recording in (problem.recording, unseen))
     ratio = there / np.maximum(known, 1e-9)
     fast = np.flatnonzero(ratio > FASTER)
@@ -197,7 +197,7 @@ def farther_joints(problem: Problem, seen: HeldOutResult, findings: Sequence[Fin
     """Says where unseen data go beyond the positions by which a function of a joint's position was fitted."""
     if seen.whole is problem.recording:
         return []
-    unseen = cut_recording(seen.whole, slice(seen.first, len(seen.whole)))
+    unseen = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
     notes = []
     placed = {f.joint for f in findings if f.effect in PLACED and f.coordinate.startswith("position of joint")}
     for joint in sorted(joint for joint in placed if joint):
@@ -228,7 +228,7 @@ def beside_larger(slight: FittedEffect | None, members: Sequence[FittedEffect]) 
     if not told:
         return ()
     share, member, j = min(told, key=lambda each: each[0])
-    if slight.hypothesis.effect.alike:
+    if slight.hypothesis.effect.shared_coefficient:
         return (_NOT_ALIKE.format(slight.hypothesis.label, member.hypothesis.label),)
     if share >= 1.0:
         return ()

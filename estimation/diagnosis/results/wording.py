@@ -56,8 +56,8 @@ def word_finding(
         units = {"force": force_unit(robot, joint - 1), "length": length_unit(robot, joint - 1)}
     parameters = _parameters(robot, member, fitted, i, known)
     sentence = _when(hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units), parameters)
-    if hypothesis.effect.vague and not known[: len(extension.coefficients)].any():
-        sentence = hypothesis.effect.vague.format(joint=joint)
+    if hypothesis.effect.undetermined_text and not known[: len(extension.coefficients)].any():
+        sentence = hypothesis.effect.undetermined_text.format(joint=joint)
     pattern = hypothesis.name if hypothesis.name.startswith(PREFIX) else ""
     rivals = [] if found is None else [(rival.hypothesis, worse) for rival, worse in found.rivals]
     return Finding(
@@ -65,7 +65,7 @@ def word_finding(
         joint=joint,
         parameters=parameters,
         p_value=p_value,
-        delta_bic=member.worth(problem.rows),
+        delta_bic=member.local_bic_gain(problem.rows),
         gain=gain,
         rivals=tuple(
             (h.name if h.joint in (joint, None) else f"{h.name} of joint {h.joint}", float(worse))
@@ -73,7 +73,7 @@ def word_finding(
         ),
         sentence=sentence,
         visible=member.visible,
-        coordinate=hypothesis.effect.coordinate(problem.sees(hypothesis.effect), joint, member.shape)[0],
+        coordinate=hypothesis.effect.coordinate(problem.state_for(hypothesis.effect), joint, member.shape)[0],
         pattern=pattern,
     )
 

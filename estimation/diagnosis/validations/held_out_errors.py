@@ -50,34 +50,34 @@ class HeldOutResult:
     """Errors on unseen data.
 
     Attributes:
-        unseen: of all models.
+        errors: of all models.
         gains: what each member brings there.
-        rises: by what factor each member changes the error of all joints that it acts on.
-        worse: whether unseen rows speak against each member.
-        kept: share of what each member does to the error of the fit that is left there.
-        speaks: share of each member's gain by which unseen rows speak for it (`Unseen.growth`).
+        rmse_ratio: by what factor each member changes the error of all joints that it acts on.
+        contradicts: whether unseen rows speak against each member.
+        cv_retained_gain: share of what each member does to the error of the fit that is left there.
+        support: share of each member's gain by which unseen rows speak for it (`Unseen.growth`).
         coordinates: on which each member shows there (M,).
         whole: the unseen data, after the logs of the fit where heat may last from them.
-        first: row of `whole` at which the unseen data begin.
+        first_held_out_row: row of `whole` at which the unseen data begin.
         effects: columns (N, n, k) of each member on the data of the fit.
         torque: of all members together on the unseen data (M, n).
-        pull: on base model, nuisance and members, of all fits.
-        gone: members that came with a change, and that the unseen data are taken to be without.
+        prior: on base model, nuisance and members, of all fits.
+        absent: members that came with a change, and that the unseen data are taken to be without.
     """
 
-    unseen: HeldOutErrors
+    errors: HeldOutErrors
     gains: tuple[Gain, ...]
-    rises: tuple[float, ...]
-    worse: tuple[bool, ...]
-    kept: tuple[float, ...]
-    speaks: tuple[float, ...]
+    rmse_ratio: tuple[float, ...]
+    contradicts: tuple[bool, ...]
+    cv_retained_gain: tuple[float, ...]
+    support: tuple[float, ...]
     coordinates: tuple[Array, ...]
     whole: Recording
-    first: int
+    first_held_out_row: int
     effects: tuple[Array, ...]
     torque: Array
-    pull: GaussianPrior
-    gone: frozenset[int] = frozenset()
+    prior: GaussianPrior
+    absent: frozenset[int] = frozenset()
 
 
 def measure_held_out(
@@ -105,29 +105,29 @@ def measure_held_out(
         unseen, states, whole, first, columns = _on_logs(robot, problem, members, effects, held_out, pull, gone)
     else:
         unseen = _left_out(problem, effects, pull)
-        states = [problem.sees(member.hypothesis.effect) for member in members]
+        states = [problem.state_for(member.hypothesis.effect) for member in members]
         whole, first, columns = problem.recording, 0, list(effects)
     there = slice(first, None)
     torque = np.zeros_like(whole.tau[there])
     for X, member in zip(columns, members, strict=True):
         torque += X @ member.coefficients
     return HeldOutResult(
-        unseen=unseen,
+        errors=unseen,
         gains=tuple(_gain(unseen, i, member, rng) for i, member in enumerate(members)),
-        rises=tuple(_rise(unseen, i, member) for i, member in enumerate(members)),
-        worse=tuple(unseen.surely_worse(i + 1) for i in range(len(members))),
-        kept=tuple(unseen.kept(i + 1, _joints(member)) for i, member in enumerate(members)),
-        speaks=tuple(unseen.growth[i + 1] / max(member.gain, 1e-300) for i, member in enumerate(members)),
+        rmse_ratio=tuple(_rise(unseen, i, member) for i, member in enumerate(members)),
+        contradicts=tuple(unseen.surely_worse(i + 1) for i in range(len(members))),
+        cv_retained_gain=tuple(unseen.retained_share(i + 1, _joints(member)) for i, member in enumerate(members)),
+        support=tuple(unseen.growth[i + 1] / max(member.gain, 1e-300) for i, member in enumerate(members)),
         coordinates=tuple(
             m.hypothesis.effect.coordinate(state, m.hypothesis.joint, m.shape)[1][there]
             for m, state in zip(members, states, strict=True)
         ),
         whole=whole,
-        first=first,
+        first_held_out_row=first,
         effects=effects,
         torque=torque,
-        pull=pull,
-        gone=gone,
+        prior=pull,
+        absent=gone,
     )
 
 
@@ -153,7 +153,7 @@ def _only_once(recording: Recording, effects: Sequence[Array]) -> str:
         energies = np.array([float(np.sum(X[run] ** 2)) for run in recording.runs])
         if energies.max() > ALONE * energies.sum():
             return "something that was found acts in one log only"
-    moves = np.array([~recording.unsure[run].all(axis=0) for run in recording.runs])
+    moves = np.array([~recording.sign_unknown[run].all(axis=0) for run in recording.runs])
     return "a joint moves in one log only" if (moves.sum(axis=0) == 1).any() else ""
 
 
@@ -180,7 +180,7 @@ def simulate_held_out(
     Returns:
         The simulation; None where the fitted robot runs away from the loop.
     """
-    whole, first = measured.whole, measured.first
+    whole, first = measured.whole, measured.first_held_out_row
     parts = [slice(max(run.start, first), run.stop) for run in whole.runs if run.stop > first]
     if not held_out and (len(parts) == 1 or _only_once(whole, measured.effects)):
         parts = _parts(whole)
@@ -191,12 +191,12 @@ def simulate_held_out(
     b = known.size
     before = FittedRobot(model=known.model, columns=known.independent, values=base[:b])
     edges = np.cumsum([b + problem.baseline.nuisance.shape[2], *(X.shape[2] for X in measured.effects)])
-    there = [i for i in range(len(members)) if i not in measured.gone]
+    there = [i for i in range(len(members)) if i not in measured.absent]
     after = replace(
         before,
         values=extended[:b],
-        felt=problem.parameters_without_payload[list(known.independent)],
-        bearing=problem.bearing,
+        base_values_for_effects=problem.parameters_without_payload[list(known.independent)],
+        extra_load=problem.extra_load,
         since=problem.situation.origin,
         members=tuple(members[i] for i in there),
         coefficients=tuple(extended[edges[i] : edges[i + 1]] for i in there),
@@ -230,14 +230,14 @@ def _fits(problem: Problem, measured: HeldOutResult, left_out: slice | None) -> 
     full = np.concatenate(
         [problem.baseline.regressor[rows], problem.baseline.nuisance[rows], *(X[rows] for X in effects)], axis=2
     )
-    weights = (~recording.unsure / problem.whitening.scales(len(recording)))[rows]
+    weights = (~recording.sign_unknown / problem.whitening.scales(len(recording)))[rows]
     flat = (full * weights[:, :, None]).reshape(-1, full.shape[2])
     gram, cross = flat.T @ flat, flat.T @ (recording.tau[rows] * weights).reshape(-1)
     # Thinned rows count for all.
     factor = kept.sum() / max(len(rows), 1)
     alone, *_, everything = model_columns(full.shape[2] - sum(X.shape[2] for X in effects), effects)
     first, last = (
-        solve_map(factor * gram[np.ix_(chosen, chosen)], factor * cross[chosen], measured.pull.columns(chosen))
+        solve_map(factor * gram[np.ix_(chosen, chosen)], factor * cross[chosen], measured.prior.columns(chosen))
         for chosen in (alone, everything)
     )
     return first, last
@@ -288,7 +288,7 @@ def _on_logs(
     other = subtract_known_payload(
         robot, build_recording(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN, travel=travel)
     )
-    other = other.trusting(recording.trusted)
+    other = other.with_trusted(recording.trusted)
     # One clock: where the unseen logs come later, the heat of the ones before is still there.
     later = bool(other.t[0] > recording.t[-1])
     whole = join_recordings(recording, other) if later else other

@@ -82,12 +82,12 @@ class Pattern(JointEffect):
         return self.sentence(None)
 
     @property
-    def fast(self) -> bool:  # type: ignore[override]
+    def independent_of_acceleration(self) -> bool:  # type: ignore[override]
         """Whether it is looked for above the bands too: what vibrates owes nothing to accelerations."""
         return self.kind == "vibration"
 
     @property
-    def unmoved(self) -> bool:  # type: ignore[override]
+    def exogenous(self) -> bool:  # type: ignore[override]
         """Whether the arm's motion answers to it, and not it to the motion."""
         return self.kind == "vibration"
 

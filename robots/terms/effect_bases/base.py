@@ -33,25 +33,29 @@ class Effect(ABC):
         whole_robot: whether it acts on the robot as a whole; its joint is then None.
         rare: whether it is to be thought of last: it resembles a common effect, and robots seldom have it.
         depends_on: ``state`` where one and the same motion always meets it, ``time`` where it comes, goes or builds up.
-        keeps: whether what came before a log acts in it still: heat.
-        passing: whether it belongs to the logs it is found in, and may be gone or different in others.
-        alike: whether it has one coefficient, that all joints share: each joint tells it, and they must agree.
+        has_thermal_memory: whether what came before a log acts in it still: heat.
+        transient: whether it belongs to the logs it is found in, and may be gone or different in others.
+        shared_coefficient: whether it has one coefficient, that all joints share: each joint tells it, and they must
+            agree.
         lags: whether its one coefficient is a time: reversals tell that no better than their own moments are known.
-        turns: whether it acts where a joint turns round: an error in the moment of that resembles it.
-        kicks: whether it acts by changes of acceleration: they are largest, and least known, where a joint turns round.
-        fast: whether its torque owes nothing to accelerations: it is looked for above the frequencies of those, too.
-        sharp: whether its torque may turn round or pass within some samples, otherwise than by the sign of a velocity:
-            where logs are thinned, it is evaluated before.
-        unmoved: whether the arm's motion answers to it, and not it to the motion: no base model is fitted to that.
-        blurs: whether it lets friction turn round later or over some time: how sharp its sign is shows beside it only.
-        waves: whether it goes up and down over the joint's range, as a spot of it does once.
-        borne: whether the gears bear its torque: what grows with their load feels it.
+        acts_at_reversals: whether it acts where a joint turns round: an error in the moment of that resembles it.
+        acceleration_driven: whether it acts by changes of acceleration: they are largest, and least known, where a
+            joint turns round.
+        independent_of_acceleration: whether its torque owes nothing to accelerations: it is looked for above the
+            frequencies of those, too.
+        needs_full_rate: whether its torque may turn round or pass within some samples, otherwise than by the sign of a
+            velocity: where logs are thinned, it is evaluated before.
+        exogenous: whether the arm's motion answers to it, and not it to the motion: no base model is fitted to that.
+        smooths_friction_sign: whether it lets friction turn round later or over some time: how sharp its sign is shows
+            beside it only.
+        oscillates_over_range: whether it goes up and down over the joint's range, as a spot of it does once.
+        loads_gear: whether the gears bear its torque: what grows with their load feels it.
         preloads: whether what it pulls with throughout is in the base model's offset.
-        loaded: whether it depends on what the gears bear.
-        last: whether it acts on all of the torque, that of other effects too (`Situation.beyond`).
+        depends_on_gear_load: whether it depends on what the gears bear.
+        acts_on_total_torque: whether it acts on all of the torque, that of other effects too (`Situation.beyond`).
         distorts: whether a reading of its joint's torque is wrong by it, as that torque has it: the base model follows
             such readings, and both are then fitted at once. A `StaticJointEffect`.
-        vague: what is said of it where the logs determine none of its coefficients; nothing by default.
+        undetermined_text: what is said of it where the logs determine none of its coefficients; nothing by default.
         shapes: the parameters that the columns are not linear in.
         rivals: effects that resemble it, the closest first.
         experiments: kinds of experiment that separate it from them, the best first.
@@ -62,23 +66,23 @@ class Effect(ABC):
     whole_robot: ClassVar[bool] = False
     rare: ClassVar[bool] = False
     depends_on: ClassVar[Literal["state", "time"]] = "state"
-    keeps: ClassVar[bool] = False
-    passing: ClassVar[bool] = False
-    alike: ClassVar[bool] = False
+    has_thermal_memory: ClassVar[bool] = False
+    transient: ClassVar[bool] = False
+    shared_coefficient: ClassVar[bool] = False
     lags: ClassVar[bool] = False
-    turns: ClassVar[bool] = False
-    kicks: ClassVar[bool] = False
-    fast: ClassVar[bool] = False
-    sharp: ClassVar[bool] = False
-    unmoved: ClassVar[bool] = False
-    blurs: ClassVar[bool] = False
-    waves: ClassVar[bool] = False
-    borne: ClassVar[bool] = False
+    acts_at_reversals: ClassVar[bool] = False
+    acceleration_driven: ClassVar[bool] = False
+    independent_of_acceleration: ClassVar[bool] = False
+    needs_full_rate: ClassVar[bool] = False
+    exogenous: ClassVar[bool] = False
+    smooths_friction_sign: ClassVar[bool] = False
+    oscillates_over_range: ClassVar[bool] = False
+    loads_gear: ClassVar[bool] = False
     preloads: ClassVar[bool] = False
-    loaded: ClassVar[bool] = False
-    last: ClassVar[bool] = False
+    depends_on_gear_load: ClassVar[bool] = False
+    acts_on_total_torque: ClassVar[bool] = False
     distorts: ClassVar[bool] = False
-    vague: ClassVar[str] = ""
+    undetermined_text: ClassVar[str] = ""
     shapes: ClassVar[tuple[Shape, ...]] = ()
     rivals: ClassVar[tuple[str, ...]] = ()
     experiments: ClassVar[tuple[str, ...]] = ()
@@ -103,7 +107,7 @@ class Effect(ABC):
         """Lists coefficients and shapes that are one quantity told twice, and what they may differ by (deviation)."""
         return ()
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Whether a machine may have these values, of a shape where that is given.
 
         One that is stopped by its largest size wants to be more still, and one below its least is none.
@@ -176,7 +180,7 @@ class Effect(ABC):
         """
         return ()
 
-    def elsewhere(
+    def other_optima(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[tuple[float, ...], ...], ...]:
         """Lists other summits than a refined shape's, which a search from there does not reach.
@@ -185,14 +189,14 @@ class Effect(ABC):
         """
         return ()
 
-    def further(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
+    def open_edges(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
         """Lists what it would be where it may go on beside a refined shape, by a formula that is near to it only.
 
         Each with the shape parameter that is then not told.
         """
         return ()
 
-    def lasting(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+    def sustained_shapes(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
         """Lists shapes of formulas that stay true while it lasts, where a refined one's is near to it only.
 
         As if it acted throughout; when it does are the first two of its shape parameters, a start and a duration [s].
@@ -203,7 +207,7 @@ class Effect(ABC):
         """Lists shapes that a log may not tell apart though other motions do; the likeliest is taken of those."""
         return ()
 
-    def leaves(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
+    def leakage(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
         """Gives the share of what the effect explains on a joint, from 0, that its formula may leave unexplained there.
 
         What is left must not be taken for another effect: formulas are true to some per cent of an effect.

@@ -15,7 +15,7 @@ from robots.terms.situations.situation import Situation
 Array = NDArray[np.float64]
 
 LoadPath = Literal["effects", "preloads"]
-"""The torque of effects that are `borne` alone, or with the base model's offset on joints of those it `preloads`."""
+"""Torque of effects that load the gear: alone, or with the base model's offset on joints that they preload."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +23,7 @@ class LoadSource:
     """An effect whose torque gears bear.
 
     Attributes:
-        effect: one that is `borne`.
+        effect: one that is `loads_gear`.
         joint: where it acts, counted from 1; None for the whole robot.
         shape: values of its shape parameters.
         coefficients: of its columns (k,).
@@ -43,20 +43,20 @@ class ExtraGearLoad:
     gear bears, whichever has how much of it.
 
     Attributes:
-        how: what of them the gears bear.
-        weights: the effects.
+        path: what of them the gears bear.
+        sources: the effects.
     """
 
-    how: LoadPath
-    weights: Sequence[LoadSource]
+    path: LoadPath
+    sources: Sequence[LoadSource]
 
     def on(self, now: Situation) -> Situation:
         """Gives what effects that grow with the load depend on."""
         borne = np.zeros_like(now.q)
-        for weight in self.weights:
+        for weight in self.sources:
             borne += weight.effect.columns(now, weight.joint, weight.shape) @ weight.coefficients
-        if self.how == "preloads":
-            held = sorted({w.joint - 1 for w in self.weights if w.effect.preloads and w.joint is not None})
+        if self.path == "preloads":
+            held = sorted({w.joint - 1 for w in self.sources if w.effect.preloads and w.joint is not None})
             borne[:, held] += (now.torque - now.rigid - now.friction)[:, held]
         return now.bearing(borne)
 

@@ -22,18 +22,18 @@ class HeatEffect(JointEffect):
     """An effect of one joint whose first shape is the time constant of a heat that is kept."""
 
     depends_on: ClassVar[Literal["state", "time"]] = "time"
-    keeps: ClassVar[bool] = True
+    has_thermal_memory: ClassVar[bool] = True
     falls: ClassVar[bool] = False
     """Whether its coefficients are falls of friction, Coulomb and viscous: what warms up loses some of it.
 
     Where oil gets thinner slow motion may rub more (Bittencourt and Gunnarsson 2012), but not all motion does.
     """
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Tells what follows its source within seconds from heat, and what grows from what heat makes fall."""
         slow = not shape or shape[0] > LEAST * self.shapes[0].lower
         warmer = self.falls and rises(robot, joint, coefficients)
-        return slow and not warmer and super().believable(robot, joint, coefficients)
+        return slow and not warmer and super().is_plausible(robot, joint, coefficients)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists time constants up to three times the data's duration: all slower ones look like the slowest."""

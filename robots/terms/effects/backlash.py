@@ -66,8 +66,8 @@ class Backlash(Effect):
 
     name: ClassVar[str] = "backlash"
     title: ClassVar[str] = "gear backlash"
-    loaded: ClassVar[bool] = True
-    kicks: ClassVar[bool] = True
+    depends_on_gear_load: ClassVar[bool] = True
+    acceleration_driven: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("gap_crossed", "rad", 1e-7, 0.2, "log"),
         Shape("longest", "s", 0.01, SLOWEST, "log", (SLOWEST,), default=SLOWEST),
@@ -76,7 +76,7 @@ class Backlash(Effect):
         Shape("landing", "s", BRIEFEST, 0.1, "log", (LANDS,), default=LANDS),
     )
     rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "presliding_hysteresis", "load_dependent_friction")
-    fast: ClassVar[bool] = True
+    independent_of_acceleration: ClassVar[bool] = True
     experiments: ClassVar[tuple[str, ...]] = ("payload", "micro_reversals")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
@@ -127,7 +127,7 @@ class Backlash(Effect):
         either = ((LANDS, None), rotors, (0.0, None), (SLOWEST, None), (gap, None))
         return tuple((g, s, z, r, lands) for lands, r, z, s, g in product(*either))[:-1]
 
-    def elsewhere(
+    def other_optima(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[tuple[float, ...], ...], ...]:
         """Gives the gap that the size tells, crossed in as long as now: by the motor's time instead of free flight.

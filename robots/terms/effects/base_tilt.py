@@ -34,7 +34,7 @@ class BaseTilt(Effect):
 
     name: ClassVar[str] = "base_tilt"
     title: ClassVar[str] = "tilted base"
-    borne: ClassVar[bool] = True
+    loads_gear: ClassVar[bool] = True
     whole_robot: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = OWN
     rivals: ClassVar[tuple[str, ...]] = ("spring", "encoder_offset", "torque_constant_error", "payload_change")
@@ -57,10 +57,10 @@ class BaseTilt(Effect):
         """Names the whole robot, if there is gravity."""
         return (None,) if np.any(robot.chain.gravity) else ()
 
-    def leaves(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
+    def leakage(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
         """Gives half of it for an upright first axis whose own moments are too small to be determined."""
         hidden = joint == 0 and upright(robot) and not any(shape)
-        return 0.5 if hidden else super().leaves(robot, joint, shape)
+        return 0.5 if hidden else super().leakage(robot, joint, shape)
 
     def complete(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[float, ...]:
         """Gives the first axis' own moments, if they may be there: angles would take what they are."""

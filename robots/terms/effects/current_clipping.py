@@ -28,7 +28,7 @@ class CurrentClipping(JointEffect):
 
     name: ClassVar[str] = "current_clipping"
     title: ClassVar[str] = "torque limited by the drive current"
-    last: ClassVar[bool] = True
+    acts_on_total_torque: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("level", "N m", 1e-3, 1e6, "log", inexact=0.01),)
     rivals: ClassVar[tuple[str, ...]] = ("torque_constant_saturation", "load_dependent_friction")
     experiments: ClassVar[tuple[str, ...]] = ("payload", "static_hold")
@@ -41,7 +41,7 @@ class CurrentClipping(JointEffect):
         """Gives what a limit takes of the torque beyond its level: of less, another bends it."""
         return ((LEAST, 1.0),)
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Gives true for all of the range: a torque that is cut off is all lost."""
         return float(coefficients[0]) > LEAST
 

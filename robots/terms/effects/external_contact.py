@@ -43,10 +43,10 @@ class ExternalContact(Effect):
 
     name: ClassVar[str] = "external_contact"
     title: ClassVar[str] = "external contact"
-    borne: ClassVar[bool] = True
+    loads_gear: ClassVar[bool] = True
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
-    passing: ClassVar[bool] = True
+    transient: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.03),
         Shape("duration", "s", 0.03, 60.0, "log", (0.2, 0.5, 1.25, 3.2), 0.05),
@@ -71,7 +71,7 @@ class ExternalContact(Effect):
             told = [Coefficient(f"peak_on_joint_{j + 1}", force_unit(robot, j)) for j in range(robot.n)]
         return (*told, *(Coefficient("", "") for _ in range(_count(robot.n) - len(told))))
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Whether joints before the one that feels it most feel it, too.
 
         A force misses the axes of the first two where it acts across the arm, or along an upright first axis; all
@@ -81,7 +81,7 @@ class ExternalContact(Effect):
         most = int(np.argmax(size))
         told = not on_the_flange(shape) and not on_body(shape)
         alone = told and most >= 2 and bool((size[:most] < ALONE * size[most]).all())
-        return not alone and super().believable(robot, joint, coefficients, shape)
+        return not alone and super().is_plausible(robot, joint, coefficients, shape)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists durations, each starting every half of it."""
@@ -94,7 +94,7 @@ class ExternalContact(Effect):
         hardness = (self.shapes[2].lower, self.shapes[2].upper)
         return (first, last), (self.shapes[1].lower, longest), hardness, (0.0, 0.0), (0.0, 0.0)
 
-    def elsewhere(
+    def other_optima(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[tuple[float, ...], ...], ...]:
         """Gives pushes on the flange that last, of which this may be the part in which the arm moves least."""
@@ -112,13 +112,13 @@ class ExternalContact(Effect):
             ),
         )
 
-    def further(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
+    def open_edges(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
         """Gives pushes as long as this, just before and just after: what pushes an arm that moves is no such pulse."""
         start, duration = shape[:2]
         times = ((0, start - duration), (1, start + duration))
         return tuple((k, (at, duration, HOLD, 0.0, 0.0)) for k, at in times)
 
-    def lasting(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+    def sustained_shapes(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
         """Gives forces at a place of each of the bodies."""
         if on_body(shape):
             return ()

@@ -38,7 +38,7 @@ class HandGuiding(Effect):
     title: ClassVar[str] = "robot guided by hand (external force)"
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
-    passing: ClassVar[bool] = True
+    transient: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.02),
         Shape("end", "s", -np.inf, np.inf, "linear", inexact=0.02),

@@ -30,7 +30,7 @@ class JointCoupling(StaticEffect):
 
     name: ClassVar[str] = "joint_coupling"
     title: ClassVar[str] = "coupled drives of neighbouring joints"
-    sharp: ClassVar[bool] = True
+    needs_full_rate: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("way", "", -1.0, 1.0, "linear", WAYS, default=1.0, beside=True, choices=WAYS),
     )

@@ -44,8 +44,8 @@ class JointElasticity(Effect):
 
     name: ClassVar[str] = "joint_elasticity"
     title: ClassVar[str] = "joint elasticity (compliant gear)"
-    loaded: ClassVar[bool] = True
-    kicks: ClassVar[bool] = True
+    depends_on_gear_load: ClassVar[bool] = True
+    acceleration_driven: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("dynamic_stiffness", "N m/rad", 1e-6, 1e12, "log", inexact=INEXACT),
         ROTOR,
@@ -83,10 +83,10 @@ class JointElasticity(Effect):
         stiffness = float(np.clip(1.0 / coefficients[0], *self.bounds(situation, joint)[0]))
         return (stiffness, KNOWN), *plain, *((stiffness, None) for _ in plain)
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Tells a gear from what swings as if on a spring of another stiffness than it winds up by."""
         ratio = float(coefficients[0]) * shape[0] if shape else 1.0
-        return 1.0 / APART < ratio < APART and super().believable(robot, joint, coefficients, shape)
+        return 1.0 / APART < ratio < APART and super().is_plausible(robot, joint, coefficients, shape)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per compliance of one."""

@@ -33,7 +33,7 @@ class LoadDependentFriction(StaticJointEffect):
 
     name: ClassVar[str] = "load_dependent_friction"
     title: ClassVar[str] = "load-dependent friction"
-    loaded: ClassVar[bool] = True
+    depends_on_gear_load: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("driven_back", "1", 0.0, 1.0, "linear", (ALIKE,), 0.05, default=ALIKE),
         ROTOR,

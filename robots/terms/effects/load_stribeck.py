@@ -23,8 +23,8 @@ class LoadStribeck(StaticJointEffect):
 
     name: ClassVar[str] = "load_stribeck"
     title: ClassVar[str] = "load-dependent break-away friction"
-    loaded: ClassVar[bool] = True
-    sharp: ClassVar[bool] = True
+    depends_on_gear_load: ClassVar[bool] = True
+    needs_full_rate: ClassVar[bool] = True
     rare: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("stribeck_velocity", "rad/s", 1e-3, 2.0, "log"),)
     rivals: ClassVar[tuple[str, ...]] = ("stribeck", "load_dependent_friction", "presliding_hysteresis")

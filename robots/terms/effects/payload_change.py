@@ -25,7 +25,7 @@ class PayloadChange(Effect):
 
     name: ClassVar[str] = "payload_change"
     title: ClassVar[str] = "sudden change of the payload"
-    borne: ClassVar[bool] = True
+    loads_gear: ClassVar[bool] = True
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
     shapes: ClassVar[tuple[Shape, ...]] = (

@@ -25,8 +25,8 @@ class PreslidingHysteresis(JointEffect):
 
     name: ClassVar[str] = "presliding_hysteresis"
     title: ClassVar[str] = "presliding hysteresis"
-    sharp: ClassVar[bool] = True
-    turns: ClassVar[bool] = True
+    needs_full_rate: ClassVar[bool] = True
+    acts_at_reversals: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("presliding_travel", "rad", 1e-5, 0.2, "log"),)
     rivals: ClassVar[tuple[str, ...]] = ("stribeck", "backlash", "time_delay", "current_lag", "spring")
     experiments: ClassVar[tuple[str, ...]] = ("micro_reversals", "sweep")

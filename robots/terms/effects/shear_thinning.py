@@ -23,7 +23,7 @@ class ShearThinning(StaticJointEffect):
 
     name: ClassVar[str] = "shear_thinning"
     title: ClassVar[str] = "shear-thinning viscous friction"
-    sharp: ClassVar[bool] = True
+    needs_full_rate: ClassVar[bool] = True
     rare: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("power", "1", 0.2, 0.9, "linear", (0.3, 0.5, 0.7)),)
     rivals: ClassVar[tuple[str, ...]] = ("stribeck", "presliding_hysteresis")

@@ -42,9 +42,9 @@ class Spring(StaticJointEffect):
 
     name: ClassVar[str] = "spring"
     title: ClassVar[str] = "spring or cable on the joint"
-    borne: ClassVar[bool] = True
+    loads_gear: ClassVar[bool] = True
     preloads: ClassVar[bool] = True
-    vague: ClassVar[str] = (
+    undetermined_text: ClassVar[str] = (
         "A spring or cable acts on joint {joint}. These logs do not determine its stiffness, because gravity has a "
         "similar effect."
     )
@@ -73,11 +73,11 @@ class Spring(StaticJointEffect):
         """Gives ratio and dead centre of a spring without levers."""
         return frozenset() if _has_lever(shape) else frozenset((0, 1))
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Whether its ends stay apart: a catch at one angle resembles a spring whose ends nearly meet there."""
         assert joint is not None
         meets = _has_lever(shape) and shape[0] > MEETING and _passes(robot, joint, shape[1])
-        return not meets and super().believable(robot, joint, coefficients, shape)
+        return not meets and super().is_plausible(robot, joint, coefficients, shape)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists a spring without levers, and levers if the joint turns far enough to determine them."""

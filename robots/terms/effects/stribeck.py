@@ -24,7 +24,7 @@ class Stribeck(StaticJointEffect):
 
     name: ClassVar[str] = "stribeck"
     title: ClassVar[str] = "Stribeck friction"
-    sharp: ClassVar[bool] = True
+    needs_full_rate: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("stribeck_velocity", "rad/s", 1e-3, 2.0, "log", inexact=0.03),
         Shape("exponent", "1", 0.5, 2.5, "linear", (1.0, 2.0)),

@@ -29,18 +29,18 @@ class Late(Effect):
     """Delay of the logged torque; the shape follows from reversals, the coefficient from all other data."""
 
     lags: ClassVar[bool] = True
-    blurs: ClassVar[bool] = True
-    sharp: ClassVar[bool] = True
+    smooths_friction_sign: ClassVar[bool] = True
+    needs_full_rate: ClassVar[bool] = True
 
     def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
         """Ties reversals to all else: what `near` allows is 95 %."""
         return ((0, 0, 0.5 * (APART - 1.0 / APART) / 1.96 * float(abs(coefficients[0]))),)
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Whether a machine may have these values: it does not stand where its reversals' lets it come no closer."""
         ends = [end for shift in shape for end in near(shift)[0]]
         torn = any(bool(np.isclose(coefficients[0], end, rtol=1e-6, atol=0.0)) for end in ends)
-        return super().believable(robot, joint, coefficients, shape) and not torn
+        return super().is_plausible(robot, joint, coefficients, shape) and not torn
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
@@ -60,7 +60,7 @@ class TimeDelay(Late):
     name: ClassVar[str] = "time_delay"
     title: ClassVar[str] = "delay between torque and position"
     whole_robot: ClassVar[bool] = True
-    alike: ClassVar[bool] = True
+    shared_coefficient: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (SHIFT,)
     rivals: ClassVar[tuple[str, ...]] = ("current_lag", "presliding_hysteresis", "joint_elasticity")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "micro_reversals")

@@ -54,8 +54,8 @@ class TorqueRipple(StaticJointEffect):
         Shape("friction_share", "", 0.0, 1.0, "linear", (0.0,), default=0.0, choices=(0.0, 1.0)),
     )
     rivals: ClassVar[tuple[str, ...]] = ("position_dependent_friction", "spring", "encoder_eccentricity")
-    fast: ClassVar[bool] = True
-    waves: ClassVar[bool] = True
+    independent_of_acceleration: ClassVar[bool] = True
+    oscillates_over_range: ClassVar[bool] = True
     experiments: ClassVar[tuple[str, ...]] = ("sweep",)
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:

@@ -27,7 +27,7 @@ class TorqueSensorDrift(JointEffect):
     name: ClassVar[str] = "torque_sensor_drift"
     title: ClassVar[str] = "zero drift of a torque sensor"
     depends_on: ClassVar[Literal["state", "time"]] = "time"
-    passing: ClassVar[bool] = True
+    transient: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("origin", "s", -np.inf, np.inf, "linear"),
         Shape("stretch", "s", 1e-3, 1e7, "log"),

@@ -44,8 +44,9 @@ class Situation:
             situations that this one joins; `parameters` are the first's, and each has a model of its own gravity.
         measured: torque as logged (N, n) [N m or N]; None where there is no log, and in models that are evaluated.
         beyond: torque of other effects (N, n) [N m or N], for those that act on all of the torque; None for none.
-        borne: torque of other effects (N, n) that the gears bear besides the robot's own [N m or N]; None for none.
-        finer: the same logs before they were thinned; None where they were not.
+        extra_load: torque of other effects (N, n) that the gears bear besides the robot's own [N m or N]; None for
+            none.
+        full_rate: the same logs before they were thinned; None where they were not.
         since: moment from which the phase of what vibrates counts [s]; None for its own first.
     """
 
@@ -63,8 +64,8 @@ class Situation:
     parts: tuple[Situation, ...] = ()
     measured: Array | None = None
     beyond: Array | None = None
-    borne: Array | None = None
-    finer: Finer | None = None
+    extra_load: Array | None = None
+    full_rate: Finer | None = None
     since: float | None = None
     _cache: dict[object, Any] = field(default_factory=dict, repr=False)
 
@@ -95,7 +96,7 @@ class Situation:
     @property
     def sampled(self) -> float:
         """The median sample period of the logs before they were thinned [s]."""
-        return self.period if self.finer is None else self.finer.situation.period
+        return self.period if self.full_rate is None else self.full_rate.situation.period
 
     @property
     def whole(self) -> Array:
@@ -108,20 +109,20 @@ class Situation:
 
     def bearing(self, torque: Array | None) -> Situation:
         """The same with torque (N, n) [N m or N] that the gears bear besides the robot's own; None for none."""
-        return self._with("borne", torque)
+        return self._with("extra_load", torque)
 
     def _with(self, name: str, torque: Array | None) -> Situation:
         """The same with a torque that is known, at all samples too; what is kept for callers depends on neither."""
         if torque is not None:
             torque = np.broadcast_to(torque, self.q.shape)
-        if self.finer is None or torque is None:
+        if self.full_rate is None or torque is None:
             return replace(self, **{name: torque})  # type: ignore[arg-type]
-        other = self.finer.situation
+        other = self.full_rate.situation
         spread = np.empty_like(other.q)
         for own, run in zip(other.runs, self.runs, strict=True):
             spread[own] = np.column_stack([np.interp(other.t[own], self.t[run], x) for x in torque[run].T])
-        finer = replace(self.finer, situation=other._with(name, spread))
-        return replace(self, **{name: torque}, finer=finer)  # type: ignore[arg-type]
+        finer = replace(self.full_rate, situation=other._with(name, spread))
+        return replace(self, **{name: torque}, full_rate=finer)  # type: ignore[arg-type]
 
     @cached_property
     def gravity(self) -> Array:
@@ -133,8 +134,8 @@ class Situation:
     @cached_property
     def sign(self) -> Array:
         """The sign of the velocities as the base model takes it (N, n), low-passed where logs are thinned."""
-        if self.finer is not None:
-            return self.finer.thinned(self.finer.situation.sign)
+        if self.full_rate is not None:
+            return self.full_rate.thinned(self.full_rate.situation.sign)
         return sign_of(self.dq, self.velocity_scale)
 
     @cached_property
@@ -146,7 +147,7 @@ class Situation:
     def load(self) -> Array:
         """The torque that passes the gears (N, n) [N m or N]: the rigid body's without rotors, and what they bear."""
         own = self.rigid - self.ddq * self.rotors.sum(axis=0)
-        return own if self.borne is None else own + self.borne
+        return own if self.extra_load is None else own + self.extra_load
 
     def friction_at(self, dq: Array) -> Array:
         """Evaluates the base model's friction (N, n) [N m or N] at other velocities (N, n)."""
@@ -218,7 +219,9 @@ class Finer:
 def with_finer(coarse: Situation, finer: Finer) -> Situation:
     """Gives a situation of thinned logs whose friction is that of all samples, low-passed as their torque."""
     friction = finer.thinned(finer.situation.friction)
-    return replace(coarse, friction=friction, torque=coarse.torque - coarse.friction + friction, finer=finer, _cache={})
+    return replace(
+        coarse, friction=friction, torque=coarse.torque - coarse.friction + friction, full_rate=finer, _cache={}
+    )
 
 
 def situation(

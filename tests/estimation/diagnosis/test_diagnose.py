@@ -130,8 +130,8 @@ def test_the_summary_names_cause_joint_and_gain(stepped: tuple[Diagnosis, Log]) 
     text = stepped[0].summary()
     assert "friction_step (joint 2)" in text
     for parameter in stepped[0].findings[0].parameters:
-        assert f"{parameter.name} (" in parameter.told
-        assert parameter.told in text
+        assert f"{parameter.name} (" in parameter.text
+        assert parameter.text in text
     assert "not seen" in text
     assert len(stepped[0].to_frame()) == sum(len(f.parameters) for f in stepped[0].findings)
 

@@ -130,5 +130,5 @@ def test_base_parameters_come_back(arm_plant: Callable[..., Plant], problem: Pro
     plant = arm_plant()
     recording = problem.recording
     clean = plant.model.torque(recording.q, recording.dq, recording.ddq, plant.parameters)
-    error = (problem.situation.torque - clean)[~recording.unsure.any(axis=1)]
+    error = (problem.situation.torque - clean)[~recording.sign_unknown.any(axis=1)]
     assert np.all(error.std(axis=0) < 0.0067 * clean.std(axis=0))

@@ -141,7 +141,7 @@ def test_what_warms_up_gains_no_friction(arm: Robot, effect: str, falls: tuple[f
     """One kind of friction may rise while the other falls; where it rises at all speeds, it is no heat."""
     shape = tuple(400.0 if own.name == "time_constant" else 0.0 for own in EFFECTS[effect].shapes)
     fast = replace(arm, limits=replace(arm.limits, velocity=np.full(arm.n, 10.0)))
-    assert EFFECTS[effect].believable(fast, 1, np.array(falls), shape) is believed
+    assert EFFECTS[effect].is_plausible(fast, 1, np.array(falls), shape) is believed
 
 
 def test_a_change_is_told_at_its_time_or_between_two() -> None:

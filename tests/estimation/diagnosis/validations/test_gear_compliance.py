@@ -43,7 +43,7 @@ def found_in(robot: Robot, log: Log, **options: object) -> tuple[MeasuredComplia
     recording = build_recording(robot, [log])
     base = build_baseline(base_parameters(robot, "coulomb-viscous", (0.001,) * robot.n), recording)
     scale = recording.tau.std(axis=0)
-    values = fit_values(base, scale, recording.unsure, recording.tau, base_model_prior(base, recording))
+    values = fit_values(base, scale, recording.sign_unknown, recording.tau, base_model_prior(base, recording))
     return measure_gear_compliance(base.situation(recording, values), recording, [log], false_alarm=0.01, **options)
 
 
