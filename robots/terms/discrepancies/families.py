@@ -19,7 +19,7 @@ from robots.terms.effects import Situation
 Array = NDArray[np.float64]
 
 HARMONICS = (1, 2, 3, 4)
-# Of what remembers velocity, of a sensor that creeps, and of a supply that sags [s].
+# Time constants of velocity memory, of a creeping sensor, and of a sagging supply [s].
 MEMORIES, CREEPS, SUPPLIES = (0.1, 0.3, 1.0, 3.0), (1.0, 3.0, 10.0, 30.0), (0.03, 0.15, 0.7)
 # time constants of grease that thins as it is worked [s].
 WORKED = (0.5, 2.0, 8.0)
@@ -39,7 +39,7 @@ class Family:
     Attributes:
         columns: evaluates them (N, k), of what is seen, the joint (from 1), another one's number and the shape.
         count: k.
-        words: what the residual torque does, with room for the other joint's name and the shape.
+        words: the dependence of the residual torque, with placeholders for the other joint and the shape.
         of: the joint's input (N,) that the shape's value is the largest size of, in the logs that it was found in: the
             functions are the same ones in any other log.
         unit: of that.
@@ -168,9 +168,9 @@ def _supply(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> A
 
 
 def _followers(s: Situation, source: Array, memories: tuple[float, ...]) -> Array:
-    """What follows a source (N,) with some time constants [s], (N, k), each log anew, from its mean there.
+    """First-order filters of a source (N,) with several time constants [s], (N, k). Each log starts at its mean.
 
-    From zero it would settle for as long, as a drift does that begins with the log.
+    A start from zero would cause a transient that resembles a drift at the log's start.
     """
     columns = np.zeros((len(s), len(memories)))
     for k, memory in enumerate(memories):
@@ -232,7 +232,7 @@ def _sway(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Arr
 def _turns(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     q, v, a = (x[:, joint - 1] for x in (s.q, s.dq, s.ddq))
     waves = (np.cos(shape[0] * q), np.sin(shape[0] * q))
-    # What an error of the position of so many waves does through stiffness, friction and inertia.
+    # Effect of a periodic position error through stiffness, friction and inertia.
     return np.column_stack([wave * factor for factor in (np.ones(len(s)), v, v**2, a) for wave in waves])
 
 

@@ -17,7 +17,7 @@ FEWEST = 3  # joints
 
 
 class OverTime(Effect):
-    """What all joints share and changes slowly with time."""
+    """Base class of slow changes over time that all joints share."""
 
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"

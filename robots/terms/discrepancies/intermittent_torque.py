@@ -161,7 +161,7 @@ class PeriodicTorque(OverTime):
             if has_long_pauses(situation):
                 return ()
             shortest, longest = max(SHORTEST, BRIEFEST / share), duration / TIMES
-            # From one to the next the last push moves by as much as it lasts.
+            # Between neighbouring periods, the last push moves by its own duration.
             rates = np.arange(1.0 / longest, 1.0 / shortest, share / duration) if longest > shortest else np.zeros(0)
             return tuple(float(1.0 / rate) for rate in rates if not _with_motion(situation, rate))
 

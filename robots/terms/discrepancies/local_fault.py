@@ -20,11 +20,11 @@ APART = 1.5
 NARROWEST, WIDEST = 0.004, 0.2
 """Smallest and largest width of a spot, as fractions of the joint's range."""
 BINS = 1000
-"""Of the joint's range, by which all spots are ranked at once."""
+"""Number of bins of the joint's range, by which all positions are ranked at once."""
 
 
 class Placed(JointEffect):
-    """What is at a place of a joint's range."""
+    """Base class of effects at a position of a joint's range."""
 
     def coordinate(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the position."""

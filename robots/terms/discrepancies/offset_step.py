@@ -20,13 +20,13 @@ Array = NDArray[np.float64]
 CHANGES = 64
 """Times through the data; of so many only the likeliest are scanned, for what acts on all joints takes much memory."""
 APART = 2
-"""Of those times as many beside one that is scanned are not: it is refined."""
+"""Number of neighbours of a scanned time that are skipped, because the time is refined."""
 LEAST = 0.02
 """Share of its torque's energy below which a change is taken to have that much."""
 
 
 class Step(Sudden):
-    """What acts on all joints from a time t_c on, and did not before."""
+    """Base class of effects on all joints from a time t_c on."""
 
     moments: ClassVar[int] = CHANGES
 

@@ -125,7 +125,7 @@ class Pattern(JointEffect):
         return tuple((float(f),) for f in np.arange(bottom, top, 0.5 / duration))
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
-        """Keeps a vibration below what the samples resolve, a swing where it is one, and what measures an input."""
+        """Bounds a vibration to frequencies that the samples resolve, a swing to its range, and fixes input scales."""
         if FAMILIES[self.kind].of:
             ((largest,),) = self.grid(situation, joint)
             return ((largest, largest),)
@@ -152,7 +152,7 @@ class Pattern(JointEffect):
         level = np.convolve(np.pad(power, width // 2, mode="reflect"), np.ones(width) / width, mode="valid")
         points = np.array(grid)[:, 0]
         contrast = np.interp(points, f, power / np.maximum(level, 1e-300))
-        # Of a line that lasts, a search from beside its top would leave as much as it takes.
+        # A search that starts beside the top of a narrow spectral line would not reach it.
         return tuple((_top(np.asarray(f), power, float(points[i])),) for i in np.argsort(-contrast)[:count])
 
     @property
@@ -236,7 +236,7 @@ def is_of_time(effect: object) -> bool:
 
 
 def is_plain(effect: object) -> bool:
-    """Whether a pattern's few functions resemble a cause that is no other: a name that explains less is none."""
+    """Whether a simple pattern resembles one specific cause."""
     return isinstance(effect, (EndStop, GainStep, Step, PayloadDrift)) or (
         isinstance(effect, Pattern) and effect.kind == "ageing"
     )

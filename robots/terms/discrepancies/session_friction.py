@@ -22,7 +22,7 @@ SESSIONS = 6
 class SessionFriction(OverTime):
     """tau_j = s_jk f_j in the session k, f_j the friction of the base model, which is that of the first one.
 
-    What one joint has from one moment on is `friction_step`; here each has its own share, in each session.
+    A change of one joint at one time is `friction_step`; here each joint has its own factor in each session.
     """
 
     name: ClassVar[str] = "pattern:daily:0:odd"

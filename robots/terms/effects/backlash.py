@@ -35,12 +35,12 @@ ASIDE = (-0.03, -0.015, 0.0, 0.015, 0.03)
 FARTHEST = 0.1
 """Largest such share: of a base model whose zero is less sure nothing follows."""
 BRIEFEST, LANDS = 0.012, 0.02
-"""Times [s] in which a flank stops the link: at least, and where nothing tells it. When a blow falls is known to some
-milliseconds, as the load's zero is: one briefer than that would err by more than it is where it is predicted."""
+"""Shortest and default time [s] in which a flank stops the link. The time of an impact is known to some milliseconds:
+the prediction of a shorter impact would be worse than none."""
 REBOUND, SETTLES = 0.2, 2.0
 """Share of its speed with which a link comes back from the flank, and in how many times its landing it loses that."""
 LEAST, MOST = 1 / 8, 8.0
-"""Shares of the gap that the time of its crossing tells: the time, whose cube that is, is true to a factor of two."""
+"""Uncertainty of the gap from its crossing time: the time, whose cube it is, is correct to a factor of two."""
 
 HOVERS = 0.05
 """Share of its root mean square that a load must get beyond zero to have changed sides."""
@@ -48,7 +48,7 @@ HOVERS = 0.05
 INEXACT = 0.2
 """Share by which a play errs besides: links bounce otherwise, and drives give way to the kick, by as much."""
 SMALLEST = 5e-7
-"""Half a play below which there is none [rad or m]: at a radius of a tenth of a metre, what teeth are rough by."""
+"""Half a backlash below which it counts as zero [rad or m]: the roughness of teeth at a radius of 0.1 m."""
 
 
 class Backlash(Effect):
@@ -85,7 +85,7 @@ class Backlash(Effect):
         return (Coefficient("half_play", length_unit(robot, joint - 1), 0.0, 0.05, INEXACT, SMALLEST),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
-        """Ties the play that the torque's size tells to the gap that the crossings' time tells."""
+        """Links the backlash from the size of the torque to the gap from the crossing times."""
         ((lower, upper),) = super().ranges(robot, joint, shape)
         return ((max(lower, LEAST * shape[0] / 2), min(upper, MOST * shape[0] / 2)),)
 
@@ -119,7 +119,7 @@ class Backlash(Effect):
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the gap that the size of the torque tells, free flight however long, and the base model's zero."""
+        """Gives the gap from the size of the torque, for free motion, and the base model's zero."""
         gap = float(np.clip(2.0 * coefficients[0], self.shapes[0].lower, self.shapes[0].upper))
         # All but what was refined itself: each as it should be, or not.
         assert joint is not None
@@ -130,7 +130,7 @@ class Backlash(Effect):
     def other_optima(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Gives the gap that the size tells, crossed in as long as now: by the motor's time instead of free flight.
+        """Gives the gap from the size of the torque with the present crossing time, limited by the motor.
 
         Free flight in the time that was seen asks for a smaller gap, and goes astray where loads change more slowly.
         Another rotor, where it is not sure, makes the load change sign at other times: a narrow summit on the right
@@ -238,7 +238,7 @@ def _crossings(situation: Situation, joint: int, at: float, rotor: float) -> tup
         part = load[run]
         sure = np.flatnonzero(np.abs(part) > beyond)
         last = sure[:-1][part[sure[:-1]] * part[sure[1:]] < 0]
-        # Of the rows between two sides the load changes its sign for good in the last that is not yet the new one's.
+        # The load changes sign for good in the last row before the new side.
         changes = np.flatnonzero(part[:-1] * part[1:] <= 0)
         after = sure[np.searchsorted(sure, last, side="right")]
         found.append(run.start + changes[np.searchsorted(changes, after, side="left") - 1])

@@ -45,7 +45,7 @@ class BaseTilt(Effect):
         return Coefficient("tilt_1", "rad", -0.5, 0.5), Coefficient("tilt_2", "rad", -0.5, 0.5)
 
     def unused(self, shape: tuple[float, ...]) -> frozenset[int]:
-        """Gives moments where there are none."""
+        """Gives the shape without moments."""
         return frozenset() if any(shape) else frozenset((0, 1))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:

@@ -27,7 +27,7 @@ FROM = (0.0, 0.5, 1.0)
 ALONE = 0.05  # share of what a joint feels below which others feel nothing
 NONE = 1e-6  # ratio of force to moment, or the reverse, below which the smaller one counts as zero
 WRENCH = tuple(f"mean_{what}_{k}" for what in ("force", "moment") for k in "xyz")
-# Of a force F at the place r of a body, the first along the base's axes, the second along the body's.
+# A force F at the place r of a body; F along the base's axes, r along the body's.
 PLACED = tuple(f"place_{i}_force_{k}" for i in "xyz" for k in "xyz")
 
 
@@ -72,7 +72,7 @@ class ExternalContact(Effect):
         return (*told, *(Coefficient("", "") for _ in range(_count(robot.n) - len(told))))
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
-        """Whether joints before the one that feels it most feel it, too.
+        """Whether joints before the most loaded one are loaded as well.
 
         A force misses the axes of the first two where it acts across the arm, or along an upright first axis; all
         before a further one it misses by chance only. What one of those has alone is its own.
@@ -97,7 +97,7 @@ class ExternalContact(Effect):
     def other_optima(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Gives pushes on the flange that last, of which this may be the part in which the arm moves least."""
+        """Gives longer pushes on the flange that may contain this one."""
         if on_body(shape):
             return ()
         (first, last), (_, longest), *_ = self.bounds(situation, joint)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Of the torque, what is less than this is rounding.
+# Fraction of the torque below which a value is rounding.
 NO_WEIGHT = 1e-9
 # Who moves the arm takes over this share of what its motion needs at least: less is no hand.
 MOST = 0.5

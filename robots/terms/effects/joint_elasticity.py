@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DAMPING = 0.05
-"""Of the resonance, of its critical one."""
+"""Damping ratio of the resonance."""
 INEXACT = 0.05
 """Share by which the stiffness by the dynamics errs besides: it is as right as the inertia and the damping are."""
 OWN = 0.03
@@ -26,7 +26,7 @@ OWN = 0.03
 SCANNED = (3.5, 4.2, 5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 18.0, 30.0, 300.0)
 """Resonances [Hz] of a scan, at the log's mean inertia: dense where a motion may excite them, for they are narrow."""
 LIGHTEST = 0.02
-"""Of a joint's largest inertia, the least that an arm makes it in any pose."""
+"""Smallest inertia of a joint in any pose, as a fraction of its largest."""
 APART = 5.0
 """Times by which the stiffness by the dynamics and that by the compliance differ at most: they are of one gear."""
 LOWEST, HIGHEST = 3.0, 1000.0
@@ -164,7 +164,7 @@ def link_inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Arra
 
 
 def windup(situation: Situation, joint: int, lag: Array, rate: Array, curve: Array, rotor: float = KNOWN) -> Array:
-    """Gives the torque (N, n) by which all joints change when a link lags its encoder, to first order.
+    """Gives the torque change (N, n) of all joints when a link lags its encoder, to first order.
 
     Args:
         situation: what the robot did.

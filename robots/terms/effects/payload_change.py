@@ -79,4 +79,4 @@ class PayloadChange(Effect):
 
 
 USED = (0, 1, 2, 3, 4, 7, 9)
-"""Of the ten inertial parameters: all but the products of inertia."""
+"""Used inertial parameters: all but the products of inertia."""

@@ -56,7 +56,7 @@ class PositionDependentFriction(StaticJointEffect):
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the nearest whole order, where the joint's range does not tell it from the one found."""
+        """Gives the nearest whole order, if the joint's range does not distinguish it from the fitted one."""
         assert joint is not None
         order = max(float(round(shape[0])), 1.0)
         if length_unit(situation.robot, joint - 1) == "m":

@@ -1,4 +1,4 @@
-"""Grease that thins as it is sheared."""
+"""Friction of shear-thinning grease."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 SMALL = 1e-5  # [s]
 SHORTEST = 1e-4
-"""Delay [s] below which there is none: how friction turns round within a sample is not known that well."""
+"""Delay [s] below which it counts as zero: the sign change of friction within a sample is not known better."""
 APART = 1.6
 # Motion above the known frequencies is delayed as well, so a delay is underestimated by some per cent.
 INEXACT = 0.05
@@ -70,7 +70,7 @@ class TimeDelay(Late):
         return (Coefficient("delay", "s", -0.05, 0.05, INEXACT, SHORTEST),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
-        """Keeps the delay near that of the reversals, of which the torque's own is a difference quotient."""
+        """Bounds the delay to values near that of the reversals."""
         return near(shape[0])
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:

@@ -104,8 +104,8 @@ class TorqueRipple(StaticJointEffect):
     ) -> tuple[tuple[float | None, ...], ...]:
         """Lists whole orders up to 12 within the resolution of an order, and those of a known gear; none is late.
 
-        Each by the load and by the motor's torque. A motion that repeats, sampled, may not tell a gear's order from
-        others far away: it is the likelier.
+        Each with the load and with the motor torque. A periodic motion may not distinguish a known gear's order from
+        distant ones; the known one is more likely.
         """
         assert joint is not None
         spacing = self._resolution(situation, joint)[0]

@@ -69,7 +69,7 @@ def test_white_noise_errors_would_be_too_small(experiment):
     estimates, errors, _ = experiment
     white = np.array([estimate.white_noise_errors for estimate in estimates])
     assert np.mean((errors / white) ** 2) > 3
-    assert all(any("coloured" in warning for warning in estimate.warnings) for estimate in estimates)
+    assert all(any("correlated in time" in warning for warning in estimate.warnings) for estimate in estimates)
     assert all(2 < estimate.colour < 5 for estimate in estimates)
 
 

@@ -119,7 +119,7 @@ def test_another_number_of_joints_is_refused(model):
     """A log of three joints is none of a two-joint model."""
     t = 0.01 * np.arange(100)
     log = Log(t=t, q=np.zeros((100, 3)), metadata={"file": "three.csv"})
-    with pytest.raises(InputError, match=r"three\.csv: 3 joints; allowed: 2, as the model of arm has"):
+    with pytest.raises(InputError, match=r"three\.csv: 3 joints; allowed: 2, as in the model of arm"):
         predict(model, log)
 
 
