@@ -1,4 +1,4 @@
-"""What effects of heat share: they build up and go with a time constant that the data must be long enough to show."""
+"""Base class of thermal effects: they rise and decay with a time constant that the data must be long enough to show."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Of the first joints' inertia no log tells how much is the rotor's, which loads no gear.
+"""Rotor inertia of the first joints, which no log separates from the link inertia, but which does not load the gear.
 
 Where a robot's description does not say it, or says it as datasheets do, what gears do with their load may.
 """

@@ -54,19 +54,18 @@ SMALLEST = 5e-7
 class Backlash(Effect):
     """The link lags its encoder by (b / 2) side: the side changes from where the load changes sign, in T + L.
 
-    A load that grows by r per second carries the link's inertia M over the gap b in T = (6 b M / r)^(1/3), or in the
-    longest time that the motor, which goes on, leaves it: it flies by s^3, ever faster, and has most of its speed where
-    it lands. The far flank stops it with half a wave of force, over a time L that is that of half a swing of the link
-    on the gear's teeth and on what the drive gives way, and throws it back a little. So the torque lacks the load for
-    long and little, and then is hit for short and much. It follows from the lag as for an elastic gear: bursts at zero
-    crossings of the load, not of the velocity. Their size and their time tell the same gap, each but roughly: nothing
-    flies quite freely from flank to flank, or lands alike each time. Zero is where the base model has the load's, to
-    some per cent: what of a joint's torque is offset and what its load, a log tells less well, and a slow load crosses
-    late.
+    A load that grows by r per second moves the link's inertia M over the gap b in T = (6 b M / r)^(1/3), or in the
+    longest time that the moving motor leaves. The motion in the gap grows with the third power of time, so the link is
+    fastest when it lands. The far flank stops it with a half wave of force over a time L: half a period of the link on
+    the stiffness of teeth and drive. The torque first lacks the load slightly for a long time, then shows a short and
+    large impact. It follows from the lag as for an elastic gear: bursts at zero crossings of the load, not of the
+    velocity. Size and duration of the bursts both determine the gap, each only roughly, because real crossings and
+    landings vary. The zero of the load is known from the base model to some per cent; a log separates offset and load
+    poorly, and a slow load crosses late.
     """
 
     name: ClassVar[str] = "backlash"
-    title: ClassVar[str] = "play in the gear (backlash)"
+    title: ClassVar[str] = "gear backlash"
     depends_on_gear_load: ClassVar[bool] = True
     acceleration_driven: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
@@ -180,10 +179,11 @@ class Backlash(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
-            f"The gear of joint {joint} has a play of {2 * coefficients[0]:.3g} {length}: its link changes sides when "
-            f"the load changes sign."
+            f"The gear of joint {joint} has {2 * coefficients[0]:.3g} {length} of backlash; the link moves through it "
+            f"when "
+            "the load changes sign."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
@@ -227,8 +227,8 @@ def _size(situation: Situation, joint: int) -> float:
 def _crossings(situation: Situation, joint: int, at: float, rotor: float) -> tuple[Array, Array, Array]:
     """Finds where the load passes a value: times [s], the new side, and its rate over the link's inertia [rad/s3].
 
-    It must get as far as `HOVERS` beyond before it comes back: a load that hovers about zero, as that of a horizontal
-    axis at even speed, has no sides, and what makes it cross is what is not known of the motion.
+    A crossing counts only if the load gets beyond `HOVERS` before it comes back. A load that stays near zero, as on a
+    horizontal axis at constant speed, would cross only by errors of the motion.
     """
     load = load_beside(situation, joint, rotor) - at
     inertia = np.maximum(link_inertia(situation, joint, rotor)[:, joint - 1], 1e-12)

@@ -27,7 +27,7 @@ class CurrentClipping(JointEffect):
     """
 
     name: ClassVar[str] = "current_clipping"
-    title: ClassVar[str] = "torque cut off at the current limit"
+    title: ClassVar[str] = "torque limited by the drive current"
     acts_on_total_torque: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("level", "N m", 1e-3, 1e6, "log", inexact=0.01),)
     rivals: ClassVar[tuple[str, ...]] = ("torque_constant_saturation", "load_dependent_friction")
@@ -109,8 +109,8 @@ class CurrentClipping(JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
-        return f"The torque of joint {joint} is cut off at {shape[0]:.4g} {force}: the drive's current is at its limit."
+        """Describes the values in one sentence."""
+        return f"The torque of joint {joint} is limited to {shape[0]:.3g} {force}, the drive's current limit."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the torque that is cut."""

@@ -43,7 +43,7 @@ class JointElasticity(Effect):
     """
 
     name: ClassVar[str] = "joint_elasticity"
-    title: ClassVar[str] = "a gear that winds up under load (elasticity)"
+    title: ClassVar[str] = "joint elasticity (compliant gear)"
     depends_on_gear_load: ClassVar[bool] = True
     acceleration_driven: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
@@ -66,7 +66,7 @@ class JointElasticity(Effect):
         return tuple((_stiffness(situation, joint, f, rotor), rotor) for rotor in rotors for f in SCANNED)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the resonance within what gears have, and the rotor near what is known of it."""
+        """Bounds the resonance to usual gears, and the rotor to values near the known one."""
         assert joint is not None
         rotor = rotor_bounds(situation, joint)
         softest = _stiffness(situation, joint, LOWEST, rotor[1])
@@ -104,9 +104,9 @@ class JointElasticity(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
-            f"The gear of joint {joint} winds up under load, with a stiffness of "
+            f"The gear of joint {joint} is elastic, with a stiffness of "
             f"{1.0 / max(coefficients[0], 1e-12):.3g} {force}/{length}."
         )
 

@@ -1,4 +1,4 @@
-"""What an effect may depend on: the motion, the base model's torque in it, and how that torque would change."""
+"""Inputs of effects: the motion, the base model's torque, and its sensitivities."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Kept = TypeVar("Kept")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Situation:
-    """What the robot did, all logs one after the other, and what the base model says of it.
+    """The motion of all logs, one after the other, and the base model's torque.
 
     Attributes:
         model: the base model.

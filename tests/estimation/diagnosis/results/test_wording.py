@@ -104,7 +104,7 @@ def test_what_is_no_part_of_the_model_says_so() -> None:
     )
     refuted = no_part(finding)
     assert (refuted.effect, refuted.joint, refuted.parameters, refuted.rivals) == ("unexplained", 2, (), ())
-    assert "looks like a gear that winds up under load" in refuted.sentence
+    assert "looks like joint elasticity" in refuted.sentence
     assert "no part of it" in refuted.sentence
     assert "do not bear that function out" in no_part(finding_of("pattern:load:0:odd", finding)).sentence
 
