@@ -11,7 +11,6 @@ from estimation.diagnosis.base_models.baseline import base_parameters
 from estimation.diagnosis.base_models.payload_and_gravity import subtract_known_payload
 from estimation.diagnosis.experiment_plans.detection_limits import find_limits
 from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
-from estimation.diagnosis.hypothesis_tests.residual_shares import residual_shares
 from estimation.diagnosis.hypothesis_tests.scan import measure
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.log_repair import repair_log
@@ -19,6 +18,7 @@ from estimation.diagnosis.recordings.unusable_logs import find_unusable_logs
 from estimation.diagnosis.results.assembly import DiagnosisInputs, assemble
 from estimation.diagnosis.results.diagnosis import Diagnosis
 from estimation.diagnosis.searches.search import search
+from estimation.diagnosis.validations.residual_shares import residual_shares
 from estimation.diagnosis.validations.verdict import decide_verdict
 from estimation.logs.clocks import put_on_clock
 from robots.common.errors import InputError, NotIdentifiableError

@@ -23,7 +23,8 @@ from robots.signals import Motion
 from robots.terms import Column, build_term, describe_term
 from robots.terms.effect_bases.gear_load import ExtraGearLoad
 from robots.terms.situations.flange_body import with_body
-from robots.terms.situations.situation import Situation, joined, situation
+from robots.terms.situations.joining import join_situations
+from robots.terms.situations.situation import Situation, situation
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -140,7 +141,9 @@ class Model:
 
         def state(known: Array) -> Situation:
             earlier = [situation(model, known, m.t, m.q, m.dq, m.ddq) for m in before]
-            return replace(joined([*earlier, situation(model, known, *arrays)], self.torque_model), since=self.since)
+            return replace(
+                join_situations([*earlier, situation(model, known, *arrays)], self.torque_model), since=self.since
+            )
 
         cut = any(extension.source.acts_on_total_torque for extension in self.extensions)
         extended = extension_torque(self.extensions, state(felt), state(parameters) if cut else None, self.bearing)

@@ -15,8 +15,9 @@ from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.terms.effects import Situation
 from robots.terms.situations.flange_body import with_body
+from robots.terms.situations.joining import join_situations
 from robots.terms.situations.of_model import sign_of, velocity_scale
-from robots.terms.situations.situation import Finer, joined, situation, with_finer
+from robots.terms.situations.situation import Finer, situation, with_finer
 
 Array = NDArray[np.float64]
 
@@ -110,7 +111,7 @@ def _situation(recording: Recording, model: TorqueModel, full: Array) -> Situati
         motion = (recording.t[rows], recording.q[rows], recording.dq[rows], recording.ddq[rows])
         starts = tuple(run.start - rows.start for run, *_ in members)
         parts.append(situation(model.under(gravity), with_body(model, full, body), *motion, starts=starts))
-    return joined(parts, model)
+    return join_situations(parts, model)
 
 
 __all__ = ["subtract_known_payload", "base_regressor", "build_situation"]

@@ -25,7 +25,8 @@ from robots.terms.effect_bases.heat import HeatEffect
 from robots.terms.effects import situation
 from robots.terms.effects.base_tilt import level_axes
 from robots.terms.situations.flange_body import point_mass, with_body
-from robots.terms.situations.situation import Situation, joined
+from robots.terms.situations.joining import join_situations
+from robots.terms.situations.situation import Situation
 
 Array = NDArray[np.float64]
 
@@ -126,7 +127,7 @@ class Grams:
             model = self.model.under(self.problem.recording.gravities[-1] if part.gravity is None else part.gravity)
             before = self._logged if warm and not number else None
             played, first = self._played(model, part, t0, before)
-            now = joined([played], self.model)
+            now = join_situations([played], self.model)
             bases.append(model.regressor(now.q[first:], now.dq[first:], now.ddq[first:], columns=self.columns))
             for columns, cause in zip(effects, self.every, strict=True):
                 values = cause.hypothesis.effect.columns(now, cause.hypothesis.joint, cause.shape)

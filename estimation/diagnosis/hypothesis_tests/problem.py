@@ -274,34 +274,6 @@ class Problem:
         """Marks rows (N, n) away from those of unknown direction."""
         return self.recording.distant_from(self.recording.sign_unknown)
 
-    def null_crosses(self, groups: Sequence[Group]) -> Array:
-        """Products (count, k, draws) of groups of one size on the same joints with noise that has a fit of its own."""
-        noise, projected = self.nulls
-        total = -(np.concatenate([group.against for group in groups]) @ projected)
-        for a, j in enumerate(groups[0].joints):
-            total += np.concatenate([group.columns[a] for group in groups], axis=1).T @ noise[j]
-        null = np.asarray(total.reshape(len(groups), -1, projected.shape[1]))
-        for at, group in enumerate(groups):
-            for part in group.high_band_columns:
-                null[at] += self._drawn(part)
-            if group.reversal_columns is not None:
-                null[at] += group.reversal_columns.T @ self._drawn_timing
-        return null
-
-    def _drawn(self, columns: Small) -> Array:
-        """Products (k, draws) of columns above the band with noise: of many rows, and so as good as normal.
-
-        The same columns meet the same noise.
-        """
-        gram = (columns.T @ columns).astype(float)
-        values, vectors = np.linalg.eigh(gram)
-        unit = np.random.default_rng(gram.ravel().view(np.uint64)).standard_normal((len(gram), self.nulls[1].shape[1]))
-        return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ unit)
-
-    @cached_property
-    def _drawn_timing(self) -> Array:
-        return np.random.default_rng(self.n).standard_normal((self.n, self.nulls[1].shape[1]))
-
     def product(self, first: Group, second: Group) -> Array:
         """Inner products (k1, k2) of what the base model leaves of two groups."""
         P = self.whitening.precision

@@ -13,6 +13,7 @@ from scipy.stats import gumbel_r
 
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.null_products import null_products
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from robots.common.memory import give_back
@@ -167,7 +168,7 @@ def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
         nulls = np.empty((len(kept), ordered[0].size, problem.nulls[1].shape[1]), np.float32)
         for members in batches.values():
             places = [at for at, _ in members]
-            nulls[places] = problem.null_crosses([groups[at] for at in places])
+            nulls[places] = null_products(problem, [groups[at] for at in places])
     return Entry(
         hypothesis=hypothesis,
         shapes=tuple(kept),

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
 from estimation.diagnosis.experiment_plans.detection_limits import Limit
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
@@ -29,12 +30,14 @@ from estimation.diagnosis.results.notes import (
 )
 from estimation.diagnosis.results.wording import no_part, word_finding
 from estimation.diagnosis.searches.selection import SelectedEffect, Selection
+from estimation.diagnosis.validations.comparison import has_close_rivals
 from estimation.diagnosis.validations.equivalent_shapes import complete_effects, equivalent_shapes
 from estimation.diagnosis.validations.free_functions import strongest_pattern
 from estimation.diagnosis.validations.gain_intervals import HeldOutErrors
 from estimation.diagnosis.validations.gear_compliance import EFFECT as ELASTICITY
 from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance, measure_gear_compliance
-from estimation.diagnosis.validations.held_out_errors import HeldOutResult, measure_held_out, simulate_held_out
+from estimation.diagnosis.validations.held_out_errors import HeldOutResult, measure_held_out
+from estimation.diagnosis.validations.held_out_simulation import simulate_held_out
 from estimation.diagnosis.validations.held_out_validation import validate_on_held_out
 from estimation.diagnosis.validations.prediction_settings import (
     all_row_errors,
@@ -42,7 +45,7 @@ from estimation.diagnosis.validations.prediction_settings import (
     with_best_cutoff,
     with_best_sign_sharpness,
 )
-from estimation.diagnosis.validations.verdict import CLOSE, Verdict, has_close_rivals
+from estimation.diagnosis.validations.verdict import Verdict
 from estimation.logs.provenance import describe_logs
 from robots.robot import Robot
 from robots.signals import Log
@@ -205,7 +208,7 @@ def _compliances(told: DiagnosisInputs, seen: HeldOutResult) -> tuple[MeasuredCo
 def _next(problem: Problem, founds: Sequence[SelectedEffect]) -> NextExperiment | None:
     """Plans the experiment that tells the causes that are left apart."""
     for found in founds:
-        close = [rival for rival, worse in found.rivals if worse < CLOSE]
+        close = [rival for rival, worse in found.rivals if worse < CLOSE_RIVAL_BIC]
         if close:
             return plan_next(problem, [found.effect, *close])
     return None

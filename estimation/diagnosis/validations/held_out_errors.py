@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.payload_and_gravity import base_regressor, subtract_known_payload
-from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
@@ -19,15 +18,12 @@ from estimation.diagnosis.joint_fits.shrinkage import effects_prior
 from estimation.diagnosis.joint_fits.total_torque import effect_columns
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording, join_recordings
-from estimation.diagnosis.validations.forward_simulation import FittedRobot, simulate_both
 from estimation.diagnosis.validations.gain_intervals import (
     PARTS,
     HeldOutErrors,
     cross_validation_errors,
     held_out_errors,
-    model_columns,
 )
-from estimation.diagnosis.validations.simulation_result import Simulation
 from estimation.regressions.parameter_priors import GaussianPrior
 from robots.robot import Robot
 from robots.signals import Log
@@ -36,9 +32,6 @@ from robots.terms.effects import Situation
 Array = NDArray[np.float64]
 
 SHORTEST_UNSEEN = 1.0  # [s] of held-out logs
-# Of this many seconds of unseen data the motion is simulated, by a fit to at most so many rows.
-STRETCH = 5.0
-ENOUGH_ROWS = 12_000
 # A joint tells an effect of another, or of its own, by this share of the gain and more.
 TELLING = 0.1
 # An effect lives in one log that holds more than this share of its energy.
@@ -134,10 +127,10 @@ def measure_held_out(
 def _left_out(problem: Problem, effects: Sequence[Array], pull: GaussianPrior) -> HeldOutErrors:
     """Leaves out logs in turn; parts of logs where an effect lives in one log alone, which no other log could tell."""
     recording = problem.recording
-    why = _only_once(recording, effects)
+    why = found_in_one_log_only(recording, effects)
     if len(recording.runs) == 1 or not why:
         return cross_validation_errors(problem, effects, pull)
-    apart = replace(recording, starts=tuple(part.start for part in _parts(recording)))
+    apart = replace(recording, starts=tuple(part.start for part in split_runs(recording)))
     unseen = cross_validation_errors(replace(problem, recording=apart), effects, pull)
     return replace(unseen, how=_WITHIN.format(PARTS, len(recording.runs), why))
 
@@ -147,7 +140,7 @@ _WITHIN = (
 )
 
 
-def _only_once(recording: Recording, effects: Sequence[Array]) -> str:
+def found_in_one_log_only(recording: Recording, effects: Sequence[Array]) -> str:
     """Says what is told by one of several logs alone; nothing where all is told by others too."""
     for X in effects:
         energies = np.array([float(np.sum(X[run] ** 2)) for run in recording.runs])
@@ -157,90 +150,13 @@ def _only_once(recording: Recording, effects: Sequence[Array]) -> str:
     return "a joint moves in one log only" if (moves.sum(axis=0) == 1).any() else ""
 
 
-def _parts(recording: Recording) -> list[slice]:
+def split_runs(recording: Recording) -> list[slice]:
     """Cuts every log into stretches of about as many rows."""
     parts = []
     for run in recording.runs:
         edges = np.linspace(run.start, run.stop, PARTS + 1).astype(int)
         parts += [slice(int(a), int(b)) for a, b in pairwise(edges) if b > a]
     return parts
-
-
-def simulate_held_out(
-    problem: Problem, members: Sequence[FittedEffect], measured: HeldOutResult, held_out: bool
-) -> Simulation | None:
-    """Simulates the stretch of unseen data in which the extension acts most, without and with it.
-
-    Args:
-        problem: the data of the fit.
-        members: what was found, at least one.
-        measured: of these members.
-        held_out: whether logs were kept apart; else the fit leaves out the part in which the stretch lies.
-
-    Returns:
-        The simulation; None where the fitted robot runs away from the loop.
-    """
-    whole, first = measured.whole, measured.first_held_out_row
-    parts = [slice(max(run.start, first), run.stop) for run in whole.runs if run.stop > first]
-    if not held_out and (len(parts) == 1 or _only_once(whole, measured.effects)):
-        parts = _parts(whole)
-    strength = np.sum((measured.torque / problem.whitening.scale) ** 2, axis=1)
-    part, rows = _strongest(parts, np.concatenate([np.zeros(first), strength]), round(STRETCH / whole.step))
-    base, extended = _fits(problem, measured, None if held_out else part)
-    known = problem.baseline.base
-    b = known.size
-    before = FittedRobot(model=known.model, columns=known.independent, values=base[:b])
-    edges = np.cumsum([b + problem.baseline.nuisance.shape[2], *(X.shape[2] for X in measured.effects)])
-    there = [i for i in range(len(members)) if i not in measured.absent]
-    after = replace(
-        before,
-        values=extended[:b],
-        base_values_for_effects=problem.parameters_without_payload[list(known.independent)],
-        extra_load=problem.extra_load,
-        since=problem.situation.origin,
-        members=tuple(members[i] for i in there),
-        coefficients=tuple(extended[edges[i] : edges[i + 1]] for i in there),
-    )
-    return simulate_both(before, after, whole, rows)
-
-
-def _strongest(parts: Sequence[slice], strength: Array, length: int) -> tuple[slice, slice]:
-    """Finds the window of some rows in which a signal (N,) is strongest, and the part in which it lies."""
-    sums = np.concatenate([[0.0], np.cumsum(strength)])
-    best, chosen = -1.0, (parts[0], parts[0])
-    for part in parts:
-        size = min(length, part.stop - part.start)
-        for start in range(part.start, part.stop - size + 1, max(1, size // 4)):
-            mean = float(sums[start + size] - sums[start]) / size
-            # A longer window goes before a short one that is hardly stronger by chance.
-            value = mean * min(1.0, size / length)
-            if value > best:
-                best, chosen = value, (part, slice(start, start + size))
-    return chosen
-
-
-def _fits(problem: Problem, measured: HeldOutResult, left_out: slice | None) -> tuple[Array, Array]:
-    """Fits base model and nuisance alone, and with the effects, to all rows but those left out."""
-    recording, effects = problem.recording, measured.effects
-    kept = np.ones(len(recording), dtype=bool)
-    if left_out is not None:
-        kept[left_out] = False
-    rows = np.flatnonzero(kept)
-    rows = rows[:: max(1, -(-len(rows) // ENOUGH_ROWS))]
-    full = np.concatenate(
-        [problem.baseline.regressor[rows], problem.baseline.nuisance[rows], *(X[rows] for X in effects)], axis=2
-    )
-    weights = (~recording.sign_unknown / problem.whitening.scales(len(recording)))[rows]
-    flat = (full * weights[:, :, None]).reshape(-1, full.shape[2])
-    gram, cross = flat.T @ flat, flat.T @ (recording.tau[rows] * weights).reshape(-1)
-    # Thinned rows count for all.
-    factor = kept.sum() / max(len(rows), 1)
-    alone, *_, everything = model_columns(full.shape[2] - sum(X.shape[2] for X in effects), effects)
-    first, last = (
-        solve_map(factor * gram[np.ix_(chosen, chosen)], factor * cross[chosen], measured.prior.columns(chosen))
-        for chosen in (alone, everything)
-    )
-    return first, last
 
 
 def _gain(unseen: HeldOutErrors, i: int, member: FittedEffect, rng: np.random.Generator) -> Gain:

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, MIN_BIC_GAIN
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations.free_functions import SURE
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
-from estimation.diagnosis.validations.verdict import CLOSE, Verdict
+from estimation.diagnosis.validations.verdict import Verdict
 from robots.terms.discrepancies.patterns import PREFIX, is_of_time, is_oscillation
 from robots.terms.effects import Effect
 
@@ -200,7 +200,7 @@ def _alternative(
             harmless.append((SelectedEffect(form, found.p_value, found.rivals), seen))
             if seen.gains[place].ci95[0] > 0:
                 return harmless[-1]
-    close = [(rival, worse) for rival, worse in found.rivals if worse < CLOSE]
+    close = [(rival, worse) for rival, worse in found.rivals if worse < CLOSE_RIVAL_BIC]
     for k, (rival, worse) in enumerate(close):
         seen = measure([*members[:place], rival, *members[place + 1 :]])
         if not _is_harmful(seen, place, rival, beyond) and seen.gains[place].ci95[0] > 0:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import RARE, FittedEffect, refine
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.searches.selection import SelectedEffect, Selection
@@ -17,6 +17,7 @@ from estimation.diagnosis.validations.comparison import (
     NEARLY,
     STAYS,
     has_better_bic,
+    has_close_rivals,
     is_outperformed,
     retains_gain,
 )
@@ -26,8 +27,6 @@ from robots.terms.discrepancies.patterns import is_of_time, is_plain
 
 # Several names on a joint that explain this share of what as many free functions do are as good as those.
 AS_MUCH = 0.95
-# Rivals within this of the best BIC stay possible.
-CLOSE = 10.0
 # Nor is a name borrowed from free functions of which none does this share of what it does.
 HALF = 0.5
 
@@ -297,8 +296,3 @@ def _is_robust(
 
 def _others(kept: Sequence[SelectedEffect], found: SelectedEffect) -> list[FittedEffect]:
     return [other.effect for other in kept if other is not found]
-
-
-def has_close_rivals(found: SelectedEffect) -> bool:
-    """Whether an effect has rivals that fit about as well; one that robots seldom have must do so by the data alone."""
-    return any(worse < (RARE if rival.hypothesis.effect.rare else CLOSE) for rival, worse in found.rivals)

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
 from estimation.diagnosis.experiment_plans.detection_limits import summarise_limits
 from estimation.diagnosis.results.diagnosis import Diagnosis
-from estimation.diagnosis.validations.verdict import CLOSE
 from oed.reports.pages.diagnosis_limits import limits_section
 from oed.reports.pages.diagnosis_simulation import simulation_section
 from oed.reports.pages.diagnosis_view import DiagnosisView, view_of
@@ -195,8 +195,8 @@ def _finding(view: DiagnosisView, index: int) -> Section:
             Table(
                 headings=("alternative effect", "BIC difference"),
                 rows=tuple((title, round(margin, 1)) for title, margin in finding.rivals),
-                caption=f"Below {CLOSE:g} an alternative remains possible"
-                f"{'' if finding.rivals[0][1] < CLOSE else ': none does'}.",
+                caption=f"Below {CLOSE_RIVAL_BIC:g} an alternative remains possible"
+                f"{'' if finding.rivals[0][1] < CLOSE_RIVAL_BIC else ': none does'}.",
             )
         )
     picture = cause_picture(
@@ -234,7 +234,7 @@ _NO_EXPERIMENT = {
 
 def _next(view: DiagnosisView) -> Section:
     if not view.next_kind:
-        rare = [title for finding in view.findings for title, worse in finding.rivals if worse < CLOSE]
+        rare = [title for finding in view.findings for title, worse in finding.rivals if worse < CLOSE_RIVAL_BIC]
         text = _UNLESS.format(", ".join(rare)) if view.verdict == "named" and rare else _NO_EXPERIMENT[view.verdict]
         return Section(title="Next step", paragraphs=(f"{text}{_rough(view)}",))
     paragraphs = [f"Record {view.next_kind}: {view.next_why}." if view.next_why else f"Record {view.next_kind}."]

@@ -13,6 +13,7 @@ from estimation import diagnose
 from estimation.diagnosis.base_models.baseline import base_parameters
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
+from estimation.diagnosis.hypothesis_tests.null_products import null_products
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
@@ -209,7 +210,7 @@ def test_null_logs_meet_reversals_whose_lags_are_noise(pose_arm: Callable[..., P
     errors = np.array([5e-4, 1e-3])
     problem = replace(plain, timing=ReversalTiming(np.zeros(2), errors, np.zeros(2)))
     hypothesis = Hypothesis(EFFECTS["time_delay"], None)
-    before, after = (p.null_crosses([p.measured(hypothesis, (1e-3,))])[0] for p in (plain, problem))
+    before, after = (null_products(p, [p.measured(hypothesis, (1e-3,))])[0] for p in (plain, problem))
     assert np.var(after - before) == pytest.approx(np.sum(errors**-2.0), rel=0.2)
 
 

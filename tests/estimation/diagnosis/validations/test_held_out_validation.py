@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations.held_out_validation import (
     CONTRADICTION_SHARE,
@@ -15,7 +16,6 @@ from estimation.diagnosis.validations.held_out_validation import (
     MINOR_SHARE,
     REJECT_RMSE_RATIO,
 )
-from estimation.diagnosis.validations.verdict import CLOSE
 from tests.estimation.diagnosis.borne_out_bench import (
     FREE,
     HARMS,
@@ -184,7 +184,7 @@ def test_what_comes_and_goes_need_not_last_on_other_stretches() -> None:
 
 def test_a_close_rival_that_helps_takes_the_place() -> None:
     """It keeps place and p-value, and the rivals after it, counted from it; the note names both."""
-    rivals = ((STRIBECK, 2.0), (TILT, 5.0), (PRESLIDING, CLOSE + 1.0))
+    rivals = ((STRIBECK, 2.0), (TILT, 5.0), (PRESLIDING, CLOSE_RIVAL_BIC + 1.0))
     bench = bench_with(spring=HARMS, stribeck=HARMS)
     result = borne(bench, SelectedEffect(SPRING, 1e-9, rivals), free=[FREE], p_values=[1e-4])
     assert result.effects == (TILT, FREE)
@@ -213,7 +213,7 @@ def test_a_rival_that_is_not_borne_out_takes_no_place(shown: Shown) -> None:
 def test_a_rival_that_fits_far_worse_takes_no_place() -> None:
     """Were it to help, the data of the fit still speak against it."""
     bench = bench_with(spring=HARMS)
-    assert borne(bench, SelectedEffect(SPRING, 1e-9, ((STRIBECK, CLOSE),))).effects == ()
+    assert borne(bench, SelectedEffect(SPRING, 1e-9, ((STRIBECK, CLOSE_RIVAL_BIC),))).effects == ()
     assert all(LABELS["stribeck"] not in asked for asked in bench.asked)
 
 
