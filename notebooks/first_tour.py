@@ -14,10 +14,10 @@
 # %% [markdown]
 # # First tour: design, experiment, identification, prediction
 #
-# A virtual ER3A takes the place of the robot, so that everything here runs without one. With a real robot you send
-# `trajectory.csv` to the controller and read the log that it recorded instead of the one of `simulate`.
+# This tour uses a virtual ER3A, so it runs without a robot. With a real robot, send `trajectory.csv` to the controller
+# and read its log instead of the one of `simulate`.
 #
-# The parameters of the virtual robot are drawn a fifth away from its description: there is something to identify.
+# The true parameters of the virtual robot differ by a fifth from its description.
 
 # %%
 import tempfile
@@ -34,13 +34,14 @@ from robots import Sensors, load_robot, nominal_plant, simulate
 folder = Path(tempfile.mkdtemp())
 robot = load_robot("er3a")
 print(robot.name, robot.joint_names)
-print("assumed, no source backs them:", ", ".join(robot.assumed))
+print("assumed values, without a source:", ", ".join(robot.assumed))
 
 # %% [markdown]
 # ## Design
 #
-# A quick search. The criterion is the condition number of the unscaled regressor Y in SI units, over the parameters
-# that can be identified at all: 36 of the rigid body, 4 rotor inertias, Coulomb and viscous friction of six joints.
+# This is a quick search. The criterion is the condition number of the regressor Y, unscaled and in SI units. Y has a
+# column for each parameter that can be identified: 36 of the rigid body, 4 rotor inertias, and Coulomb and viscous
+# friction of six joints.
 
 # %%
 design = oed.design(robot, friction="coulomb-viscous", effort="quick", seed=1)
@@ -48,8 +49,8 @@ print(design.summary())
 design.save(folder)  # trajectory.csv for the controller, design.json for the record
 
 # %% [markdown]
-# Every joint's velocity as a share of its limit. The Fourier part comes first, three periods of it; then one stroke a
-# joint, to its velocity bound and back.
+# The plot shows each joint's velocity as a share of its limit. Three periods of the Fourier series come first. One
+# velocity stroke a joint follows, to its velocity bound and back.
 
 # %%
 _, axes = plt.subplots(figsize=(9, 4))
@@ -57,7 +58,7 @@ design.plot(ax=axes)
 plt.show()
 
 # %% [markdown]
-# The closest approach to each limit, measured on the file's own samples:
+# The smallest margins to the limits, computed from the samples of the file:
 
 # %%
 for margin in sorted(design.check(), key=lambda margin: margin.slack_fraction)[:5]:
@@ -68,7 +69,7 @@ for margin in sorted(design.check(), key=lambda margin: margin.slack_fraction)[:
 # %% [markdown]
 # ## Experiment
 #
-# The log has positions in encoder steps and torques with 2 % of coloured noise.
+# The log has positions in encoder steps, and torques with 2 % of coloured noise.
 
 # %%
 plant = nominal_plant(robot, spread=0.2, seed=3, sensors=Sensors(torque_noise=0.02))
@@ -79,8 +80,8 @@ print(f"{len(log)} samples of {log.n} joints, {log.duration:.1f} s")
 # %% [markdown]
 # ## Identification
 #
-# Only `t`, `q` and `tau` are used. The columns: the error of the fit, of blocks that the fit had not seen, of a
-# constant, and of the robot's description, each over the joint's torque RMS.
+# Only `t`, `q` and `tau` are used. The columns are shares of the joint's torque RMS: the error of the fit, of blocks
+# left out of the fit, of a constant, and of the robot's description.
 
 # %%
 estimate = identify(robot, log, friction="coulomb-viscous")
@@ -94,8 +95,8 @@ estimate.plot(ax=axes)
 plt.show()
 
 # %% [markdown]
-# The truth is known here. Each estimate less the truth, over its standard error, should be about as large as a standard
-# normal variable.
+# The true values are known here. The error of an estimate, divided by its standard error, should be about as large as a
+# standard normal variable.
 
 # %%
 truth = dict(zip(plant.model.names, plant.parameters, strict=True))
@@ -108,7 +109,7 @@ print(f"friction parameters: RMS of error over standard error {np.sqrt(np.mean(s
 # %% [markdown]
 # ## Prediction
 #
-# Another motion, which the fit has not seen: the model needs its positions only.
+# The model predicts the torque of a held-out motion. It needs only its positions.
 
 # %%
 estimate.save(folder)

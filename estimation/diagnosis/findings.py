@@ -12,7 +12,7 @@ import numpy as np
 from robots.common.plain import finite, number
 
 # Parameters of one finding that a summary lists.
-TOLD = 8
+MOST_LISTED = 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +37,7 @@ class Parameter:
     determined: bool
 
     @property
-    def told(self) -> str:
+    def text(self) -> str:
         """Its name, with its interval where it has one, or its value where that was chosen among a few."""
         low, high = self.ci95
         if not np.isfinite([low, high]).all():
@@ -178,7 +178,7 @@ def read_finding(item: dict[str, Any]) -> Finding:
     )
 
 
-def listed(told: Sequence[str]) -> str:
+def list_parameters(told: Sequence[str]) -> str:
     """Lists parameters, no more than a line holds: a force at a place of a body has twelve."""
-    left = len(told) - TOLD
-    return ", ".join(told if left <= 1 else [*told[:TOLD], f"and {left} more in diagnosis.json"])
+    left = len(told) - MOST_LISTED
+    return ", ".join(told if left <= 1 else [*told[:MOST_LISTED], f"and {left} more in diagnosis.json"])

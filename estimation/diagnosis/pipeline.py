@@ -8,19 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import base_parameters
-from estimation.diagnosis.base_models.payload_and_gravity import lightened
+from estimation.diagnosis.base_models.payload_and_gravity import subtract_known_payload
 from estimation.diagnosis.experiment_plans.detection_limits import find_limits
 from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
-from estimation.diagnosis.hypothesis_tests.residual_shares import residual_shares
 from estimation.diagnosis.hypothesis_tests.scan import measure
-from estimation.diagnosis.recordings.log_reading import record
-from estimation.diagnosis.recordings.log_repair import mended
-from estimation.diagnosis.recordings.unusable_logs import hopeless_logs
-from estimation.diagnosis.results.assembly import Told, assemble
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.recordings.log_repair import repair_log
+from estimation.diagnosis.recordings.unusable_logs import find_unusable_logs
+from estimation.diagnosis.results.assembly import DiagnosisInputs, assemble
 from estimation.diagnosis.results.diagnosis import Diagnosis
 from estimation.diagnosis.searches.search import search
-from estimation.diagnosis.validations.verdict import judge
-from estimation.logs.clocks import clocked
+from estimation.diagnosis.validations.residual_shares import residual_shares
+from estimation.diagnosis.validations.verdict import decide_verdict
+from estimation.logs.clocks import put_on_clock
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.memory import give_back
 from robots.common.parallel import one_blas_thread
@@ -84,27 +84,27 @@ def diagnose(
     bar = progress or SILENT
     bar.start("diagnosing", 1.0)
     try:
-        on_clock = clocked(data, other)
+        on_clock = put_on_clock(data, other)
         data, other = sorted(on_clock.logs, key=lambda log: float(log.t[0])), list(on_clock.held_out)
         found: list[str] = []
         if check:
             bar.update(0.0, "checking the logs")
             (data, told_of_logs), (other, told_of_others) = (
-                _mended(robot, data, "Log"),
-                _mended(robot, other, "Held out"),
+                _repaired(robot, data, "Log"),
+                _repaired(robot, other, "Held out"),
             )
             found = [*told_of_logs, *told_of_others]
-        recording = lightened(robot, record(robot, data))
+        recording = subtract_known_payload(robot, build_recording(robot, data))
         if not (np.ptp(recording.q, axis=0) > 0).any():
             raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
         # Unseen logs count too: what only they show is told by the description at least.
         gravities = [log.gravity for log in (*data, *other) if log.gravity is not None]
         base = base_parameters(robot, friction, (0.001,) * robot.n, gravities)
-        hopeless = hopeless_logs(base, recording)
-        notes = tuple(_HOPELESS.format(k + 1, _named(recording.names[k]), 100 * s) for k, s in hopeless.items())
+        hopeless = find_unusable_logs(base, recording)
+        notes = tuple(_UNUSABLE.format(k + 1, _log_name(recording.names[k]), 100 * s) for k, s in hopeless.items())
         if hopeless:
             data = [log for k, log in enumerate(data) if k not in hopeless]
-            recording = lightened(robot, record(robot, data))
+            recording = subtract_known_payload(robot, build_recording(robot, data))
         searched = search(base, recording, effects, false_alarm, seed, bar)
         problem, selection, entries = searched.problem, searched.selection, searched.entries
         bar.update(0.75, "limits of what the logs can show")
@@ -114,14 +114,14 @@ def diagnose(
         give_back()
         bar.update(0.83, "what is left")
         patterns = measure(problem, all_hypotheses(robot, list(all_patterns(robot))))
-        judgement = judge(problem, selection, patterns, false_alarm, np.random.default_rng(seed + 2))
+        judgement = decide_verdict(problem, selection, patterns, false_alarm, np.random.default_rng(seed + 2))
         bar.update(0.93, "gain on unseen data")
         del patterns
         give_back()
-        told = Told(
+        told = DiagnosisInputs(
             problem=problem,
             selection=selection,
-            judgement=judgement,
+            verdict=judgement,
             limits=limits,
             excess=residual_shares(problem),
             logs=tuple(data),
@@ -136,19 +136,19 @@ def diagnose(
         bar.finish()
 
 
-_HOPELESS = (
+_UNUSABLE = (
     "Log {}{} is left out: fitted to it alone, the base model still leaves {:.0f} % of the torque on every joint. It "
     "says nothing of what the arm is like; look at its torque."
 )
 
 
-def _mended(robot: Robot, logs: Sequence[Log], kind: str) -> tuple[list[Log], list[str]]:
+def _repaired(robot: Robot, logs: Sequence[Log], kind: str) -> tuple[list[Log], list[str]]:
     """The stretches of logs that can be used, and what is to be told of them."""
-    several = [mended(robot, log, f"{kind} {k}{_named(log.name)}") for k, log in enumerate(logs, start=1)]
+    several = [repair_log(robot, log, f"{kind} {k}{_log_name(log.name)}") for k, log in enumerate(logs, start=1)]
     return [part for one in several for part in one.logs], [note for one in several for note in one.notes]
 
 
-def _named(name: str) -> str:
+def _log_name(name: str) -> str:
     return f" ({name})" if name else ""
 
 

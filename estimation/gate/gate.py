@@ -38,7 +38,7 @@ from estimation.gate.quick_fits.joint_fit import Rows
 from estimation.gate.quick_fits.joint_physics import joint_physics, mean_inertias
 from estimation.gate.quick_fits.whole_fit import fit_all
 from estimation.gate.report import FEWEST, GateReport, pick_rows, worst_first
-from estimation.logs.known_setup import set_up
+from estimation.logs.known_setup import robot_for_log
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log
@@ -47,10 +47,10 @@ Array = NDArray[np.float64]
 
 # Rows by which the smoothing is chosen, and without which nothing is fitted.
 CHOICE_ROWS, FEWEST_ROWS = 1500, 60
-# How much worse (mean log error) a higher cut-off may predict and still be taken: it tells more of inertias; and
+# A higher cut-off is used if its error is at most this much worse (mean log): it shows inertias better; and
 # for the delays, which a low one hides.
 SLACK, SHARP_SLACK = 0.03, 0.3
-# By how much another unit must explain the torque better (mean log error) to be the right one.
+# Improvement (mean log error) with another unit, from which it counts as the right one.
 BETTER = 0.1
 
 
@@ -75,7 +75,7 @@ def check_log(robot: Robot, log: Log) -> GateReport:
     file = str(log.metadata.get("file", log.name))
     if log.n != robot.n:
         raise InputError(f"{log.n} joints", file=file or None, allowed=f"{robot.n}, as {robot.name} has")
-    robot = set_up(robot, log)
+    robot = robot_for_log(robot, log)
     samples, duration = len(log), log.duration
     stalls = check_stalls(log)
     if stalls.findings:

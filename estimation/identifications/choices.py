@@ -1,4 +1,4 @@
-"""What the data themselves choose: the smoothing, the sharpness of the friction's sign, the regularisation."""
+"""Choices by cross-validation: smoothing, sharpness of the friction's sign, regularisation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from estimation.estimators import Estimator
 from estimation.identifications.comparison import VELOCITY_SCALES, Comparison
 from estimation.identifications.trials import Candidates
 from estimation.preprocessing import Smoother
-from estimation.regressions.parameter_priors import Pull
+from estimation.regressions.parameter_priors import GaussianPrior
 from estimation.regressions.preparation import Prepared
 from robots.base_parameters import BaseParameters
 
@@ -23,7 +23,7 @@ __all__ = ["VELOCITY_SCALES", "Candidates", "Choice", "choose"]
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """What was chosen, and how good it was on blocks that the fit had not seen.
+    """The chosen settings and their error on held-out blocks.
 
     Attributes:
         smoother: of the positions.
@@ -42,7 +42,7 @@ class Choice:
     smoother: Smoother
     ridge: float
     velocity_scales: tuple[float, ...]
-    pull: Pull | None
+    pull: GaussianPrior | None
     held_out: Array
     spread: Array
     band: Array
@@ -71,7 +71,7 @@ def choose(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator,
     """
     comparison = Comparison(base, logs, estimator, candidates)
     smoother = comparison.smoother()
-    # On torque as it was logged: a ridge biases, and must gain something that stands out of the noise.
+    # On the logged torque: a ridge causes bias, so its gain must be significant.
     blocks = comparison.blocks(smoother, 1)
     choices: list[Choice] = []
     for trial in comparison.regularisation(blocks):

@@ -14,7 +14,7 @@ from estimation.identifications.trials import Candidates, Trial, smallest, stron
 from estimation.preprocessing import Harmonics, LowPass, Smoother, SmoothingSpline
 from estimation.regressions.blocks import Blocks, Sides, side_products
 from estimation.regressions.joint_regressor import JointRegressor, summed
-from estimation.regressions.parameter_priors import Pull, description_pull, friction_levels
+from estimation.regressions.parameter_priors import GaussianPrior, friction_levels, prior_from_description
 from estimation.regressions.preparation import Prepared, Rows, rows_of
 from robots.base_parameters import BaseParameters
 
@@ -28,9 +28,9 @@ WIDER = np.array(VELOCITY_SCALES[1:])
 SAVING = 0.03
 # How much worse, in mean log error, a lower cut-off may be and still be taken.
 CUTOFF_SLACK = 0.0005
-# How much better another smoother or a pull towards the description must be than the low-pass and none.
+# Required gain of another smoother over the low-pass, or of a prior over none.
 SMOOTHER_GAIN, PULL_GAIN = 0.005, 0.03
-# How much worse, in log error, a single joint may become by a pull.
+# Largest allowed loss of a single joint by a prior (log error).
 UNFAIR = 0.25
 # Share of the errors that a band is to hold, and up to how many blocks each gets the quantile of all others.
 BAND, FEW = 0.95, 24
@@ -91,10 +91,10 @@ class Comparison:
         return chosen
 
     def regularisation(self, blocks: Sides) -> tuple[Trial, Trial]:
-        """Chooses pull and ridge: towards the description where that clearly helps, else to zero as far as it helps.
+        """Chooses prior and ridge: the description if it clearly helps, otherwise zero.
 
         Returns:
-            The trial with the smallest ridge and no pull, and the chosen one.
+            The trial with the smallest ridge and no prior, and the chosen one.
         """
         ridges = sorted(self.candidates.ridges)
         tried = [self._try(blocks, ridge, None) for ridge in ridges]
@@ -188,7 +188,7 @@ class Comparison:
         settings = [(ridges[0], None), (middle, None), (middle, self._description(blocks))]
         return min(self._try(blocks, *setting).cost for setting in settings)
 
-    def _try(self, blocks: Sides, ridge: float, pull: Pull | None) -> Trial:
+    def _try(self, blocks: Sides, ridge: float, pull: GaussianPrior | None) -> Trial:
         trial = Trial(ridge, pull, tuple(self._scales(blocks, ridge, pull)), np.zeros(0))
         return replace(trial, logs=np.log(np.maximum(self.left_out(blocks, trial) / self.spread, EXACT)))
 
@@ -205,15 +205,15 @@ class Comparison:
         return chosen.without(weights, trial.ridge, trial.pull)
 
     def band(self, smoother: Smoother, blocks: Sides, trial: Trial) -> tuple[Array, Array]:
-        """Half-width (n,) that holds `BAND` of the left-out errors, and the share that it holds on unseen blocks (n,).
+        """Half-width (n,) that contains `BAND` of the held-out errors, and its coverage on other blocks (n,).
 
-        Each block's share is counted with the quantile of the other blocks' errors: what a user sees who takes the
-        band to a motion of the same kind (a split conformal interval, block by block).
+        Each block's coverage is counted with the quantile of the other blocks' errors, as for a new motion of the same
+        kind (a split conformal interval, block by block).
         """
         values = iter(self._without(blocks.fitted.columns(self._columns(trial.scales).tolist()), trial))
         rows = self._rows(smoother)
         errors = [np.abs(error) for part in rows for error in self._errors(part, trial.scales, values)]
-        # Of joints that stand in a block its errors are not known.
+        # Errors of joints at rest in a block are unknown.
         told = np.array([~np.isnan(error[0]) for error in errors])
         levels = np.array([band_of(error) for error in errors])
         whole = band_of(np.concatenate(errors))
@@ -258,7 +258,7 @@ class Comparison:
         bounds = np.linspace(0, len(part.motion), pieces + 1).astype(int).tolist()
         return [slice(first, stop) for first, stop in pairwise(bounds)]
 
-    def _scales(self, blocks: Sides, ridge: float, pull: Pull | None) -> list[int]:
+    def _scales(self, blocks: Sides, ridge: float, pull: GaussianPrior | None) -> list[int]:
         """Per joint the index of its velocity scale: the widest saving, if it is worth it."""
         total = blocks.fitted.total
         choices = np.array([self._columns([k] * len(total.count)) for k in range(len(VELOCITY_SCALES))])
@@ -275,7 +275,7 @@ class Comparison:
                 chosen[position] = self.base.size + (column.joint - 1) * extra + scale - 1
         return chosen
 
-    def _description(self, blocks: Sides) -> Pull | None:
+    def _description(self, blocks: Sides) -> GaussianPrior | None:
         if not self.candidates.pull:
             return None
         total = blocks.fitted.total
@@ -283,7 +283,7 @@ class Comparison:
         own = [column.joint - 1 for column in self.base.columns]
         squares = np.array([total.gram[joint, i, i] / count[joint] for i, joint in enumerate(own)])
         level = friction_levels(self.base, np.sqrt(squares), self.fastest)
-        return description_pull(self.base, np.sqrt(total.square / count), level)
+        return prior_from_description(self.base, np.sqrt(total.square / count), level)
 
 
 def band_of(errors: Array) -> Array:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
-from estimation.logs.clocks import are_apart
+from estimation.logs.clocks import do_not_overlap
 from estimation.logs.formats import SUFFIXES, is_bag_folder
 from robots.common.errors import InputError
 from robots.signals import Log
@@ -47,4 +47,4 @@ def in_order(logs: Sequence[Log]) -> tuple[Log, ...]:
     Args:
         logs: of one folder.
     """
-    return tuple(sorted(logs, key=lambda log: float(log.t[0]))) if are_apart(logs) else tuple(logs)
+    return tuple(sorted(logs, key=lambda log: float(log.t[0]))) if do_not_overlap(logs) else tuple(logs)

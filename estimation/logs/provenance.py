@@ -26,7 +26,7 @@ def describe_logs(logs: Sequence[Log]) -> list[dict[str, object]]:
     return described
 
 
-def are_one(log: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+def are_same_log(log: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     """Whether two of what `describe_logs` gives are of one log: by their files; without them by start and samples."""
     keys = ("sha256",) if log["sha256"] and other["sha256"] else ("start", "samples")
     return all(log[key] == other[key] for key in keys)

@@ -1,4 +1,4 @@
-"""What was added to a model: effects with their shapes, coefficients and uncertainty."""
+"""Extensions of a model: effects with their shapes, coefficients and uncertainty."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robots.common.errors import InputError
 from robots.common.plain import all_finite, finite
 from robots.robot import Robot
 from robots.terms.discrepancies.patterns import build_pattern
-from robots.terms.effect_bases.gear_load import Bearing, Borne, Weight, laden_with
+from robots.terms.effect_bases.gear_load import ExtraGearLoad, LoadPath, LoadSource, with_gear_load
 from robots.terms.effects import EFFECTS, Effect
 from robots.terms.situations.situation import Situation
 
@@ -110,34 +110,36 @@ def read_extension(data: Mapping[str, Any], robot: Robot) -> Extension:
     )
 
 
-def write_bearing(bearing: Bearing) -> dict[str, Any]:
+def write_gear_load(bearing: ExtraGearLoad) -> dict[str, Any]:
     """Writes what gears bear of a model's extensions as plain data for `model.json`."""
     weights = [
         {"effect": w.effect.name, "joint": w.joint, "shape": list(w.shape), "coefficients": w.coefficients.tolist()}
-        for w in bearing.weights
+        for w in bearing.sources
     ]
-    return {"how": bearing.how, "weights": weights}
+    return {"how": bearing.path, "weights": weights}
 
 
-def read_bearing(data: Mapping[str, Any], robot: Robot) -> Bearing:
-    """Reads what `write_bearing` wrote.
+def read_gear_load(data: Mapping[str, Any], robot: Robot) -> ExtraGearLoad:
+    """Reads what `write_gear_load` wrote.
 
     Raises:
         InputError: an unknown way or effect, or values that do not fit it.
     """
-    if data["how"] not in get_args(Borne):
-        raise InputError(f"borne_by_gears: how is {data['how']!r}", allowed=", ".join(get_args(Borne)))
+    if data["how"] not in get_args(LoadPath):
+        raise InputError(f"borne_by_gears: how is {data['how']!r}", allowed=", ".join(get_args(LoadPath)))
     weights = []
     for item in data["weights"]:
         effect, joint = find_effect(str(item["effect"])), item["joint"]
         values = [np.array(item[key], dtype=float) for key in ("shape", "coefficients")]
-        if not effect.borne or joint not in effect.joints(robot):
-            raise InputError(f"borne_by_gears: {effect.name} on joint {joint}", allowed="an effect that gears bear")
+        if not effect.loads_gear or joint not in effect.joints(robot):
+            raise InputError(
+                f"borne_by_gears: {effect.name} on joint {joint}", allowed="an effect whose torque loads the gear"
+            )
         sizes = (len(effect.shapes),), (len(effect.parameters(robot, joint)),)
         if tuple(v.shape for v in values) != sizes or not all(np.isfinite(v).all() for v in values):
             raise InputError(f"borne_by_gears: values of {effect.name} that do not fit it")
-        weights.append(Weight(effect, joint, tuple(values[0].tolist()), values[1]))
-    return Bearing(data["how"], weights)
+        weights.append(LoadSource(effect, joint, tuple(values[0].tolist()), values[1]))
+    return ExtraGearLoad(data["how"], weights)
 
 
 def find_effect(name: str) -> Effect:
@@ -155,11 +157,11 @@ def find_effect(name: str) -> Effect:
 
 
 def extension_torque(
-    extensions: Sequence[Extension], felt: Situation, own: Situation | None = None, bearing: Bearing | None = None
+    extensions: Sequence[Extension], felt: Situation, own: Situation | None = None, bearing: ExtraGearLoad | None = None
 ) -> Array:
-    """Evaluates the extensions of a model in what its base model says of a motion (N, n) [N m or N].
+    """Evaluates the torque (N, n) [N m or N] of a model's extensions.
 
-    What acts on all of the torque comes after the others: what makes it late, then what cuts it off.
+    Effects on the total torque come after the others: first delays, then the current limit.
 
     Args:
         extensions: the effects.
@@ -169,7 +171,7 @@ def extension_torque(
         bearing: what of them the gears bear; None for nothing.
     """
     total, own = np.zeros_like(felt.q), felt if own is None else own
-    felt = laden_with(felt, bearing)
+    felt = with_gear_load(felt, bearing)
     for stage in range(3):
         now = (felt, felt.beside(total), own.beside(total))[stage]
         acting = [extension for extension in extensions if _stage(extension.source) == stage]
@@ -178,7 +180,7 @@ def extension_torque(
 
 
 def _stage(effect: Effect) -> int:
-    return 2 if effect.last else int(effect.blurs)
+    return 2 if effect.acts_on_total_torque else int(effect.smooths_friction_sign)
 
 
 def _described(effect: Effect, robot: Robot, joint: int | None, shape: tuple[float, ...]) -> list[tuple[str, str]]:

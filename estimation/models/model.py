@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.logs.known_setup import require_known
-from estimation.models.extension import Extension, extension_torque, read_bearing, read_extension, write_bearing
+from estimation.models.extension import Extension, extension_torque, read_extension, read_gear_load, write_gear_load
 from estimation.models.robot_in_file import build_robot, describe_robot, require_described
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
@@ -21,9 +21,10 @@ from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms import Column, build_term, describe_term
-from robots.terms.effect_bases.gear_load import Bearing
+from robots.terms.effect_bases.gear_load import ExtraGearLoad
 from robots.terms.situations.flange_body import with_body
-from robots.terms.situations.situation import Situation, joined, situation
+from robots.terms.situations.joining import join_situations
+from robots.terms.situations.situation import Situation, situation
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,7 +64,7 @@ class Model:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     extensions: tuple[Extension, ...] = ()
     felt: Array | None = None
-    bearing: Bearing | None = None
+    bearing: ExtraGearLoad | None = None
     since: float | None = None
 
     @property
@@ -94,7 +95,7 @@ class Model:
     @property
     def keeps_heat(self) -> bool:
         """Whether what came before a motion acts in it still."""
-        return any(extension.source.keeps for extension in self.extensions)
+        return any(extension.source.has_thermal_memory for extension in self.extensions)
 
     def torque(
         self,
@@ -140,9 +141,11 @@ class Model:
 
         def state(known: Array) -> Situation:
             earlier = [situation(model, known, m.t, m.q, m.dq, m.ddq) for m in before]
-            return replace(joined([*earlier, situation(model, known, *arrays)], self.torque_model), since=self.since)
+            return replace(
+                join_situations([*earlier, situation(model, known, *arrays)], self.torque_model), since=self.since
+            )
 
-        cut = any(extension.source.last for extension in self.extensions)
+        cut = any(extension.source.acts_on_total_torque for extension in self.extensions)
         extended = extension_torque(self.extensions, state(felt), state(parameters) if cut else None, self.bearing)
         return own + extended[-len(own) :]
 
@@ -174,7 +177,7 @@ class Model:
                 "term": column.term,
                 "value": float(value),
                 "unit": column.unit,
-                # A number that JSON cannot hold, and that nobody should trust, is left out.
+                # A number that is not finite cannot be written as JSON and is left out.
                 "standard_error": float(error) if known else None,
                 "determined": bool(known),
                 "stands_for": formula,
@@ -194,7 +197,11 @@ class Model:
             **({"extensions": [extension.to_dict(robot) for extension in self.extensions]} if self.extensions else {}),
             **({"felt_by_extensions": self.felt.tolist()} if self.extensions and self.felt is not None else {}),
             **({"phases_since": self.since} if self.extensions and self.since is not None else {}),
-            **({"borne_by_gears": write_bearing(self.bearing)} if self.extensions and self.bearing is not None else {}),
+            **(
+                {"borne_by_gears": write_gear_load(self.bearing)}
+                if self.extensions and self.bearing is not None
+                else {}
+            ),
         }
 
     def save(self, path: Path, *, force: bool = False) -> None:
@@ -223,7 +230,7 @@ def load_model(path: str | Path) -> Model:
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise InputError(f"cannot be read as JSON: {error}", file=file) from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InputError("is no model file", file=file, allowed=f'"format": "{FORMAT}"')
+        raise InputError("is not a model file", file=file, allowed=f'"format": "{FORMAT}"')
     version = data.get("format_version")
     if not isinstance(version, int) or version > FORMAT_VERSION:
         raise InputError(f"format version {version!r}", file=file, allowed=f"up to {FORMAT_VERSION}")
@@ -232,7 +239,7 @@ def load_model(path: str | Path) -> Model:
     except InputError as error:
         raise InputError(error.problem, file=file, allowed=error.allowed, remedy=error.remedy) from error
     except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"is damaged: {type(error).__name__} {error}", file=file) from error
+        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error
 
 
 def _from_dict(data: Mapping[str, Any]) -> Model:
@@ -242,7 +249,7 @@ def _from_dict(data: Mapping[str, Any]) -> Model:
     parameters = data["parameters"]
     unknown = [item["name"] for item in parameters if item["name"] not in index]
     if unknown:
-        raise InputError(f"parameter {unknown[0]} is none of the model's terms")
+        raise InputError(f"parameter {unknown[0]} does not belong to the model's terms")
     torque_model.symbolic()  # a term that does not suit the robot says so now, not at the first prediction
     columns = tuple(index[item["name"]] for item in parameters)
     values = np.array([item["value"] for item in parameters], dtype=float)
@@ -268,7 +275,7 @@ def _from_dict(data: Mapping[str, Any]) -> Model:
         extensions=tuple(read_extension(item, torque_model.robot) for item in data.get("extensions", [])),
         felt=felt if "felt_by_extensions" in data else None,
         since=None if data.get("phases_since") is None else float(data["phases_since"]),
-        bearing=read_bearing(data["borne_by_gears"], torque_model.robot) if "borne_by_gears" in data else None,
+        bearing=read_gear_load(data["borne_by_gears"], torque_model.robot) if "borne_by_gears" in data else None,
     )
 
 

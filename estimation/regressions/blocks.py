@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.regressions.moments import Moments, solve_all
-from estimation.regressions.parameter_priors import Pull
+from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ class Blocks:
         """The normal equations of all blocks together."""
         return Moments(*(array.sum(axis=1) for array in (self.gram, self.cross, self.square, self.count)))
 
-    def fitted(self, choices: NDArray[np.intp], ridge: float, pull: Pull | None) -> Array:
+    def fitted(self, choices: NDArray[np.intp], ridge: float, pull: GaussianPrior | None) -> Array:
         """Fits several choices of as many columns each, every joint's rows counting alike.
 
         Args:
@@ -89,7 +89,7 @@ class Blocks:
     def _chosen(self) -> dict[tuple[int, ...], Blocks]:
         return {}
 
-    def without(self, weights: Array, ridge: float, pull: Pull | None) -> Array:
+    def without(self, weights: Array, ridge: float, pull: GaussianPrior | None) -> Array:
         """Fits all blocks but one, for each of them.
 
         Args:
@@ -117,11 +117,11 @@ class Blocks:
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """Blocks as a fit sees them, and as a prediction is judged on them.
+    """Blocks for a fit, and for the validation of a prediction.
 
-    A joint that is almost at rest has friction of no known sign, and its rows do not count in a fit. A prediction has
-    to say something there all the same, and its error at the starts of motions depends on the smoothing more than any
-    other: what is left out of the fit must not be left out of its verdict.
+    A joint almost at rest has friction of unknown sign, and its rows do not count in a fit. A prediction is needed
+    there as well, and its error at the start of motions depends most on the smoothing. Rows left out of the fit
+    therefore count in its validation.
 
     Attributes:
         fitted: of the rows that count.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.linear_algebra.positive import solve_positive
-from estimation.regressions.parameter_priors import Pull
+from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ class Moments:
     cross: Array
     square: Array
     count: Array
-    pull: Pull | None = None
+    pull: GaussianPrior | None = None
 
     @staticmethod
     def of(Y: Array, tau: Array, mask: Array) -> Moments:
@@ -65,8 +65,8 @@ class Moments:
             count=self.count - other.count,
         )
 
-    def pulled(self, pull: Pull | None) -> Moments:
-        """Gives the same sums with another pull."""
+    def pulled(self, pull: GaussianPrior | None) -> Moments:
+        """Gives the same sums with another prior."""
         return replace(self, pull=pull)
 
     def columns(self, chosen: NDArray[np.intp]) -> Moments:
@@ -110,7 +110,7 @@ class Moments:
         return np.sqrt(np.maximum(self.residual(parameters) / rows, np.maximum(floor, np.finfo(float).tiny)))
 
 
-def solve_all(gram: Array, cross: Array, square: Array, ridge: float, pull: Pull | None) -> Array:
+def solve_all(gram: Array, cross: Array, square: Array, ridge: float, pull: GaussianPrior | None) -> Array:
     """Solves several weighted normal equations with one ridge, see `Moments.solve`.
 
     Args:

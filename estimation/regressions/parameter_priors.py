@@ -1,4 +1,4 @@
-"""What is known of parameters before a log is read: how far each may lie from the robot's description."""
+"""Priors of the parameters: their expected distance from the robot's description."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FAINT = 1e-12
 
 
 @dataclass(frozen=True)
-class Pull:
+class GaussianPrior:
     """A quadratic penalty (pi - target)' precision (pi - target), 1 where a parameter is wrong by its own size.
 
     Attributes:
@@ -35,13 +35,13 @@ class Pull:
     precision: Array
     target: Array
 
-    def columns(self, chosen: NDArray[np.intp]) -> Pull:
+    def columns(self, chosen: NDArray[np.intp]) -> GaussianPrior:
         """Keeps some of the p columns, of independent parameters."""
-        return Pull(self.precision[np.ix_(chosen, chosen)], self.target[chosen])
+        return GaussianPrior(self.precision[np.ix_(chosen, chosen)], self.target[chosen])
 
 
-def description_pull(base: BaseParameters, torque: Array, level: Array) -> Pull | None:
-    """Pulls towards the robot's description, in steps of what could be wrong with it.
+def prior_from_description(base: BaseParameters, torque: Array, level: Array) -> GaussianPrior | None:
+    """Builds the prior from the robot's description, scaled by its expected errors.
 
     Standard inertial parameters scatter about the description by each link's mass m, m l and m l^2, l its radius of
     gyration about its frame; regrouped, that is the covariance K S K' of base parameters, so that a combination which
@@ -75,7 +75,7 @@ def description_pull(base: BaseParameters, torque: Array, level: Array) -> Pull 
     scale = np.where(scale > 0, scale, 1.0)
     normalised = covariance / scale[:, None] / scale + FAINT * np.eye(len(scale))
     precision = np.linalg.inv(normalised) / scale[:, None] / scale
-    return Pull(precision, base.from_standard(model.nominal))
+    return GaussianPrior(precision, base.from_standard(model.nominal))
 
 
 def link_spreads(inertia: Array) -> Array:

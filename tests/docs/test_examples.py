@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.sentence_lengths import pages
 from estimation import read_log
 from robots import load_robot, nominal_plant
 from robots.plants import load_plant
@@ -64,3 +65,18 @@ def test_log_example_is_read(tmp_path):
     log = read_log(path)
     assert log.q[1, 0] == pytest.approx(np.deg2rad(0.01))
     np.testing.assert_array_equal(log.tau[:, 0], [-0.12, -0.35])
+
+
+def import_lines() -> list[str]:
+    """Every import that a Python block of README or documentation begins with, once each."""
+    found = []
+    for path in pages():
+        for code in re.findall(r"^```python\n(.*?)^```$", path.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL):
+            found += re.findall(r"^(?:from|import) .*$", code, flags=re.MULTILINE)
+    return sorted(set(found))
+
+
+@pytest.mark.parametrize("line", import_lines())
+def test_imports_work(line):
+    """What the Python examples import is where they import it from."""
+    exec(line, {})

@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.payload_and_gravity import regressor_on, signs_on, situation_on
-from estimation.diagnosis.recordings.directions import SHARP, sharpest
+from estimation.diagnosis.base_models.payload_and_gravity import base_regressor, build_situation, friction_signs
+from estimation.diagnosis.recordings.directions import SHARP, sharpest_sign_velocity
 from estimation.diagnosis.recordings.log_reading import Recording
-from estimation.diagnosis.recordings.thinning import at_all_samples
+from estimation.diagnosis.recordings.thinning import evaluate_at_full_rate
 from estimation.linear_algebra.orthonormal import orthonormal
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.regressor import default_model
@@ -49,7 +49,9 @@ class Baseline:
 
     def situation(self, recording: Recording, values: Array) -> Situation:
         """Gives what effects may depend on, with base parameters (b,)."""
-        return replace(situation_on(recording, self.base.model, values, self.base.independent), measured=recording.tau)
+        return replace(
+            build_situation(recording, self.base.model, values, self.base.independent), measured=recording.tau
+        )
 
 
 def base_parameters(
@@ -80,11 +82,11 @@ def build_baseline(
     seen = recording if known is None else known
     scale = seen.tau.std(axis=0) if residual_scale is None else residual_scale
     least = 1e-9 * max(1.0, float(np.abs(seen.tau).max()))
-    Y = regressor_on(base, recording)
+    Y = base_regressor(base, recording)
     signs = [i for i, column in enumerate(base.columns) if column.symbol == "f1"]
     chosen = None
     if signs:
-        trial = Y if np.array_equal(seen.dq, recording.dq) else regressor_on(base, seen)
+        trial = Y if np.array_equal(seen.dq, recording.dq) else base_regressor(base, seen)
         fit = _Signs(trial, signs, base, seen, 1.0 / np.maximum(scale, least))
         narrow = np.full(recording.n, WIDEST)
         chosen = fit.sharpness(narrow)
@@ -101,7 +103,7 @@ def build_baseline(
         base = replace(base, model=model)
         for i in signs:
             joint = base.columns[i].joint - 1
-            Y[:, joint, i] = signs_on(recording, joint, np.array([chosen[joint]]))[:, 0]
+            Y[:, joint, i] = friction_signs(recording, joint, np.array([chosen[joint]]))[:, 0]
     return Baseline(base, Y, _nuisance(recording, chosen))
 
 
@@ -114,8 +116,8 @@ def _nuisance(recording: Recording, chosen: tuple[float, ...] | None) -> Array:
         return np.zeros((len(recording), recording.n, 0))
     result = np.zeros((len(recording), recording.n, recording.n))
     for j, v0 in enumerate(chosen):
-        change = at_all_samples(recording, partial(_change, joint=j, v0=v0))
-        if np.sum(change[~recording.unsure[:, j]] ** 2) > SHOWN * np.sum(change**2):
+        change = evaluate_at_full_rate(recording, partial(_change, joint=j, v0=v0))
+        if np.sum(change[~recording.sign_unknown[:, j]] ** 2) > SHOWN * np.sum(change**2):
             result[:, j, j] = change
     return result
 
@@ -140,10 +142,12 @@ class _Signs:
         self.recording, self.stride = recording, max(1, len(recording) // 20_000)
         self.joints = [base.columns[i].joint - 1 for i in signs]
         # The sharpest for each of them.
-        self.first = [sum(v0 < 0.999 * sharpest(recording.dq[:, joint]) for v0 in SCALES) for joint in self.joints]
+        self.first = [
+            sum(v0 < 0.999 * sharpest_sign_velocity(recording.dq[:, joint]) for v0 in SCALES) for joint in self.joints
+        ]
         rows = slice(None, None, self.stride)
         self.weights = np.broadcast_to(weights, recording.tau.shape)[rows]
-        self.counts = ~recording.unsure[rows] * self.weights
+        self.counts = ~recording.sign_unknown[rows] * self.weights
         rest = np.delete(Y[rows], signs, axis=2) * self.counts[:, :, None]
         self.Q = orthonormal(rest.reshape(-1, rest.shape[2]), FAINT).reshape(len(rest), recording.n, -1)
         self.tau = recording.tau[rows] * self.counts
@@ -153,7 +157,7 @@ class _Signs:
         for a, joint in enumerate(self.joints):
             # A sign acts on its own joint's rows alone.
             own = slice(a * len(SCALES), (a + 1) * len(SCALES))
-            columns = signs_on(recording, joint, np.array(SCALES))[rows] * self.counts[:, joint, None]
+            columns = friction_signs(recording, joint, np.array(SCALES))[rows] * self.counts[:, joint, None]
             gram[own, own] = columns.T @ columns
             cross[own] = columns.T @ self.tau[:, joint]
             against[own] = columns.T @ self.Q[:, joint]
@@ -180,7 +184,7 @@ class _Signs:
         values = self._fitted(trial)
         residual = self.tau - self.Q @ (self.along - self.against[trial].T @ values)
         for joint, value in zip(self.joints, values, strict=True):
-            sign = signs_on(self.recording, joint, np.array([scales[joint]]))[:: self.stride, 0]
+            sign = friction_signs(self.recording, joint, np.array([scales[joint]]))[:: self.stride, 0]
             residual[:, joint] -= value * sign * self.counts[:, joint]
         result = np.zeros(self.recording.tau.shape)
         for run in self.recording.runs:
@@ -194,7 +198,7 @@ class _Signs:
         return np.asarray(np.linalg.pinv(self.gram[np.ix_(trial, trial)], 1e-9) @ self.cross[trial])
 
 
-def inertia_of(baseline: Baseline, recording: Recording, values: Array) -> Array:
+def inertia_matrix(baseline: Baseline, recording: Recording, values: Array) -> Array:
     """Gives the torque on each joint per acceleration of each (n, n) [kg m2], as base parameters (b,) say it.
 
     Rotors included, root mean square over some states.

@@ -9,19 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.recordings.recording import Recording
-from estimation.diagnosis.recordings.thinning import at_all_samples, thinned
+from estimation.diagnosis.recordings.thinning import decimate, evaluate_at_full_rate
 from robots.base_parameters import BaseParameters
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.terms.effects import Situation
 from robots.terms.situations.flange_body import with_body
+from robots.terms.situations.joining import join_situations
 from robots.terms.situations.of_model import sign_of, velocity_scale
-from robots.terms.situations.situation import Finer, joined, situation, with_finer
+from robots.terms.situations.situation import Finer, situation, with_finer
 
 Array = NDArray[np.float64]
 
 
-def lightened(robot: Robot, recording: Recording) -> Recording:
+def subtract_known_payload(robot: Robot, recording: Recording) -> Recording:
     """Takes the torque of the logs' known payloads off the measured one."""
     if not recording.payloads:
         return recording
@@ -32,32 +33,36 @@ def lightened(robot: Robot, recording: Recording) -> Recording:
             parameters = with_body(model, np.zeros(model.size), body)
             motion = (recording.q[run], recording.dq[run], recording.ddq[run])
             tau[run] -= model.under(gravity).torque(*motion, parameters)
-    return replace(recording, tau=tau, finer=None if recording.finer is None else lightened(robot, recording.finer))
+    return replace(
+        recording,
+        tau=tau,
+        full_rate=None if recording.full_rate is None else subtract_known_payload(robot, recording.full_rate),
+    )
 
 
-def regressor_on(base: BaseParameters, recording: Recording) -> Array:
+def base_regressor(base: BaseParameters, recording: Recording) -> Array:
     """Evaluates the base model's columns (N, n, b) on a recording, each log under its own gravity.
 
     Signs are low-passed as the torque was, where logs are thinned.
     """
     Y = _regressor(base, recording)
-    if recording.finer is None:
+    if recording.full_rate is None:
         return Y
     scales = velocity_scale(base.model)
     for i, column in enumerate(base.columns):
         if column.symbol == "f1":
             joint = column.joint - 1
-            Y[:, joint, i] = signs_on(recording, joint, scales[[joint]])[:, 0]
+            Y[:, joint, i] = friction_signs(recording, joint, scales[[joint]])[:, 0]
     return Y
 
 
-def signs_on(recording: Recording, joint: int, scales: Array) -> Array:
+def friction_signs(recording: Recording, joint: int, scales: Array) -> Array:
     """Evaluates a joint's signs (N, k), from 0, as smooth as `scales` (k,) say, 0 for the sharp one."""
-    return at_all_samples(recording, lambda samples: sign_of(samples.dq[:, joint, None], scales))
+    return evaluate_at_full_rate(recording, lambda samples: sign_of(samples.dq[:, joint, None], scales))
 
 
 def _regressor(base: BaseParameters, recording: Recording) -> Array:
-    if not recording.fields:
+    if not recording.gravity_fields:
         return base.regressor(recording.q, recording.dq, recording.ddq)
     Y = np.empty((len(recording), recording.n, base.size))
     for run, gravity in zip(recording.runs, recording.gravities, strict=True):
@@ -66,7 +71,7 @@ def _regressor(base: BaseParameters, recording: Recording) -> Array:
     return Y
 
 
-def torque_on(base: BaseParameters, recording: Recording, values: Array) -> Array:
+def base_torque(base: BaseParameters, recording: Recording, values: Array) -> Array:
     """Evaluates the base model's torque (N, n) on a recording with base parameters (b,), each log under its gravity."""
     parts = []
     for run, gravity in zip(recording.runs, recording.gravities, strict=True):
@@ -75,7 +80,7 @@ def torque_on(base: BaseParameters, recording: Recording, values: Array) -> Arra
     return np.concatenate(parts)
 
 
-def situation_on(
+def build_situation(
     recording: Recording, model: TorqueModel, parameters: Array, columns: tuple[int, ...] | None = None
 ) -> Situation:
     """Gives what effects may depend on in a recording, payloads and bases that stand otherwise included.
@@ -89,11 +94,11 @@ def situation_on(
     full = np.zeros(model.size)
     full[slice(None) if columns is None else list(columns)] = parameters
     coarse = _situation(recording, model, full)
-    if recording.finer is None:
+    if recording.full_rate is None:
         return coarse
-    starts, stride = recording.finer.starts, recording.stride
-    whole = _situation(recording.finer, model, full)
-    return with_finer(coarse, Finer(whole, lambda rows: thinned(rows, starts, stride)))
+    starts, stride = recording.full_rate.starts, recording.stride
+    whole = _situation(recording.full_rate, model, full)
+    return with_finer(coarse, Finer(whole, lambda rows: decimate(rows, starts, stride)))
 
 
 def _situation(recording: Recording, model: TorqueModel, full: Array) -> Situation:
@@ -106,7 +111,7 @@ def _situation(recording: Recording, model: TorqueModel, full: Array) -> Situati
         motion = (recording.t[rows], recording.q[rows], recording.dq[rows], recording.ddq[rows])
         starts = tuple(run.start - rows.start for run, *_ in members)
         parts.append(situation(model.under(gravity), with_body(model, full, body), *motion, starts=starts))
-    return joined(parts, model)
+    return join_situations(parts, model)
 
 
-__all__ = ["lightened", "regressor_on", "situation_on"]
+__all__ = ["subtract_known_payload", "base_regressor", "build_situation"]

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis, all_hypotheses
-from estimation.diagnosis.hypothesis_tests.joint_agreement import joint_by_joint
+from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
 from estimation.diagnosis.hypothesis_tests.power import (
-    beside,
     detectable_energy,
+    residual_energy,
     resolving_energy,
     size_per_energy,
     unit_mixtures,
@@ -108,7 +108,7 @@ def find_limits(problem: Problem, entries: Sequence[Entry], *, false_alarm: floa
     return tuple(limits)
 
 
-def told_in_one(limits: Sequence[Limit]) -> str:
+def summarise_limits(limits: Sequence[Limit]) -> str:
     """Says in one sentence, without its stop, what logs would have shown; empty where they would show nothing."""
     sizes = [limit.detectable for limit in limits if np.isfinite(limit.detectable)]
     if not sizes:
@@ -160,7 +160,7 @@ def _limit(
         fitted = min((sum(known[k] is None for k in free) for known in assumed), default=len(free))
         penalty = (len(roots[at]) + fitted) * float(np.log(problem.rows * len(entry.groups[at].joints)))
         needed = detectable_energy(len(roots[at]), tries, false_alarm=false_alarm, penalty=penalty)
-        sure = _sure(problem, hypothesis, entry.shapes[at]) if hypothesis.effect.lags else 1.0
+        sure = _certain_share(problem, hypothesis, entry.shapes[at]) if hypothesis.effect.lags else 1.0
         return float(size_per_energy(mixtures[at], entry.groups[at].gram) * np.sqrt(needed / sure))
 
     sizes = {at: size(at) for at in showing}
@@ -186,10 +186,10 @@ def _limit(
     )
 
 
-def _sure(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> float:
+def _certain_share(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> float:
     """Gives the share of an effect's energy that counts, where joints tell it by reversals."""
-    told = joint_by_joint(problem, hypothesis, shape, accept(problem, ()))
-    return float(np.sum(told.sure * told.gram) / np.sum(told.gram)) if told.gram.any() else 1.0
+    told = per_joint_evidence(problem, hypothesis, shape, accept(problem, ()))
+    return float(np.sum(told.certain_share * told.gram) / np.sum(told.gram)) if told.gram.any() else 1.0
 
 
 def _toughest(
@@ -199,7 +199,7 @@ def _toughest(
     worst: tuple[float, str | None] = (smallest, None)
     for name, rival in rivals:
         per_energy = max(
-            size_per_energy(mixtures, beside(group.gram, problem.product(group, other), other.gram, other.raw))
+            size_per_energy(mixtures, residual_energy(group.gram, problem.product(group, other), other.gram, other.raw))
             for other in (rival.groups[k] for k in _spread(len(rival.groups), RIVAL_SHAPES))
         )
         size = per_energy * np.sqrt(resolving_energy())
@@ -213,8 +213,8 @@ def _note(problem: Problem, hypothesis: Hypothesis) -> str:
 
     What acts for a moment may do so in a rest.
     """
-    if hypothesis.effect.passing:
-        resting = float(np.mean(problem.recording.unsure.all(axis=1)))
+    if hypothesis.effect.transient:
+        resting = float(np.mean(problem.recording.sign_unknown.all(axis=1)))
         if resting > RESTING:
             return RESTS.format(100 * resting)
     duration = float(problem.recording.t[-1] - problem.recording.t[0])

@@ -48,7 +48,7 @@ class Stage:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Room:
+class MotionRange:
     """What an experiment may use.
 
     Attributes:
@@ -79,7 +79,7 @@ class Room:
         return (self.lower + self.upper) / 2
 
 
-def room_of(robot: Robot, recording: Recording) -> Room:
+def motion_range(robot: Robot, recording: Recording) -> MotionRange:
     """Measures the room that the logs have shown; limits of the robot that are tighter count."""
     lengths = [part.stop - part.start for part in recording.runs]
     longest = int(np.argmax(lengths))
@@ -91,7 +91,7 @@ def room_of(robot: Robot, recording: Recording) -> Room:
     acceleration = np.abs(recording.ddq).max(axis=0)
     first, last = recording.t[rows][[0, -1]]
     mass = float(np.nansum(robot.inertia[:, 0])) if robot.has_inertia else 40.0
-    return Room(
+    return MotionRange(
         robot=robot,
         lower=np.maximum(recording.q.min(axis=0), limits.lower),
         upper=np.minimum(recording.q.max(axis=0), limits.upper),
@@ -109,7 +109,7 @@ def _known(limit: Array) -> Array:
     return np.where(np.isfinite(limit) & (limit > 0), 0.9 * limit, np.inf)
 
 
-def _motion(room: Room, q: NDArray[Any]) -> Motion:
+def _motion(room: MotionRange, q: NDArray[Any]) -> Motion:
     """Differentiates positions (N, n) that are smooth."""
     t = np.asarray(room.step * np.arange(len(q)))
     dq = np.asarray(np.gradient(q, room.step, axis=0))
@@ -129,14 +129,14 @@ def _ease(share: NDArray[Any]) -> NDArray[Any]:
     return s**3 * (10 - 15 * s + 6 * s**2)
 
 
-def _rested(room: Room, q: NDArray[Any]) -> NDArray[Any]:
+def _rested(room: MotionRange, q: NDArray[Any]) -> NDArray[Any]:
     """Lets positions (N, n) begin and end at rest in the middle, over two seconds each."""
     t = room.step * np.arange(len(q))
     share = _ease(t / EASE) * _ease((t[-1] - t) / EASE)
     return room.middle + share[:, None] * (q - room.middle)
 
 
-def _visit(room: Room, points: Array, rest: float) -> Array:
+def _visit(room: MotionRange, points: Array, rest: float) -> Array:
     """Moves from point to point (K, n), with a rest [s] at each."""
     parts = [np.repeat(points[:1], max(round(rest / room.step), 1), axis=0)]
     for start, end in pairwise(points):
@@ -150,14 +150,14 @@ def _visit(room: Room, points: Array, rest: float) -> Array:
     return np.concatenate(parts)
 
 
-def _alone(room: Room, joint: int, x: Array) -> Array:
+def _alone(room: MotionRange, joint: int, x: Array) -> Array:
     """One joint, counted from 0, takes positions (N,), the others the middle."""
     q = np.repeat(room.middle[None], len(x), axis=0)
     q[:, joint] = x
     return q
 
 
-def sweep(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
+def sweep(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
     """Runs one joint there and back at constant speeds, each twice the last, at most 8 s a stroke."""
     reach = float(room.upper[joint] - room.lower[joint])
     top, a = float(room.speed[joint]), float(room.acceleration[joint])
@@ -177,25 +177,25 @@ def sweep(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
     return (Stage(motion=_motion(room, np.concatenate(parts))),)
 
 
-def pause(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
+def pause(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
     """Repeats the logged motion three times, rests, and repeats it once more."""
     again = Stage(motion=room.reference)
     return (again, again, again, Stage(motion=room.reference, pause=PAUSE))
 
 
-def static_hold(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
+def static_hold(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
     """Holds sixteen poses for a second and a half each."""
     random = np.random.default_rng(variant)
     points = room.lower + random.random((16, room.robot.n)) * (room.upper - room.lower)
     return (Stage(motion=_motion(room, _visit(room, points, 1.5))),)
 
 
-def payload(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
+def payload(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
     """Makes the logged motion without and with a known payload."""
     return (Stage(motion=room.reference), Stage(motion=room.reference, pause=60.0, payload=room.payload))
 
 
-def single_joint(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
+def single_joint(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
     """Makes the logged motion of one joint, then of its neighbour, the others at rest."""
     joints = [joint, joint - 1 if joint else min(1, room.robot.n - 1)]
     return tuple(
@@ -204,7 +204,7 @@ def single_joint(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
     )
 
 
-def micro_reversals(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
+def micro_reversals(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
     """Turns one joint back and forth, ever less far: from a third of its range to a thousandth of it."""
     largest = 0.3 * float(room.upper[joint] - room.lower[joint])
     periods = 4.0 * np.arange(0, 8)
@@ -216,14 +216,14 @@ def micro_reversals(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
     return (Stage(motion=_motion(room, _rested(room, _alone(room, joint, x)))),)
 
 
-def mirrored(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
+def mirrored(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
     """Makes the logged motion forwards, then backwards in time."""
     m = room.reference
     back = Motion(m.t, m.q[::-1], -m.dq[::-1], m.ddq[::-1])
     return (Stage(motion=m), Stage(motion=back))
 
 
-def second_base_pose(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
+def second_base_pose(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
     """Makes the logged motion on a base that is tilted by 15 degrees."""
     gravity = np.asarray(room.robot.chain.gravity, dtype=float)
     axis = level_axes(gravity)[variant % 2] if gravity.any() else np.zeros(3)
@@ -232,7 +232,7 @@ def second_base_pose(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
     return (Stage(motion=room.reference, gravity=tilted),)
 
 
-def multisine(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
+def multisine(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
     """Moves all joints with frequencies up to 6 Hz, as fast as the accelerations allow."""
     random = np.random.default_rng(variant)
     t = room.step * np.arange(round(REFERENCE / room.step))
@@ -251,12 +251,12 @@ def multisine(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
     return (Stage(motion=_motion(room, _rested(room, q))),)
 
 
-def repeat(room: Room, joint: int, variant: int) -> tuple[Stage, ...]:
+def repeat(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
     """Makes the logged motion again."""
     return (Stage(motion=room.reference),)
 
 
-MAKERS: dict[str, Callable[[Room, int, int], tuple[Stage, ...]]] = {
+MAKERS: dict[str, Callable[[MotionRange, int, int], tuple[Stage, ...]]] = {
     "repeat": repeat,
     "mirrored": mirrored,
     "single_joint": single_joint,

@@ -15,8 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.experiment_plans.experiment_grams import ARM, Cause, Grams
-from estimation.diagnosis.experiment_plans.experiment_motions import MADE, MAKERS, VARIED, Room, Stage, room_of
-from estimation.diagnosis.experiment_plans.rival_shapes import imitating_forms
+from estimation.diagnosis.experiment_plans.experiment_motions import (
+    MADE,
+    MAKERS,
+    VARIED,
+    MotionRange,
+    Stage,
+    motion_range,
+)
+from estimation.diagnosis.experiment_plans.rival_shapes import find_rival_shapes
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from robots.robot import Robot
 from robots.signals import Motion
@@ -141,7 +148,7 @@ class _Choice:
     @property
     def duration(self) -> float:
         """With pauses [s]."""
-        return float(sum(stage.pause + stage.motion.duration for stage in repeated(self.stages, self.times)))
+        return float(sum(stage.pause + stage.motion.duration for stage in repeat_stages(self.stages, self.times)))
 
     def proposal(self) -> Proposal:
         return Proposal(kind=self.kind, resolves=self.chance, duration=self.duration, times=self.times)
@@ -165,8 +172,8 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
     robot = problem.situation.robot.under(problem.recording.gravities[-1])
     joint = next((c.hypothesis.joint for c in possible if c.hypothesis.joint is not None), None)
     index = joint - 1 if joint is not None else int(np.argmax(np.ptp(problem.recording.q, axis=0)))
-    room = room_of(robot, problem.recording)
-    grams = Grams(problem, possible, imitating_forms(problem, possible))
+    room = motion_range(robot, problem.recording)
+    grams = Grams(problem, possible, find_rival_shapes(problem, possible))
     choices = [_made(grams, room, index, kind) for kind in MAKERS]
     if max(choice.chance for choice in choices) < ENOUGH:
         choices = [_longer(grams, choice) for choice in choices]
@@ -175,7 +182,7 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
     for variant in range(1, VARIANTS if best.kind in VARIED and best.chance < ENOUGH else 1):
         other = _times(grams, _made(grams, room, index, best.kind, variant), best.times)
         best = min(best, other, key=lambda choice: choice.rank)
-    stages = repeated(best.stages, best.times)
+    stages = repeat_stages(best.stages, best.times)
     # What builds up or comes at a moment does not tell twice as much in twice the time.
     chance = best.chance if best.times == 1 else grams.chance(stages)
     names = [c.hypothesis.label.replace("_", " ") for c in possible]
@@ -217,13 +224,13 @@ def _and(names: Sequence[str]) -> str:
     return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def repeated(stages: Sequence[Stage], times: int) -> tuple[Stage, ...]:
+def repeat_stages(stages: Sequence[Stage], times: int) -> tuple[Stage, ...]:
     """Makes each stage so often, one after the other; what is changed before it, such as a payload, is changed once."""
     again = [replace(stage, pause=Stage.pause) for stage in stages]
     return tuple(part for stage, other in zip(stages, again, strict=True) for part in (stage, *(other,) * (times - 1)))
 
 
-def _made(grams: Grams, room: Room, joint: int, kind: str, variant: int = 0) -> _Choice:
+def _made(grams: Grams, room: MotionRange, joint: int, kind: str, variant: int = 0) -> _Choice:
     stages = MAKERS[kind](room, joint, variant)
     later = grams.later(stages)
     return _Choice(kind, stages, later, grams.chances_of(later))

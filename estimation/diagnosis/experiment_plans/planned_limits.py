@@ -13,14 +13,14 @@ from estimation.diagnosis.base_models.baseline import build_baseline
 from estimation.diagnosis.experiment_plans.detection_limits import Limit, find_limits
 from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.problem_setup import pose
+from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem
 from estimation.diagnosis.hypothesis_tests.scan import measure
 from estimation.diagnosis.noise_models.frequency_bands import Band
-from estimation.diagnosis.noise_models.masked_rows import no_gaps
+from estimation.diagnosis.noise_models.masked_rows import no_masked_rows
 from estimation.diagnosis.noise_models.whitening import Whitening
-from estimation.diagnosis.recordings.directions import SHARP, SURELY, sharpest
+from estimation.diagnosis.recordings.directions import SHARP, SURELY, sharpest_sign_velocity
 from estimation.diagnosis.recordings.log_reading import Recording
-from estimation.regressions.parameter_priors import Pull
+from estimation.regressions.parameter_priors import GaussianPrior
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError
 from robots.plants.sensors import Sensors
@@ -86,9 +86,9 @@ def planned_problem(
         step=step,
         cycles=(None,) * len(motions),
         cutoff=0.5 / step,
-        unsure=_at_reversals(joined.dq, starts),
-        clear=np.zeros(joined.q.shape, dtype=bool),
-        jolts=np.zeros(joined.q.shape[1]),
+        sign_unknown=_at_reversals(joined.dq, starts),
+        sign_known_from_velocity=np.zeros(joined.q.shape, dtype=bool),
+        reversal_acceleration_error=np.zeros(joined.q.shape[1]),
         floor=np.zeros(joined.q.shape[1]),
         names=tuple(f"motion {i}" for i in range(1, len(motions) + 1)),
     )
@@ -98,8 +98,8 @@ def planned_problem(
     baseline = build_baseline(find_base_parameters(model), replace(recording, tau=rough), whitening.scale)
     # The parameters are known: the motion's own torque gives them back, and nothing is to hold them elsewhere.
     size = baseline.base.size + baseline.nuisance.shape[2]
-    free = Pull(np.zeros((size, size)), np.zeros(size))
-    return pose(recording, baseline, whitening, draws=0, rng=np.random.default_rng(0), pull=free)
+    free = GaussianPrior(np.zeros((size, size)), np.zeros(size))
+    return build_problem(recording, baseline, whitening, draws=0, rng=np.random.default_rng(0), pull=free)
 
 
 def _at_reversals(dq: Array, starts: tuple[int, ...]) -> NDArray[np.bool_]:
@@ -108,7 +108,7 @@ def _at_reversals(dq: Array, starts: tuple[int, ...]) -> NDArray[np.bool_]:
     turned[1:] = dq[1:] * dq[:-1] < 0
     turned[list(starts)] = False
     beside = turned | np.roll(turned, -1, axis=0)
-    return beside | (np.abs(dq) < SURELY * np.array([sharpest(column) for column in dq.T]))
+    return beside | (np.abs(dq) < SURELY * np.array([sharpest_sign_velocity(column) for column in dq.T]))
 
 
 def expected_whitening(recording: Recording, noise: Sensors, level: Array | None = None) -> Whitening:
@@ -129,7 +129,7 @@ def expected_whitening(recording: Recording, noise: Sensors, level: Array | None
         scale=size * innovation,
         precision=np.eye(n),
         starts=recording.starts,
-        gaps=no_gaps(n),
+        masked=no_masked_rows(n),
         bands=(Band(np.zeros(0), 1, 0.5 / recording.step),) * recording.n,
         innovations=np.random.default_rng(0).standard_normal((1024, n)),
     )

@@ -21,7 +21,7 @@ POINTS = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class RivalShape:
     """A cause with another shape than the one that was fitted."""
 
     hypothesis: Hypothesis
@@ -29,14 +29,14 @@ class Form:
     coefficients: Array
 
 
-def imitating_forms(problem: Problem, causes: Sequence[Cause]) -> list[tuple[int, Form]]:
+def find_rival_shapes(problem: Problem, causes: Sequence[Cause]) -> list[tuple[int, RivalShape]]:
     """Finds for each cause the forms of the others that leave the least of it on the logs there are.
 
     Returns:
         Index and form of the causes that imitate another better so than as they were fitted.
     """
     forms = [
-        (k, Form(cause.hypothesis, shape, np.zeros(len(cause.coefficients))))
+        (k, RivalShape(cause.hypothesis, shape, np.zeros(len(cause.coefficients))))
         for k, cause in enumerate(causes)
         for shape in _shapes(problem, cause)
     ]
@@ -55,7 +55,7 @@ def imitating_forms(problem: Problem, causes: Sequence[Cause]) -> list[tuple[int
 
 def _shapes(problem: Problem, cause: Cause) -> Iterator[tuple[float, ...]]:
     effect, joint = cause.hypothesis.effect, cause.hypothesis.joint
-    state = problem.sees(effect)
+    state = problem.state_for(effect)
     seen = {cause.shape}
     for shape in (*_around(problem, cause), *_spread(effect.grid(state, joint))):
         # A moment of the logs says nothing of an experiment.
@@ -69,7 +69,7 @@ def _shapes(problem: Problem, cause: Cause) -> Iterator[tuple[float, ...]]:
 
 def _around(problem: Problem, cause: Cause) -> Iterator[tuple[float, ...]]:
     effect = cause.hypothesis.effect
-    bounds = effect.bounds(problem.sees(effect), cause.hypothesis.joint)
+    bounds = effect.bounds(problem.state_for(effect), cause.hypothesis.joint)
     for k, ((low, high), shape, value) in enumerate(zip(bounds, effect.shapes, cause.shape, strict=True)):
         if not high > low or shape.choices or shape.is_left(value):
             continue

@@ -11,7 +11,7 @@ from robots.terms.base import force_unit, length_unit
 MOVED = 1e-3  # [rad or m] below which a joint has not moved
 
 
-def hidden_springs(problem: Problem, false_alarm: float) -> tuple[tuple[int, str], ...]:
+def undetectable_springs(problem: Problem, false_alarm: float) -> tuple[tuple[int, str], ...]:
     """Says of which joints a spring as strong as all of their torque would be missed, in a sentence each.
 
     A spring's or a counterbalance's torque is a smooth function of one position. Over a short range gravity, whose

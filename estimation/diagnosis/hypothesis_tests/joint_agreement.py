@@ -20,32 +20,36 @@ ASIDE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class PerJointEvidence:
     """What each of the joints on which an effect of one column acts tells of its coefficient.
 
     Attributes:
         gram: squares of the column (m,).
         cross: its products with the residual (m,).
-        sure: share (m,) of what they tell that errors of the motion leave.
-        apart: variance (m,) of a joint's own coefficient that the formulas of other effects there may make.
+        certain_share: share (m,) of what they tell that errors of the motion leave.
+        formula_variance: variance (m,) of a joint's own coefficient that the formulas of other effects there may make.
     """
 
     gram: Array
     cross: Array
-    sure: Array
-    apart: Array
+    certain_share: Array
+    formula_variance: Array
 
-    def some(self, joints: NDArray[np.bool_]) -> Told:
+    def subset(self, joints: NDArray[np.bool_]) -> PerJointEvidence:
         """Gives what some of the joints (m,) tell."""
-        return Told(self.gram[joints], self.cross[joints], self.sure[joints], self.apart[joints])
+        return PerJointEvidence(
+            self.gram[joints], self.cross[joints], self.certain_share[joints], self.formula_variance[joints]
+        )
 
     def gain(self, *, surely: bool = False) -> float:
         """What one coefficient of all joints explains, over their Birge ratio; of what is sure of that, where asked."""
-        share = self.sure if surely else 1.0
-        return agreed_gain(share * self.gram, share * self.cross, self.apart)
+        share = self.certain_share if surely else 1.0
+        return shared_coefficient_gain(share * self.gram, share * self.cross, self.formula_variance)
 
 
-def joint_by_joint(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...], accepted: Accepted) -> Told:
+def per_joint_evidence(
+    problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...], accepted: Accepted
+) -> PerJointEvidence:
     """Measures an effect of one column, a torque per time, on each of its joints, beside others.
 
     A log with reversals tells a delay by them, as often as they come; but when a joint turns round is known only as
@@ -58,22 +62,22 @@ def joint_by_joint(problem: Problem, hypothesis: Hypothesis, shape: tuple[float,
         group = problem.group((j,), (X,), effect=hypothesis.effect)
         own = score(problem, group, accepted)
         gram[k], cross[k] = float(np.ravel(own.gram)[0]), float(np.ravel(own.cross)[0])
-        late = problem.late(j)
+        late = problem.reversal_time_error(j)
         if late.any() and gram[k] > 0:
             told = score(problem, problem.split(group, np.ones(1), late > 0), accepted).gram.sum(axis=1)
             told = np.maximum(told, 0.0)
             # What is told by the balance of impulses has its error already.
-            timed = 0.0 if group.timed is None else float(np.sum(group.timed**2))
+            timed = 0.0 if group.reversal_columns is None else float(np.sum(group.reversal_columns**2))
             if told.sum() > 0:
                 # What each of them has of the column's squares weighs its moment.
                 squares = np.where(late > 0, group.columns[0][:, 0], 0.0) ** 2
                 usual = np.sum(squares * late**2) / max(float(np.sum(squares)), 1e-300)
                 sure[k] = (told[0] / (1.0 + usual * told[0]) + told[1] + timed) / (told.sum() + timed)
     apart = ASIDE**2 * explained[list(joints)] / np.where(gram > 0, gram, np.inf)
-    return Told(gram, cross, sure, apart)
+    return PerJointEvidence(gram, cross, sure, apart)
 
 
-def agreed_gain(gram: Array, cross: Array, apart: Array | None = None) -> float:
+def shared_coefficient_gain(gram: Array, cross: Array, apart: Array | None = None) -> float:
     """What one coefficient of all joints explains, over their Birge ratio.
 
     One joint may be at odds with the rest, where something else is left on it: it then counts for nothing.

@@ -91,7 +91,7 @@ def size_per_energy(mixtures: Array, left: Array) -> float:
     return 1.0 / np.sqrt(middle) if middle > 0 else np.inf
 
 
-def beside(left: Array, cross: Array, rival: Array, rival_raw: Array) -> Array:
+def residual_energy(left: Array, cross: Array, rival: Array, rival_raw: Array) -> Array:
     """Projects a rival's columns out of an effect's energy (Schur complement).
 
     Args:

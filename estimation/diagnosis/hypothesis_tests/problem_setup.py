@@ -6,19 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import FAINT, Baseline
-from estimation.diagnosis.base_models.priors import held, loosened, pull_of
+from estimation.diagnosis.base_models.priors import base_model_prior, inflate_conflicting_prior, solve_map
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.noise_models.high_frequency_band import Upper
+from estimation.diagnosis.noise_models.high_frequency_band import HighBand
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.linear_algebra.orthonormal import orthonormal
-from estimation.regressions.parameter_priors import Pull
-from robots.terms.effect_bases.gear_load import Bearing, laden_with
+from estimation.regressions.parameter_priors import GaussianPrior
+from robots.terms.effect_bases.gear_load import ExtraGearLoad, with_gear_load
 
 Array = NDArray[np.float64]
 
 
-def pose(
+def build_problem(
     recording: Recording,
     baseline: Baseline,
     whitening: Whitening,
@@ -26,10 +26,10 @@ def pose(
     draws: int,
     rng: np.random.Generator,
     extra: Array | None = None,
-    pull: Pull | None = None,
-    upper: Upper | None = None,
+    pull: GaussianPrior | None = None,
+    upper: HighBand | None = None,
     followed: Array | None = None,
-    bearing: Bearing | None = None,
+    bearing: ExtraGearLoad | None = None,
 ) -> Problem:
     """Fits the base model to white data and prepares the null.
 
@@ -40,7 +40,7 @@ def pose(
         draws: noise drawn for the null; 0 for none.
         rng: draws it.
         extra: torque (N, n) of effects that are known already, taken off before the base model's situation is computed.
-        pull: what holds base parameters that the data leave open; by default `pull_of`, loosened.
+        pull: what holds base parameters that the data leave open; by default `base_model_prior`, loosened.
         upper: the frequencies above the bands.
         followed: that part (N, n) of the known effects' torque which others may make late.
         bearing: what of the known effects the gears bear; None for nothing.
@@ -70,42 +70,44 @@ def pose(
         pressed[k] = sum(P[j, k] * noise[:, j] for j in range(n) if P[j, k])
     scales = whitening.scales(len(recording))
     own = recording.tau if extra is None else recording.tau - extra
-    gram, cross = moments(baseline, ~recording.unsure / scales, own)
+    gram, cross = normal_equations(baseline, ~recording.sign_unknown / scales, own)
     if pull is None:
         strength = whitening.row_weight
-        pull = loosened(pull_of(baseline, recording, strength), gram.sum(axis=0), cross.sum(axis=0), strength)
-    values = held(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
-    alone = values if extra is None else fit_values(baseline, scales, recording.unsure, recording.tau, pull)
+        pull = inflate_conflicting_prior(
+            base_model_prior(baseline, recording, strength), gram.sum(axis=0), cross.sum(axis=0), strength
+        )
+    values = solve_map(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
+    alone = values if extra is None else fit_values(baseline, scales, recording.sign_unknown, recording.tau, pull)
     remainder = recording.tau - baseline.regressor @ alone
-    now = laden_with(baseline.situation(recording, values), bearing)
+    now = with_gear_load(baseline.situation(recording, values), bearing)
     return Problem(
         recording=recording,
         baseline=baseline,
         whitening=whitening,
         situation=now,
-        mixed=np.ascontiguousarray(np.einsum("jk,nkb->jnb", root, Q, optimize=True), dtype=np.float32),
+        weighted_base_columns=np.ascontiguousarray(np.einsum("jk,nkb->jnb", root, Q, optimize=True), dtype=np.float32),
         residual=tilted @ root.T,
         white=np.linalg.solve(root.T, tilted.T).T,
         energy=float(np.sum(tilted**2)),
         nulls=(pressed, projected),
-        remainder=remainder,
-        pull=pull,
-        upper=upper,
-        followed=None if followed is None else now.beside(followed),
-        bearing=bearing,
+        base_residual=remainder,
+        prior=pull,
+        high_band=upper,
+        delayed_torque_state=None if followed is None else now.beside(followed),
+        extra_load=bearing,
     )
 
 
-def fit_values(baseline: Baseline, scale: Array, unsure: NDArray[np.bool_], tau: Array, pull: Pull) -> Array:
+def fit_values(baseline: Baseline, scale: Array, unsure: NDArray[np.bool_], tau: Array, pull: GaussianPrior) -> Array:
     """Fits base parameters (b,) to torque (N, n), weighed by the noise of each joint (n,) or of each row too (N, n).
 
     Directions that the log does not determine go where the pull has them.
     """
-    gram, cross = moments(baseline, ~unsure / scale, tau)
-    return held(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
+    gram, cross = normal_equations(baseline, ~unsure / scale, tau)
+    return solve_map(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
 
 
-def moments(baseline: Baseline, weights: Array, tau: Array) -> tuple[Array, Array]:
+def normal_equations(baseline: Baseline, weights: Array, tau: Array) -> tuple[Array, Array]:
     """Gives each joint's normal equations (n, p, p), (n, p) of base parameters and nuisance, rows weighed (N, n)."""
     size = baseline.regressor.shape[2] + baseline.nuisance.shape[2]
     gram, cross = np.zeros((tau.shape[1], size, size)), np.zeros((tau.shape[1], size))

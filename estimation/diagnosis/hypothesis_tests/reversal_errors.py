@@ -11,13 +11,13 @@ from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from robots.terms.effects import EFFECTS
 
 
-def owed_to_moments(problem: Problem, joint: int, group: Group, gain: float, accepted: Accepted) -> float:
+def gain_from_reversal_errors(problem: Problem, joint: int, group: Group, gain: float, accepted: Accepted) -> float:
     """Gives the part of a gain that is gone where the reversals of a joint (from 1) may all be late by their error.
 
     Friction that turns round over a short way is late for that. What the moments' error allows is fitted beside it,
     with that error as its prior.
     """
-    late = problem.late(joint - 1)
+    late = problem.reversal_time_error(joint - 1)
     if not late.any():
         return 0.0
     usual = float(np.sqrt(np.mean(late[late > 0] ** 2)))

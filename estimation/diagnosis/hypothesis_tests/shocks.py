@@ -11,7 +11,7 @@ from scipy.signal import correlate
 
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
 
 Array = NDArray[np.float64]
@@ -25,7 +25,7 @@ TAIL, FEWEST, MOST, LIKELY = 0.02, 5, 20, 0.01
 GLITCH = 0.1
 
 
-def beside_a_shock(problem: Problem, member: Member, accepted: Accepted) -> Member:
+def gain_beside_shock(problem: Problem, member: FittedEffect, accepted: Accepted) -> FittedEffect:
     """Measures what an effect explains beside what is accepted and one shock of the noise, if that may have been one.
 
     Noise with memory comes of innovations; a single one that is far out (an innovational outlier, Fox 1972) makes a
@@ -46,7 +46,7 @@ def beside_a_shock(problem: Problem, member: Member, accepted: Accepted) -> Memb
     likely = _chance(problem, elsewhere, joints, float(sizes[best, place].max())) >= LIKELY
     struck = joints if likely else joints[largest : largest + 1]
     beside = accept(problem, (*accepted.groups, _shock(problem, struck, place, offset)))
-    situation = problem.sees(member.hypothesis.effect)
+    situation = problem.state_for(member.hypothesis.effect)
     gain, _ = score(problem, member.group, beside).bounded(
         *member.hypothesis.coefficient_bounds(situation.robot, member.shape)
     )

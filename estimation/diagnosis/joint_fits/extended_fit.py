@@ -8,18 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.priors import held
+from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from estimation.diagnosis.joint_fits.event_window import going_on
-from estimation.diagnosis.joint_fits.shape_errors import between_logs, hidden_moments, inexact, shape_errors, with_value
-from estimation.diagnosis.joint_fits.shrinkage import pull_on
+from estimation.diagnosis.joint_fits.event_window import open_event_edges
+from estimation.diagnosis.joint_fits.shape_errors import (
+    formula_errors,
+    shape_errors,
+    spread_over_pauses,
+    widen_change_times,
+    with_value,
+)
+from estimation.diagnosis.joint_fits.shrinkage import effects_prior
 from estimation.identifications.identification import NEGLIGIBLE, RELATIVE
 from estimation.models.extension import Extension
 from estimation.models.model import Model
-from estimation.regressions.parameter_priors import Pull
+from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
 
@@ -31,7 +37,7 @@ LOST = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class ExtendedFit:
     """Base parameters and effects, fitted together.
 
     Attributes:
@@ -45,7 +51,7 @@ class Fitted:
     values: Array
 
 
-def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[str, object]) -> Fitted:
+def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: dict[str, object]) -> ExtendedFit:
     """Fits base parameters and the members' coefficients by generalised least squares, shapes as they were refined.
 
     The covariance counts the shape parameters as free, by the derivative of the members' torque.
@@ -54,13 +60,13 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
     base = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
     blocks, slices, deviations = [base], [], []
     at = base.shape[2]
-    told: list[Member] = []
+    told: list[FittedEffect] = []
     for i, member in enumerate(members):
         rest = [m for k, m in enumerate(members) if k != i]
         # How far it may be is asked from the middle of a pause, not from the end of it that the search came to.
-        member = between_logs(problem, member, rest)
+        member = spread_over_pauses(problem, member, rest)
         steps = shape_errors(problem, member, accept(problem, tuple(m.group for m in rest)))
-        steps = going_on(problem, member, rest, hidden_moments(problem, member, rest, steps))
+        steps = open_event_edges(problem, member, rest, widen_change_times(problem, member, rest, steps))
         told.append(member)
         X = dense(problem, member.hypothesis, member.shape)
         slopes = [_slope(problem, member, k, abs(step)) for k, step in enumerate(steps)]
@@ -72,10 +78,10 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
     fast, kicks = np.zeros((2, columns.shape[2]), dtype=bool)
     for member, (start, size, shapes) in zip(members, slices, strict=True):
         rows, effect = slice(start, start + size + shapes), member.hypothesis.effect
-        fast[rows], kicks[rows] = effect.fast, effect.kicks
+        fast[rows], kicks[rows] = effect.independent_of_acceleration, effect.acceleration_driven
     flat, tau = white.independent(columns), white.independent(problem.recording.tau)
-    if problem.upper is not None and fast.any():
-        above, beyond = problem.upper.regression(columns[:, :, fast], calm=kicks[fast])
+    if problem.high_band is not None and fast.any():
+        above, beyond = problem.high_band.regression(columns[:, :, fast], calm=kicks[fast])
         higher = np.zeros((len(above), len(fast)))
         higher[:, fast] = above
         flat, tau = np.concatenate([flat, higher]), np.concatenate([tau, beyond])
@@ -84,11 +90,11 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         linear[start + size : start + size + shapes] = False
     values = np.zeros(columns.shape[2])
     free = flat[:, linear]
-    pull = pull_on(problem, members)
+    pull = effects_prior(problem, members)
     # White rows tell what they are, not what coloured ones of their number would.
-    pull = Pull(pull.precision / white.row_weight, pull.target)
-    values[linear] = held(free.T @ free, free.T @ tau, pull)
-    by_reversals = timed(members, [start for start, *_ in slices], (problem.n, flat.shape[1]))
+    pull = GaussianPrior(pull.precision / white.row_weight, pull.target)
+    values[linear] = solve_map(free.T @ free, free.T @ tau, pull)
+    by_reversals = reversal_columns(members, [start for start, *_ in slices], (problem.n, flat.shape[1]))
     covariance, unseen = _covariance(np.concatenate([flat, by_reversals]))
     lower_upper = [m.hypothesis.coefficient_bounds(problem.situation.robot, m.shape) for m in members]
     extensions, known = [], []
@@ -97,7 +103,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
     ):
         rows = slice(start, start + size + shapes)
         # Joints that differ in what they should agree on know it so much worse.
-        own = covariance[rows, rows] * member.scatter
+        own = covariance[rows, rows] * member.birge_ratio
         scale = np.concatenate([np.ones(size), np.abs(steps)])
         # What is not known at all stays so, whatever its slope's covariance.
         open_ = ~np.isfinite(scale)
@@ -111,7 +117,7 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         own[range(len(own)), range(len(own))] = np.maximum(np.diag(own), profile**2)
         own[open_, open_] = np.inf
         coefficients = np.clip(values[start : start + size], lower, upper)
-        own[range(len(own)), range(len(own))] += inexact(problem, member, coefficients) ** 2
+        own[range(len(own)), range(len(own))] += formula_errors(problem, member, coefficients) ** 2
         for i, k, apart in member.hypothesis.effect.ties(coefficients):
             own = _narrowed(own, size + k, float(np.hypot(np.sqrt(own[i, i]), apart)))
         errors = np.sqrt(np.maximum(np.diag(own), 0.0))
@@ -144,10 +150,10 @@ def fit_extended(problem: Problem, members: Sequence[Member], provenance: dict[s
         provenance=provenance,
         extensions=tuple(extensions),
         felt=problem.parameters_without_payload[list(baseline.base.independent)],
-        bearing=problem.bearing,
+        bearing=problem.extra_load,
         since=problem.situation.origin,
     )
-    return Fitted(model, tuple(known), values[: base.shape[2]])
+    return ExtendedFit(model, tuple(known), values[: base.shape[2]])
 
 
 def dense(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Array:
@@ -159,20 +165,20 @@ def dense(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) ->
     return X
 
 
-def timed(members: Sequence[Member], starts: Sequence[int], shape: tuple[int, int]) -> Array:
+def reversal_columns(members: Sequence[FittedEffect], starts: Sequence[int], shape: tuple[int, int]) -> Array:
     """What each joint's reversals tell beside the rows (n, p) of members whose columns start at these."""
     told = np.zeros(shape)
     for member, start in zip(members, starts, strict=True):
-        if member.group.timed is not None:
-            told[:, start : start + member.group.size] = member.group.timed
+        if member.group.reversal_columns is not None:
+            told[:, start : start + member.group.size] = member.group.reversal_columns
     return told
 
 
-def _slope(problem: Problem, member: Member, k: int, step: float) -> Array:
+def _slope(problem: Problem, member: FittedEffect, k: int, step: float) -> Array:
     """How the member's torque changes by one standard error of a shape parameter (N, n, 1)."""
     value = member.shape[k]
     h = step if np.isfinite(step) else 0.3 * abs(value)
-    low, high = member.hypothesis.effect.bounds(problem.sees(member.hypothesis.effect), member.hypothesis.joint)[k]
+    low, high = member.hypothesis.effect.bounds(problem.state_for(member.hypothesis.effect), member.hypothesis.joint)[k]
     up, down = min(value + h, high), max(value - h, low)
     if up <= down:
         return np.zeros((len(problem.recording), problem.n, 1))

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member, refine
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from robots.terms.effect_bases.gear_load import Bearing, Borne, Weight
+from robots.terms.effect_bases.gear_load import ExtraGearLoad, LoadPath, LoadSource
 from robots.terms.effects import EFFECTS
 
 Array = NDArray[np.float64]
@@ -25,22 +25,22 @@ BY_LOAD = EFFECTS["load_dependent_friction"]
 
 
 @dataclass(frozen=True, eq=False)
-class Laden:
+class GearLoad:
     """What gears bear of some effects.
 
     Attributes:
-        bearing: that; None for nothing.
-        shows: whether it explains more than what was found without it, so that a search should be made with it.
+        extra_load: that; None for nothing.
+        improves_fit: whether it explains more than what was found without it, so that a search should be made with it.
     """
 
-    bearing: Bearing | None = None
-    shows: bool = False
+    extra_load: ExtraGearLoad | None = None
+    improves_fit: bool = False
 
 
-NOTHING = Laden()
+NO_GEAR_LOAD = GearLoad()
 
 
-def laden(problem: Problem, members: Sequence[Member], values: Array) -> Laden:
+def find_gear_load(problem: Problem, members: Sequence[FittedEffect], values: Array) -> GearLoad:
     """Tells from the data what gears bear of the effects found.
 
     A gear bears a spring that is mounted behind it, and one is taken to be so where nothing depends on it. Where a load
@@ -52,38 +52,40 @@ def laden(problem: Problem, members: Sequence[Member], values: Array) -> Laden:
         members: the effects.
         values: of base model, nuisance and all members, fitted together.
     """
-    at, weights = len(problem.pull.target), []
+    at, weights = len(problem.prior.target), []
     for member in members:
         place, own = member.hypothesis, values[at : at + len(member.coefficients)]
         at += len(own)
-        if place.effect.borne:
-            weights.append(Weight(place.effect, place.joint, member.shape, own))
+        if place.effect.loads_gear:
+            weights.append(LoadSource(place.effect, place.joint, member.shape, own))
     if not weights:
-        return NOTHING
-    ways: list[Borne] = ["effects", "preloads"] if any(w.effect.preloads for w in weights) else ["effects"]
-    bearings = [Bearing(way, weights) for way in ways]
+        return NO_GEAR_LOAD
+    ways: list[LoadPath] = ["effects", "preloads"] if any(w.effect.preloads for w in weights) else ["effects"]
+    bearings = [ExtraGearLoad(way, weights) for way in ways]
     state = problem.baseline.situation(problem.recording, values[: problem.baseline.base.size])
-    borne = bearings[0].on(state).borne
+    borne = bearings[0].on(state).extra_load
     assert borne is not None
     size, other = (np.sqrt(np.mean(torque**2, axis=0)) for torque in (borne, state.load))
     felt = set((np.flatnonzero(size > FELT * other) + 1).tolist())
-    on_them = [m for m in members if m.hypothesis.joint in felt and not m.hypothesis.effect.borne]
+    on_them = [m for m in members if m.hypothesis.joint in felt and not m.hypothesis.effect.loads_gear]
     if not on_them:
-        return Laden(bearings[0])
-    before = _worth(problem, members)
-    best, most = Laden(bearings[0]), before
+        return GearLoad(bearings[0])
+    before = _set_bic_gain(problem, members)
+    best, most = GearLoad(bearings[0]), before
     for bearing in bearings:
-        now = replace(problem, situation=bearing.on(state), bearing=bearing)
-        for told in _told_otherwise(now, members, on_them):
-            worth = _worth(now, told)
-            if worth > most + (0.0 if best.shows else MIN_BIC_GAIN):
-                best, most = Laden(bearing, shows=True), worth
+        now = replace(problem, situation=bearing.on(state), extra_load=bearing)
+        for told in _alternatives(now, members, on_them):
+            worth = _set_bic_gain(now, told)
+            if worth > most + (0.0 if best.improves_fit else MIN_BIC_GAIN):
+                best, most = GearLoad(bearing, improves_fit=True), worth
     return best
 
 
-def _told_otherwise(problem: Problem, members: Sequence[Member], on_them: Sequence[Member]) -> list[list[Member]]:
+def _alternatives(
+    problem: Problem, members: Sequence[FittedEffect], on_them: Sequence[FittedEffect]
+) -> list[list[FittedEffect]]:
     """Lists what the members would be with this load: those that feel it fitted anew, and one name or none left out."""
-    feel = [m for m in on_them if m.hypothesis.effect.loaded]
+    feel = [m for m in on_them if m.hypothesis.effect.depends_on_gear_load]
     result = []
     for out in (None, *(m for m in on_them if m not in feel)):
         rest = [m for m in members if m is not out and m not in feel]
@@ -97,7 +99,7 @@ def _told_otherwise(problem: Problem, members: Sequence[Member], on_them: Sequen
     return result
 
 
-def _worth(problem: Problem, members: Sequence[Member]) -> float:
+def _set_bic_gain(problem: Problem, members: Sequence[FittedEffect]) -> float:
     """Squared residual that members explain together, less what their parameters cost."""
     rows = problem.rows
     cost = sum(m.degrees * float(np.log(rows * len(m.group.joints))) for m in members)

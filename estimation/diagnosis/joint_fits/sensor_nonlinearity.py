@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.priors import held
+from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member, all_but, refine, within
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, clip_shape, refine
 from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.total_torque import JointFit
 from robots.terms.effect_bases.static import StaticJointEffect
@@ -23,7 +23,7 @@ ENOUGH = 1e-4
 """A step that makes the sum of squares smaller by less than this share is the last one."""
 
 
-def undistorted(problem: Problem, members: Sequence[Member]) -> tuple[Problem, list[Member]]:
+def fit_sensor_nonlinearity(problem: Problem, members: Sequence[FittedEffect]) -> tuple[Problem, list[FittedEffect]]:
     """Fits the base model, other members and what distorts readings at once, by Gauss and Newton's method.
 
     A base model that is fitted to readings alone follows them. A distortion measured by its torque is then too small,
@@ -40,21 +40,21 @@ def undistorted(problem: Problem, members: Sequence[Member]) -> tuple[Problem, l
     search = _Search(problem, [m for k, m in enumerate(members) if k not in wrong], [members[k] for k in wrong])
     problem, known = search.run()
     for k, member in zip(wrong, known, strict=True):
-        found[k] = refine(problem, member.hypothesis, member.shape, all_but(problem, found, k), effort=0)
+        found[k] = refine(problem, member.hypothesis, member.shape, accept_all_but(problem, found, k), effort=0)
     return problem, found
 
 
 class _Search:
     """Unknowns: base parameters, nuisance and coefficients of plain members; then coefficients and shapes of others."""
 
-    def __init__(self, problem: Problem, plain: Sequence[Member], wrong: Sequence[Member]) -> None:
+    def __init__(self, problem: Problem, plain: Sequence[FittedEffect], wrong: Sequence[FittedEffect]) -> None:
         self.problem, self.wrong = problem, list(wrong)
-        self.fit = JointFit(problem, plain, np.ones_like(problem.recording.unsure))
+        self.fit = JointFit(problem, plain, np.ones_like(problem.recording.sign_unknown))
         # What is known, such as the torque that a formula is relative to, stays.
         self.bounds = [_bounds(problem, member) for member in wrong]
         self.loose = [[k for k, (low, high) in enumerate(own) if low < high] for own in self.bounds]
 
-    def run(self) -> tuple[Problem, list[Member]]:
+    def run(self) -> tuple[Problem, list[FittedEffect]]:
         """Steps until the sum of squares falls no more."""
         members, tau = self.wrong, self.problem.recording.tau
         values = self.fit.values(tau - self._distortion(self.problem, members))
@@ -74,7 +74,7 @@ class _Search:
                 break
         return now, members
 
-    def _solved(self, values: Array, now: Problem, members: Sequence[Member]) -> Array:
+    def _solved(self, values: Array, now: Problem, members: Sequence[FittedEffect]) -> Array:
         """Solves for all unknowns, what is read linear in them as it is about here."""
         passes, more, own = np.ones_like(self.problem.recording.tau), [], [values]
         for member, loose in zip(members, self.loose, strict=True):
@@ -91,9 +91,11 @@ class _Search:
         # Nuisance and other effects are read as they are: what distorts is told by the base model's torque.
         columns[:, :, : self.problem.baseline.base.size] *= passes[:, :, None]
         left = self.problem.recording.tau - self.fit.full @ values - self._distortion(now, members)
-        return held(*self.fit.normal(left + columns @ np.concatenate(own), columns), self.problem.pull)
+        return solve_map(*self.fit.normal(left + columns @ np.concatenate(own), columns), self.problem.prior)
 
-    def _moved(self, values: Array, members: Sequence[Member], goal: Array, share: float) -> tuple[Array, list[Member]]:
+    def _moved(
+        self, values: Array, members: Sequence[FittedEffect], goal: Array, share: float
+    ) -> tuple[Array, list[FittedEffect]]:
         """Goes a share of the way to a solution."""
         at, moved = len(values), []
         for member, loose, bounds in zip(members, self.loose, self.bounds, strict=True):
@@ -101,7 +103,7 @@ class _Search:
             coefficients = member.coefficients + share * (goal[at : at + k] - member.coefficients)
             for i, value in zip(loose, goal[at + k : at + k + len(loose)], strict=True):
                 shape[i] += share * (float(value) - shape[i])
-            moved.append(replace(member, coefficients=coefficients, shape=within(shape, bounds)))
+            moved.append(replace(member, coefficients=coefficients, shape=clip_shape(shape, bounds)))
             at += k + len(loose)
         return values + share * (goal[: len(values)] - values), moved
 
@@ -110,12 +112,12 @@ class _Search:
         now = problem.baseline.situation(problem.recording, values[: problem.baseline.base.size])
         return replace(problem, situation=now)
 
-    def _distortion(self, now: Problem, members: Sequence[Member]) -> Array:
+    def _distortion(self, now: Problem, members: Sequence[FittedEffect]) -> Array:
         return np.sum([dense(now, m.hypothesis, m.shape) @ m.coefficients for m in members], axis=0)
 
-    def _cost(self, values: Array, now: Problem, members: Sequence[Member]) -> float:
+    def _cost(self, values: Array, now: Problem, members: Sequence[FittedEffect]) -> float:
         """What is left, weighed, and what the pull and reversals say against it."""
-        fit, problem, pull = self.fit, self.problem, self.problem.pull
+        fit, problem, pull = self.fit, self.problem, self.problem.prior
         left = (problem.recording.tau - fit.full @ values - self._distortion(now, members)) * fit.weights
         off = values[: len(pull.target)] - pull.target
         cost = float(np.sum(left**2) + off @ pull.precision @ off)
@@ -124,5 +126,5 @@ class _Search:
         return cost
 
 
-def _bounds(problem: Problem, member: Member) -> tuple[tuple[float, float], ...]:
+def _bounds(problem: Problem, member: FittedEffect) -> tuple[tuple[float, float], ...]:
     return member.hypothesis.effect.bounds(problem.situation, member.hypothesis.joint)

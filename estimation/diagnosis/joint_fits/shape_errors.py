@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member, climb
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, climb
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from robots.common.stretches import spans
 
@@ -39,12 +39,12 @@ CUT = 0.05
 POINTS = 21
 
 
-def shape_errors(problem: Problem, member: Member, others: Accepted) -> list[float]:
+def shape_errors(problem: Problem, member: FittedEffect, others: Accepted) -> list[float]:
     """Finds each shape parameter's standard error by its profile; infinite where the likelihood hardly drops.
 
     One whose bounds are equal is known, unless it is a choice and another would do about as well.
     """
-    situation = problem.sees(member.hypothesis.effect)
+    situation = problem.state_for(member.hypothesis.effect)
     bounds = member.hypothesis.effect.bounds(situation, member.hypothesis.joint)
     steps = []
     for k, (value, (low, high), shape) in enumerate(
@@ -86,14 +86,16 @@ def shape_errors(problem: Problem, member: Member, others: Accepted) -> list[flo
     return steps
 
 
-def _chosen(problem: Problem, member: Member, k: int, others: Accepted) -> bool:
+def _chosen(problem: Problem, member: FittedEffect, k: int, others: Accepted) -> bool:
     """Whether the data tell the only value that a shape parameter may have from others that machines have."""
     rest = [value for value in member.hypothesis.effect.shapes[k].choices if value != member.shape[k]]
     gains = [_gain(problem, member, with_value(member.shape, k, value), others) for value in rest]
     return max(gains, default=-np.inf) < _gain(problem, member, member.shape, others) - CHOSEN
 
 
-def _assumed(problem: Problem, member: Member, others: Accepted, best: float, bounds: tuple[float, float]) -> float:
+def _assumed(
+    problem: Problem, member: FittedEffect, others: Accepted, best: float, bounds: tuple[float, float]
+) -> float:
     """How far a shape may be from what is assumed of it, by the likelihood's own top, which was not worth its price."""
     points = np.linspace(*bounds, POINTS)
     gains = [_gain(problem, member, (float(x),), others) for x in points]
@@ -102,7 +104,7 @@ def _assumed(problem: Problem, member: Member, others: Accepted, best: float, bo
     return max(near, default=0.0)
 
 
-def _drop(problem: Problem, member: Member, k: int, others: Accepted, best: float, value: float) -> float:
+def _drop(problem: Problem, member: FittedEffect, k: int, others: Accepted, best: float, value: float) -> float:
     """How much less is explained with another value of a shape parameter."""
     return best - _gain(problem, member, with_value(member.shape, k, value), others)
 
@@ -134,20 +136,20 @@ def _reach(drop: Callable[[float], float], value: float, step: float, bounds: tu
     return float(farthest)
 
 
-def _paired(member: Member) -> bool:
+def _paired(member: FittedEffect) -> bool:
     """Whether its shapes are a velocity and the exponent of it, or the like: two of which neither is assumed."""
     shapes = member.hypothesis.effect.shapes
     return len(shapes) == 2 and all(s.default is None and s.lower > -np.inf for s in shapes)
 
 
-def _along_ridge(problem: Problem, member: Member, k: int, others: Accepted, step: float) -> float:
+def _along_ridge(problem: Problem, member: FittedEffect, k: int, others: Accepted, step: float) -> float:
     """How far one of two shapes may be, by the likelihood at its 95 % bound, the other one always refitted.
 
     A ridge of the likelihood is bent: neither its curvature at the top says how long it is, nor its width. The longer
     way counts.
     """
     shapes = member.hypothesis.effect.shapes
-    bounds = member.hypothesis.effect.bounds(problem.sees(member.hypothesis.effect), member.hypothesis.joint)
+    bounds = member.hypothesis.effect.bounds(problem.state_for(member.hypothesis.effect), member.hypothesis.joint)
     other, value = 1 - k, member.shape[k]
     best: list[float] = []
 
@@ -184,7 +186,9 @@ def _along_ridge(problem: Problem, member: Member, k: int, others: Accepted, ste
     return farthest
 
 
-def hidden_moments(problem: Problem, member: Member, others: Sequence[Member], errors: Sequence[float]) -> list[float]:
+def widen_change_times(
+    problem: Problem, member: FittedEffect, others: Sequence[FittedEffect], errors: Sequence[float]
+) -> list[float]:
     """Widens errors of moments of change, and of how long it lasts from there, beside times that show none.
 
     Args:
@@ -202,7 +206,7 @@ def hidden_moments(problem: Problem, member: Member, others: Sequence[Member], e
     return result
 
 
-def between_logs(problem: Problem, member: Member, others: Sequence[Member]) -> Member:
+def spread_over_pauses(problem: Problem, member: FittedEffect, others: Sequence[FittedEffect]) -> FittedEffect:
     """Puts a change that may as well have come between two logs in the middle of where it may have come."""
     moments = _moments(member)
     if len(moments) != 1 or _durations(member):
@@ -213,11 +217,11 @@ def between_logs(problem: Problem, member: Member, others: Sequence[Member]) -> 
     return member
 
 
-def _moments(member: Member) -> list[int]:
+def _moments(member: FittedEffect) -> list[int]:
     return [k for k, s in enumerate(member.hypothesis.effect.shapes) if s.moment]
 
 
-def _durations(member: Member) -> list[int]:
+def _durations(member: FittedEffect) -> list[int]:
     return [k for k, s in enumerate(member.hypothesis.effect.shapes) if s.name == "duration"]
 
 
@@ -227,15 +231,17 @@ def _pauses(problem: Problem) -> list[tuple[float, float]]:
     return [(float(t[start - 1]), float(t[start])) for start in problem.recording.starts[1:]]
 
 
-def _hidden(problem: Problem, member: Member, others: Sequence[Member], moment: float) -> list[tuple[float, float]]:
+def _hidden(
+    problem: Problem, member: FittedEffect, others: Sequence[FittedEffect], moment: float
+) -> list[tuple[float, float]]:
     """Lists the times [s] about a moment between which nothing shows it.
 
     A drive is at its limit, and its torque is all that; the joints stand; or no log was running.
     """
     t, joints = problem.recording.t, member.hypothesis.effect.acts_on(problem.situation.robot, member.hypothesis.joint)
-    blind = [np.asarray(problem.recording.unsure[:, list(joints)].all(axis=1))]
+    blind = [np.asarray(problem.recording.sign_unknown[:, list(joints)].all(axis=1))]
     for other in others:
-        if other.hypothesis.effect.last and set(other.group.joints) & set(joints):
+        if other.hypothesis.effect.acts_on_total_torque and set(other.group.joints) & set(joints):
             lost = [np.abs(X).max(axis=1) for X in problem.columns_of(other.hypothesis, other.shape)[1]]
             blind.append(np.asarray(np.any([loss > CUT * loss.max() for loss in lost], axis=0)))
     found = [(float(t[start]), float(t[stop - 1])) for rows in blind for start, stop in spans(rows)]
@@ -250,19 +256,19 @@ def _hidden(problem: Problem, member: Member, others: Sequence[Member], moment: 
     return [(a, b) for a, b in merged if b - a > BORDER and a - BORDER <= moment <= b + BORDER]
 
 
-def inexact(problem: Problem, member: Member, coefficients: Array) -> Array:
+def formula_errors(problem: Problem, member: FittedEffect, coefficients: Array) -> Array:
     """Standard errors (k + s,) of coefficients (k,) and shapes that the formula adds to those of the data."""
     effect, robot = member.hypothesis.effect, problem.situation.robot
     described = zip(effect.shapes, member.shape, strict=True)
     shapes = [s.inexact * (abs(value) if s.scale == "log" else 1.0) for s, value in described]
     own = np.array([c.inexact for c in effect.parameters(robot, member.hypothesis.joint)])
-    agreed = member.gain / member.scatter
-    if 0 < member.doubt < agreed:
-        own = np.hypot(own, np.sqrt(1.0 / (agreed - member.doubt) - 1.0 / agreed))
+    agreed = member.gain / member.birge_ratio
+    if 0 < member.motion_error_chi2 < agreed:
+        own = np.hypot(own, np.sqrt(1.0 / (agreed - member.motion_error_chi2) - 1.0 / agreed))
     return np.array([*(own * np.abs(coefficients)), *shapes])
 
 
-def _gain(problem: Problem, member: Member, shape: tuple[float, ...], others: Accepted) -> float:
+def _gain(problem: Problem, member: FittedEffect, shape: tuple[float, ...], others: Accepted) -> float:
     """What is explained at a shape, by coefficients that go with it: a delay's are near that of its reversals."""
     result = score(problem, problem.measured(member.hypothesis, shape), others)
     return result.bounded(*member.hypothesis.coefficient_bounds(problem.situation.robot, shape))[0]

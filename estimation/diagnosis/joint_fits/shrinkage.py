@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scoring import Score, accept, score
-from estimation.regressions.parameter_priors import Pull
+from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
 
@@ -21,7 +21,7 @@ ENERGIES = np.linspace(-2.0, 25.0, 109)
 FAINT = 1e-9
 
 
-def shrinkage(result: Score) -> Array:
+def shrinkage_precision(result: Score) -> Array:
     """Gives the a-priori precision (k,) of an effect's coefficients, as the data themselves ask for it.
 
     Each column is taken to make a torque of the same a-priori energy e, c_i ~ N(0, e / |x_i|^2), and e is what makes
@@ -49,16 +49,16 @@ def shrinkage(result: Score) -> Array:
     return np.asarray(raw / np.exp(energy))
 
 
-def pull_on(problem: Problem, members: Sequence[Member]) -> Pull:
+def effects_prior(problem: Problem, members: Sequence[FittedEffect]) -> GaussianPrior:
     """Gives the pull on base model, nuisance and the coefficients of members (b + m + k,), in units of plain rows."""
-    pull = problem.pull
+    pull = problem.prior
     own, targets = [], []
     for i, member in enumerate(members):
         others = accept(problem, tuple(m.group for k, m in enumerate(members) if k != i))
-        precision, target = shrinkage(score(problem, member.group, others)), np.zeros(member.group.size)
-        if member.group.timed is not None and problem.timing is not None:
-            timed = np.sum(member.group.timed**2, axis=0)
-            target = member.group.timed.T @ problem.timing.residual / (timed + precision)
+        precision, target = shrinkage_precision(score(problem, member.group, others)), np.zeros(member.group.size)
+        if member.group.reversal_columns is not None and problem.timing is not None:
+            timed = np.sum(member.group.reversal_columns**2, axis=0)
+            target = member.group.reversal_columns.T @ problem.timing.residual / (timed + precision)
             precision = precision + timed
         own.append(problem.whitening.row_weight * precision)
         targets.append(target)
@@ -67,4 +67,4 @@ def pull_on(problem: Problem, members: Sequence[Member]) -> Pull:
     precision = np.zeros((known + len(added),) * 2)
     precision[:known, :known] = pull.precision
     precision[range(known, len(precision)), range(known, len(precision))] = added
-    return Pull(precision, np.concatenate([pull.target, *targets]))
+    return GaussianPrior(precision, np.concatenate([pull.target, *targets]))

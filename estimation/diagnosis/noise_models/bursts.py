@@ -20,7 +20,7 @@ SELDOM = 0.1
 """Share of the rows up to which it is for moments; more is what the residual is like."""
 
 
-def bursts(pieces: Sequence[Array], measured: NDArray[np.bool_], step: float) -> NDArray[np.bool_]:
+def find_bursts(pieces: Sequence[Array], measured: NDArray[np.bool_], step: float) -> NDArray[np.bool_]:
     """Marks rows (M, n) about such moments, joint by joint.
 
     Args:

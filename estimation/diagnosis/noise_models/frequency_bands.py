@@ -120,7 +120,7 @@ def find_bands(
     return tuple(low_pass(float(cutoff), rate, stride) for cutoff in cutoffs)
 
 
-def unbiased(recording: Recording, inertia: Array, residual: Array, moving: Array | float = 1.0) -> Array:
+def unbiased_frequencies(recording: Recording, inertia: Array, residual: Array, moving: Array | float = 1.0) -> Array:
     """Finds up to which frequencies (n,) [Hz] the errors of accelerations bias no model by what shows.
 
     An error of energy E in a column that has the energy G with it, both over the noise's, takes the share E / G off its

@@ -13,10 +13,10 @@ from scipy.signal import firwin
 
 from estimation.diagnosis.base_models.baseline import FAINT, Baseline
 from estimation.diagnosis.noise_models.frequency_bands import TRANSITION, Band, low_pass
-from estimation.diagnosis.noise_models.masked_rows import find_gaps
-from estimation.diagnosis.noise_models.spectral_lines import without_lines
+from estimation.diagnosis.noise_models.masked_rows import find_masked_rows
+from estimation.diagnosis.noise_models.spectral_lines import remove_lines
 from estimation.diagnosis.noise_models.whitening import Whitening
-from estimation.diagnosis.recordings.recording import Recording, long_gap
+from estimation.diagnosis.recordings.recording import Recording, rest_rows
 from estimation.linear_algebra.orthonormal import orthonormal
 
 Array = NDArray[np.float64]
@@ -33,27 +33,27 @@ PARTS, FEWEST = 8, 10
 
 
 @dataclass(frozen=True, eq=False)
-class Above:
+class JointHighBand:
     """What one joint's torque is above its band.
 
     Attributes:
-        passing: lets through what is above, at the white rows, and levels its noise.
+        high_pass: lets through what is above, at the white rows, and levels its noise.
         counts: weights of the rows (N',): none for those whose direction of motion is not known.
         base: orthonormal columns of the base model (N', b).
         residual: white torque that the base model leaves, fitted anew (N',).
-        bare: what it leaves as it was fitted to the band (N',).
+        residual_of_band_fit: what it leaves as it was fitted to the band (N',).
     """
 
-    passing: Band
+    high_pass: Band
     counts: Array
     base: Array
     residual: Array
-    bare: Array
+    residual_of_band_fit: Array
 
 
 @dataclass(frozen=True, eq=False)
-class Upper:
-    """A second regression, in the frequencies above each joint's band, for effects that are `fast`.
+class HighBand:
+    """A second regression above each joint's band, for effects that are `independent_of_acceleration`.
 
     The noise is the residual's own there, with what unknown accelerations add to it. Each joint's columns of the base
     model are fitted anew, for what is left of friction and inertia there is not what they are below; but not for what
@@ -62,24 +62,24 @@ class Upper:
     Attributes:
         whitening: makes the noise white in a band that is far wider.
         joints: each joint's; None where its band leaves nothing above it.
-        calm: white rows (N',) in which no joint turns round.
+        far_from_reversals: white rows (N',) in which no joint turns round.
     """
 
     whitening: Whitening
-    joints: tuple[Above | None, ...]
-    calm: NDArray[np.bool_]
+    joints: tuple[JointHighBand | None, ...]
+    far_from_reversals: NDArray[np.bool_]
 
     def columns(self, series: Array, joint: int, *, calm: bool = False, bare: bool = False) -> Array:
         """Whitens columns (N, k) of a joint, from 0, above its band and projects the base model out (N', k).
 
-        Those that are to be `calm` count where no joint turns round: all feel what is not known of its acceleration.
-        From those that are `bare` nothing is projected.
+        Those that are to be `far_from_reversals` count where no joint turns round: all feel what is not known of its
+        acceleration. From those that are `bare` nothing is projected.
         """
         above = self.joints[joint]
         if above is None:
             return np.zeros((0, series.shape[1]))
-        counts = above.counts * self.calm if calm else above.counts
-        white = _passed(self.whitening, series, joint, above.passing) * counts[:, None]
+        counts = above.counts * self.far_from_reversals if calm else above.counts
+        white = _passed(self.whitening, series, joint, above.high_pass) * counts[:, None]
         return white if bare else np.asarray(white - above.base @ (above.base.T @ white))
 
     def cross(self, columns: Array, joint: int, *, bare: bool = False) -> Array:
@@ -87,22 +87,22 @@ class Upper:
         above = self.joints[joint]
         if above is None:
             return np.zeros(columns.shape[1])
-        return np.asarray(columns.T @ (above.bare if bare else above.residual))
+        return np.asarray(columns.T @ (above.residual_of_band_fit if bare else above.residual))
 
-    def slope(self, joint: int, rows: int, *, bare: bool = False) -> Array:
+    def score_gradient(self, joint: int, rows: int, *, bare: bool = False) -> Array:
         """Gives what torque in each of a joint's rows (N,) has to do with the residual above its band."""
         above = self.joints[joint]
         if above is None:
             return np.zeros(rows)
-        left = above.counts * (above.bare if bare else above.residual)
+        left = above.counts * (above.residual_of_band_fit if bare else above.residual)
         runs = _runs(left, self.whitening.starts, rows, self.whitening.stride)
         # Without delay, what is above is let through alike from either side.
-        return self.whitening.unfiltered(np.concatenate([above.passing.passed(run) for run in runs]), joint, rows)
+        return self.whitening.unfiltered(np.concatenate([above.high_pass.passed(run) for run in runs]), joint, rows)
 
     def regression(self, columns: Array, *, calm: NDArray[np.bool_]) -> tuple[Array, Array]:
         """Gives the rows (R, k) of columns (N, n, k) above the bands of joints that they act on, and torque (R,).
 
-        Those marked in `calm` (k,) count where no joint turns round.
+        Those marked in `far_from_reversals` (k,) count where no joint turns round.
         """
         rows, torque = [np.zeros((0, columns.shape[2]))], [np.zeros(0)]
         for j, above in enumerate(self.joints):
@@ -115,9 +115,9 @@ class Upper:
         return np.concatenate(rows), np.concatenate(torque)
 
 
-def pose_upper(
+def build_high_band(
     recording: Recording, baseline: Baseline, remainder: Array, noise: Array, bands: Sequence[Band], wide: Whitening
-) -> Upper:
+) -> HighBand:
     """Prepares the regression above the bands.
 
     Args:
@@ -129,8 +129,8 @@ def pose_upper(
         wide: whitens the noise in wider bands.
     """
     # Rows beside reversals are left out after the filters: a ripple goes on through them, and need not be bridged.
-    wide = replace(wide, gaps=find_gaps(recording.unsure, recording.starts, long_gap(recording.step)))
-    joints: list[Above | None] = []
+    wide = replace(wide, masked=find_masked_rows(recording.sign_unknown, recording.starts, rest_rows(recording.step)))
+    joints: list[JointHighBand | None] = []
     for j, (band, wider) in enumerate(zip(bands, wide.bands, strict=True)):
         if band.cutoff > NEARLY * wider.cutoff:
             joints.append(None)
@@ -143,8 +143,8 @@ def pose_upper(
         own = np.concatenate([baseline.regressor[:, j], baseline.nuisance[:, j]], axis=1)
         base = orthonormal(_passed(wide, own[:, own.any(axis=0)], j, passing) * counts[:, None], FAINT)
         white = _passed(wide, remainder[:, j, None], j, passing)[:, 0] * counts
-        joints.append(Above(passing, counts, base, white - base @ (base.T @ white), white))
-    return Upper(wide, tuple(joints), recording.calm(wide.stride))
+        joints.append(JointHighBand(passing, counts, base, white - base @ (base.T @ white), white))
+    return HighBand(wide, tuple(joints), recording.far_from_reversals(wide.stride))
 
 
 def _levelling(
@@ -173,7 +173,7 @@ def _levelling(
         counted = int(np.count_nonzero(values))
         power = np.abs(np.fft.rfft(values)) ** 2 / max(counted, 1)
         f = np.fft.rfftfreq(len(values), 1 / rate)
-        power = without_lines(power[:, None], f[1], period if count > 1 else None)[:, 0]
+        power = remove_lines(power[:, None], f[1], period if count > 1 else None)[:, 0]
         lines = np.arange(len(f)) % count == 0
         known += counted
         for part, (below, above) in enumerate(pairwise(edges)):
@@ -230,7 +230,7 @@ def _counts(wide: Whitening, recording: Recording, joint: int, edge: int) -> Arr
     reach = int(np.ceil(0.5 / wide.bands[joint].cutoff / recording.step))
     parts = []
     for run in recording.runs:
-        part = ~maximum_filter1d(recording.unsure[run, joint], 2 * reach + 1)[:: wide.stride]
+        part = ~maximum_filter1d(recording.sign_unknown[run, joint], 2 * reach + 1)[:: wide.stride]
         part[:edge] = False
         part[max(len(part) - edge, 0) :] = False
         parts.append(part)

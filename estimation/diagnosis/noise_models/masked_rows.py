@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Gaps:
+class MaskedRows:
     """Rows in which a joint's direction of motion is not known, nor then the sign of its friction.
 
     They are bridged by straight lines in torque and hypotheses alike, so that filters pass over them: a friction that
@@ -42,7 +42,7 @@ class Gaps:
         result[rows] = (1 - w) * series[before] + w * series[after]
         return result
 
-    def gathered(self, slope: Array, joint: int) -> Array:
+    def bridge_adjoint(self, slope: Array, joint: int) -> Array:
         """Hands on to the rows beside a joint's gaps what (N,) has to do with the bridge: the adjoint of `bridged`."""
         rows, before, after, weight = self.bridges[joint]
         result = slope.copy()
@@ -51,7 +51,7 @@ class Gaps:
         np.add.at(result, after, weight * slope[rows])
         return result
 
-    def freed(self, white: NDArray[Real], joint: int) -> NDArray[Real]:
+    def project_out(self, white: NDArray[Real], joint: int) -> NDArray[Real]:
         """Projects the short gaps' torques out of white columns of a joint."""
         return self.free[joint].projected_out(white) if joint < len(self.free) else white
 
@@ -66,7 +66,7 @@ class Gaps:
         return np.column_stack(columns)
 
 
-def find_gaps(unsure: NDArray[np.bool_], starts: tuple[int, ...], longest: int = 0) -> Gaps:
+def find_masked_rows(unsure: NDArray[np.bool_], starts: tuple[int, ...], longest: int = 0) -> MaskedRows:
     """Makes bridges over stretches of rows (N, n) longer than `longest`, none from one log to another."""
     bridges = []
     for column in unsure.T:
@@ -92,10 +92,10 @@ def find_gaps(unsure: NDArray[np.bool_], starts: tuple[int, ...], longest: int =
         else:
             rows, before, after, weight = empty, empty, empty, np.zeros(0)
         bridges.append((rows, before, after, weight))
-    return Gaps(tuple(bridges), ())
+    return MaskedRows(tuple(bridges), ())
 
 
-def no_gaps(joints: int) -> Gaps:
+def no_masked_rows(joints: int) -> MaskedRows:
     """Builds the gaps of a motion whose direction is known throughout."""
     none = np.zeros(0, dtype=np.intp)
-    return Gaps(((none, none, none, np.zeros(0)),) * joints, ())
+    return MaskedRows(((none, none, none, np.zeros(0)),) * joints, ())

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from estimation.diagnosis.noise_models.bursts import bursts
-from estimation.diagnosis.noise_models.frequency_bands import SHARE, find_bands, unbiased
-from estimation.diagnosis.noise_models.masked_rows import find_gaps
-from estimation.diagnosis.noise_models.noise_nuisance_basis import Beside
-from estimation.diagnosis.noise_models.noise_spectrum import PLAIN, SPARING, fit_process
-from estimation.diagnosis.noise_models.spectral_lines import without_lines
+from estimation.diagnosis.noise_models.bursts import find_bursts
+from estimation.diagnosis.noise_models.frequency_bands import SHARE, find_bands, unbiased_frequencies
+from estimation.diagnosis.noise_models.masked_rows import find_masked_rows
+from estimation.diagnosis.noise_models.noise_nuisance_basis import NuisanceProjection
+from estimation.diagnosis.noise_models.noise_spectrum import ALL_FREQUENCIES, WITHOUT_LOW_FREQUENCIES, fit_noise_process
+from estimation.diagnosis.noise_models.spectral_lines import remove_lines
 from estimation.diagnosis.noise_models.whitening import Whitening, free_columns
 from estimation.diagnosis.recordings.log_reading import Recording
-from estimation.diagnosis.recordings.recording import long_gap
+from estimation.diagnosis.recordings.recording import rest_rows
 
 Array = NDArray[np.float64]
 
@@ -64,16 +64,16 @@ def estimate_whitening(
         share: of the torque noise, what those may make in the bands.
         spared: for each joint columns (N, k) on which no noise is measured.
     """
-    colour = SPARING if len(spared) else PLAIN
-    longest = long_gap(recording.step)
-    rests = find_gaps(recording.unsure, recording.starts, longest)
+    colour = WITHOUT_LOW_FREQUENCIES if len(spared) else ALL_FREQUENCIES
+    longest = rest_rows(recording.step)
+    rests = find_masked_rows(recording.sign_unknown, recording.starts, longest)
     # Where the direction of motion is not known the residual is no noise.
-    gaps = find_gaps(recording.unsure, recording.starts)
+    gaps = find_masked_rows(recording.sign_unknown, recording.starts)
     bridged = np.column_stack([gaps.bridged(column, j) for j, column in enumerate(residual.T)])
     pieces = [bridged[run] for run in recording.runs]
     moving = np.array([1.0 - len(rows) / len(residual) for rows, *_ in rests.bridges])
-    highest = unbiased(recording, inertia, bridged, moving) if share == SHARE else np.inf
-    known = [~recording.unsure[run] for run in recording.runs]
+    highest = unbiased_frequencies(recording, inertia, bridged, moving) if share == SHARE else np.inf
+    known = [~recording.sign_unknown[run] for run in recording.runs]
     bands = find_bands(recording, inertia, _density(pieces, recording.step, known), share, highest)
     pieces = [
         np.column_stack([band.passed(column) for band, column in zip(bands, piece.T, strict=True)]) for piece in pieces
@@ -85,23 +85,23 @@ def estimate_whitening(
     resting = rests.resting(recording.starts, len(residual), stride, int(np.ceil(1.5 * widths.max())) + 2)
     measured = ~resting if colour.held else _measured(recording, stride, widths, ~resting)
     spared = [gaps.bridged(X, j) for j, X in enumerate(spared)]
-    beside = Beside(spared, bands, recording.runs, measured)
+    beside = NuisanceProjection(spared, bands, recording.runs, measured)
     left = beside.left(pieces)
-    if (moments := bursts(left, measured, step)).any():
+    if (moments := find_bursts(left, measured, step)).any():
         measured &= ~moments
-        beside = Beside(spared, bands, recording.runs, measured)
+        beside = NuisanceProjection(spared, bands, recording.runs, measured)
         left = beside.left(pieces)
     counts, pieces = np.maximum(measured.sum(axis=0), 1).astype(float), left
     slowest, fastest = max(colour.flat, FEWEST / (sum(map(len, pieces)) * step)), INSIDE * cutoffs
-    slowest = slowest if slowest <= PLAIN.flat else 0.0
+    slowest = slowest if slowest <= ALL_FREQUENCIES.flat else 0.0
     period = next((cycle.period for cycle in recording.cycles if cycle is not None), None)
-    noise = fit_process(pieces, step, counts, parameters, (slowest, fastest), beside, period, colour)
+    noise = fit_noise_process(pieces, step, counts, parameters, (slowest, fastest), beside, period, colour)
     levels = None
     if len(pieces) > 1:
         counted = [rows.sum(axis=0) for rows in np.split(~resting, np.cumsum([len(piece) for piece in pieces])[:-1])]
         levels = _levels([noise.whitened(piece) for piece in pieces], counted, step, slowest, fastest)
         pieces = [piece / level for piece, level in zip(pieces, levels, strict=True)]
-        noise = fit_process(pieces, step, counts, parameters, (slowest, fastest), beside, period, colour)
+        noise = fit_noise_process(pieces, step, counts, parameters, (slowest, fastest), beside, period, colour)
     trimmed = max(len(a) for a in noise.coefficients)
     innovations = np.concatenate([noise.whitened(piece)[min(trimmed, len(piece) // 2) :] for piece in pieces])
     # White noise has as much power at each frequency: what effects add to the slow ones is left out, and above the band
@@ -109,7 +109,7 @@ def estimate_whitening(
     spectrum = np.fft.rfft(innovations, axis=0)
     f = np.fft.rfftfreq(len(innovations), step)
     inside = (f[:, None] >= slowest) & (f[:, None] < fastest)
-    power = without_lines(np.abs(spectrum) ** 2, f[1], period)
+    power = remove_lines(np.abs(spectrum) ** 2, f[1], period)
     spectrum *= np.sqrt(power) / np.maximum(np.abs(spectrum), np.finfo(float).tiny)
     spectrum[~inside] = 0.0
     power = np.where(inside, power / beside.kept(len(innovations), counts), 0.0)
@@ -127,12 +127,12 @@ def estimate_whitening(
         precision=np.asarray(np.linalg.inv(correlation), dtype=np.float64),
         starts=recording.starts,
         innovations=white,
-        gaps=gaps,
+        masked=gaps,
         bands=bands,
         levels=levels,
     )
-    free = free_columns(recording.unsure, longest, plain, widths.tolist())
-    plain = replace(plain, gaps=replace(gaps, free=free))
+    free = free_columns(recording.sign_unknown, longest, plain, widths.tolist())
+    plain = replace(plain, masked=replace(gaps, free=free))
     white_left = np.where(resting, np.nan, np.abs(plain.all(residual)))
     level = np.array([np.nanmedian(column) if np.isfinite(column).any() else 1.0 for column in white_left.T]) / 0.6745
     weights = np.minimum(1.0, HUBER * np.maximum(level, 0.1) / np.maximum(white_left, 1e-12))
@@ -147,7 +147,7 @@ def _measured(recording: Recording, stride: int, widths: Array, moving: NDArray[
     """
     result = moving.copy()
     for j, width in enumerate(widths):
-        bridges = find_gaps(recording.unsure[:, [j]], recording.starts, max(SHORT, round(width)))
+        bridges = find_masked_rows(recording.sign_unknown[:, [j]], recording.starts, max(SHORT, round(width)))
         held = bridges.resting(recording.starts, len(recording), stride, int(np.ceil(width)))[:, 0]
         if np.sum(moving[:, j] & ~held) > ENOUGH * np.sum(moving[:, j]):
             result[:, j] &= ~held
@@ -165,7 +165,7 @@ def _pushed(outside: NDArray[np.bool_], recording: Recording, stride: int, cutof
         width = max(3, round(max(TOGETHER, 1.5 / cutoff) / step))
         crowded[:, j] = uniform_filter1d(outside[:, j].astype(float), width) >= 0.5
     near = [
-        maximum_filter1d(recording.unsure[run].astype(np.int8), 2 * reach + 1, axis=0)[::stride]
+        maximum_filter1d(recording.sign_unknown[run].astype(np.int8), 2 * reach + 1, axis=0)[::stride]
         for run in recording.runs
     ]
     return outside & crowded & (np.concatenate(near) == 0)
@@ -210,7 +210,7 @@ def quiet_joints(recording: Recording, residual: Array, inertia: Array) -> NDArr
     density = _density([residual[run] for run in recording.runs], recording.step)
     # Of the samples themselves, which are as many as a kick lasts for.
     noise = np.sqrt(density * recording.stride / (2 * recording.step))
-    return np.asarray(np.diag(inertia) * recording.jolts < DROWNED * noise)
+    return np.asarray(np.diag(inertia) * recording.reversal_acceleration_error < DROWNED * noise)
 
 
 def _density(pieces: Sequence[Array], step: float, known: Sequence[NDArray[np.bool_]] | None = None) -> Array:

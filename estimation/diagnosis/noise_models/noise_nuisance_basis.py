@@ -26,7 +26,7 @@ FAINT = 1e-6
 LEAST_KEPT = 0.2
 
 
-class Beside:
+class NuisanceProjection:
     """Columns that are projected out of white rows, joint by joint, and what of noise they leave at each frequency.
 
     Args:
@@ -70,7 +70,7 @@ def is_short(recording: Recording) -> bool:
     return recording.duration < SHORTEST
 
 
-def own_functions(recording: Recording, baseline: Baseline, residual: Array) -> tuple[Array, ...]:
+def build_nuisance_projection(recording: Recording, baseline: Baseline, residual: Array) -> tuple[Array, ...]:
     """Evaluates functions of position, speed and load, and friction by time, less what the base model makes of them.
 
     Most effects of the catalogue are about such a function. What they leave in the residual is as fast as the motion
@@ -86,7 +86,7 @@ def own_functions(recording: Recording, baseline: Baseline, residual: Array) -> 
     """
     if is_short(recording):
         return ()
-    known = ~recording.unsure
+    known = ~recording.sign_unknown
     weights = known / np.maximum(recording.tau.std(axis=0), 1e-12)
     sign = baseline.situation(recording, np.zeros(baseline.base.size)).sign
     size = baseline.regressor.shape[2] + baseline.nuisance.shape[2]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
-from estimation.diagnosis.noise_models.noise_nuisance_basis import Beside
-from estimation.diagnosis.noise_models.spectral_lines import without_lines
+from estimation.diagnosis.noise_models.noise_nuisance_basis import NuisanceProjection
+from estimation.diagnosis.noise_models.spectral_lines import remove_lines
 from estimation.uncertainty.autoregressive import HIGHEST_ORDER, Noise, fit_noise, levinson
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ ROUNDS = 20
 
 
 @dataclass(frozen=True)
-class Colour:
+class SpectrumSettings:
     """How the colour of noise is told.
 
     Attributes:
@@ -43,19 +43,19 @@ class Colour:
 
 # Beside free functions all of the memory is used: an order that predicts best misses much of what noise slower than a
 # second has, and slow effects are measured against that. Where nothing is spared it would take slow effects for noise.
-SPARING = Colour(flat=0.15, memory=1.0, rows=100, times=HIGHEST_ORDER, held=False)
-PLAIN = Colour(flat=1.0, memory=0.2, rows=1, times=1, held=True)
+WITHOUT_LOW_FREQUENCIES = SpectrumSettings(flat=0.15, memory=1.0, rows=100, times=HIGHEST_ORDER, held=False)
+ALL_FREQUENCIES = SpectrumSettings(flat=1.0, memory=0.2, rows=1, times=1, held=True)
 
 
-def fit_process(
+def fit_noise_process(
     pieces: Sequence[Array],
     step: float,
     counts: Array,
     parameters: int,
     window: tuple[float, Array],
-    beside: Beside,
+    beside: NuisanceProjection,
     period: float | None,
-    colour: Colour,
+    colour: SpectrumSettings,
 ) -> Noise:
     """Fits the noise by its spectrum within a window, and lets the model say what is outside.
 
@@ -78,7 +78,7 @@ def fit_process(
     orders = np.clip(longest, LOWEST_ORDER, HIGHEST_ORDER).astype(int)
     size = next_fast_len(max(map(len, pieces)) + int(orders.max()) + 1, real=True)
     power = sum(np.abs(np.fft.rfft(piece, size, axis=0)) ** 2 for piece in pieces) / counts
-    power = without_lines(power / beside.kept(size, counts), 1 / (size * step), period)
+    power = remove_lines(power / beside.kept(size, counts), 1 / (size * step), period)
     power = power * rows * joints / max(rows * joints - parameters, 0.5 * rows * joints)
     covariances = [
         _covariance(power[:, j], size, step, counts[j], (window[0], float(window[1][j])), orders[j], colour.times)

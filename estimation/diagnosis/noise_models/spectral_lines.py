@@ -14,7 +14,7 @@ CHANCE = 1e-3
 BESIDE, FEWEST = 1.0, 41
 
 
-def without_lines(power: Array, width: float, period: float | None = None) -> Array:
+def remove_lines(power: Array, width: float, period: float | None = None) -> Array:
     """Levels lines to the noise about them.
 
     The power of noise at one frequency is exponentially distributed about its density, and a median tells that whatever

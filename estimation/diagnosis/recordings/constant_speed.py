@@ -16,7 +16,7 @@ STRAIGHT = 1.5
 """Encoder steps by which the middle of a straight line is off its ends' mean, three times rounded, at most."""
 
 
-def cruised(q: Array, dq: Array, ddq: Array, counts: Array, step: float) -> tuple[Array, Array]:
+def remove_encoder_lines(q: Array, dq: Array, ddq: Array, counts: Array, step: float) -> tuple[Array, Array]:
     """Takes the lines of encoder steps out of velocities and accelerations (N, n), where joints keep their speed.
 
     At constant speed the steps fold down to a few frequencies that stay where they are. No spectrum tells those from

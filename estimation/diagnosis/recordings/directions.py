@@ -45,20 +45,27 @@ class Directions:
     """What is known of the directions of a log's joints.
 
     Attributes:
-        unsure: rows (N, n) in which a joint's direction is not known, or not to be relied on beside its reversals.
-        clear: those of them (N, n) in which the velocity tells it.
-        jolts: error of the accelerations (n,) beside reversals [rad/s2 or m/s2].
-        late: how late joints may turn round (N, n) [s] by their velocities' error, where rows beside reversals count.
+        sign_unknown: rows (N, n) in which a joint's direction is not known, or not to be relied on beside its
+            reversals.
+        sign_known_from_velocity: those of them (N, n) in which the velocity tells it.
+        reversal_acceleration_error: error of the accelerations (n,) beside reversals [rad/s2 or m/s2].
+        reversal_time_error: how late joints may turn round (N, n) [s] by their velocities' error, where rows beside
+            reversals count.
     """
 
-    unsure: Flags
-    clear: Flags
-    jolts: Array
-    late: Array
+    sign_unknown: Flags
+    sign_known_from_velocity: Flags
+    reversal_acceleration_error: Array
+    reversal_time_error: Array
 
     def rows(self, kept: slice) -> Directions:
         """Gives what is known of some rows."""
-        return replace(self, unsure=self.unsure[kept], clear=self.clear[kept], late=self.late[kept])
+        return replace(
+            self,
+            sign_unknown=self.sign_unknown[kept],
+            sign_known_from_velocity=self.sign_known_from_velocity[kept],
+            reversal_time_error=self.reversal_time_error[kept],
+        )
 
     def spread(self, between: NDArray[np.intp]) -> Directions:
         """Takes no row as sure whose torque comes of two samples between which a joint may have turned round.
@@ -69,14 +76,18 @@ class Directions:
         inner = np.flatnonzero(between >= 0)
         if not len(inner):
             return self
-        unsure = self.unsure.copy()
+        unsure = self.sign_unknown.copy()
         begins = np.flatnonzero(np.diff(between[inner], prepend=-1))
         found = np.logical_or.reduceat(unsure[inner], begins, axis=0)
         unsure[inner] = np.repeat(found, np.diff([*begins, len(inner)]), axis=0)
-        return replace(self, unsure=unsure, clear=self.clear & ~(unsure & ~self.unsure))
+        return replace(
+            self,
+            sign_unknown=unsure,
+            sign_known_from_velocity=self.sign_known_from_velocity & ~(unsure & ~self.sign_unknown),
+        )
 
 
-def directions(
+def find_directions(
     dq: Array, ddq: Array, cutoffs: Array, floor: Array, ends: Array, step: float, rest: Array | None
 ) -> Directions:
     """Tells in which rows (N, n) of a log the direction of a joint's motion is known.
@@ -114,10 +125,10 @@ def directions(
         usual = float(np.sqrt(np.average(error**2, weights=np.where(turned, change, 0.0) + 1e-300)))
         # It may be as large as the noise hides where it has most power, and as what is seen beside the reversals.
         hidden = KICK * largest / (2 * np.pi * cutoff) * (LOOP / cutoff) ** 2
-        usual = max(usual, hidden if rest is None else min(hidden, _shaken(rest[:, j], turned, step)))
+        usual = max(usual, hidden if rest is None else min(hidden, _bound_reversal_velocity(rest[:, j], turned, step)))
         jolts[j] = 2 * np.pi * max(cutoff, LOOP) * usual
         error = CLEAR * np.maximum(error, usual)
-        least = np.maximum(error, np.maximum(ALIKE * change, SURELY * sharpest(v)))
+        least = np.maximum(error, np.maximum(ALIKE * change, SURELY * sharpest_sign_velocity(v)))
         clear[:, j] = sampled & (error < change) & (np.abs(v) > least)
         if (turned & (error < change)).any():
             # Reversals at which it is more do not count.
@@ -128,7 +139,7 @@ def directions(
     return Directions(unsure, unsure & clear, jolts, late)
 
 
-def _shaken(rest: Array, turned: Flags, step: float) -> float:
+def _bound_reversal_velocity(rest: Array, turned: Flags, step: float) -> float:
     """Bounds what kicks do to a joint's velocity at its reversals by what its position (N,) has there besides.
 
     They move it by as much as that is larger than elsewhere, or would not be told to be; a position loop undoes them
@@ -143,7 +154,7 @@ def _shaken(rest: Array, turned: Flags, step: float) -> float:
     return float(2 * np.pi * LOOP * np.sqrt(max(here - usual, 0.0) + error))
 
 
-def sharpest(dq: Array) -> float:
+def sharpest_sign_velocity(dq: Array) -> float:
     """Gives the velocity over which a joint's sign is tried at its sharpest, by its velocities (N,)."""
     return SHARP * min(1.0, float(np.abs(dq).max(initial=0.0)))
 

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from estimation.diagnosis.recordings.constant_speed import cruised
-from estimation.diagnosis.recordings.directions import ALIKE, Directions, directions
-from estimation.diagnosis.recordings.periods import Cycle, find_cycle, project
-from estimation.diagnosis.recordings.position_cutoff import believable_cutoff
+from estimation.diagnosis.recordings.constant_speed import remove_encoder_lines
+from estimation.diagnosis.recordings.directions import ALIKE, Directions, find_directions
+from estimation.diagnosis.recordings.periods import Cycle, find_cycle, project_on_harmonics
+from estimation.diagnosis.recordings.position_cutoff import select_position_cutoff
 from estimation.diagnosis.recordings.position_spectra import Spectra, Spectrum
 from estimation.diagnosis.recordings.recording import Recording
-from estimation.diagnosis.recordings.smoothed_motion import smoothed
-from estimation.diagnosis.recordings.thinning import low_passed, thin, under_its_top
+from estimation.diagnosis.recordings.smoothed_motion import smooth_motion
+from estimation.diagnosis.recordings.thinning import decimate_recording, keep_clipped_level, low_pass_rows
 from estimation.gate.checks.resolution import lattice_step
 from estimation.regressions.preparation import Prepared, prepare, still_joints
 from robots.common.errors import InputError
@@ -44,7 +44,7 @@ SHARPER = 1.2
 SETTLED, ENDS = 0.15, 2.0
 
 
-def record(
+def build_recording(
     robot: Robot,
     logs: Sequence[Log],
     *,
@@ -83,14 +83,14 @@ def record(
     stride = round(step / own)
     whole = abs(step - stride * own) < WHOLE * own
     if stride > 1 and whole and sum(log.log.duration for log in prepared) / own <= MOST_FINE:
-        return thin(record(robot, logs, step=own, shortest=shortest, travel=travel), stride)
+        return decimate_recording(build_recording(robot, logs, step=own, shortest=shortest, travel=travel), stride)
     spectra = [Spectra.of(log.positions) for log in prepared]
     found = [[of.of_positions(x) for x in log.positions.q.T] for of, log in zip(spectra, prepared, strict=True)]
     highest = np.max([[spectrum.cutoff() for spectrum in own] for own in found], axis=0)
-    cap = believable_cutoff(robot, prepared, highest)
+    cap = select_position_cutoff(robot, prepared, highest)
     parts = [_part(log, step, cap, of, own) for log, of, own in zip(prepared, spectra, found, strict=True)]
     never = np.all([np.ptp(part[1], axis=0) == 0 for part in parts], axis=0)
-    parts = _standing(parts, still_joints([part[1] for part in parts], travel) | never)
+    parts = _zero_resting_joints(parts, still_joints([part[1] for part in parts], travel) | never)
     lengths = [len(part[0]) for part in parts]
     total = sum(lengths) * step
     if total < shortest:
@@ -114,19 +114,19 @@ def record(
         cycles=tuple(part[5] for part in parts),
         cutoff=min(float(part[6].min()) for part in parts),
         floor=np.max([part[8] for part in parts], axis=0),
-        unsure=np.concatenate([part[7].unsure for part in parts]),
-        clear=np.concatenate([part[7].clear for part in parts]),
-        jolts=np.max([part[7].jolts for part in parts], axis=0),
-        late=np.concatenate([part[7].late for part in parts]),
-        rest=np.concatenate(rests) if len(rests) == len(parts) else None,
+        sign_unknown=np.concatenate([part[7].sign_unknown for part in parts]),
+        sign_known_from_velocity=np.concatenate([part[7].sign_known_from_velocity for part in parts]),
+        reversal_acceleration_error=np.max([part[7].reversal_acceleration_error for part in parts], axis=0),
+        reversal_time_error=np.concatenate([part[7].reversal_time_error for part in parts]),
+        position_residual=np.concatenate(rests) if len(rests) == len(parts) else None,
         cutoffs=np.array([part[6] for part in parts]) if len(rests) == len(parts) else None,
         names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
         payloads=_payloads(prepared),
-        fields=_fields(prepared),
+        gravity_fields=_fields(prepared),
     )
 
 
-def _standing(parts: Sequence[_Part], held: NDArray[np.bool_]) -> list[_Part]:
+def _zero_resting_joints(parts: Sequence[_Part], held: NDArray[np.bool_]) -> list[_Part]:
     """Takes joints that stand in a log (logs, n), but for a tremble, for joints at rest: it says nothing of them.
 
     What moves there is the error of the position loop, by some steps of the encoder, and friction holds against it. A
@@ -138,10 +138,10 @@ def _standing(parts: Sequence[_Part], held: NDArray[np.bool_]) -> list[_Part]:
         dq, ddq, floor = (np.where(stands, 0.0, values) for values in (dq, ddq, floor))
         still = replace(
             turns,
-            unsure=turns.unsure | stands,
-            clear=turns.clear & ~stands,
-            jolts=np.where(stands, 0.0, turns.jolts),
-            late=np.where(stands, 0.0, turns.late),
+            sign_unknown=turns.sign_unknown | stands,
+            sign_known_from_velocity=turns.sign_known_from_velocity & ~stands,
+            reversal_acceleration_error=np.where(stands, 0.0, turns.reversal_acceleration_error),
+            reversal_time_error=np.where(stands, 0.0, turns.reversal_time_error),
         )
         result.append((t, q, dq, ddq, tau, cycle, cutoffs, still, floor, rest))
     return result
@@ -173,15 +173,15 @@ def _part(log: Prepared, step: float, cap: float, spectra: Spectra, found: Seque
     period, grid = log.positions.period, log.positions.t
     positions = log.positions.q
     cutoffs = np.minimum([spectrum.cutoff() for spectrum in found], cap)
-    q, dq, ddq = smoothed(positions, period, cutoffs)
+    q, dq, ddq = smooth_motion(positions, period, cutoffs)
     cycle = find_cycle(positions, period)
     if cycle is not None:
         rows = slice(cycle.start, cycle.stop)
-        exact, known, repeated = project(positions, period, cycle)
+        exact, known, repeated = project_on_harmonics(positions, period, cycle)
         # One pass alone may be sharper, where the motion does not repeat as exactly as its encoder counts.
         better = (known > SHARPER * cutoffs) & (known <= cap)
         rest = positions[rows] - exact[0]
-        slow = smoothed(rest, period, np.array([spectra.of_positions(x).cutoff(none=0.0) for x in rest.T]))
+        slow = smooth_motion(rest, period, np.array([spectra.of_positions(x).cutoff(none=0.0) for x in rest.T]))
         for whole, harmonic, other in zip((q, dq, ddq), exact, slow, strict=True):
             # What does not repeat is motion too, where it stands out of the noise.
             whole[rows] = np.where(better, harmonic + other, whole[rows])
@@ -209,11 +209,11 @@ def _part(log: Prepared, step: float, cap: float, spectra: Spectra, found: Seque
     beside = log.log.t[np.clip(np.searchsorted(log.log.t, t), 1, len(log.log.t) - 1) + np.array([[-1], [0]])]
     sampled = abs(step - period) < 1e-9 and bool(np.abs(beside - t).min(axis=0).max() < ALIKE * period)
     steps = np.array([lattice_step(x) for x in log.log.q.T])
-    states[1:] = cruised(states[0], states[1], states[2], steps, step)
+    states[1:] = remove_encoder_lines(states[0], states[1], states[2], steps, step)
     besides = positions[first : first + count] - q[first : first + count] if sampled else None
-    turns = directions(states[1], states[2], cutoffs, floor, np.maximum(ends, floor), step, besides)
+    turns = find_directions(states[1], states[2], cutoffs, floor, np.maximum(ends, floor), step, besides)
     turns = turns.spread(_between(log.log.t, t, period))
-    cut = slice(None) if moved is not None else _moving(states[1], step)
+    cut = slice(None) if moved is not None else _trim_ends(states[1], step)
     q, dq, ddq = (array[cut] for array in states)
     rests = None if besides is None else besides[cut]
     return t[cut], q, dq, ddq, tau[cut], moved, cutoffs, turns.rows(cut), floor, rests
@@ -233,7 +233,7 @@ def _torque(log: Prepared, step: float) -> _Interpolation:
     if step > 1.5 * period:
         even = t[0] + period * np.arange(int((t[-1] - t[0]) / period + 1e-6) + 1)
         tau = np.column_stack([np.interp(even, t, column) for column in tau.T])
-        t, tau = even, under_its_top(tau, low_passed(tau, step / period))
+        t, tau = even, keep_clipped_level(tau, low_pass_rows(tau, step / period))
     return _Interpolation(t, tau)
 
 
@@ -247,7 +247,7 @@ class _Interpolation:
         return np.column_stack([np.interp(at, self.t, column) for column in self.values.T])
 
 
-def _moving(dq: Array, step: float) -> slice:
+def _trim_ends(dq: Array, step: float) -> slice:
     """Leaves out the ends of a log where the robot comes from and to rest: stiction may hold any torque there."""
     speed = np.sqrt(np.mean(dq**2, axis=0))
     active = np.flatnonzero((np.abs(dq) > SETTLED * np.maximum(speed, 1e-9)).any(axis=1))
@@ -257,4 +257,4 @@ def _moving(dq: Array, step: float) -> slice:
     return slice(min(int(active[0]), most), max(int(active[-1]) + 1, len(dq) - most))
 
 
-__all__ = ["Recording", "record"]
+__all__ = ["Recording", "build_recording"]

@@ -42,7 +42,7 @@ _BY_FIT = ", by a quick look at rigid body and friction alone"
 
 
 @dataclass(frozen=True)
-class Mended:
+class RepairedLog:
     """A log without what would be taken for an effect of the robot.
 
     Attributes:
@@ -54,7 +54,7 @@ class Mended:
     notes: tuple[str, ...]
 
 
-def mended(robot: Robot, log: Log, which: str) -> Mended:
+def repair_log(robot: Robot, log: Log, which: str) -> RepairedLog:
     """Fills rows that stick out of their neighbours, and cuts the log at its gaps.
 
     A lost message is a torque of a thousandth of a second, which would be named a contact with any certainty, and a
@@ -78,10 +78,10 @@ def mended(robot: Robot, log: Log, which: str) -> Mended:
     notes += [
         f"{which}{_BY_FIT if finding.name in TOLD else ''}: {finding}."
         for finding in gate.findings
-        if _is_told(finding)
+        if _is_reported(finding)
     ]
     log = gate.on_time(log)
-    return Mended(_stretches(_filled(log) if len(gate.spikes) else log, gate), tuple(notes))
+    return RepairedLog(_stretches(_filled(log) if len(gate.spikes) else log, gate), tuple(notes))
 
 
 _SIZES = (
@@ -95,7 +95,7 @@ def _range(values: Sequence[float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _is_told(finding: Finding) -> bool:
+def _is_reported(finding: Finding) -> bool:
     if finding.severity == "refuse":
         return finding.name not in ("no_motion", "short")
     return finding.severity == "warning" and finding.name not in OWN

@@ -61,14 +61,14 @@ def find_cycle(q: Array, step: float) -> Cycle | None:
         return None
     x = (q[:, moving] - q[:, moving].mean(axis=0)) / spread[moving]
     stride = max(1, len(x) // COARSE)
-    for lag in _returns(x[::stride], stride * step):
+    for lag in _candidate_lags(x[::stride], stride * step):
         cycle = _examine(x, lag * stride, stride, step)
         if cycle is not None:
             return cycle
     return None
 
 
-def _returns(x: Array, step: float) -> list[int]:
+def _candidate_lags(x: Array, step: float) -> list[int]:
     """Lags at which the motion comes back after it had been away, the shortest first."""
     difference = _difference(x)
     shortest, longest = max(2, round(SHORTEST / step)), len(x) // 2 + 1
@@ -137,7 +137,7 @@ def _longest(flags: NDArray[np.bool_]) -> tuple[int, int]:
     return max(spans(flags), key=lambda span: span[1] - span[0], default=(0, 0))
 
 
-def project(q: Array, step: float, cycle: Cycle) -> tuple[tuple[Array, Array, Array], Array, Array]:
+def project_on_harmonics(q: Array, step: float, cycle: Cycle) -> tuple[tuple[Array, Array, Array], Array, Array]:
     """Projects the repeated rows on the harmonics that stand out of what changes from period to period.
 
     Args:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.recordings.smoothed_motion import smoothed
+from estimation.diagnosis.recordings.smoothed_motion import smooth_motion
 from estimation.regressions.preparation import Prepared
 from robots.regressor import default_model
 from robots.robot import Robot
@@ -29,7 +29,7 @@ SLOW = 0.05  # of a joint's RMS speed, below which its friction's sign is not kn
 FAINT = 1e-6
 
 
-def believable_cutoff(robot: Robot, logs: Sequence[Prepared], cutoffs: Array) -> float:
+def select_position_cutoff(robot: Robot, logs: Sequence[Prepared], cutoffs: Array) -> float:
     """Finds the frequency [Hz] above which positions are noise by what their acceleration does to the torque's fit.
 
     An encoder's noise is white where its steps are crossed quickly. Where a joint is slow, or samples repeat, it has
@@ -66,7 +66,7 @@ def _residual(robot: Robot, logs: Sequence[Prepared], cutoffs: Array) -> float:
     total = sum(len(log.positions.t) for log in logs)
     for log in logs:
         t, period = log.positions.t, log.positions.period
-        q, dq, ddq = smoothed(log.positions.q, period, cutoffs)
+        q, dq, ddq = smooth_motion(log.positions.q, period, cutoffs)
         edge = min(round(1 / (float(cutoffs.min()) * period)), len(t) // 4)
         rows = np.arange(edge, len(t) - edge, max(1, total // ROWS))
         speed = np.sqrt(np.mean(dq**2, axis=0))

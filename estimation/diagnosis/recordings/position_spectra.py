@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from estimation.diagnosis.recordings.smoothed_motion import passed
+from estimation.diagnosis.recordings.smoothed_motion import low_pass_gain
 from estimation.preprocessing import Resampled, between_rows
 
 Array = NDArray[np.float64]
@@ -69,7 +69,7 @@ class Spectrum:
         """
         motion = np.where(self.f < meets, np.maximum(self.density - self.floor, 0.0), 0.0)
         for cutoff in meets * HIGHER:
-            kept = passed(self.f, cutoff)
+            kept = low_pass_gain(self.f, cutoff)
             weight = self.f**4
             if np.sum(weight * motion * (1 - kept) ** 2) <= np.sum(weight * self.floor * kept**2):
                 return float(cutoff)

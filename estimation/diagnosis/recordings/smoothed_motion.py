@@ -20,7 +20,7 @@ DEGREE = 7
 KNOTS = 6.0  # per period of the cut-off
 
 
-def smoothed(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array, Array]:
+def smooth_motion(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array, Array]:
     """Low-passes positions (N, n) without lag and differentiates them.
 
     Args:
@@ -38,7 +38,7 @@ def smoothed(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array, Arr
         sections = butter(ORDER, min(cutoff * 2 * period, 0.99), output="sos")
         padding = min(len(x) - 1, round(12 / (cutoff * period)))
         q[:, j] = sosfiltfilt(sections, x[:, j], padtype="odd", padlen=padding)
-    states = (q, *differentiated(q, period))
+    states = (q, *differentiate(q, period))
     for j, cutoff in enumerate(cutoffs):
         if cutoff <= 0:
             continue
@@ -53,12 +53,12 @@ def smoothed(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array, Arr
     return states
 
 
-def passed(f: Array, cutoff: float) -> Array:
+def low_pass_gain(f: Array, cutoff: float) -> Array:
     """Gives the share that passes of positions of some frequencies [Hz]: that of the filter, forward and backward."""
     return np.asarray(1.0 / (1.0 + (f / cutoff) ** (2 * ORDER)))
 
 
-def differentiated(x: Array, period: float) -> tuple[Array, Array]:
+def differentiate(x: Array, period: float) -> tuple[Array, Array]:
     """Gives the first and second derivative (N, n) by central differences of sixth order, lower at the ends.
 
     Args:

@@ -13,7 +13,7 @@ LEFT = 0.5
 ROWS, ENOUGH = 2000, 3
 
 
-def hopeless_logs(base: BaseParameters, recording: Recording) -> dict[int, float]:
+def find_unusable_logs(base: BaseParameters, recording: Recording) -> dict[int, float]:
     """Finds logs of which the base model explains next to nothing, whatever its parameters.
 
     Friction of all kinds, masses and offsets are fitted to the log alone: a drive that rings in saturation, a torque
@@ -33,7 +33,7 @@ def hopeless_logs(base: BaseParameters, recording: Recording) -> dict[int, float
     for k, (run, gravity) in enumerate(zip(recording.runs, recording.gravities, strict=True)):
         rows = slice(run.start, run.stop, max(1, (run.stop - run.start) // ROWS))
         motion = recording.q[rows], recording.dq[rows], recording.ddq[rows]
-        counts = ~recording.unsure[rows]
+        counts = ~recording.sign_unknown[rows]
         Y = base.regressor(*motion, gravity=gravity) * counts[:, :, None]
         tau = recording.tau[rows] * counts
         squares = (tau**2).sum(axis=0)

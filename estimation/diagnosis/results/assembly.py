@@ -9,15 +9,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.payload_and_gravity import situation_on
+from estimation.diagnosis.base_models.payload_and_gravity import build_situation
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
 from estimation.diagnosis.experiment_plans.detection_limits import Limit
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scan import measure
 from estimation.diagnosis.joint_fits.extended_fit import fit_extended
-from estimation.diagnosis.recordings.recording import cut
+from estimation.diagnosis.recordings.recording import cut_recording
 from estimation.diagnosis.results.diagnosis import Diagnosis, Trace
 from estimation.diagnosis.results.notes import (
     beside_larger,
@@ -28,16 +29,23 @@ from estimation.diagnosis.results.notes import (
     worse_joints,
 )
 from estimation.diagnosis.results.wording import no_part, word_finding
-from estimation.diagnosis.searches.selection import Found, Selection
-from estimation.diagnosis.validations.equivalent_shapes import alike_forms, completed
+from estimation.diagnosis.searches.selection import SelectedEffect, Selection
+from estimation.diagnosis.validations.comparison import has_close_rivals
+from estimation.diagnosis.validations.equivalent_shapes import complete_effects, equivalent_shapes
 from estimation.diagnosis.validations.free_functions import strongest_pattern
-from estimation.diagnosis.validations.gain_intervals import Unseen
+from estimation.diagnosis.validations.gain_intervals import HeldOutErrors
 from estimation.diagnosis.validations.gear_compliance import EFFECT as ELASTICITY
-from estimation.diagnosis.validations.gear_compliance import Windup, measure_windups
-from estimation.diagnosis.validations.held_out_errors import Measured, measure_unseen, simulate_unseen
-from estimation.diagnosis.validations.held_out_validation import bear_out
-from estimation.diagnosis.validations.prediction_settings import as_sharp, every_row, smoothed_best, with_band
-from estimation.diagnosis.validations.verdict import CLOSE, Judgement, is_open
+from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance, measure_gear_compliance
+from estimation.diagnosis.validations.held_out_errors import HeldOutResult, measure_held_out
+from estimation.diagnosis.validations.held_out_simulation import simulate_held_out
+from estimation.diagnosis.validations.held_out_validation import validate_on_held_out
+from estimation.diagnosis.validations.prediction_settings import (
+    all_row_errors,
+    with_band,
+    with_best_cutoff,
+    with_best_sign_sharpness,
+)
+from estimation.diagnosis.validations.verdict import Verdict
 from estimation.logs.provenance import describe_logs
 from robots.robot import Robot
 from robots.signals import Log
@@ -51,12 +59,12 @@ SHOWN = 4000  # rows of the curves kept for pictures
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class DiagnosisInputs:
     """All that a diagnosis is made of."""
 
     problem: Problem
     selection: Selection
-    judgement: Judgement
+    verdict: Verdict
     limits: tuple[Limit, ...]
     excess: Array
     logs: tuple[Log, ...]
@@ -67,28 +75,28 @@ class Told:
     notes: tuple[str, ...] = ()
 
 
-def assemble(robot: Robot, told: Told) -> Diagnosis:
+def assemble(robot: Robot, told: DiagnosisInputs) -> Diagnosis:
     """Fits the extended model, measures it on unseen data, and puts the findings into words."""
     problem = told.problem
-    judgement = replace(told.judgement, kept=completed(problem, told.judgement.kept))
-    held = bear_out(
+    judgement = replace(told.verdict, named=complete_effects(problem, told.verdict.named))
+    held = validate_on_held_out(
         judgement,
-        lambda members, gone: measure_unseen(robot, problem, members, told.held_out, told.seed + 3, gone),
+        lambda members, gone: measure_held_out(robot, problem, members, told.held_out, told.seed + 3, gone),
         partial(_is_beyond, told),
-        partial(alike_forms, problem),
-        lambda member: member.worth(problem.rows),
+        partial(equivalent_shapes, problem),
+        lambda member: member.local_bic_gain(problem.rows),
         partial(_unnamed, robot, told),
     )
-    members, founds, seen = held.members, held.founds, held.seen
-    twisted = _windups(told, seen)
+    members, founds, seen = held.effects, held.findings, held.measured
+    twisted = _compliances(told, seen)
     # Where nothing else is left, a name that unseen data refuted shows at least where something is unexplained.
-    spoiling = held.spoiling or (() if members or twisted else held.refuted)
+    spoiling = held.rejected_discrepancies or (() if members or twisted else held.refuted)
     verdict = judgement.verdict
     if len(members) > len(founds) or spoiling:
         verdict = "unexplained"
     elif held.notes:
         # Something did stand out of the noise clearly, if a name that did does not hold.
-        verdict = "ambiguous" if any(map(is_open, founds)) else "named"
+        verdict = "ambiguous" if any(map(has_close_rivals, founds)) else "named"
         verdict = verdict if members else "unexplained" if held.refuted else "none"
     fitted = fit_extended(problem, members, _provenance(told))
     findings = tuple(
@@ -112,17 +120,17 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
             no_part(word_finding(robot, problem, member, fit, i, p_value, None, gain))
             for i, (member, p_value, gain) in enumerate(spoiling, start=len(members))
         )
-    unseen, apart = seen.unseen, findings[len(members) :]
+    unseen, apart = seen.errors, findings[len(members) :]
     if twisted and not members and not spoiling:
         verdict = "named"
     findings += tuple(windup.finding for windup in twisted)
     known = {extension.joint for extension in fitted.model.extensions if extension.effect == ELASTICITY}
     added = [windup.extension for windup in twisted if windup.extension.joint not in known]
-    simulation = simulate_unseen(problem, members, seen, bool(told.held_out)) if members else None
+    simulation = simulate_held_out(problem, members, seen, bool(told.held_out)) if members else None
     lost = (_LOST,) if members and simulation is None else ()
     timed = [member for member in members if member.group.by_reversals]
     whole = replace(fitted.model, extensions=(*fitted.model.extensions, *added))
-    whole = as_sharp(smoothed_best(whole, problem, told.logs), told.logs)
+    whole = with_best_sign_sharpness(with_best_cutoff(whole, problem, told.logs), told.logs)
     model = with_band(whole, told.logs, told.held_out, unseen)
     # Of a joint that rests in all of them unseen data say nothing: that is no error of zero.
     shown = unseen.counts.any(axis=0)
@@ -142,11 +150,11 @@ def assemble(robot: Robot, told: Told) -> Diagnosis:
             *told.notes,
             *notes_of(problem, told.false_alarm, findings, apart, after, [m.hypothesis.name for m in timed]),
             *worse_joints(before, after),
-            *turning_joints(every_row(model), after, unseen.counts),
+            *turning_joints(all_row_errors(model), after, unseen.counts),
             *faster_joints(problem, seen),
             *farther_joints(problem, seen, findings),
             *held.notes,
-            *beside_larger(told.selection.slight, members),
+            *beside_larger(told.selection.strongest_unaccepted, members),
             *lost,
         ),
         trace=_trace(unseen, [seen.coordinates[i] for i in order], twisted),
@@ -159,19 +167,21 @@ def _each_once(*notes: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(notes))
 
 
-def _is_beyond(told: Told, effect: Effect) -> bool:
+def _is_beyond(told: DiagnosisInputs, effect: Effect) -> bool:
     """Whether unseen logs say nothing of an effect that belongs to the logs of the fit: a contact, a drift.
 
     Where it is not known when they were recorded, they say nothing of what comes with time.
     """
-    if any(f.member.hypothesis.effect is effect and f.member.group.by_reversals for f in told.selection.found):
+    if any(f.effect.hypothesis.effect is effect and f.effect.group.by_reversals for f in told.selection.found):
         return True
     if not told.held_out:
         return False
-    return effect.passing or (not told.dated and effect.depends_on == "time")
+    return effect.transient or (not told.dated and effect.depends_on == "time")
 
 
-def _unnamed(robot: Robot, told: Told, member: Member, beside: Sequence[Member]) -> tuple[Member, float] | None:
+def _unnamed(
+    robot: Robot, told: DiagnosisInputs, member: FittedEffect, beside: Sequence[FittedEffect]
+) -> tuple[FittedEffect, float] | None:
     """Finds a free function on the joint of a name that unseen data refuted, or on all where it was the robot's."""
     own = member.hypothesis.joint
     wanted = [h for h in all_hypotheses(robot, list(all_patterns(robot))) if own is None or h.joint == own]
@@ -183,28 +193,28 @@ def _unnamed(robot: Robot, told: Told, member: Member, beside: Sequence[Member])
 _LOST = "Simulated forward, the fitted robot ran away from the position loop: its fit suits no simulation."
 
 
-def _windups(told: Told, seen: Measured) -> tuple[Windup, ...]:
+def _compliances(told: DiagnosisInputs, seen: HeldOutResult) -> tuple[MeasuredCompliance, ...]:
     """Gears whose wind-up was logged; on held-out logs their gain is measured where those have it too."""
     if all(log.qlink is None for log in told.logs):
         return ()
     now, unseen = told.problem.situation, None
     if any(log.qlink is not None for log in told.held_out):
-        other = cut(seen.whole, slice(seen.first, len(seen.whole)))
-        there = situation_on(other, now.model, told.problem.parameters_without_payload)
+        other = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
+        there = build_situation(other, now.model, told.problem.parameters_without_payload)
         unseen = (there, other, told.held_out)
-    return measure_windups(now, told.problem.recording, told.logs, false_alarm=told.false_alarm, unseen=unseen)
+    return measure_gear_compliance(now, told.problem.recording, told.logs, false_alarm=told.false_alarm, unseen=unseen)
 
 
-def _next(problem: Problem, founds: Sequence[Found]) -> NextExperiment | None:
+def _next(problem: Problem, founds: Sequence[SelectedEffect]) -> NextExperiment | None:
     """Plans the experiment that tells the causes that are left apart."""
     for found in founds:
-        close = [rival for rival, worse in found.rivals if worse < CLOSE]
+        close = [rival for rival, worse in found.rivals if worse < CLOSE_RIVAL_BIC]
         if close:
-            return plan_next(problem, [found.member, *close])
+            return plan_next(problem, [found.effect, *close])
     return None
 
 
-def _trace(unseen: Unseen, seen_as: Sequence[Array], windups: Sequence[Windup]) -> Trace:
+def _trace(unseen: HeldOutErrors, seen_as: Sequence[Array], windups: Sequence[MeasuredCompliance]) -> Trace:
     rows = slice(None, None, max(1, len(unseen.t) // SHOWN))
     hidden = ~unseen.counts
     before, after = (np.where(hidden, np.nan, unseen.errors[k]) for k in (0, -1))
@@ -215,7 +225,7 @@ def _trace(unseen: Unseen, seen_as: Sequence[Array], windups: Sequence[Windup]) 
     return Trace(unseen.t[rows], unseen.measured[rows], before[rows], after[rows], coordinates, curves)
 
 
-def _provenance(told: Told) -> dict[str, object]:
+def _provenance(told: DiagnosisInputs) -> dict[str, object]:
     problem = told.problem
     torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
     return {
@@ -226,7 +236,7 @@ def _provenance(told: Told) -> dict[str, object]:
         "velocity_scales": [float(v) for v in problem.situation.velocity_scale],
         "seed": told.seed,
         "false_alarm": told.false_alarm,
-        "residual_rms": np.sqrt(np.mean(problem.remainder**2, axis=0)).tolist(),
+        "residual_rms": np.sqrt(np.mean(problem.base_residual**2, axis=0)).tolist(),
         "torque_rms": torque.tolist(),
         "gravities": [list(gravity) for gravity in problem.baseline.base.gravities],
     }

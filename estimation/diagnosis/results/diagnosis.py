@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.experiment_plans.detection_limits import Limit, told_in_one
+from estimation.diagnosis.experiment_plans.detection_limits import Limit, summarise_limits
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
-from estimation.diagnosis.findings import Finding, listed, read_finding
-from estimation.diagnosis.validations.prediction_settings import every_row
+from estimation.diagnosis.findings import Finding, list_parameters, read_finding
+from estimation.diagnosis.validations.prediction_settings import all_row_errors
 from estimation.diagnosis.validations.simulation_result import Simulation, read_simulation
 from estimation.models.model import Model, load_model
 from robots.common.errors import InputError
@@ -100,13 +100,13 @@ class Diagnosis:
 
         `baseline` and `extended` leave out rows in which a joint's direction of motion is not known.
         """
-        return every_row(self.model)
+        return all_row_errors(self.model)
 
     def summary(self) -> str:
         """Says what was found, what it brings, and what stays open."""
         robot = self.model.robot
         lines = [f"{robot.name}: {_VERDICTS[self.verdict]}"]
-        if self.verdict == "none" and (seen := told_in_one(self.limits)):
+        if self.verdict == "none" and (seen := summarise_limits(self.limits)):
             lines.append(f"  {seen[0].lower()}{seen[1:]}")
         for finding in self.findings:
             where = f"joint {finding.joint}" if finding.joint else "whole robot"
@@ -120,10 +120,10 @@ class Diagnosis:
             lines.append(f"    unseen error{finding.elsewhere} {before} -> {after} of the {of}{beside} (fall {fall} %)")
             # Coefficients of a free function mean nothing each.
             parameters = finding.parameters if finding.effect != "unexplained" else ()
-            if known := [parameter.told for parameter in parameters if parameter.determined]:
-                lines.append(f"    95 % intervals: {listed(known)}")
-            if open_ := [parameter.told for parameter in parameters if not parameter.determined]:
-                lines.append(f"    not well determined by these logs: {listed(open_)}")
+            if known := [parameter.text for parameter in parameters if parameter.determined]:
+                lines.append(f"    95 % intervals: {list_parameters(known)}")
+            if open_ := [parameter.text for parameter in parameters if not parameter.determined]:
+                lines.append(f"    not well determined by these logs: {list_parameters(open_)}")
             close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]
             if close:
                 lines.append(f"    not told apart from: {', '.join(close)}")

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.experiment_plans.detection_limits import STILL
-from estimation.diagnosis.experiment_plans.undetectable_springs import hidden_springs
+from estimation.diagnosis.experiment_plans.undetectable_springs import undetectable_springs
 from estimation.diagnosis.findings import Finding
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member
-from estimation.diagnosis.recordings.recording import cut
-from estimation.diagnosis.validations.held_out_errors import Measured
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.recordings.recording import cut_recording
+from estimation.diagnosis.validations.held_out_errors import HeldOutResult
 from robots.terms.effects import EFFECTS
 from robots.terms.effects.current_clipping import CERTAIN, CurrentClipping
 
@@ -68,7 +68,7 @@ def notes_of(
         )
     told_of = {finding.joint for finding in findings if finding.effect == CLIPPING.name}
     for j in sorted({*range(1, recording.n + 1)} - told_of):
-        if CLIPPING.chance(problem.sees(CLIPPING), j, recording.tau) < CERTAIN:
+        if CLIPPING.chance(problem.state_for(CLIPPING), j, recording.tau) < CERTAIN:
             notes.append(_AT_LIMIT.format(j, float(np.abs(recording.tau[:, j - 1]).max())))
     strange = _strange(problem, after)
     notes += strange.values()
@@ -102,7 +102,7 @@ def notes_of(
             "has been, and says nothing elsewhere."
         )
     sprung = {finding.joint for finding in findings if finding.effect == "spring"}
-    notes += [text for joint, text in hidden_springs(problem, false_alarm) if joint not in sprung]
+    notes += [text for joint, text in undetectable_springs(problem, false_alarm) if joint not in sprung]
     return tuple(notes)
 
 
@@ -132,10 +132,10 @@ def unsure_gain(finding: Finding) -> str:
 
 def _strange(problem: Problem, after: Array) -> dict[int, str]:
     """Says where the model predicts logs far worse than it fits them: there is more in them than was found."""
-    counts = ~problem.recording.unsure
+    counts = ~problem.recording.sign_unknown
     number = np.maximum(counts.sum(axis=0), 1)
     torque = np.sqrt((problem.recording.tau**2 * counts).sum(axis=0) / number)
-    fitted = np.sqrt((problem.remainder**2 * counts).sum(axis=0) / number) / np.maximum(torque, 1e-12)
+    fitted = np.sqrt((problem.base_residual**2 * counts).sum(axis=0) / number) / np.maximum(torque, 1e-12)
     far = np.flatnonzero(after > np.maximum(STRANGE * fitted, FAR))
     return {int(j): _STRANGE.format(j + 1, 100 * after[j], 100 * fitted[j]) for j in far}
 
@@ -181,11 +181,11 @@ _TURNING = (
 )
 
 
-def faster_joints(problem: Problem, seen: Measured) -> list[str]:
+def faster_joints(problem: Problem, seen: HeldOutResult) -> list[str]:
     """Says which joints are faster on unseen data than their friction's polynomial was fitted for."""
     if seen.whole is problem.recording or not any(column.symbol == "f4" for column in problem.baseline.base.columns):
         return []
-    unseen = cut(seen.whole, slice(seen.first, len(seen.whole)))
+    unseen = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
     known, there = (np.abs(recording.dq).max(axis=0) for recording in (problem.recording, unseen))
     ratio = there / np.maximum(known, 1e-9)
     fast = np.flatnonzero(ratio > FASTER)
@@ -193,11 +193,11 @@ def faster_joints(problem: Problem, seen: Measured) -> list[str]:
     return [_FASTER.format("s" if len(fast) > 1 else "", names, ratio[fast].max())] if len(fast) else []
 
 
-def farther_joints(problem: Problem, seen: Measured, findings: Sequence[Finding]) -> list[str]:
+def farther_joints(problem: Problem, seen: HeldOutResult, findings: Sequence[Finding]) -> list[str]:
     """Says where unseen data go beyond the positions by which a function of a joint's position was fitted."""
     if seen.whole is problem.recording:
         return []
-    unseen = cut(seen.whole, slice(seen.first, len(seen.whole)))
+    unseen = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
     notes = []
     placed = {f.joint for f in findings if f.effect in PLACED and f.coordinate.startswith("position of joint")}
     for joint in sorted(joint for joint in placed if joint):
@@ -220,7 +220,7 @@ _FASTER = (
 )
 
 
-def beside_larger(slight: Member | None, members: Sequence[Member]) -> tuple[str, ...]:
+def beside_larger(slight: FittedEffect | None, members: Sequence[FittedEffect]) -> tuple[str, ...]:
     """Says what stood out beside what was found, but is as small as formulas may leave of that."""
     if slight is None:
         return ()
@@ -228,14 +228,14 @@ def beside_larger(slight: Member | None, members: Sequence[Member]) -> tuple[str
     if not told:
         return ()
     share, member, j = min(told, key=lambda each: each[0])
-    if slight.hypothesis.effect.alike:
+    if slight.hypothesis.effect.shared_coefficient:
         return (_NOT_ALIKE.format(slight.hypothesis.label, member.hypothesis.label),)
     if share >= 1.0:
         return ()
     return (_SLIGHT.format(slight.hypothesis.label, member.hypothesis.label, 100 * share, j + 1),)
 
 
-def _acts(member: Member, joint: int) -> bool:
+def _acts(member: FittedEffect, joint: int) -> bool:
     return joint in member.group.joints and member.gain_on([joint]) > 0
 
 

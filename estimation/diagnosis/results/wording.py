@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.findings import Finding, Gain, Parameter
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member
-from estimation.diagnosis.joint_fits.extended_fit import Fitted
-from estimation.diagnosis.searches.selection import Found
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.joint_fits.extended_fit import ExtendedFit
+from estimation.diagnosis.searches.selection import SelectedEffect
 from robots.robot import Robot
 from robots.terms.base import force_unit, length_unit
 from robots.terms.discrepancies.patterns import PREFIX
@@ -29,11 +29,11 @@ NOTHING = 1e-6
 def word_finding(
     robot: Robot,
     problem: Problem,
-    member: Member,
-    fitted: Fitted,
+    member: FittedEffect,
+    fitted: ExtendedFit,
     i: int,
     p_value: float,
-    found: Found | None,
+    found: SelectedEffect | None,
     gain: Gain,
 ) -> Finding:
     """Puts one effect of the extended model into words and numbers.
@@ -56,8 +56,8 @@ def word_finding(
         units = {"force": force_unit(robot, joint - 1), "length": length_unit(robot, joint - 1)}
     parameters = _parameters(robot, member, fitted, i, known)
     sentence = _when(hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units), parameters)
-    if hypothesis.effect.vague and not known[: len(extension.coefficients)].any():
-        sentence = hypothesis.effect.vague.format(joint=joint)
+    if hypothesis.effect.undetermined_text and not known[: len(extension.coefficients)].any():
+        sentence = hypothesis.effect.undetermined_text.format(joint=joint)
     pattern = hypothesis.name if hypothesis.name.startswith(PREFIX) else ""
     rivals = [] if found is None else [(rival.hypothesis, worse) for rival, worse in found.rivals]
     return Finding(
@@ -65,7 +65,7 @@ def word_finding(
         joint=joint,
         parameters=parameters,
         p_value=p_value,
-        delta_bic=member.worth(problem.rows),
+        delta_bic=member.local_bic_gain(problem.rows),
         gain=gain,
         rivals=tuple(
             (h.name if h.joint in (joint, None) else f"{h.name} of joint {h.joint}", float(worse))
@@ -73,7 +73,7 @@ def word_finding(
         ),
         sentence=sentence,
         visible=member.visible,
-        coordinate=hypothesis.effect.coordinate(problem.sees(hypothesis.effect), joint, member.shape)[0],
+        coordinate=hypothesis.effect.coordinate(problem.state_for(hypothesis.effect), joint, member.shape)[0],
         pattern=pattern,
     )
 
@@ -110,7 +110,7 @@ _DENIED = (
 
 
 def _parameters(
-    robot: Robot, member: Member, fitted: Fitted, i: int, known: NDArray[np.bool_]
+    robot: Robot, member: FittedEffect, fitted: ExtendedFit, i: int, known: NDArray[np.bool_]
 ) -> tuple[Parameter, ...]:
     extension = fitted.model.extensions[i]
     effect = member.hypothesis.effect

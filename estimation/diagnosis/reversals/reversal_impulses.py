@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from estimation.diagnosis.recordings.periods import Cycle
 from estimation.diagnosis.recordings.recording import Recording
-from estimation.diagnosis.recordings.smoothed_motion import passed
+from estimation.diagnosis.recordings.smoothed_motion import low_pass_gain
 from robots.base_parameters import BaseParameters
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ ALIKE = 2e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class ImpulseResponse:
     """What unit forces between each pair of edges do to a unit inertia, less what a low-pass leaves in the motion.
 
     Attributes:
@@ -48,7 +48,7 @@ class Table:
     values: Array
 
     @staticmethod
-    def of(cutoff: float, step: float, half: Array) -> Table:
+    def of(cutoff: float, step: float, half: Array) -> ImpulseResponse:
         """Evaluates them for a low-pass [Hz], a sample period [s] and edges on one side [s]."""
         edges = np.concatenate([-half[:0:-1], half])
         dx = step / FINE
@@ -64,8 +64,10 @@ class Table:
         inside = np.abs(at) <= half[-1]
         whole = np.stack([np.where(inside, part, 0.0) @ free for part in (way, speed, force)])
         f = np.fft.rfftfreq(4 * len(x), dx)
-        kept = np.fft.irfft(np.fft.rfft(whole, 4 * len(x), axis=1) * passed(np.asarray(f), cutoff)[:, None], axis=1)
-        return Table(x, whole - kept[:, : len(x)])
+        kept = np.fft.irfft(
+            np.fft.rfft(whole, 4 * len(x), axis=1) * low_pass_gain(np.asarray(f), cutoff)[:, None], axis=1
+        )
+        return ImpulseResponse(x, whole - kept[:, : len(x)])
 
     def at(self, times: Array) -> Array:
         """Gives positions, velocities, accelerations (3, M, K) at times (M,) within."""
@@ -83,7 +85,7 @@ def edges_of(cutoff: float, step: float) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Turns:
+class Reversals:
     """A joint's reversals in all logs.
 
     Attributes:
@@ -101,7 +103,7 @@ class Turns:
     inertia: Array
 
 
-def reversals(recording: Recording, j: int, base: BaseParameters, values: Array) -> Turns | None:
+def find_reversals(recording: Recording, j: int, base: BaseParameters, values: Array) -> Reversals | None:
     """Finds the reversals of a joint (from 0), with base parameters (b,); None where they are too few."""
     at, rates, run, kind = [], [], [], []
     for k, rows in enumerate(recording.runs):
@@ -126,7 +128,7 @@ def reversals(recording: Recording, j: int, base: BaseParameters, values: Array)
     usual = float(np.median(own))
     if usual <= 0:
         return None
-    return Turns(moments[fast], np.sign(rate[fast]), runs[fast], kinds[fast], np.maximum(own, LEAST * usual))
+    return Reversals(moments[fast], np.sign(rate[fast]), runs[fast], kinds[fast], np.maximum(own, LEAST * usual))
 
 
 def _crossings(v: Array) -> tuple[Array, Array]:
@@ -160,8 +162,8 @@ def _alike(kinds: NDArray[np.intp], q: Array, rate: Array) -> NDArray[np.intp]:
     return np.asarray(connected_components(links, directed=False)[1][kinds], dtype=np.intp)
 
 
-def columns_about(
-    recording: Recording, turns: Turns, at: Array, tables: list[Table]
+def impulse_columns(
+    recording: Recording, turns: Reversals, at: Array, tables: list[ImpulseResponse]
 ) -> tuple[list[Array], NDArray[np.intp], Array]:
     """Gives what unit forces about reversals do (N, K), and how near those are.
 
@@ -192,7 +194,7 @@ def columns_about(
     return columns, nearest, away
 
 
-def moved(recording: Recording, turns: Turns, at: Array, dq: Array) -> Array:
+def shift_reversals(recording: Recording, turns: Reversals, at: Array, dq: Array) -> Array:
     """Moves reversals (R,) to where a velocity (N,) has its own nearest to them, if that is near."""
     own, rate = _crossings(dq)
     result = at.copy()

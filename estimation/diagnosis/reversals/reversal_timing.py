@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import Baseline
-from estimation.diagnosis.base_models.payload_and_gravity import torque_on
+from estimation.diagnosis.base_models.payload_and_gravity import base_torque
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.reversals.reversal_impulses import (
     FEWEST,
-    Table,
-    Turns,
-    columns_about,
+    ImpulseResponse,
+    Reversals,
     edges_of,
-    moved,
-    reversals,
+    find_reversals,
+    impulse_columns,
+    shift_reversals,
 )
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ USUAL = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class Timing:
+class ReversalTiming:
     """What reversals tell of how late torque is.
 
     Attributes:
@@ -69,21 +69,21 @@ class Timing:
         """What some joints (from 0) tell of a lag of all torque (n, 1), over their errors."""
         return np.where(np.isin(np.arange(len(self.errors)), joints), 1.0 / self.errors, 0.0)[:, None]
 
-    def beside(self, recording: Recording) -> Timing | None:
+    def beside(self, recording: Recording) -> ReversalTiming | None:
         """Keeps what is not told by rows at reversals that count, or far better than by those; None for nothing."""
         errors = self.errors.copy()
-        for j in np.flatnonzero(recording.counting):
-            assert recording.late is not None
+        for j in np.flatnonzero(recording.counted_rows):
+            assert recording.reversal_time_error is not None
             turns = recording.dq[1:, j] * recording.dq[:-1, j] < 0
-            late = np.sqrt(np.mean(recording.late[:-1, j][turns] ** 2)) if turns.any() else 0.0
+            late = np.sqrt(np.mean(recording.reversal_time_error[:-1, j][turns] ** 2)) if turns.any() else 0.0
             if errors[j] > BETTER * late:
                 errors[j] = np.inf
         return replace(self, errors=errors) if np.isfinite(errors).any() else None
 
 
-def reversal_timing(
+def measure_reversal_timing(
     recording: Recording, baseline: Baseline, values: Array, residual: Array, extra: Array | None = None
-) -> Timing | None:
+) -> ReversalTiming | None:
     """Measures how late torque is against each joint's reversals.
 
     Friction that turns round is late in the torque by as much as the torque is. An encoder tells a reversal of
@@ -104,29 +104,29 @@ def reversal_timing(
         The timing; None where no joint tells any.
     """
     base = baseline.base
-    if recording.finer is not None:
-        own = recording.finer
-        residual = own.tau - torque_on(base, own, values)
+    if recording.full_rate is not None:
+        own = recording.full_rate
+        residual = own.tau - base_torque(base, own, values)
         if extra is not None:
             residual -= np.column_stack([np.interp(own.t, recording.t, column) for column in extra.T])
         recording = own
-    if recording.rest is None or recording.cutoffs is None:
+    if recording.position_residual is None or recording.cutoffs is None:
         return None
     lags, errors, kicks = np.zeros(recording.n), np.full(recording.n, np.inf), np.zeros(recording.n)
     coulomb = {column.joint - 1: i for i, column in enumerate(base.columns) if column.symbol == "f1"}
-    signs = torque_on(base, recording, np.isin(np.arange(base.size), list(coulomb.values())).astype(float))
+    signs = base_torque(base, recording, np.isin(np.arange(base.size), list(coulomb.values())).astype(float))
     for j, i in coulomb.items():
-        turns = reversals(recording, j, base, values)
+        turns = find_reversals(recording, j, base, values)
         if turns is None:
             continue
         found = _joint(recording, j, turns, residual[:, j], float(abs(values[i])), signs[:, j])
         if found is not None:
             lags[j], errors[j], kicks[j] = found
-    return Timing(lags, errors, kicks)
+    return ReversalTiming(lags, errors, kicks)
 
 
 @dataclass(frozen=True, eq=False)
-class _Kick:
+class _Impulse:
     """The mean force of a joint's kicks.
 
     Attributes:
@@ -147,10 +147,10 @@ class _Kick:
 
 
 def _joint(
-    recording: Recording, j: int, turns: Turns, force: Array, friction: float, sign: Array
+    recording: Recording, j: int, turns: Reversals, force: Array, friction: float, sign: Array
 ) -> tuple[float, float, float] | None:
     """Lag of torque behind a joint's reversals, its error [s], and the kicks; None where those are not understood."""
-    kick = _kick(recording, j, turns, force) if friction > 0 else None
+    kick = _fit_impulse(recording, j, turns, force) if friction > 0 else None
     if kick is None:
         return None
     rate = np.abs(np.interp(kick.at, np.arange(len(force)), recording.ddq[:, j]))
@@ -179,22 +179,22 @@ def _joint(
     return lag, error, velocity
 
 
-def _kick(recording: Recording, j: int, turns: Turns, force: Array) -> _Kick | None:
+def _fit_impulse(recording: Recording, j: int, turns: Reversals, force: Array) -> _Impulse | None:
     """Fits the mean force of a joint's kicks to its positions and, but for the gaps, its torque; None where that fails.
 
     A low-pass leaves nothing of it in the motion that stands out of the encoder's noise at any one reversal.
     """
-    assert recording.rest is not None
+    assert recording.position_residual is not None
     assert recording.cutoffs is not None
-    rest, step, cutoffs = recording.rest[:, j], recording.step, recording.cutoffs[:, j]
+    rest, step, cutoffs = recording.position_residual[:, j], recording.step, recording.cutoffs[:, j]
     loud, noise = _level(rest), _level(force)
     if min(loud, noise, float(cutoffs.min())) <= 0:
         return None
     edges = edges_of(float(cutoffs.min()), step)
-    tables, gap = [Table.of(float(f), step, edges) for f in cutoffs], edges[1]
+    tables, gap = [ImpulseResponse.of(float(f), step, edges) for f in cutoffs], edges[1]
     at = turns.at
     for _ in range(ROUNDS):
-        columns, nearest, away = columns_about(recording, turns, at, tables)
+        columns, nearest, away = impulse_columns(recording, turns, at, tables)
         counted = away * step <= ABOUT
         told = counted & (away * step > gap)
         design = np.concatenate([columns[0][counted] / loud, columns[2][told] / noise])
@@ -202,7 +202,7 @@ def _kick(recording: Recording, j: int, turns: Turns, force: Array) -> _Kick | N
         gram = design.T @ design
         inverse = np.linalg.inv(gram + FAINT * np.trace(gram) / len(gram) * np.eye(len(gram)))
         coefficients = inverse @ (design.T @ data)
-        at = moved(recording, turns, at, recording.dq[:, j] + columns[1] @ coefficients)
+        at = shift_reversals(recording, turns, at, recording.dq[:, j] + columns[1] @ coefficients)
     left = data - design @ coefficients
     position, torque = np.split(left, [int(counted.sum())])
     if np.mean(position**2) > QUIET[0] or np.mean(torque**2) > QUIET[1]:
@@ -218,7 +218,7 @@ def _kick(recording: Recording, j: int, turns: Turns, force: Array) -> _Kick | N
     def error(x: Array) -> float:
         return LARGER * float(np.sqrt(x @ covariance @ x))
 
-    return _Kick(
+    return _Impulse(
         at=at,
         force=columns[2] @ coefficients,
         gap=gap / step,

@@ -8,12 +8,12 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
-from estimation.diagnosis.hypothesis_tests.joint_agreement import agreed_gain, joint_by_joint
+from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence, shared_coefficient_gain
 from estimation.diagnosis.hypothesis_tests.log_noise_levels import profile_gain
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
-from estimation.diagnosis.hypothesis_tests.shocks import beside_a_shock
+from estimation.diagnosis.hypothesis_tests.shocks import gain_beside_shock
 
 # Time [s] before and after a kick of another effect, such as a link that lands, in which drives answer to it; what
 # kicks in more than this share of the rows is none. Rows aside must tell this share of a delay.
@@ -22,32 +22,40 @@ ANSWERS, MOSTLY, ASIDE = 0.2, 0.8, 0.5
 SURE = 0.2
 
 
-def worth_it(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
+def passes_bic(problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]) -> bool:
     """Whether a candidate is worth its parameters beside members; the first one may have another size in each log."""
-    worth = candidate.bic(problem.rows) - candidate.doubt if members else candidate.worth(problem.rows)
+    worth = (
+        candidate.bic_gain(problem.rows) - candidate.motion_error_chi2
+        if members
+        else candidate.local_bic_gain(problem.rows)
+    )
     if worth <= MIN_BIC_GAIN and not members and len(problem.recording.runs) > 1:
         worth += profile_gain(problem, candidate) - candidate.gain
     return worth > MIN_BIC_GAIN
 
 
-def is_told(problem: Problem, candidate: Member, p_value: float, others: Sequence[Member], false_alarm: float) -> bool:
+def is_accepted(
+    problem: Problem, candidate: FittedEffect, p_value: float, others: Sequence[FittedEffect], false_alarm: float
+) -> bool:
     """Whether an effect is worth its parameters beside others, or sure without that."""
-    return worth_it(problem, candidate, others) or is_sure(problem, candidate, p_value, others, false_alarm)
+    return passes_bic(problem, candidate, others) or is_certain(problem, candidate, p_value, others, false_alarm)
 
 
-def is_sure(problem: Problem, candidate: Member, p_value: float, others: Sequence[Member], false_alarm: float) -> bool:
+def is_certain(
+    problem: Problem, candidate: FittedEffect, p_value: float, others: Sequence[FittedEffect], false_alarm: float
+) -> bool:
     """Whether an effect on joints where no other acts is far from chance, and worth its parameters at all."""
     joints = set(candidate.group.joints)
     apart = not any(joints.intersection(other.group.joints) for other in others)
-    return apart and p_value < SURE * false_alarm and candidate.bic(problem.rows) - candidate.doubt > 0
+    return apart and p_value < SURE * false_alarm and candidate.bic_gain(problem.rows) - candidate.motion_error_chi2 > 0
 
 
-def lasts(problem: Problem, candidate: Member, accepted: Accepted) -> bool:
+def exceeds_single_shock(problem: Problem, candidate: FittedEffect, accepted: Accepted) -> bool:
     """Whether what acts for a moment is more than one shock of the noise."""
-    return beside_a_shock(problem, candidate, accepted).worth(problem.rows) > MIN_BIC_GAIN
+    return gain_beside_shock(problem, candidate, accepted).local_bic_gain(problem.rows) > MIN_BIC_GAIN
 
 
-def beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
+def exceeds_leakage(problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]) -> bool:
     """Whether a candidate is worth it by the joints alone on which it is more than what others may leave.
 
     What the torque as logged shows by itself, such as flat tops, no other formula leaves. Nor does one leave the same
@@ -57,8 +65,8 @@ def beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bo
     flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
     if flags is not None and flags.any():
         return True
-    if hypothesis.effect.alike:
-        return not members or _agreed(problem, candidate, members)
+    if hypothesis.effect.shared_coefficient:
+        return not members or _joints_agree(problem, candidate, members)
     robot = problem.situation.robot
     able = [
         j
@@ -66,24 +74,26 @@ def beyond(problem: Problem, candidate: Member, members: Sequence[Member]) -> bo
         if candidate.gain_on([j])
         >= max(
             (
-                m.hypothesis.effect.leaves(robot, j, m.shape) * m.gain_on([j]) * candidate.share_beside(m, j)
+                m.hypothesis.effect.leakage(robot, j, m.shape) * m.gain_on([j]) * candidate.share_beside(m, j)
                 for m in members
             ),
             default=0.0,
         )
     ]
     lost = candidate.gain - candidate.gain_on(able)
-    return not members or candidate.bic(problem.rows) - lost > MIN_BIC_GAIN
+    return not members or candidate.bic_gain(problem.rows) - lost > MIN_BIC_GAIN
 
 
-def told_aside(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
+def delay_supported_away_from_impacts(
+    problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]
+) -> bool:
     """Whether a delay that all joints have alike is told by more than the answers of drives to another effect's kicks.
 
     A link that lands throws its motor back, which the log has for motion of motor and link alike: the torque, which
     answers to it, then seems to be ahead of that, on all joints that feel it.
     """
-    kicks = [member for member in members if member.hypothesis.effect.kicks]
-    if not kicks or not candidate.hypothesis.effect.alike:
+    kicks = [member for member in members if member.hypothesis.effect.acceleration_driven]
+    if not kicks or not candidate.hypothesis.effect.shared_coefficient:
         return True
     reach = round(ANSWERS / (problem.recording.step * problem.whitening.stride))
     beside = np.zeros(problem.rows, dtype=bool)
@@ -107,20 +117,20 @@ def told_aside(problem: Problem, candidate: Member, members: Sequence[Member]) -
     whole = float(candidate.coefficients[0])
     share = float(cross.sum() / gram.sum()) / whole if whole else 0.0
     paid = candidate.degrees * float(np.log(problem.rows * len(gram)))
-    return share > ASIDE and agreed_gain(gram, cross) - paid > MIN_BIC_GAIN
+    return share > ASIDE and shared_coefficient_gain(gram, cross) - paid > MIN_BIC_GAIN
 
 
-def _agreed(problem: Problem, candidate: Member, members: Sequence[Member]) -> bool:
+def _joints_agree(problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]) -> bool:
     """Whether joints on which no effect of theirs explains more tell a common coefficient by themselves."""
-    if not told_aside(problem, candidate, members):
+    if not delay_supported_away_from_impacts(problem, candidate, members):
         return False
     beside = accept(problem, tuple(m.group for m in members))
-    told = joint_by_joint(problem, candidate.hypothesis, candidate.shape, beside)
+    told = per_joint_evidence(problem, candidate.hypothesis, candidate.shape, beside)
     others = [
         max((m.gain_on([j]) for m in members if m.hypothesis.joint == j + 1), default=0.0)
         for j in candidate.group.joints
     ]
-    told = told.some((told.gram > 0) & (told.sure * told.cross**2 >= told.gram * others))
+    told = told.subset((told.gram > 0) & (told.certain_share * told.cross**2 >= told.gram * others))
     if not len(told.gram):
         return False
     return told.gain(surely=True) - candidate.degrees * float(np.log(problem.rows * len(told.gram))) > MIN_BIC_GAIN

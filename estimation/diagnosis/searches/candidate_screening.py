@@ -7,19 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scan import Outcome, Scan
 from robots.terms.effects import Effect
 
 # Hypotheses refined at each step, the best by their point on the grid.
-CONTENDERS = 7
+MOST_CANDIDATES = 7
 # A hypothesis whose grid point explains less than this share of the best one's gain is no contender.
 NEAR = 0.3
 # What acts for a moment is no contender where twice its gain at the grid is too little: its search takes the longest.
 TWICE = 2.0
 
 
-def contenders(problem: Problem, result: Scan, members: Sequence[Member] = (), least: float = -np.inf) -> list[Outcome]:
+def screen_candidates(
+    problem: Problem, result: Scan, members: Sequence[FittedEffect] = (), least: float = -np.inf
+) -> list[Outcome]:
     """Picks the hypotheses worth refining: near the best at the grid, each effect and joint once.
 
     What acts for a moment must also be able to come near the best there, or near a worth (Schwarz) that is known to be
@@ -36,15 +38,15 @@ def contenders(problem: Problem, result: Scan, members: Sequence[Member] = (), l
     def reached(outcome: Outcome, times: float = 1.0) -> float:
         """What it is worth with its shape parameters paid for, as when it is refined."""
         effect, joint = outcome.hypothesis.effect, outcome.hypothesis.joint
-        free = sum(high > low for low, high in effect.bounds(problem.sees(effect), joint))
+        free = sum(high > low for low, high in effect.bounds(problem.state_for(effect), joint))
         rows = problem.rows * len(effect.acts_on(problem.situation.robot, joint))
         return float(times * outcome.gain - (outcome.degrees + free) * np.log(rows))
 
     ranked = sorted(able, key=worth, reverse=True)
-    best, top = max(o.gain for o in able), max(*map(reached, ranked[:CONTENDERS]), least)
+    best, top = max(o.gain for o in able), max(*map(reached, ranked[:MOST_CANDIDATES]), least)
     hopeless = {o.hypothesis for o in able if _of_a_moment(o.hypothesis.effect) and reached(o, TWICE) < top}
-    return [o for o in ranked if o.gain >= NEAR * best and o.hypothesis not in hopeless][:CONTENDERS]
+    return [o for o in ranked if o.gain >= NEAR * best and o.hypothesis not in hopeless][:MOST_CANDIDATES]
 
 
 def _of_a_moment(effect: Effect) -> bool:
-    return effect.passing or any(shape.moment for shape in effect.shapes)
+    return effect.transient or any(shape.moment for shape in effect.shapes)

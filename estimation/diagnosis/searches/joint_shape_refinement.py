@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member, all_but, refine
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 
 ROUNDS = 8
@@ -18,7 +18,7 @@ TOLD = 1.0
 FACTORS = (1.0, 2.0, 4.0, 8.0, 16.0)
 
 
-def together(problem: Problem, members: Sequence[Member]) -> list[Member]:
+def refine_shapes_jointly(problem: Problem, members: Sequence[FittedEffect]) -> list[FittedEffect]:
     """Refines the shapes of members that share a joint until they move no more.
 
     One round refines each beside the others; where all of them went then they go on together (the pattern moves of
@@ -28,18 +28,18 @@ def together(problem: Problem, members: Sequence[Member]) -> list[Member]:
     for joint in sorted({m.hypothesis.joint for m in members if m.hypothesis.joint is not None}):
         own = [i for i, m in enumerate(result) if m.hypothesis.joint == joint and m.shape]
         # What acts on all of the torque is measured in sight of the others as they are.
-        if len(own) > 1 and not any(result[i].hypothesis.effect.last for i in own):
+        if len(own) > 1 and not any(result[i].hypothesis.effect.acts_on_total_torque for i in own):
             _along(problem, result, own)
     return result
 
 
-def _along(problem: Problem, members: list[Member], own: Sequence[int]) -> None:
+def _along(problem: Problem, members: list[FittedEffect], own: Sequence[int]) -> None:
     """Moves some of the members, in place."""
     gain = _explained(problem, members)
     for left in reversed(range(ROUNDS)):
         before = [members[i] for i in own]
         for i in own:
-            beside = all_but(problem, members, i)
+            beside = accept_all_but(problem, members, i)
             members[i] = refine(problem, members[i].hypothesis, members[i].shape, beside)
         more = _explained(problem, members) - gain
         # The last word is a refinement's: it says which shapes are free.
@@ -57,16 +57,16 @@ def _along(problem: Problem, members: list[Member], own: Sequence[int]) -> None:
             gain, members[:] = reached, trial
 
 
-def _explained(problem: Problem, members: Sequence[Member]) -> float:
+def _explained(problem: Problem, members: Sequence[FittedEffect]) -> float:
     return accept(problem, tuple(member.group for member in members)).gain
 
 
-def _further(problem: Problem, before: Member, after: Member, factor: float) -> tuple[float, ...]:
+def _further(problem: Problem, before: FittedEffect, after: FittedEffect, factor: float) -> tuple[float, ...]:
     """Gives the shape that goes on as from one to the other, by a multiple of that, within its bounds."""
     effect, joint = after.hypothesis.effect, after.hypothesis.joint
     shape = []
     for (low, high), described, a, b in zip(
-        effect.bounds(problem.sees(effect), joint), effect.shapes, before.shape, after.shape, strict=True
+        effect.bounds(problem.state_for(effect), joint), effect.shapes, before.shape, after.shape, strict=True
     ):
         further = b * (b / a) ** factor if described.scale == "log" and a > 0 < b else b + factor * (b - a)
         shape.append(float(np.clip(further, low, high)))

@@ -7,19 +7,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.diagnosis.base_models.baseline import Baseline, build_baseline, inertia_of
-from estimation.diagnosis.base_models.priors import free, held, loosened, pull_of
+from estimation.diagnosis.base_models.baseline import Baseline, build_baseline, inertia_matrix
+from estimation.diagnosis.base_models.priors import (
+    base_model_prior,
+    inflate_conflicting_prior,
+    solve_least_squares,
+    solve_map,
+)
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.problem_setup import moments, pose
+from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem, normal_equations
 from estimation.diagnosis.hypothesis_tests.scan import Entry, measure
-from estimation.diagnosis.joint_fits.total_torque import composed
-from estimation.diagnosis.noise_models.high_frequency_band import WIDER, pose_upper
+from estimation.diagnosis.joint_fits.total_torque import with_total_torque
+from estimation.diagnosis.noise_models.high_frequency_band import WIDER, build_high_band
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening, quiet_joints
-from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short, own_functions
+from estimation.diagnosis.noise_models.noise_nuisance_basis import build_nuisance_projection, is_short
 from estimation.diagnosis.recordings.log_reading import Recording
-from estimation.diagnosis.reversals.reversal_timing import reversal_timing
-from estimation.diagnosis.searches.refit import Settled, calmer, moved, settle
+from estimation.diagnosis.reversals.reversal_timing import measure_reversal_timing
+from estimation.diagnosis.searches.refit import RefitResult, base_torque_changed, noise_decreased, refit
 from estimation.diagnosis.searches.selection import Selection, select, with_rivals
 from robots.base_parameters import BaseParameters
 from robots.common.memory import give_back
@@ -39,13 +44,13 @@ class Search:
     """One search through the catalogue with one noise model.
 
     Attributes:
-        posed: what was searched.
+        searched_problem: what was searched.
         problem: that, its state composed with the effects found.
         entries: the catalogue, measured.
         selection: what was found.
     """
 
-    posed: Problem
+    searched_problem: Problem
     problem: Problem
     entries: list[Entry]
     selection: Selection
@@ -61,44 +66,44 @@ def search(
 ) -> Search:
     """Searches the catalogue; once more where what was found had been taken for noise."""
     hypotheses = all_hypotheses(base.model.robot, effects)
-    recording = _relied_on(base, recording)
+    recording = _trust_reversal_rows(base, recording)
     baseline, settled = fit_plain(base, recording)
     last: Search | None = None
     blurred = False
     known: dict[Hypothesis, tuple[float, ...]] = {}
     for attempt in range(SEARCHES):
         share = 0.1 + 0.3 * attempt
-        inertia = inertia_of(baseline, recording, settled.values)
+        inertia = inertia_matrix(baseline, recording, settled.values)
         fitted = baseline.base.size + settled.degrees
-        spared = own_functions(recording, baseline, settled.residual)
+        spared = build_nuisance_projection(recording, baseline, settled.residual)
         whitening = estimate_whitening(recording, settled.residual, fitted, inertia, spared=spared)
         if last is not None:
-            members = [found.member for found in last.selection.found]
-            anew = settled.laden.shows or calmer(last.problem, whitening)
-            if not (anew or moved(last.problem, settled.values, members)):
+            members = [found.effect for found in last.selection.found]
+            anew = settled.gear_load.improves_fit or noise_decreased(last.problem, whitening)
+            if not (anew or base_torque_changed(last.problem, settled.values, members)):
                 break
             # Its columns are most of what a diagnosis keeps in memory: they go before others come.
             last = None
             give_back()
             if blurred:
-                baseline = build_baseline(base, recording, known=settled.followed_motion(recording, members))
+                baseline = build_baseline(base, recording, known=settled.delayed_motion(recording, members))
         rng = np.random.default_rng(seed)
-        posed = pose(
+        posed = build_problem(
             recording,
             baseline,
             whitening,
             draws=DRAWS,
             rng=rng,
             extra=settled.extra,
-            followed=settled.followed,
-            bearing=settled.laden.bearing,
+            followed=settled.delayed,
+            bearing=settled.gear_load.extra_load,
         )
-        if any(effect.fast for effect in effects):
+        if any(effect.independent_of_acceleration for effect in effects):
             wide = estimate_whitening(recording, settled.residual, fitted, inertia, WIDER, spared)
             # What is left by the base model as it is fitted alone: beside effects it may be far from that.
-            upper = pose_upper(recording, baseline, posed.remainder, settled.residual, whitening.bands, wide)
-            posed = replace(posed, upper=upper)
-        timing = reversal_timing(recording, baseline, settled.values, *settled.but_late())
+            upper = build_high_band(recording, baseline, posed.base_residual, settled.residual, whitening.bands, wide)
+            posed = replace(posed, high_band=upper)
+        timing = measure_reversal_timing(recording, baseline, settled.values, *settled.without_delay())
         if timing is not None:
             posed = replace(posed, timing=timing.beside(recording))
         give_back()
@@ -113,30 +118,30 @@ def search(
         )
         if not last.selection.found or attempt == SEARCHES - 1:
             break
-        known = {found.member.hypothesis: found.member.shape for found in last.selection.found}
-        settled = settle(last.problem, [found.member for found in last.selection.found])
+        known = {found.effect.hypothesis: found.effect.shape for found in last.selection.found}
+        settled = refit(last.problem, [found.effect for found in last.selection.found])
         # A delay made the sign of friction look less sharp than it is.
-        blurred = any(found.member.hypothesis.effect.blurs for found in last.selection.found)
+        blurred = any(found.effect.hypothesis.effect.smooths_friction_sign for found in last.selection.found)
     assert last is not None
-    told = with_rivals(last.posed, last.entries, last.selection, np.random.default_rng(seed))
+    told = with_rivals(last.searched_problem, last.entries, last.selection, np.random.default_rng(seed))
     return replace(last, selection=told)
 
 
-def _relied_on(base: BaseParameters, recording: Recording) -> Recording:
+def _trust_reversal_rows(base: BaseParameters, recording: Recording) -> Recording:
     """Lets rows at reversals count where neither direction nor acceleration is in doubt: a model tells the second."""
-    if not recording.clear.any():
+    if not recording.sign_known_from_velocity.any():
         return recording
     baseline, settled = fit_plain(base, recording)
-    inertia = inertia_of(baseline, recording, settled.values)
+    inertia = inertia_matrix(baseline, recording, settled.values)
     trusted = quiet_joints(recording, settled.residual, inertia)
-    timing = reversal_timing(recording, baseline, settled.values, settled.residual)
-    if timing is not None and recording.late is not None:
+    timing = measure_reversal_timing(recording, baseline, settled.values, settled.residual)
+    if timing is not None and recording.reversal_time_error is not None:
         # Positions alone bound what a kick may hide; beside torque they may tell that it is more.
-        trusted &= timing.kicks <= np.max(recording.late * np.abs(recording.ddq), axis=0)
-    return recording.trusting(trusted)
+        trusted &= timing.kicks <= np.max(recording.reversal_time_error * np.abs(recording.ddq), axis=0)
+    return recording.with_trusted(trusted)
 
 
-def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Settled]:
+def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, RefitResult]:
     """Fits the base model alone.
 
     Rows count by what the fit before leaves of them: against noise as large as the torque, a description that lacks a
@@ -144,12 +149,15 @@ def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Set
     joints that the base model describes well must not bend what it says of the others.
     """
     baseline, tau = build_baseline(base, recording), recording.tau
-    counts, size = ~recording.unsure, tau.std(axis=0) + 1e-12
-    pull, (grams, crosses) = pull_of(baseline, recording), moments(baseline, counts.astype(float), tau)
+    counts, size = ~recording.sign_unknown, tau.std(axis=0) + 1e-12
+    pull, (grams, crosses) = (
+        base_model_prior(baseline, recording),
+        normal_equations(baseline, counts.astype(float), tau),
+    )
     scale = size
     for _ in range(ROUNDS):
         gram, cross = np.tensordot(scale**-2.0, grams, 1), scale**-2.0 @ crosses
-        values = held(gram, cross, loosened(pull, gram, cross))[: baseline.base.size]
+        values = solve_map(gram, cross, inflate_conflicting_prior(pull, gram, cross))[: baseline.base.size]
         left = tau - baseline.regressor @ values
         noise = np.sqrt((left**2 * counts).sum(axis=0) / np.maximum(counts.sum(axis=0), 1))
         before, scale = scale, np.clip(noise, QUIETEST * size, scale)
@@ -157,8 +165,8 @@ def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Set
             break
     if not is_short(recording):
         # Effects are measured beside a base model that nothing holds: so is the noise.
-        left = tau - np.concatenate([baseline.regressor, baseline.nuisance], axis=2) @ free(gram, cross)
-    return baseline, Settled(left, values)
+        left = tau - np.concatenate([baseline.regressor, baseline.nuisance], axis=2) @ solve_least_squares(gram, cross)
+    return baseline, RefitResult(left, values)
 
 
 def _searched(
@@ -170,17 +178,17 @@ def _searched(
     share: float,
     known: Mapping[Hypothesis, tuple[float, ...]],
 ) -> Search:
-    entries = measure(problem, hypotheses, _teller(bar, share, 0.2))
+    entries = measure(problem, hypotheses, _scan_progress(bar, share, 0.2))
     give_back()
-    advance = _noter(bar, share + 0.25)
+    advance = _note_progress(bar, share + 0.25)
     selection = select(problem, entries, false_alarm=false_alarm, rng=rng, advance=advance, known=known)
-    members = [found.member for found in selection.found]
-    return Search(problem, composed(problem, members, hypotheses), entries, selection)
+    members = [found.effect for found in selection.found]
+    return Search(problem, with_total_torque(problem, members, hypotheses), entries, selection)
 
 
-def _teller(bar: Progress, start: float, share: float) -> Callable[[float], None]:
+def _scan_progress(bar: Progress, start: float, share: float) -> Callable[[float], None]:
     return lambda done: bar.update(start + share * done, "scan")
 
 
-def _noter(bar: Progress, at: float) -> Callable[[str], None]:
+def _note_progress(bar: Progress, at: float) -> Callable[[str], None]:
     return lambda note: bar.update(at, note)

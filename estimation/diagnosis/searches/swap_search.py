@@ -11,12 +11,12 @@ import numpy as np
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member, all_but, refine
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry, Outcome, scan
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
-from estimation.diagnosis.joint_fits.total_torque import composed
-from estimation.diagnosis.searches.acceptance import is_sure
-from estimation.diagnosis.searches.candidate_screening import contenders
+from estimation.diagnosis.joint_fits.total_torque import with_total_torque
+from estimation.diagnosis.searches.acceptance import is_certain
+from estimation.diagnosis.searches.candidate_screening import screen_candidates
 from robots.common.parallel import threaded
 
 # A member whose gain is within this share of what it was when it won over its rivals wins over them still.
@@ -24,16 +24,16 @@ SAME = 0.02
 RIVALS = 4  # that are tried in a member's place at once
 
 
-def polished(
+def refine_with_swaps(
     problem: Problem,
     entries: Sequence[Entry],
-    members: list[Member],
+    members: list[FittedEffect],
     p_values: list[float],
     seen: Collection[Hypothesis],
     won: dict[Hypothesis, float],
     rng: np.random.Generator,
     false_alarm: float,
-) -> tuple[list[Member], list[float]]:
+) -> tuple[list[FittedEffect], list[float]]:
     """Refines each member beside the others, lets its rivals take its place, and drops what is no longer needed.
 
     What was seen in the torque stays. Rivals of one that has `won` over them with the gain that it has still, whatever
@@ -45,9 +45,9 @@ def polished(
         changed = False
         for i in range(len(members)):
             others = [m for k, m in enumerate(members) if k != i]
-            beside = all_but(problem, members, i)
-            now = composed(problem, members, [members[i].hypothesis])
-            reached = measured(problem, members[i], beside)
+            beside = accept_all_but(problem, members, i)
+            now = with_total_torque(problem, members, [members[i].hypothesis])
+            reached = remeasure(problem, members[i], beside)
             before = won.get(members[i].hypothesis)
             still = before is not None and abs(reached.gain - before) <= SAME * before
             cleared = newest.difference(members[i].group.joints)
@@ -55,15 +55,15 @@ def polished(
                 members[i] = refine(now, members[i].hypothesis, members[i].shape, beside)
                 continue
             result = scan(problem, entries, beside, rng, nulls=False)
-            near = contenders(problem, result, others, reached.bic(problem.rows))
+            near = screen_candidates(problem, result, others, reached.bic_gain(problem.rows))
             rest = [o for o in near if o.hypothesis != members[i].hypothesis]
             if still:
                 rest = [o for o in rest if cleared.intersection(_acts_on(problem, o.hypothesis))]
             # All at once: the refinement of its own shape takes as long as those of its rivals.
             with ThreadPoolExecutor(1) as apart:
                 own = apart.submit(refine, now, members[i].hypothesis, members[i].shape, beside)
-                rivals = best(problem, rest[:RIVALS], beside)
-            first = max([own.result(), *rivals], key=lambda m: m.bic(problem.rows))
+                rivals = refine_candidates(problem, rest[:RIVALS], beside)
+            first = max([own.result(), *rivals], key=lambda m: m.bic_gain(problem.rows))
             was, members[i] = members[i].hypothesis, first
             if first.hypothesis == was:
                 wide = [rival for rival in rivals if cleared.intersection(rival.group.joints)]
@@ -76,25 +76,27 @@ def polished(
         i
         for i, m in enumerate(members)
         if m.hypothesis in seen
-        or _again(problem, members, i).worth(problem.rows) > MIN_BIC_GAIN
-        or is_sure(problem, m, p_values[i], [*members[:i], *members[i + 1 :]], false_alarm)
+        or _again(problem, members, i).local_bic_gain(problem.rows) > MIN_BIC_GAIN
+        or is_certain(problem, m, p_values[i], [*members[:i], *members[i + 1 :]], false_alarm)
     ]
     return [members[i] for i in keep], [p_values[i] for i in keep]
 
 
-def _again(problem: Problem, members: Sequence[Member], i: int) -> Member:
+def _again(problem: Problem, members: Sequence[FittedEffect], i: int) -> FittedEffect:
     """Gives a member, measured anew beside the others as they are now if it was worth too little beside what they were.
 
     Joints on which they had not found their forms yet may have seemed at odds.
     """
     m = members[i]
-    if m.worth(problem.rows) > MIN_BIC_GAIN:
+    if m.local_bic_gain(problem.rows) > MIN_BIC_GAIN:
         return m
-    now = refine(problem, m.hypothesis, m.shape, all_but(problem, members, i), effort=0)
-    return replace(m, gain=now.gain, scatter=now.scatter, doubt=now.doubt)
+    now = refine(problem, m.hypothesis, m.shape, accept_all_but(problem, members, i), effort=0)
+    return replace(m, gain=now.gain, birge_ratio=now.birge_ratio, motion_error_chi2=now.motion_error_chi2)
 
 
-def _with(problem: Problem, members: list[Member], i: int, rival: Member, seen: Collection[Hypothesis]) -> list[Member]:
+def _with(
+    problem: Problem, members: list[FittedEffect], i: int, rival: FittedEffect, seen: Collection[Hypothesis]
+) -> list[FittedEffect]:
     """Gives members with a rival in the place of one and the others on its joints refined beside it, if that is better.
 
     A ripple that has taken up how late its torque is leaves a delay of all torque nothing there.
@@ -103,35 +105,38 @@ def _with(problem: Problem, members: list[Member], i: int, rival: Member, seen: 
     for k, m in enumerate(members):
         if k != i and m.hypothesis not in seen and set(m.group.joints).intersection(rival.group.joints):
             trial[k] = refine(
-                composed(problem, trial, [m.hypothesis]), m.hypothesis, m.shape, all_but(problem, trial, k)
+                with_total_torque(problem, trial, [m.hypothesis]),
+                m.hypothesis,
+                m.shape,
+                accept_all_but(problem, trial, k),
             )
-    trial[i] = refine(problem, rival.hypothesis, rival.shape, all_but(problem, trial, i))
-    return max(members, trial, key=lambda some: _worth(problem, some))
+    trial[i] = refine(problem, rival.hypothesis, rival.shape, accept_all_but(problem, trial, i))
+    return max(members, trial, key=lambda some: _set_bic_gain(problem, some))
 
 
-def _worth(problem: Problem, members: Sequence[Member]) -> float:
+def _set_bic_gain(problem: Problem, members: Sequence[FittedEffect]) -> float:
     """What members explain together, less what each is charged: Schwarz's criterion of them all."""
-    charged = sum(m.gain - m.bic(problem.rows) for m in members)
+    charged = sum(m.gain - m.bic_gain(problem.rows) for m in members)
     return accept(problem, tuple(m.group for m in members)).gain - charged
 
 
-def best(
+def refine_candidates(
     problem: Problem,
     outcomes: Sequence[Outcome],
     accepted: Accepted,
     known: Mapping[Hypothesis, tuple[float, ...]] | None = None,
-) -> list[Member]:
+) -> list[FittedEffect]:
     """Refines contenders, from shapes that are known too, the best BIC first."""
     starts = [(o.hypothesis, o.shape) for o in outcomes]
     starts += [(o.hypothesis, known[o.hypothesis]) for o in outcomes if known and o.hypothesis in known]
     refined = threaded(lambda start: refine(problem, start[0], start[1], accepted), starts)
-    tops: dict[Hypothesis, Member] = {}
-    for member in sorted(refined, key=lambda member: -member.bic(problem.rows)):
+    tops: dict[Hypothesis, FittedEffect] = {}
+    for member in sorted(refined, key=lambda member: -member.bic_gain(problem.rows)):
         tops.setdefault(member.hypothesis, member)
     return list(tops.values())
 
 
-def measured(problem: Problem, member: Member, beside: Accepted) -> Member:
+def remeasure(problem: Problem, member: FittedEffect, beside: Accepted) -> FittedEffect:
     """Measures a member anew, at its shape, beside what is accepted."""
     result = score(problem, member.group, beside)
     bounds = member.hypothesis.coefficient_bounds(problem.situation.robot, member.shape)

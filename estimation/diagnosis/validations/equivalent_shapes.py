@@ -11,21 +11,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.diagnosis.base_models.priors import explained
+from estimation.diagnosis.base_models.priors import explained_chi2
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member, all_but, refine
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.extended_fit import dense
-from estimation.diagnosis.joint_fits.shrinkage import pull_on
-from estimation.diagnosis.searches.selection import Found
-from estimation.regressions.parameter_priors import Pull
+from estimation.diagnosis.joint_fits.shrinkage import effects_prior
+from estimation.diagnosis.searches.selection import SelectedEffect
+from estimation.regressions.parameter_priors import GaussianPrior
 
 # Forms whose fits differ by less than this, twice a log-likelihood, are alike to the log.
 ALIKE = 3.0
 
 
-def alike_forms(problem: Problem, members: Sequence[Member], i: int) -> list[Member]:
+def equivalent_shapes(problem: Problem, members: Sequence[FittedEffect], i: int) -> list[FittedEffect]:
     """Lists the other forms of a member that fit about as well beside the rest, the likeliest first."""
     own, others = members[i], [m for k, m in enumerate(members) if k != i]
     shapes = own.hypothesis.effect.forms(problem.situation, own.hypothesis.joint)
@@ -35,39 +35,39 @@ def alike_forms(problem: Problem, members: Sequence[Member], i: int) -> list[Mem
     return sorted(forms, key=_evidence(problem, others), reverse=True) if forms else []
 
 
-def completed(problem: Problem, founds: Sequence[Found]) -> tuple[Found, ...]:
+def complete_effects(problem: Problem, founds: Sequence[SelectedEffect]) -> tuple[SelectedEffect, ...]:
     """Gives what was found with all that its effect has once it is there, where it is worth that.
 
     A search pays for each coefficient, and goes without those that are hardly told; values without them are told as
     surer than they are, and off by what those would have been.
     """
-    members = [found.member for found in founds]
+    members = [found.effect for found in founds]
     whole = []
     for i, found in enumerate(founds):
-        own = found.member
+        own = found.effect
         shape = own.hypothesis.effect.complete(problem.situation, own.hypothesis.joint, own.shape)
         if shape != own.shape:
-            form = refine(problem, own.hypothesis, shape, all_but(problem, members, i))
-            found = replace(found, member=form) if form.worth(problem.rows) > MIN_BIC_GAIN else found
+            form = refine(problem, own.hypothesis, shape, accept_all_but(problem, members, i))
+            found = replace(found, effect=form) if form.local_bic_gain(problem.rows) > MIN_BIC_GAIN else found
         whole.append(found)
     return tuple(whole)
 
 
-def _evidence(problem: Problem, others: Sequence[Member]) -> Callable[[Member], float]:
+def _evidence(problem: Problem, others: Sequence[FittedEffect]) -> Callable[[FittedEffect], float]:
     """Builds the function that gives twice the log-evidence of a form, up to what all forms have alike."""
     baseline, white = problem.baseline, problem.whitening
     blocks = [baseline.regressor, baseline.nuisance, *(dense(problem, m.hypothesis, m.shape) for m in others)]
     known, tau = white.independent(np.concatenate(blocks, axis=2)), white.independent(problem.recording.tau)
 
-    def evidence(form: Member) -> float:
+    def evidence(form: FittedEffect) -> float:
         flat = np.hstack([known, white.independent(dense(problem, form.hypothesis, form.shape))])
-        pull = pull_on(problem, [*others, form])
+        pull = effects_prior(problem, [*others, form])
         precision = pull.precision / white.row_weight
         gram = flat.T @ flat
         both = gram + precision
         scale = np.sqrt(np.maximum(np.diag(both), 1e-300))
         volume = np.linalg.slogdet(both / scale[:, None] / scale)[1] + 2.0 * float(np.sum(np.log(scale)))
         prior = float(np.sum(np.log(np.maximum(np.diag(precision)[known.shape[1] :], 1e-300))))
-        return explained(gram, flat.T @ tau, Pull(precision, pull.target)) - float(volume) + prior
+        return explained_chi2(gram, flat.T @ tau, GaussianPrior(precision, pull.target)) - float(volume) + prior
 
     return evidence

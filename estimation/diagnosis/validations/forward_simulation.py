@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from estimation.diagnosis.base_models.payload_and_gravity import situation_on
-from estimation.diagnosis.hypothesis_tests.refinement import Member
-from estimation.diagnosis.recordings.recording import Recording, cut
+from estimation.diagnosis.base_models.payload_and_gravity import build_situation
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.recordings.recording import Recording, cut_recording
 from estimation.diagnosis.validations.simulation_result import Curves, Simulation
 from robots.plants.closed_loop import Driven, Loop, Reference, Tangent, drive
 from robots.regressor import TorqueModel
 from robots.terms.discrepancies.patterns import PREFIX
-from robots.terms.effect_bases.gear_load import Bearing, laden_with
+from robots.terms.effect_bases.gear_load import ExtraGearLoad, with_gear_load
 from robots.terms.effect_bases.static import StaticJointEffect
 from robots.terms.situations.flange_body import with_body
 from robots.terms.situations.of_model import sign_of
@@ -33,7 +33,7 @@ NO_SIGN = 1e12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Plant:
+class FittedRobot:
     """A fitted robot.
 
     Attributes:
@@ -42,18 +42,18 @@ class Plant:
         values: their values (b,).
         members: effects beside it; none of the base model alone.
         coefficients: of each effect.
-        felt: base parameters (b,) by which effects reckon load and friction; None for `values`.
-        bearing: what of the effects the gears bear; None for nothing.
+        base_values_for_effects: base parameters (b,) by which effects reckon load and friction; None for `values`.
+        extra_load: what of the effects the gears bear; None for nothing.
         since: moment from which phases count [s]; None for the first of a motion.
     """
 
     model: TorqueModel
     columns: tuple[int, ...]
     values: Array
-    members: Sequence[Member] = ()
+    members: Sequence[FittedEffect] = ()
     coefficients: Sequence[Array] = ()
-    felt: Array | None = None
-    bearing: Bearing | None = None
+    base_values_for_effects: Array | None = None
+    extra_load: ExtraGearLoad | None = None
     since: float | None = None
 
     def at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
@@ -62,20 +62,22 @@ class Plant:
 
     def felt_at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
         """Gives what effects depend on there."""
-        now = self._by(self.values if self.felt is None else self.felt, part, motion)
-        return laden_with(now, self.bearing)
+        now = self._by(
+            self.values if self.base_values_for_effects is None else self.base_values_for_effects, part, motion
+        )
+        return with_gear_load(now, self.extra_load)
 
     def _by(self, values: Array, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
         q, dq, ddq = motion
-        now = situation_on(replace(part, q=q, dq=dq, ddq=ddq), self.model, values, self.columns)
+        now = build_situation(replace(part, q=q, dq=dq, ddq=ddq), self.model, values, self.columns)
         return replace(now, since=self.since)
 
     def base(self, part: Recording, motion: tuple[Array, Array, Array]) -> Array:
         """Evaluates the base model's torque (N, n) along a motion of one log, with its gravity and payload."""
         own = self.model.under(part.gravities[0]).torque(*motion, self.values, columns=self.columns)
-        return own + self.carried(part, motion)
+        return own + self.payload_torque(part, motion)
 
-    def carried(self, part: Recording, motion: tuple[Array, Array, Array]) -> Array:
+    def payload_torque(self, part: Recording, motion: tuple[Array, Array, Array]) -> Array:
         """Evaluates the torque (N, n) of the payload that one log carries."""
         body = with_body(self.model, np.zeros(self.model.size), part.bodies[0])
         columns = np.flatnonzero(body).tolist()
@@ -93,7 +95,7 @@ class Plant:
                 total[:, j] += X @ self.coefficients[i]
         return total
 
-    def unread(self, now: Situation, reading: Array) -> tuple[Plant, Array]:
+    def unmeasured_torque(self, now: Situation, reading: Array) -> tuple[FittedRobot, Array]:
         """Gives the plant without effects that only distort the reading, and the torque (N, n) that was read so."""
         wrong = [i for i, member in enumerate(self.members) if member.hypothesis.effect.distorts]
         plain = [i for i in range(len(self.members)) if i not in wrong]
@@ -109,7 +111,9 @@ class Plant:
         return replace(self, members=members, coefficients=coefficients), torque
 
 
-def compare(before: Plant, after: Plant, whole: Recording, rows: slice, loop: Loop | None = None) -> Simulation | None:
+def simulate_both(
+    before: FittedRobot, after: FittedRobot, whole: Recording, rows: slice, loop: Loop | None = None
+) -> Simulation | None:
     """Simulates a stretch of unseen data with both robots under the same loop.
 
     Args:
@@ -123,10 +127,10 @@ def compare(before: Plant, after: Plant, whole: Recording, rows: slice, loop: Lo
         What the loop had to do; None where a robot ran away from it.
     """
     loop = loop or Loop()
-    part = cut(whole, rows)
+    part = cut_recording(whole, rows)
     inertia = _loop_inertia(before, part)
     # The recording's torque is the arm's own; what drives it carries the log's payload besides.
-    driving = part.tau + before.carried(part, (part.q, part.dq, part.ddq))
+    driving = part.tau + before.payload_torque(part, (part.q, part.dq, part.ddq))
     reference = Reference(step=part.step, q=part.q, dq=part.dq, ddq=part.ddq, torque=driving)
     driven = [_driven(plant, whole, rows, reference, inertia, loop) for plant in (before, after)]
     if not all(np.isfinite(run.change) for run, _ in driven):
@@ -161,12 +165,12 @@ def compare(before: Plant, after: Plant, whole: Recording, rows: slice, loop: Lo
 
 
 def _driven(
-    plant: Plant, whole: Recording, rows: slice, reference: Reference, inertia: Array, loop: Loop
+    plant: FittedRobot, whole: Recording, rows: slice, reference: Reference, inertia: Array, loop: Loop
 ) -> tuple[Driven, bool]:
     """Follows one robot; says too whether its effects were evaluated along the simulated motion."""
-    part = cut(whole, rows)
+    part = cut_recording(whole, rows)
     measured = plant.at(part, (part.q, part.dq, part.ddq))
-    plant, torque = plant.unread(plant.felt_at(part, (part.q, part.dq, part.ddq)), reference.torque)
+    plant, torque = plant.unmeasured_torque(plant.felt_at(part, (part.q, part.dq, part.ddq)), reference.torque)
     reference = replace(reference, torque=torque)
     width, coulomb, tangent = measured.velocity_scale, _coulomb(measured), _tangent(measured)
     effects = _Effects(plant, whole, rows, SEEN * loop.bandwidth)
@@ -188,8 +192,8 @@ def _driven(
 class _Effects:
     """The effects' torque along motions near the measured one: a smooth part, and a factor of the velocity's sign."""
 
-    def __init__(self, plant: Plant, whole: Recording, rows: slice, cutoff: float) -> None:
-        self.plant, self.part = plant, cut(whole, rows)
+    def __init__(self, plant: FittedRobot, whole: Recording, rows: slice, cutoff: float) -> None:
+        self.plant, self.part = plant, cut_recording(whole, rows)
         count = range(len(plant.members))
         # What depends on the past, as a free function may, needs all of it; the rest this stretch alone.
         effects = [member.hypothesis.effect for member in plant.members]
@@ -200,7 +204,7 @@ class _Effects:
         self.sections = butter(4, min(2 * cutoff * self.part.step, 0.9), output="sos")
         self.history = (zero, zero)
         if late:
-            past = cut(whole, slice(0, rows.stop))
+            past = cut_recording(whole, slice(0, rows.stop))
             own = slice(rows.start, rows.stop)
             full = self._parts(past, (past.q, past.dq, past.ddq), late)
             alone = self._parts(self.part, (self.part.q, self.part.dq, self.part.ddq), late)
@@ -259,7 +263,7 @@ def _tangent(now: Situation) -> Tangent:
     return Tangent(inertia=inertia, damping=damping, stiffness=now.sensitivity("position"))
 
 
-def _loop_inertia(plant: Plant, part: Recording) -> Array:
+def _loop_inertia(plant: FittedRobot, part: Recording) -> Array:
     """The inertia (n,) that the loop is laid out for; one that the fit has lost is taken from torque and motion."""
     now = plant.at(part, (part.q, part.dq, part.ddq))
     own = np.mean(np.diagonal(_tangent(now).inertia, axis1=1, axis2=2), axis=0)

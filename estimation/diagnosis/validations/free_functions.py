@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member, refine
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry, scan
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 
@@ -26,17 +26,17 @@ SURE = 1e-9
 def free_functions(
     problem: Problem,
     patterns: Sequence[Entry],
-    named: Sequence[Member],
+    named: Sequence[FittedEffect],
     false_alarm: float,
     rng: np.random.Generator,
     *,
     alone: bool = False,
-) -> tuple[list[Member], list[float]]:
+) -> tuple[list[FittedEffect], list[float]]:
     """Adds patterns beside named effects, while the strongest is significant and worth it.
 
     Where the first is `alone`, no formula beside it that could be inexact, it must be no more than sure.
     """
-    members: list[Member] = []
+    members: list[FittedEffect] = []
     p_values: list[float] = []
     while len(members) < MOST_PATTERNS:
         accepted = accept(problem, tuple(m.group for m in (*named, *members)))
@@ -47,11 +47,11 @@ def free_functions(
         if not p <= false_alarm:
             break
         near = [refine(problem, o.hypothesis, o.shape, accepted) for o in result.outcomes[:CONTENDERS] if o.degrees]
-        member = max(near, key=lambda m: m.bic(problem.rows))
+        member = max(near, key=lambda m: m.bic_gain(problem.rows))
         before = (*named, *members)
-        if worth(member) < BEYOND * sum(m.gain_on(member.group.joints) for m in before):
+        if excess_chi2(member) < BEYOND * sum(m.gain_on(member.group.joints) for m in before):
             break
-        if member.bic(problem.rows) < LEAST and (before or not alone or p > SURE):
+        if member.bic_gain(problem.rows) < LEAST and (before or not alone or p > SURE):
             break
         members.append(member)
         p_values.append(p)
@@ -61,20 +61,20 @@ def free_functions(
 def strongest_pattern(
     problem: Problem,
     patterns: Sequence[Entry],
-    named: Sequence[Member],
+    named: Sequence[FittedEffect],
     false_alarm: float,
     rng: np.random.Generator,
-) -> tuple[Member, float] | None:
+) -> tuple[FittedEffect, float] | None:
     """Gives the free function that explains most beside names, and its p-value; None where noise explains as much."""
     members, p_values = free_functions(problem, patterns, named, false_alarm, rng, alone=True)
     return (members[0], p_values[0]) if members else None
 
 
-def criterion(problem: Problem, free: Sequence[Member]) -> float:
+def set_bic_gain(problem: Problem, free: Sequence[FittedEffect]) -> float:
     """What functions explain together, each beside those before, less what their parameters are worth (Schwarz)."""
     return sum(member.gain - member.degrees * float(np.log(problem.rows)) for member in free)
 
 
-def worth(member: Member) -> float:
+def excess_chi2(member: FittedEffect) -> float:
     """What a member explains more than as many columns of noise would."""
     return max(member.gain - member.degrees, 0.0)

@@ -9,10 +9,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.priors import explained, held
+from estimation.diagnosis.base_models.priors import explained_chi2, solve_map
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.recordings.log_reading import Recording
-from estimation.regressions.parameter_priors import Pull
+from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ BLOCK = 1.0  # [s], and five times the errors' correlation time
 
 
 @dataclass(frozen=True, eq=False)
-class Unseen:
+class HeldOutErrors:
     """Errors on data that the fits behind them had not seen.
 
     Attributes:
@@ -57,7 +57,7 @@ class Unseen:
         """Residual RMS over torque RMS (n,) of one of the models."""
         return self._shares(self.errors[model])
 
-    def kept(self, model: int, joints: Sequence[int]) -> float:
+    def retained_share(self, model: int, joints: Sequence[int]) -> float:
         """Share of the fall in NRMSE by a model's lacking effect, mean over joints, that is left on unseen data.
 
         One where nothing is known of fits that have seen the rows, or where they hardly differ.
@@ -71,14 +71,14 @@ class Unseen:
         )
         return 1.0 if before - after <= WORTH * before else (unseen[0] - unseen[1]) / (before - after)
 
-    def growing(self) -> Array:
+    def support_growth(self) -> Array:
         """By how much the extended model errs more on unseen rows (n,) than where it has seen them; never by less."""
         if self.fitted is None:
             return np.ones(self.measured.shape[1])
         unseen, seen = (self._rms(errors[-1]) for errors in (self.errors, self.fitted))
         return np.maximum(np.divide(unseen, seen, out=np.ones_like(unseen), where=seen > 0), 1.0)
 
-    def astray(self, joint: int) -> bool:
+    def is_unreliable(self, joint: int) -> bool:
         """Whether the extended model errs on unseen rows of a joint, from 0, far more than where it has seen them."""
         if self.fitted is None:
             return False
@@ -130,7 +130,7 @@ class Unseen:
         return max(BLOCK, 5 * max(times))
 
 
-def cross_validated(problem: Problem, effects: Sequence[Array], pull: Pull) -> Unseen:
+def cross_validation_errors(problem: Problem, effects: Sequence[Array], pull: GaussianPrior) -> HeldOutErrors:
     """Fits on all runs but one, or all parts but one of a single run, and measures on the one left out.
 
     Args:
@@ -151,18 +151,18 @@ def cross_validated(problem: Problem, effects: Sequence[Array], pull: Pull) -> U
             "so that the gain on another motion may differ"
         )
     base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
-    counts = ~recording.unsure
+    counts = ~recording.sign_unknown
     weights = counts / problem.whitening.scales(len(recording))
     full = np.concatenate([base, *effects], axis=2)
     weighted = full * weights[:, :, None]
     target = recording.tau * weights
     grams: list[tuple[Array, Array]] = [_moments(weighted[fold], target[fold]) for fold in folds]
     total = (np.sum([g for g, _ in grams], axis=0), np.sum([c for _, c in grams], axis=0))
-    chosen_by = models(base.shape[2], effects)
+    chosen_by = model_columns(base.shape[2], effects)
     errors = [np.empty_like(recording.tau) for _ in chosen_by]
     fitted = [
         recording.tau
-        - full[:, :, chosen] @ held(total[0][np.ix_(chosen, chosen)], total[1][chosen], pull.columns(chosen))
+        - full[:, :, chosen] @ solve_map(total[0][np.ix_(chosen, chosen)], total[1][chosen], pull.columns(chosen))
         for chosen in chosen_by
     ]
     growth = np.zeros(len(chosen_by))
@@ -170,19 +170,21 @@ def cross_validated(problem: Problem, effects: Sequence[Array], pull: Pull) -> U
         rest = (total[0] - gram, total[1] - cross)
         growth += _growth(problem, rest, (gram, cross), float(np.sum(target[fold] ** 2)), counts[fold], pull, chosen_by)
         for error, chosen in zip(errors, chosen_by, strict=True):
-            values = held(rest[0][np.ix_(chosen, chosen)], rest[1][chosen], pull.columns(chosen))
+            values = solve_map(rest[0][np.ix_(chosen, chosen)], rest[1][chosen], pull.columns(chosen))
             error[fold] = recording.tau[fold] - full[fold][:, :, chosen] @ values
-    return Unseen(how, recording.t, recording.step, recording.tau, tuple(errors), counts, tuple(fitted), tuple(growth))
+    return HeldOutErrors(
+        how, recording.t, recording.step, recording.tau, tuple(errors), counts, tuple(fitted), tuple(growth)
+    )
 
 
-def on_held_out(
+def held_out_errors(
     problem: Problem,
     effects: Sequence[Array],
     unseen: Recording,
     unseen_base: Array,
     unseen_effects: Sequence[Array],
-    pull: Pull,
-) -> Unseen:
+    pull: GaussianPrior,
+) -> HeldOutErrors:
     """Fits on all logs and measures on others.
 
     Args:
@@ -195,24 +197,26 @@ def on_held_out(
     """
     recording = problem.recording
     base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
-    weights = ~recording.unsure / problem.whitening.scales(len(recording))
+    weights = ~recording.sign_unknown / problem.whitening.scales(len(recording))
     full = np.concatenate([base, *effects], axis=2)
     gram, cross = _moments(full * weights[:, :, None], recording.tau * weights)
     other = np.concatenate([unseen_base, *unseen_effects], axis=2)
     errors = []
-    for chosen in models(base.shape[2], effects):
-        values = held(gram[np.ix_(chosen, chosen)], cross[chosen], pull.columns(chosen))
+    for chosen in model_columns(base.shape[2], effects):
+        values = solve_map(gram[np.ix_(chosen, chosen)], cross[chosen], pull.columns(chosen))
         errors.append(unseen.tau - other[:, :, chosen] @ values)
     # Stretches of a log that was cut at gaps are named after it.
     logs = len({name.rpartition(" from ")[0] or name for name in unseen.names})
     how = f"{logs} log{'s' if logs > 1 else ''} that the fit has not seen"
     how += f", in {len(unseen.runs)} stretches" if len(unseen.runs) > logs else ""
-    weights = ~unseen.unsure / problem.whitening.scale
+    weights = ~unseen.sign_unknown / problem.whitening.scale
     target = unseen.tau * weights
     more, square = _moments(other * weights[:, :, None], target), float(np.sum(target**2))
-    chosen_by = models(base.shape[2], effects)
-    growth = _growth(problem, (gram, cross), more, square, ~unseen.unsure, pull, chosen_by)
-    return Unseen(how, unseen.t, unseen.step, unseen.tau, tuple(errors), ~unseen.unsure, growth=tuple(growth))
+    chosen_by = model_columns(base.shape[2], effects)
+    growth = _growth(problem, (gram, cross), more, square, ~unseen.sign_unknown, pull, chosen_by)
+    return HeldOutErrors(
+        how, unseen.t, unseen.step, unseen.tau, tuple(errors), ~unseen.sign_unknown, growth=tuple(growth)
+    )
 
 
 def _growth(
@@ -221,7 +225,7 @@ def _growth(
     more: tuple[Array, Array],
     square: float,
     counts: NDArray[np.bool_],
-    pull: Pull,
+    pull: GaussianPrior,
     chosen_by: Sequence[NDArray[np.intp]],
 ) -> Array:
     """See `Unseen.growth`: moments of the fit and of the unseen rows, whose squared torque and number are known.
@@ -232,12 +236,12 @@ def _growth(
     for chosen in chosen_by:
         own, place = pull.columns(chosen), np.ix_(chosen, chosen)
         both = fit[0][place] + more[0][place], fit[1][chosen] + more[1][chosen]
-        told.append(explained(*both, own) - explained(fit[0][place], fit[1][chosen], own))
+        told.append(explained_chi2(*both, own) - explained_chi2(fit[0][place], fit[1][chosen], own))
     noise = problem.whitening.row_weight * max(1.0, (square - told[-1]) / max(int(counts.sum()), 1))
     return (told[-1] - np.array(told)) / noise
 
 
-def models(base: int, effects: Sequence[Array]) -> list[NDArray[np.intp]]:
+def model_columns(base: int, effects: Sequence[Array]) -> list[NDArray[np.intp]]:
     """Columns of the base model, of the extended model less each effect, and of the extended model."""
     edges = np.cumsum([base, *(X.shape[2] for X in effects)])
     own = [np.arange(a, b) for a, b in pairwise(edges)]

@@ -30,7 +30,7 @@ STIFFEST = 1e-12  # [rad/(N m)] below which a gear is rigid
 
 
 @dataclass(frozen=True, eq=False)
-class Windup:
+class MeasuredCompliance:
     """The elasticity of one gear, by its two encoders.
 
     Attributes:
@@ -56,21 +56,21 @@ class _Signals:
     """
 
     t: Array
-    windup: Array
+    deflection: Array
     rest: Array
     load: Array
     rival: Array
     delay: float
 
 
-def measure_windups(
+def measure_gear_compliance(
     now: Situation,
     recording: Recording,
     logs: Sequence[Log],
     *,
     false_alarm: float,
     unseen: tuple[Situation, Recording, Sequence[Log]] | None = None,
-) -> tuple[Windup, ...]:
+) -> tuple[MeasuredCompliance, ...]:
     """Finds the gears that wind up under load, where encoders behind them were logged.
 
     q - q_link = c load + d dq + h sign(dq) + zero + eccentricity: c the compliance, d the delay of one encoder behind
@@ -89,27 +89,27 @@ def measure_windups(
     joints = [
         j + 1
         for j in range(robot.n)
-        if np.ptp(recording.q[:, j]) > 0 and np.isfinite(windup_of(recording, logs, j + 1)).any()
+        if np.ptp(recording.q[:, j]) > 0 and np.isfinite(gear_deflection(recording, logs, j + 1)).any()
     ]
     found = []
     for joint in joints:
         # A delay is no multiple of the velocity where the joint speeds up: what was found of it is taken off first.
         delay = 0.0
         for _ in range(ALIGNED):
-            signals = _signals(now, windup_of(recording, logs, joint, delay), joint, delay)
-            delay += float(_solve(np.column_stack([signals.rest, signals.load]), signals.windup)[1])
-        signals = _signals(now, windup_of(recording, logs, joint, delay), joint, delay)
+            signals = _signals(now, gear_deflection(recording, logs, joint, delay), joint, delay)
+            delay += float(_solve(np.column_stack([signals.rest, signals.load]), signals.deflection)[1])
+        signals = _signals(now, gear_deflection(recording, logs, joint, delay), joint, delay)
         other = None
         if unseen is not None:
-            again = windup_of(unseen[1], unseen[2], joint, delay)
+            again = gear_deflection(unseen[1], unseen[2], joint, delay)
             other = _signals(unseen[0], again, joint, delay) if np.isfinite(again).any() else None
-        result = _judged(now, signals, other, joint, len(joints), false_alarm)
+        result = _test_joint(now, signals, other, joint, len(joints), false_alarm)
         if result is not None:
             found.append(result)
     return tuple(found)
 
 
-def windup_of(recording: Recording, logs: Sequence[Log], joint: int, delay: float = 0.0) -> Array:
+def gear_deflection(recording: Recording, logs: Sequence[Log], joint: int, delay: float = 0.0) -> Array:
     """Gives a joint's position less that behind its gear on a recording's rows (N,).
 
     NaN where that was not logged, and where the joint's direction is not known, nor then the side of the lost motion.
@@ -128,7 +128,7 @@ def windup_of(recording: Recording, logs: Sequence[Log], joint: int, delay: floa
             # Straight lines between samples would cut the corners of an accelerated motion.
             own, link = (CubicSpline(log.t, signal[:, joint - 1]) for signal in (log.q, log.qlink))
             result[run] = own(t) - link(np.clip(t + delay, log.t[0], log.t[-1]))
-    result[recording.unsure[:, joint - 1]] = np.nan
+    result[recording.sign_unknown[:, joint - 1]] = np.nan
     return result
 
 
@@ -142,7 +142,7 @@ def _signals(now: Situation, measured: Array, joint: int, delay: float) -> _Sign
     twice = (np.sin(2 * x), np.cos(2 * x)) if turns else (x**3, x**4)
     return _Signals(
         t=now.t[rows],
-        windup=measured[rows],
+        deflection=measured[rows],
         rest=np.column_stack([np.ones_like(q), dq, sign, *once]),
         load=now.load[:, joint - 1][rows],
         rival=np.column_stack(twice),
@@ -150,11 +150,11 @@ def _signals(now: Situation, measured: Array, joint: int, delay: float) -> _Sign
     )
 
 
-def _judged(
+def _test_joint(
     now: Situation, own: _Signals, other: _Signals | None, joint: int, tests: int, false_alarm: float
-) -> Windup | None:
+) -> MeasuredCompliance | None:
     """Judges one joint: an elastic gear against a rigid one, and against an encoder that is out of true."""
-    w = own.windup
+    w = own.deflection
     alone, whole = own.rest, np.column_stack([own.rest, own.load])
     hidden = own.load - alone @ _solve(alone, own.load)
     if not hidden @ hidden > VISIBLE * np.sum((own.load - own.load.mean()) ** 2):
@@ -176,7 +176,7 @@ def _judged(
         level = w
     else:
         one, two = _solve(alone, w), values
-        level, both = other.windup, np.column_stack([other.rest, other.load])
+        level, both = other.deflection, np.column_stack([other.rest, other.load])
         errors = [(level[b] - other.rest[b] @ one, level[b] - both[b] @ two) for b in blocks_of(other.t)]
     gain = gain_by_blocks(errors, level)
     if gain.ci95[1] < 0:
@@ -208,7 +208,7 @@ def _judged(
         coordinate=f"load of joint {joint} [{force}]",
         measured_by="qlink",
     )
-    return Windup(
+    return MeasuredCompliance(
         finding=finding,
         extension=_extension(now, joint, float(values[-1]), float(error[-1])),
         coordinate=own.load,

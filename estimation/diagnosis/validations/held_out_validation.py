@@ -7,59 +7,69 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, MIN_BIC_GAIN
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import Member
-from estimation.diagnosis.searches.selection import Found
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations.free_functions import SURE
-from estimation.diagnosis.validations.held_out_errors import Measured
-from estimation.diagnosis.validations.verdict import CLOSE, Judgement
-from robots.terms.discrepancies.patterns import PREFIX, is_of_time, swings_by_itself
+from estimation.diagnosis.validations.held_out_errors import HeldOutResult
+from estimation.diagnosis.validations.verdict import Verdict
+from robots.terms.discrepancies.patterns import PREFIX, is_of_time, is_oscillation
 from robots.terms.effects import Effect
 
-LEFT = 0.2  # share of an effect's gain that stretches left out must show
-BY_ITSELF = 1e-5  # chance from which on a swing of which unseen data cannot say is taken for noise
-SLIGHT, PLAIN = 0.1, 50.0  # share of the strongest name's worth, and BIC, below which another hardly stands out
-AGAINST = 0.1  # share of an effect's gain by which unseen data must speak against it
-HARM = 1.05  # times the unseen error: an effect that makes it so much larger is left out, sure or not
-RUINS = 1.2  # the same, whatever unseen rows say of it: where they go beyond what was fitted, its formula does not hold
-WORSE = 1.02  # times the base model's unseen error of a joint, by which free functions together are no model of it
-SAYS, PLAINLY = 0.4, 30.0  # share and size of the growth by which unseen rows speak for an effect, whatever the error
+MIN_RETAINED_GAIN = 0.2  # share of an effect's gain that stretches left out must show
+OSCILLATION_P_VALUE = 1e-5  # chance from which on a swing of which unseen data cannot say is taken for noise
+MINOR_SHARE, MINOR_BIC_GAIN = (
+    0.1,
+    50.0,
+)  # share of the strongest name's worth, and BIC, below which another hardly stands out
+CONTRADICTION_SHARE = 0.1  # share of an effect's gain by which unseen data must speak against it
+MAX_RMSE_RATIO = 1.05  # times the unseen error: an effect that makes it so much larger is left out, sure or not
+REJECT_RMSE_RATIO = (
+    1.2  # the same, whatever unseen rows say of it: where they go beyond what was fitted, its formula does not hold
+)
+MAX_FREE_RMSE_RATIO = (
+    1.02  # times the base model's unseen error of a joint, by which free functions together are no model of it
+)
+MIN_SUPPORT, MIN_SUPPORT_CHI2 = (
+    0.4,
+    30.0,
+)  # share and size of the growth by which unseen rows speak for an effect, whatever the error
 
 
 @dataclass(frozen=True, eq=False)
-class BorneOut:
+class ValidatedFindings:
     """What is left of what was found.
 
     Attributes:
-        founds: names that hold.
-        members: theirs, and free functions after them.
+        findings: names that hold.
+        effects: theirs, and free functions after them.
         p_values: of the members.
-        seen: what the members bring on unseen data.
-        spoiling: free functions that err on unseen data, with p-value and gain.
+        measured: what the members bring on unseen data.
+        rejected_discrepancies: free functions that err on unseen data, with p-value and gain.
         notes: what was left out, in words.
         refuted: names that stood out clearly and that unseen data speak against, with p-value and gain: they are no
             cause, but there is one.
     """
 
-    founds: tuple[Found, ...]
-    members: tuple[Member, ...]
+    findings: tuple[SelectedEffect, ...]
+    effects: tuple[FittedEffect, ...]
     p_values: tuple[float, ...]
-    seen: Measured
-    spoiling: tuple[tuple[Member, float, Gain], ...]
+    measured: HeldOutResult
+    rejected_discrepancies: tuple[tuple[FittedEffect, float, Gain], ...]
     notes: tuple[str, ...]
-    refuted: tuple[tuple[Member, float, Gain], ...]
+    refuted: tuple[tuple[FittedEffect, float, Gain], ...]
 
 
-def bear_out(
-    judgement: Judgement,
-    measure: Callable[[Sequence[Member], frozenset[int]], Measured],
+def validate_on_held_out(
+    judgement: Verdict,
+    measure: Callable[[Sequence[FittedEffect], frozenset[int]], HeldOutResult],
     beyond: Callable[[Effect], bool],
-    forms: Callable[[Sequence[Member], int], Sequence[Member]],
-    worth: Callable[[Member], float],
-    unnamed: Callable[[Member, Sequence[Member]], tuple[Member, float] | None],
-) -> BorneOut:
+    forms: Callable[[Sequence[FittedEffect], int], Sequence[FittedEffect]],
+    worth: Callable[[FittedEffect], float],
+    unnamed: Callable[[FittedEffect, Sequence[FittedEffect]], tuple[FittedEffect, float] | None],
+) -> ValidatedFindings:
     """Leaves out what makes unseen errors larger, one after the other, the surest first.
 
     However well it fits, it is no cause: a few rows at the end of a log. Where another form of it that fits about as
@@ -74,32 +84,32 @@ def bear_out(
             stronger one, whose formula may leave as much, unseen data that do not speak for it are the odds against it.
         unnamed: finds a free function of what a name that is left out was for, beside other members; with its p-value.
     """
-    founds = list(judgement.kept)
-    members = [*(found.member for found in founds), *judgement.patterns]
+    founds = list(judgement.named)
+    members = [*(found.effect for found in founds), *judgement.patterns]
     p_values = [*(found.p_value for found in founds), *judgement.p_values]
-    spoiling: list[tuple[Member, float, Gain]] = []
+    spoiling: list[tuple[FittedEffect, float, Gain]] = []
     notes: list[str] = []
-    refuted: list[tuple[Member, float, Gain]] = []
+    refuted: list[tuple[FittedEffect, float, Gain]] = []
     gone: set[Hypothesis] = set()
     cooled: set[Hypothesis] = set()
 
-    def look(members: Sequence[Member]) -> Measured:
+    def look(members: Sequence[FittedEffect]) -> HeldOutResult:
         return measure(members, frozenset(i for i, member in enumerate(members) if member.hypothesis in gone))
 
     seen = look(members)
-    strongest = max((worth(found.member) for found in founds), default=0.0)
-    while idle := [i for i in range(len(founds)) if _idle(seen, i, members[i], beyond, worth, strongest)]:
+    strongest = max((worth(found.effect) for found in founds), default=0.0)
+    while idle := [i for i in range(len(founds)) if _is_insignificant(seen, i, members[i], beyond, worth, strongest)]:
         notes.append(_FAINT.format(members[idle[0]].hypothesis.label))
         for items in (founds, members, p_values):
             items.pop(idle[0])
         seen = look(members)
     while harmful := (
-        [i for i, m in enumerate(members) if m.hypothesis not in cooled and _harms(seen, i, m, beyond)]
-        or _together(seen, members, len(founds))
+        [i for i, m in enumerate(members) if m.hypothesis not in cooled and _is_harmful(seen, i, m, beyond)]
+        or _harmful_free_functions(seen, members, len(founds))
     ):
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         label = members[worst].hypothesis.label
-        if len(members) == 1 > len(founds) and _unsure(members[0].hypothesis.effect, p_values[0]):
+        if len(members) == 1 > len(founds) and _is_weak(members[0].hypothesis.effect, p_values[0]):
             # All that stood out, and hardly: unseen data against it are the odds that it is noise.
             own = members[0].hypothesis.joint
             notes.append(_FAINT.format(f"a free function of {f'joint {own}' if own else _WHOLE}"))
@@ -108,17 +118,17 @@ def bear_out(
         elif worst >= len(founds):
             # A free function that errs elsewhere is no model; that something is unexplained is as true as before.
             spoiling.append((members.pop(worst), p_values.pop(worst), seen.gains[worst]))
-        elif (undone := _undone(members, worst, gone, look)) is not None:
+        elif (undone := _without_change(members, worst, gone, look)) is not None:
             seen = undone
             notes.append(_UNDONE.format(label))
             continue
-        elif instead := _instead(founds[worst], worst, members, look, beyond, forms):
+        elif instead := _alternative(founds[worst], worst, members, look, beyond, forms):
             founds[worst], seen = instead
-            members[worst] = founds[worst].member
+            members[worst] = founds[worst].effect
             if members[worst].hypothesis.label != label:
                 notes.append(_REPLACED.format(label, members[worst].hypothesis.label))
             continue
-        elif _may_have_cooled(seen, worst, members[worst]):
+        elif _explained_by_cooling(seen, worst, members[worst]):
             cooled.add(members[worst].hypothesis)
             continue
         else:
@@ -132,7 +142,9 @@ def bear_out(
         seen = look(members)
     joints = sorted({member.hypothesis.joint or 0 for member, _, _ in spoiling})
     notes += [_SPOILING.format(f"joint {joint}" if joint else _WHOLE) for joint in joints]
-    return BorneOut(tuple(founds), tuple(members), tuple(p_values), seen, tuple(spoiling), tuple(notes), tuple(refuted))
+    return ValidatedFindings(
+        tuple(founds), tuple(members), tuple(p_values), seen, tuple(spoiling), tuple(notes), tuple(refuted)
+    )
 
 
 _FAINT = "A fit of {} hardly stood out, and unseen data do not speak for it: left out."
@@ -149,13 +161,16 @@ _SPOILING = (
 )
 
 
-def _undone(
-    members: Sequence[Member], place: int, gone: set[Hypothesis], look: Callable[[Sequence[Member]], Measured]
-) -> Measured | None:
+def _without_change(
+    members: Sequence[FittedEffect],
+    place: int,
+    gone: set[Hypothesis],
+    look: Callable[[Sequence[FittedEffect]], HeldOutResult],
+) -> HeldOutResult | None:
     """Measures unseen data that a change is gone from again, such as a payload; None where that is no better."""
     hypothesis = members[place].hypothesis
     effect = hypothesis.effect
-    comes = effect.depends_on == "time" and not effect.passing and any(shape.moment for shape in effect.shapes)
+    comes = effect.depends_on == "time" and not effect.transient and any(shape.moment for shape in effect.shapes)
     if hypothesis in gone or not comes:
         return None
     gone.add(hypothesis)
@@ -166,59 +181,59 @@ def _undone(
     return None
 
 
-def _instead(
-    found: Found,
+def _alternative(
+    found: SelectedEffect,
     place: int,
-    members: Sequence[Member],
-    measure: Callable[[Sequence[Member]], Measured],
+    members: Sequence[FittedEffect],
+    measure: Callable[[Sequence[FittedEffect]], HeldOutResult],
     beyond: Callable[[Effect], bool],
-    forms: Callable[[Sequence[Member], int], Sequence[Member]],
-) -> tuple[Found, Measured] | None:
+    forms: Callable[[Sequence[FittedEffect], int], Sequence[FittedEffect]],
+) -> tuple[SelectedEffect, HeldOutResult] | None:
     """Finds another form or the closest rival of a name that unseen data bear out, and what all bring with it.
 
     Where none is, the same cause may stay in a form that the log does not tell from the first and that does no harm.
     """
-    harmless: list[tuple[Found, Measured]] = []
+    harmless: list[tuple[SelectedEffect, HeldOutResult]] = []
     for form in forms(members, place):
         seen = measure([*members[:place], form, *members[place + 1 :]])
-        if not _harms(seen, place, form, beyond):
-            harmless.append((Found(form, found.p_value, found.rivals), seen))
+        if not _is_harmful(seen, place, form, beyond):
+            harmless.append((SelectedEffect(form, found.p_value, found.rivals), seen))
             if seen.gains[place].ci95[0] > 0:
                 return harmless[-1]
-    close = [(rival, worse) for rival, worse in found.rivals if worse < CLOSE]
+    close = [(rival, worse) for rival, worse in found.rivals if worse < CLOSE_RIVAL_BIC]
     for k, (rival, worse) in enumerate(close):
         seen = measure([*members[:place], rival, *members[place + 1 :]])
-        if not _harms(seen, place, rival, beyond) and seen.gains[place].ci95[0] > 0:
+        if not _is_harmful(seen, place, rival, beyond) and seen.gains[place].ci95[0] > 0:
             rest = tuple((other, more - worse) for other, more in close[k + 1 :])
-            return Found(rival, found.p_value, rest), seen
+            return SelectedEffect(rival, found.p_value, rest), seen
     return harmless[0] if harmless else None
 
 
-def _together(seen: Measured, members: Sequence[Member], named: int) -> list[int]:
+def _harmful_free_functions(seen: HeldOutResult, members: Sequence[FittedEffect], named: int) -> list[int]:
     """Lists free functions, after the named members, that are not sure to bring anything where all together harm.
 
     Each may bring something beside the others, what those first took away.
     """
-    before, after = seen.unseen.nrmse(0), seen.unseen.nrmse(-1)
-    worse = set((np.flatnonzero(after > WORSE * before) + 1).tolist())
+    before, after = seen.errors.nrmse(0), seen.errors.nrmse(-1)
+    worse = set((np.flatnonzero(after > MAX_FREE_RMSE_RATIO * before) + 1).tolist())
     free = range(named, len(members)) if len(members) > 1 else ()
     return [i for i in free if seen.gains[i].ci95[0] <= 0 and (members[i].hypothesis.joint or 0) in worse]
 
 
-def _unsure(free: Effect, p_value: float) -> bool:
+def _is_weak(free: Effect, p_value: float) -> bool:
     """Whether a free function that is alone stands out so little that unseen data against it are the odds against it.
 
     Of what knows nothing of the motion they can say nothing.
     """
-    return not is_of_time(free) and p_value > (BY_ITSELF if swings_by_itself(free) else SURE)
+    return not is_of_time(free) and p_value > (OSCILLATION_P_VALUE if is_oscillation(free) else SURE)
 
 
-def _idle(
-    seen: Measured,
+def _is_insignificant(
+    seen: HeldOutResult,
     i: int,
-    member: Member,
+    member: FittedEffect,
     beyond: Callable[[Effect], bool],
-    worth: Callable[[Member], float],
+    worth: Callable[[FittedEffect], float],
     strongest: float,
 ) -> bool:
     """Whether a name that hardly stands out brings nothing on unseen data that it should be seen in.
@@ -229,11 +244,15 @@ def _idle(
     gain = seen.gains[i]
     if beyond(member.hypothesis.effect):
         return False
-    slight = worth(member) < min(SLIGHT * strongest, PLAIN) and seen.speaks[i] < LEFT and gain.ci95[0] <= 0
+    slight = (
+        worth(member) < min(MINOR_SHARE * strongest, MINOR_BIC_GAIN)
+        and seen.support[i] < MIN_RETAINED_GAIN
+        and gain.ci95[0] <= 0
+    )
     return slight or (worth(member) <= MIN_BIC_GAIN and gain.nrmse_after >= gain.nrmse_before)
 
 
-def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bool]) -> bool:
+def _is_harmful(seen: HeldOutResult, i: int, member: FittedEffect, beyond: Callable[[Effect], bool]) -> bool:
     """Whether unseen errors are surely larger with a member, or larger by so much that it is no gain to have it.
 
     A cause that acts at all times must also leave on stretches left out some of what it does where it was fitted: of
@@ -243,28 +262,36 @@ def _harms(seen: Measured, i: int, member: Member, beyond: Callable[[Effect], bo
     effect, joint = member.hypothesis.effect, member.hypothesis.joint
     if beyond(effect):
         return False
-    gain, speaks = seen.gains[i], seen.speaks[i]
-    told = (speaks >= LEFT and gain.ci95[0] > 0) or (speaks >= SAYS and speaks * member.gain > PLAINLY)
-    if effect.depends_on == "state" and seen.kept[i] < LEFT and not told:
+    gain, speaks = seen.gains[i], seen.support[i]
+    told = (speaks >= MIN_RETAINED_GAIN and gain.ci95[0] > 0) or (
+        speaks >= MIN_SUPPORT and speaks * member.gain > MIN_SUPPORT_CHI2
+    )
+    if effect.depends_on == "state" and seen.cv_retained_gain[i] < MIN_RETAINED_GAIN and not told:
         return True
-    if joint is not None and seen.unseen.astray(joint - 1):
+    if joint is not None and seen.errors.is_unreliable(joint - 1):
         return True
     # A free function claims no cause: what it brings elsewhere is all that it is good for.
     least = gain.ci95[1] if len(seen.gains) == 1 or is_of_time(effect) else gain.nrmse_before - gain.nrmse_after
     idle = effect.name.startswith(PREFIX) and least < 0
     # By less of its gain than this a base model that errs there, too, makes them speak against a cause.
-    against = seen.worse[i] and speaks < -AGAINST
+    against = seen.contradicts[i] and speaks < -CONTRADICTION_SHARE
     # Base parameters that it moves may err elsewhere by more than it is, whatever those rows say of it.
-    risen = seen.rises[i] > HARM if speaks < LEFT else seen.rises[i] > RUINS and gain.ci95[0] <= 0
+    risen = (
+        seen.rmse_ratio[i] > MAX_RMSE_RATIO
+        if speaks < MIN_RETAINED_GAIN
+        else seen.rmse_ratio[i] > REJECT_RMSE_RATIO and gain.ci95[0] <= 0
+    )
     # Heat that was stored before the unseen data, and what a pause left of it, are told by neither.
-    return (against and not effect.keeps) or idle or risen
+    return (against and not effect.has_thermal_memory) or idle or risen
 
 
-def _may_have_cooled(seen: Measured, i: int, member: Member) -> bool:
+def _explained_by_cooling(seen: HeldOutResult, i: int, member: FittedEffect) -> bool:
     """Whether what unseen data have against a member may be but the heat that a pause left of what they do not show.
 
     One mass stands for gear and housing: how warm a joint is when it moves again it tells worse than how it warmed.
     """
     joint = member.hypothesis.joint
-    known = seen.kept[i] >= LEFT and not (joint is not None and seen.unseen.astray(joint - 1))
-    return member.hypothesis.effect.keeps and known and seen.rises[i] <= RUINS
+    known = seen.cv_retained_gain[i] >= MIN_RETAINED_GAIN and not (
+        joint is not None and seen.errors.is_unreliable(joint - 1)
+    )
+    return member.hypothesis.effect.has_thermal_memory and known and seen.rmse_ratio[i] <= REJECT_RMSE_RATIO

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import SCALES
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.validations.gain_intervals import PARTS, Unseen
+from estimation.diagnosis.validations.gain_intervals import PARTS, HeldOutErrors
 from estimation.identifications.comparison import band_of
 from estimation.models.model import Model
 from estimation.predictions.prediction import Prediction, predict
@@ -28,7 +28,7 @@ STRETCH, POINTS = 30.0, 5
 FEWEST = 50
 
 
-def smoothed_best(model: Model, problem: Problem, logs: Sequence[Log]) -> Model:
+def with_best_cutoff(model: Model, problem: Problem, logs: Sequence[Log]) -> Model:
     """States the cut-off of the motion with which a model predicts its own logs best.
 
     A diagnosis knows of each joint up to which frequency its torque is told by positions, and weighs by that. A
@@ -48,7 +48,7 @@ def smoothed_best(model: Model, problem: Problem, logs: Sequence[Log]) -> Model:
     return min(stated, key=lambda one: _misfit(one, part, before))
 
 
-def as_sharp(model: Model, logs: Sequence[Log]) -> Model:
+def with_best_sign_sharpness(model: Model, logs: Sequence[Log]) -> Model:
     """States the sharpness of each joint's sign with which a model predicts its own logs best.
 
     A diagnosis gives up rows about reversals, and may be left with those that any sharpness suits: its model would turn
@@ -111,7 +111,7 @@ def _misfit(model: Model, log: Log, before: Sequence[Log]) -> float:
     return float(np.mean(np.log(told))) if len(told) else 0.0
 
 
-def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen: Unseen) -> Model:
+def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen: HeldOutErrors) -> Model:
     """States the half-widths of a band that holds 95 % of the model's errors on data that its fit has not seen.
 
     Args:
@@ -122,7 +122,7 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
             of them that fits had not seen.
         unseen: the errors on those.
     """
-    growth = np.ones(model.robot.n) if held_out else unseen.growing()
+    growth = np.ones(model.robot.n) if held_out else unseen.support_growth()
     every = [*logs, *held_out]
     errors = [np.abs(_error(_predicted(model, log, _before(model, log, every)))) * growth for log in held_out or logs]
     covered = np.full(model.robot.n, np.nan)
@@ -143,7 +143,7 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
     return replace(model, provenance={**model.provenance, **stated})
 
 
-def every_row(model: Model) -> Array:
+def all_row_errors(model: Model) -> Array:
     """Gives back the errors on unseen data that `with_band` states (n,); NaN where it is not known."""
     stated = model.provenance.get("unseen_nrmse")
     return np.full(model.robot.n, np.nan) if stated is None else np.array([number(value) for value in stated])

@@ -35,7 +35,7 @@ class PointwiseRows:
         return int(self._chosen.sum()) + self._averaged
 
     def add_peaks(self, z: Array, tolerance: float) -> bool:
-        """Adds the sample of each near peak; tells whether one passed its bound by more than the tolerance."""
+        """Adds the sample of each near peak; returns whether one exceeded its bound by more than the tolerance."""
         if not self._problem.pointwise:
             return False
         excess = self._problem.pointwise_excess(z)

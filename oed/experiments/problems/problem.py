@@ -56,7 +56,7 @@ class FourierProblem:
     weighting: Weighting = field(default_factory=Weighting)
 
     def __getstate__(self) -> dict[str, object]:
-        # What is derived, compiled code above all, is rebuilt in the process that needs it.
+        # Derived data, such as compiled code, are rebuilt in the process that needs them.
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
     def __setstate__(self, state: dict[str, object]) -> None:
@@ -117,8 +117,11 @@ class FourierProblem:
             labels += [label for limit in self.averaged for label in limit.labels]
             broken = [labels[row] for row in np.flatnonzero(np.concatenate(excess) >= -ROOM)]
         raise InfeasibleError(
-            f"at rest in the home pose and in the middle of the ranges: {', '.join(broken[:3])} passes its limit",
-            remedy="state another home pose or other limits",
+            (
+                f"even at rest, in the home pose and in the middle of the ranges, {', '.join(broken[:3])} exceeds its "
+                f"limit"
+            ),
+            remedy="choose another home pose, or correct the limits",
         )
 
     @property

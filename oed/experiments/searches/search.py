@@ -107,7 +107,7 @@ class Island:
         settings: the local solver and its settings.
         seed: of the whole design.
         number: of this island.
-        tell: told after each local solution how many are done, and the best value so far.
+        tell: called after each local solution with the number done and the best value so far.
         deadline: as `time.time` counts, for islands of one design may run one after the other or on several machines;
             after it the best design so far is kept.
         halted: asked again and again whether to end early with the best design so far.

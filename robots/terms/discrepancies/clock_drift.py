@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.robot import Robot
-from robots.terms.discrepancies.gain_drift import OverTime, of_logs, waves
+from robots.terms.discrepancies.gain_drift import OverTime, half_waves, log_time
 from robots.terms.effects import Coefficient, Situation
 from robots.terms.effects.time_delay import lateness
 
@@ -19,14 +19,14 @@ KNOTS = 3
 OVER = 1e-3
 
 
-class Parting(OverTime):
+class ClockDrift(OverTime):
     """-g(t) dtau_j / dt on every joint j, g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
 
     A delay that stays is `time_delay`.
     """
 
     name: ClassVar[str] = "pattern:parting:0:even"
-    title: ClassVar[str] = "torque that is logged later than position by more or less as time goes on"
+    title: ClassVar[str] = "drift between the clocks of torque and position"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the delays of the half waves."""
@@ -34,7 +34,7 @@ class Parting(OverTime):
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the change of torque per delay times each wave (N, n, KNOTS)."""
-        times = waves(of_logs(situation), KNOTS)
+        times = half_waves(log_time(situation), KNOTS)
         return np.asarray(lateness(situation, OVER)[:, :, None] * times[:, None])
 
     def describe(
@@ -46,9 +46,9 @@ class Parting(OverTime):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
-        late = waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients
+        """Describes the finding in one sentence."""
+        late = half_waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients
         return (
-            "The torque of all joints is logged later after the positions, or less late, as time goes on: by about "
-            f"{1000 * float(np.ptp(late)):.2g} ms over the logs. Two clocks that do not run alike do that."
+            "The delay between logged torque and position changes with time, on all joints: by about "
+            f"{1000 * float(np.ptp(late)):.2g} ms over the logs. Likely cause: two clocks with different rates."
         )

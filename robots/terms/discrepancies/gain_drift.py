@@ -17,7 +17,7 @@ FEWEST = 3  # joints
 
 
 class OverTime(Effect):
-    """What all joints share and changes slowly with time."""
+    """Base class of slow changes over time that all joints share."""
 
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
@@ -27,14 +27,14 @@ class OverTime(Effect):
         return (None,) if robot.n >= FEWEST else ()
 
 
-class Fading(OverTime):
+class GainDrift(OverTime):
     """tau_j g(t) on every joint j, g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
 
-    What heat makes of a motor's constant differs from joint to joint, and is `torque_constant_heat`.
+    The temperature dependence of a torque constant differs between joints; see `torque_constant_heat`.
     """
 
     name: ClassVar[str] = "pattern:fading:0:even"
-    title: ClassVar[str] = "torque of all joints that changes by the same share with time"
+    title: ClassVar[str] = "common gain drift of all torque signals"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the shares of the half waves."""
@@ -42,7 +42,7 @@ class Fading(OverTime):
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the base model's torque times each wave (N, n, KNOTS)."""
-        return np.asarray(situation.torque[:, :, None] * waves(of_logs(situation))[:, None])
+        return np.asarray(situation.torque[:, :, None] * half_waves(log_time(situation))[:, None])
 
     def describe(
         self,
@@ -53,19 +53,20 @@ class Fading(OverTime):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
-        share = waves(np.linspace(0.0, 1.0, 201)) @ coefficients
+        """Describes the finding in one sentence."""
+        share = half_waves(np.linspace(0.0, 1.0, 201)) @ coefficients
         return (
-            "The torque of all joints changes slowly with time, by the same share of each: over the logs it differs by "
-            f"{100 * float(np.ptp(share)):.2g} %. A supply, or what all amplifiers are measured by, does that."
+            "The torque signals of all joints change slowly with time by the same factor; the total change over the "
+            "logs is "
+            f"{100 * float(np.ptp(share)):.2g} %. Likely cause: the supply, or a common reference of the amplifiers."
         )
 
 
-def waves(x: Array, count: int = KNOTS) -> Array:
+def half_waves(x: Array, count: int = KNOTS) -> Array:
     """Gives half waves (N, count) of time x (N,), which goes from 0 to 1."""
     return np.column_stack([np.cos(np.pi * k * x) for k in range(1, count + 1)])
 
 
-def of_logs(situation: Situation) -> Array:
+def log_time(situation: Situation) -> Array:
     """Gives time (N,) from 0 at the first row to 1 at the last."""
     return (situation.t - situation.t[0]) / max(float(situation.t[-1] - situation.t[0]), 1e-9)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.robot import Robot
-from robots.terms.discrepancies.gain_drift import OverTime, of_logs, waves
+from robots.terms.discrepancies.gain_drift import OverTime, half_waves, log_time
 from robots.terms.effects import Coefficient, Situation
 
 Array = NDArray[np.float64]
@@ -17,14 +17,14 @@ KNOTS = 3
 _PARTS = (("mass", "kg"), ("moment_x", "kg m"), ("moment_y", "kg m"), ("moment_z", "kg m"))
 
 
-class Draining(OverTime):
+class PayloadDrift(OverTime):
     """Y_tool (m, m c) g(t), g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
 
     A body that comes or goes at once is `payload_change`.
     """
 
     name: ClassVar[str] = "pattern:draining:0:even"
-    title: ClassVar[str] = "a body at the flange that changes slowly with time"
+    title: ClassVar[str] = "slowly changing payload"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes mass and first moments of each half wave."""
@@ -33,7 +33,7 @@ class Draining(OverTime):
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of a unit body times each wave (N, n, 4 KNOTS)."""
         body = situation.sensitivity("tool")[:, :, : len(_PARTS)]
-        times = waves(of_logs(situation), KNOTS)
+        times = half_waves(log_time(situation), KNOTS)
         return np.concatenate([body * wave[:, None, None] for wave in times.T], axis=2)
 
     def describe(
@@ -45,9 +45,9 @@ class Draining(OverTime):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
-        mass = waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients[:: len(_PARTS)]
+        """Describes the finding in one sentence."""
+        mass = half_waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients[:: len(_PARTS)]
         return (
-            "The residual torque of all joints looks like that of a body at the flange that changes slowly with "
-            f"time, as a tank that empties or a coil that unwinds does: by {float(np.ptp(mass)):.2g} kg over the logs."
+            f"The residual torque of all joints matches a payload that changes slowly with time, such as a tank that "
+            f"empties: by {float(np.ptp(mass)):.2g} kg over the logs."
         )

@@ -11,10 +11,10 @@ import numpy as np
 
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import Member
-from estimation.diagnosis.searches.selection import Found
-from estimation.diagnosis.validations.held_out_validation import BorneOut, bear_out
-from estimation.diagnosis.validations.verdict import Judgement
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.searches.selection import SelectedEffect
+from estimation.diagnosis.validations.held_out_validation import ValidatedFindings, validate_on_held_out
+from estimation.diagnosis.validations.verdict import Verdict
 from robots.terms.discrepancies.patterns import build_pattern
 from robots.terms.effect_bases.base import Effect
 from robots.terms.effects import EFFECTS
@@ -48,7 +48,7 @@ class Bench:
     without: dict[str, Shown] = field(default_factory=dict)
     extra: dict[int, float] = field(default_factory=dict)
 
-    def __call__(self, members: Sequence[Member], gone: frozenset[int] = frozenset()) -> SimpleNamespace:
+    def __call__(self, members: Sequence[FittedEffect], gone: frozenset[int] = frozenset()) -> SimpleNamespace:
         labels = tuple(label_of(member) for member in members)
         self.asked.append(labels)
         shown = [
@@ -61,17 +61,17 @@ class Bench:
         ]
         lost = {m.hypothesis.joint - 1 for m, s in zip(members, shown, strict=True) if m.hypothesis.joint and s.astray}
         return SimpleNamespace(
-            unseen=SimpleNamespace(astray=lost.__contains__, nrmse=partial(self._left, members, shown)),
+            errors=SimpleNamespace(is_unreliable=lost.__contains__, nrmse=partial(self._left, members, shown)),
             gains=tuple(
                 Gain(nrmse_before=0.03, nrmse_after=0.03 - (s.low + s.high) / 2, ci95=(s.low, s.high)) for s in shown
             ),
-            rises=tuple(s.rise for s in shown),
-            worse=tuple(s.high < 0 for s in shown),
-            kept=tuple(s.kept for s in shown),
-            speaks=tuple(s.speaks for s in shown),
+            rmse_ratio=tuple(s.rise for s in shown),
+            contradicts=tuple(s.high < 0 for s in shown),
+            cv_retained_gain=tuple(s.kept for s in shown),
+            support=tuple(s.speaks for s in shown),
         )
 
-    def _left(self, members: Sequence[Member], shown: Sequence[Shown], model: int) -> np.ndarray:
+    def _left(self, members: Sequence[FittedEffect], shown: Sequence[Shown], model: int) -> np.ndarray:
         """Errors of the base model (0) and of all members together (-1) on each of eight joints."""
         error = np.full(8, 0.03)
         for member, what in zip(members, shown, strict=True) if model else ():
@@ -82,16 +82,16 @@ class Bench:
         return error
 
 
-def label_of(member: Member) -> str:
+def label_of(member: FittedEffect) -> str:
     """What a bench knows a member by: its hypothesis, and its shape if it has one."""
     return member.hypothesis.label + (f" {member.shape}" if member.shape else "")
 
 
-def member_of(name: str, joint: int | None) -> Member:
+def member_of(name: str, joint: int | None) -> FittedEffect:
     """A member by the name of its effect or pattern, which nothing was fitted to."""
     effect = EFFECTS.get(name) or build_pattern(name)
     assert effect is not None
-    return Member(Hypothesis(effect, joint), (), None, 100.0, np.zeros(1), 1, 1.0)  # type: ignore[arg-type]
+    return FittedEffect(Hypothesis(effect, joint), (), None, 100.0, np.zeros(1), 1, 1.0)  # type: ignore[arg-type]
 
 
 SPRING, STRIBECK = member_of("spring", 2), member_of("stribeck", 2)
@@ -113,22 +113,22 @@ def bench_with(**shows: Shown) -> Bench:
 
 def borne(
     bench: Bench,
-    *founds: Found,
-    free: Sequence[Member] = (),
+    *founds: SelectedEffect,
+    free: Sequence[FittedEffect] = (),
     p_values: Sequence[float] = (),
     held_out: bool = True,
-    forms: Sequence[Member] = (),
-    faint: Sequence[Member] = (),
-    worths: Mapping[Member, float] | None = None,
-    unnamed: tuple[Member, float] | None = None,
-) -> BorneOut:
+    forms: Sequence[FittedEffect] = (),
+    faint: Sequence[FittedEffect] = (),
+    worths: Mapping[FittedEffect, float] | None = None,
+    unnamed: tuple[FittedEffect, float] | None = None,
+) -> ValidatedFindings:
     """What unseen data as a bench shows them bear out of names and free functions."""
-    judgement = Judgement("named", founds, tuple(free), tuple(p_values), 1.0)
+    judgement = Verdict("named", founds, tuple(free), tuple(p_values), 1.0)
 
     def beyond(effect: Effect) -> bool:
-        return held_out and effect.passing
+        return held_out and effect.transient
 
-    return bear_out(
+    return validate_on_held_out(
         judgement,
         bench,  # type: ignore[arg-type]
         beyond,

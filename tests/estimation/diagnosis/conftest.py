@@ -7,13 +7,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline, inertia_of
-from estimation.diagnosis.base_models.priors import pull_of
+from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline, inertia_matrix
+from estimation.diagnosis.base_models.priors import base_model_prior
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.problem_setup import fit_values, pose
-from estimation.diagnosis.noise_models.high_frequency_band import pose_upper
+from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem, fit_values
+from estimation.diagnosis.noise_models.high_frequency_band import build_high_band
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening
-from estimation.diagnosis.noise_models.noise_nuisance_basis import own_functions
+from estimation.diagnosis.noise_models.noise_nuisance_basis import build_nuisance_projection
 from estimation.diagnosis.recordings.recording import Recording
 from robots import load_robot
 from robots.regressor import default_model
@@ -27,17 +27,17 @@ def pose_arm(arm: Robot) -> Callable[..., Problem]:
 
     def build(recording: Recording, draws: int = 0, wider: float | None = None) -> Problem:
         baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
-        pull = pull_of(baseline, recording)
-        values = fit_values(baseline, recording.tau.std(axis=0), recording.unsure, recording.tau, pull)
+        pull = base_model_prior(baseline, recording)
+        values = fit_values(baseline, recording.tau.std(axis=0), recording.sign_unknown, recording.tau, pull)
         residual = recording.tau - baseline.regressor @ values
-        inertia = inertia_of(baseline, recording, values)
-        spared = own_functions(recording, baseline, residual)
+        inertia = inertia_matrix(baseline, recording, values)
+        spared = build_nuisance_projection(recording, baseline, residual)
         whitening = estimate_whitening(recording, residual, baseline.base.size, inertia, spared=spared)
         upper = None
         if wider is not None:
             wide = estimate_whitening(recording, residual, baseline.base.size, inertia, wider, spared)
-            upper = pose_upper(recording, baseline, residual, residual, whitening.bands, wide)
-        return pose(recording, baseline, whitening, draws=draws, rng=np.random.default_rng(0), upper=upper)
+            upper = build_high_band(recording, baseline, residual, residual, whitening.bands, wide)
+        return build_problem(recording, baseline, whitening, draws=draws, rng=np.random.default_rng(0), upper=upper)
 
     return build
 

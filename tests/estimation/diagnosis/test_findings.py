@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimation.diagnosis.findings import TOLD, Parameter, listed
+from estimation.diagnosis.findings import MOST_LISTED, Parameter, list_parameters
 
 
 @pytest.mark.parametrize(
@@ -23,12 +23,12 @@ from estimation.diagnosis.findings import TOLD, Parameter, listed
 def test_both_ends_of_an_interval_are_told_apart(value: float, ci95: tuple, unit: str, told: str) -> None:
     """A narrow one has the digits for that, a choice among a few no interval, what is open none either."""
     parameter = Parameter(name="size", value=value, unit=unit, standard_error=1.0, ci95=ci95, determined=True)
-    assert parameter.told == told
+    assert parameter.text == told
 
 
 def test_a_summary_lists_no_more_parameters_than_a_line_holds() -> None:
     """One more is listed, for its name is no longer than the word that it is left out; of more, their number."""
     names = [f"place_{k}" for k in range(12)]
-    assert listed(names[:TOLD]) == ", ".join(names[:TOLD])
-    assert listed(names[: TOLD + 1]) == ", ".join(names[: TOLD + 1])
-    assert listed(names) == ", ".join(names[:TOLD]) + ", and 4 more in diagnosis.json"
+    assert list_parameters(names[:MOST_LISTED]) == ", ".join(names[:MOST_LISTED])
+    assert list_parameters(names[: MOST_LISTED + 1]) == ", ".join(names[: MOST_LISTED + 1])
+    assert list_parameters(names) == ", ".join(names[:MOST_LISTED]) + ", and 4 more in diagnosis.json"

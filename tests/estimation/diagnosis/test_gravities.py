@@ -13,9 +13,9 @@ import pytest
 from estimation import load_model, predict
 from estimation.diagnosis import Diagnosis, diagnose
 from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
-from estimation.diagnosis.base_models.payload_and_gravity import lightened, situation_on
-from estimation.diagnosis.recordings.log_reading import record
-from estimation.diagnosis.validations.forward_simulation import Plant
+from estimation.diagnosis.base_models.payload_and_gravity import build_situation, subtract_known_payload
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.validations.forward_simulation import FittedRobot
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log, Motion
@@ -57,14 +57,14 @@ def build(upright: Robot, fourier_motion: Callable[..., Motion], pinocchio_torqu
 def test_each_log_is_evaluated_as_its_base_stood(upright: Robot, build: Build, pinocchio_torque: Torque) -> None:
     """Columns, what effects feel, and the robot that is simulated: pinocchio's torque log by log, payloads included."""
     logs = (build(0), build(1, TILTED, MASS), build(2, TILTED))
-    recording = record(upright, logs)
-    light = lightened(upright, recording)
+    recording = build_recording(upright, logs)
+    light = subtract_known_payload(upright, recording)
     base = base_parameters(upright, SIMPLE, (WIDTH,) * 3, [TILTED])
     baseline = build_baseline(base, light)
     parameters = np.array(base.model.nominal)
     values = base.from_standard(parameters)
-    now = situation_on(light, baseline.base.model, parameters)
-    plant = Plant(model=baseline.base.model, columns=base.independent, values=values)
+    now = build_situation(light, baseline.base.model, parameters)
+    plant = FittedRobot(model=baseline.base.model, columns=base.independent, values=values)
     for run, log in zip(recording.runs, logs, strict=True):
         motion = Motion(recording.t[run], recording.q[run], recording.dq[run], recording.ddq[run])
         bare = pinocchio_torque(upright, motion, log.gravity)
@@ -87,11 +87,11 @@ def test_each_log_is_evaluated_as_its_base_stood(upright: Robot, build: Build, p
             dq=light.dq[run],
             ddq=light.ddq[run],
             payloads=(light.bodies[recording.runs.index(run)],),
-            fields=(light.gravities[recording.runs.index(run)],),
+            gravity_fields=(light.gravities[recording.runs.index(run)],),
         )
         states = (part.q, part.dq, part.ddq)
         # The plant has friction besides, and the mass; without bodies it would differ by the payload's torque.
-        carried = plant.carried(part, states)
+        carried = plant.payload_torque(part, states)
         assert carried == pytest.approx(full - bare, abs=size)
         assert plant.base(part, states) - carried == pytest.approx(baseline.regressor[run] @ values, abs=1e-6)
         assert plant.at(part, states).sensitivity("gravity") == pytest.approx(now.sensitivity("gravity")[run], abs=1e-5)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import RARE, Member
-from estimation.diagnosis.searches.selection import Found
+from estimation.diagnosis.hypothesis_tests.refinement import RARE, FittedEffect
+from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations import verdict
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
@@ -34,12 +34,12 @@ def test_a_value_at_the_edge_of_what_machines_have_is_no_name(
     """An encoder half a radian off wants to be more than that; all of a torque may be cut off; teeth have some play."""
     problem = SimpleNamespace(situation=SimpleNamespace(robot=arm))
     member = replace(member_of(name, 1, 300.0, 1), coefficients=np.array([value]))
-    assert verdict._believable(problem, member) is believed  # type: ignore[arg-type]
+    assert verdict._is_plausible(problem, member) is believed  # type: ignore[arg-type]
     for seconds in (5.0, 20.0):
         hot = replace(member_of("torque_constant_heat", 1, 300.0, 1), coefficients=np.array([-0.1]), shape=(seconds,))
-        assert verdict._believable(problem, hot) is (seconds > 5.0)  # type: ignore[arg-type]
-    assert EFFECTS["backlash"].believable(arm, 1, np.full(1, 1e-6))
-    assert not EFFECTS["backlash"].believable(arm, 1, np.full(1, 1e-7))
+        assert verdict._is_plausible(problem, hot) is (seconds > 5.0)  # type: ignore[arg-type]
+    assert EFFECTS["backlash"].is_plausible(arm, 1, np.full(1, 1e-6))
+    assert not EFFECTS["backlash"].is_plausible(arm, 1, np.full(1, 1e-7))
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
 
     def refined(
         problem: object, hypothesis: Hypothesis, shape: tuple[float, ...], beside: object, *, effort: int
-    ) -> Member:
+    ) -> FittedEffect:
         assert effort == 0
         return replace(
             torn, shape=shape, gain=worth, coefficients=np.array([shape[0] if believed else near(shape[0])[0][1]])
@@ -66,11 +66,11 @@ def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
 
     accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=0.0))
     monkeypatch.setattr(verdict, "refine", refined)
-    problem: Any = SimpleNamespace(rows=ROWS, sees=lambda effect: None, situation=SimpleNamespace(robot=None))
-    given = verdict._buildable(problem, Found(torn, 1e-9, ()), [torn])
+    problem: Any = SimpleNamespace(rows=ROWS, state_for=lambda effect: None, situation=SimpleNamespace(robot=None))
+    given = verdict._plausible_form(problem, SelectedEffect(torn, 1e-9, ()), [torn])
     assert (given is not None) is kept
     if given is not None:
-        assert given.member.shape == (near(0.004)[0][1],)
+        assert given.effect.shape == (near(0.004)[0][1],)
 
 
 @pytest.mark.parametrize(
@@ -87,4 +87,7 @@ def test_a_rare_rival_leaves_a_name_open_where_the_data_alone_speak_for_it(
 ) -> None:
     """Its BIC is that much worse beforehand."""
     other = member_of(rival, 1, 100.0, 2)
-    assert verdict.is_open(Found(member_of("thermal_friction", 1, 110.0, 2), 1e-9, ((other, worse),))) is stays_open
+    assert (
+        verdict.has_close_rivals(SelectedEffect(member_of("thermal_friction", 1, 110.0, 2), 1e-9, ((other, worse),)))
+        is stays_open
+    )

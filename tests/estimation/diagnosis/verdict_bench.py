@@ -11,7 +11,7 @@ import pytest
 
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import Member
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.validations import comparison, verdict
 from robots.terms.effects import EFFECTS
 
@@ -25,7 +25,7 @@ def accepting(monkeypatch: pytest.MonkeyPatch, accept: Callable[..., Any]) -> No
         monkeypatch.setattr(module, "accept", accept)
 
 
-def member_of(name: str, joint: int | None, gain: float, degrees: int) -> Member:
+def member_of(name: str, joint: int | None, gain: float, degrees: int) -> FittedEffect:
     """A member of a gain and a number of parameters."""
     group = Group((0,), (np.ones((ROWS, 1), np.float32),), np.zeros((1, 1)), np.eye(1), np.ones(1), np.ones(1))
-    return replace(Member(Hypothesis(EFFECTS[name], joint), (), group, gain, np.ones(1), degrees, 1.0))
+    return replace(FittedEffect(Hypothesis(EFFECTS[name], joint), (), group, gain, np.ones(1), degrees, 1.0))

@@ -9,14 +9,14 @@ from estimation.models.extension import Extension, extension_torque, find_effect
 from robots.common.errors import InputError
 from robots.regressor import default_model
 from robots.robot import Robot
-from robots.terms.discrepancies.base_compliance import Leaning
-from robots.terms.discrepancies.clock_drift import Parting
-from robots.terms.discrepancies.flange_oscillator import Swinging
-from robots.terms.discrepancies.flange_spring import Pulling
-from robots.terms.discrepancies.gain_drift import Fading
-from robots.terms.discrepancies.offset_step import ZeroShift
+from robots.terms.discrepancies.base_compliance import BaseCompliance
+from robots.terms.discrepancies.clock_drift import ClockDrift
+from robots.terms.discrepancies.flange_oscillator import FlangeOscillator
+from robots.terms.discrepancies.flange_spring import FlangeSpring
+from robots.terms.discrepancies.gain_drift import GainDrift
+from robots.terms.discrepancies.offset_step import ZeroStep
 from robots.terms.discrepancies.patterns import all_patterns, build_pattern
-from robots.terms.discrepancies.payload_drift import Draining
+from robots.terms.discrepancies.payload_drift import PayloadDrift
 from robots.terms.effects import Situation, situation
 
 
@@ -34,7 +34,7 @@ def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(
     """A pattern in a model file is the pattern that was found; all its values are finite."""
     *own, swinging, pulling, leaning, fading, draining, parting, _, _, _ = all_patterns(arm)
     for pattern in own:
-        if isinstance(pattern, ZeroShift):
+        if isinstance(pattern, ZeroStep):
             # It acts on several joints.
             continue
         assert build_pattern(pattern.name) == pattern
@@ -44,7 +44,7 @@ def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(
             assert np.isfinite(X).all()
             assert not X[:, 1].any()
         assert pattern.describe(1, np.zeros(1), pattern.grid(state, 1)[0]).startswith("The residual torque of joint 1")
-    assert type(build_pattern(swinging.name)) is type(swinging) is Swinging
+    assert type(build_pattern(swinging.name)) is type(swinging) is FlangeOscillator
     assert swinging.joints(arm) == (None,)
     for shape in swinging.grid(state, None)[:2]:
         X = swinging.columns(state, None, shape)
@@ -53,13 +53,13 @@ def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(
         # The flange is on the elbow's axis: it moves, but no force on it turns the elbow.
         assert X[:, 0].any(axis=0).all()
         assert not X[:, 1].any()
-    for effect, kind in ((pulling, Pulling), (leaning, Leaning)):
+    for effect, kind in ((pulling, FlangeSpring), (leaning, BaseCompliance)):
         assert type(build_pattern(effect.name)) is type(effect) is kind
         assert effect.joints(arm) == (None,)
         assert effect.columns(state, None).shape == (300, 2, len(effect.parameters(arm, None)))
-    assert type(build_pattern(fading.name)) is type(fading) is Fading
-    assert type(build_pattern(draining.name)) is type(draining) is Draining
-    assert type(build_pattern(parting.name)) is type(parting) is Parting
+    assert type(build_pattern(fading.name)) is type(fading) is GainDrift
+    assert type(build_pattern(draining.name)) is type(draining) is PayloadDrift
+    assert type(build_pattern(parting.name)) is type(parting) is ClockDrift
     for whole in (swinging, pulling, leaning):
         text = whole.describe(None, np.zeros(12), whole.grid(state, None)[0])
         assert text.startswith("The residual torque of all joints")

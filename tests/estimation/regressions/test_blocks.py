@@ -3,7 +3,7 @@ import pytest
 
 from estimation.regressions.blocks import Blocks, side_products
 from estimation.regressions.moments import Moments
-from estimation.regressions.parameter_priors import Pull
+from estimation.regressions.parameter_priors import GaussianPrior
 
 ROWS, JOINTS, COLUMNS, BLOCKS = 240, 3, 7, 4
 WEIGHTS = np.array([1.0, 4.0, 0.25])
@@ -65,7 +65,7 @@ def test_ridge_and_pull_are_those_of_the_moments(problem, ridge, pulled):
     Y, tau, places, blocks = problem
     rng = np.random.default_rng(2)
     root = rng.normal(size=(COLUMNS, COLUMNS))
-    pull = Pull(root @ root.T, rng.normal(size=COLUMNS)) if pulled else None
+    pull = GaussianPrior(root @ root.T, rng.normal(size=COLUMNS)) if pulled else None
     for found, place in zip(blocks.without(WEIGHTS, ridge, pull), places, strict=True):
         rest = np.setdiff1d(np.arange(ROWS), place)
         moments = Moments.of(Y[rest], tau[rest], np.ones((len(rest), JOINTS))).pulled(pull)

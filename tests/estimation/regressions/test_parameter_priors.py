@@ -6,7 +6,7 @@ import pytest
 from estimation import identify
 from estimation.identifications.choices import Candidates
 from estimation.regressions.moments import Moments
-from estimation.regressions.parameter_priors import Pull, description_pull, friction_levels, link_spreads
+from estimation.regressions.parameter_priors import GaussianPrior, friction_levels, link_spreads, prior_from_description
 from robots.base_parameters import find_base_parameters
 from robots.regressor import default_model
 
@@ -19,7 +19,7 @@ def base(arm):
 def test_the_pull_is_to_the_description(base, arm):
     """Its target is what the robot's description says, and what the description calls large may be off by more."""
     ones = np.ones(base.size)
-    pull = description_pull(base, np.ones(2), ones)
+    pull = prior_from_description(base, np.ones(2), ones)
     np.testing.assert_allclose(pull.target, base.from_standard(base.model.nominal))
     assert (np.linalg.eigvalsh(pull.precision) > 0).all()
     spreads = link_spreads(np.asarray(arm.inertia))
@@ -31,7 +31,7 @@ def test_the_pull_is_to_the_description(base, arm):
 def test_without_description_there_is_no_pull(arm):
     """A robot whose inertial parameters nobody states is not pulled to zero masses."""
     bare = replace(arm, inertia=None)
-    assert description_pull(find_base_parameters(default_model(bare)), np.ones(2), np.ones(100)) is None
+    assert prior_from_description(find_base_parameters(default_model(bare)), np.ones(2), np.ones(100)) is None
 
 
 def test_friction_counts_at_the_limit_velocity(base, arm):
@@ -49,7 +49,7 @@ def test_a_ridge_with_a_pull_is_a_quadratic_penalty():
     rng = np.random.default_rng(0)
     Y, tau = rng.normal(size=(50, 2, 4)), rng.normal(size=(50, 2))
     root = rng.normal(size=(4, 4))
-    pull = Pull(root @ root.T + np.eye(4), rng.normal(size=4))
+    pull = GaussianPrior(root @ root.T + np.eye(4), rng.normal(size=4))
     weights, ridge = np.array([1.0, 0.3]), 0.05
     moments = Moments.of(Y, tau, np.ones((50, 2))).pulled(pull)
     strength = ridge * float(weights @ moments.square)

@@ -10,8 +10,8 @@ import pytest
 
 from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
 from estimation.diagnosis.pipeline import diagnose
-from estimation.diagnosis.recordings.log_reading import Recording, record
-from estimation.diagnosis.recordings.thinning import earlier
+from estimation.diagnosis.recordings.log_reading import Recording, build_recording
+from estimation.diagnosis.recordings.thinning import shift_motion
 from estimation.diagnosis.searches.search import fit_plain
 from robots.plants import simulate
 from robots.robot import Robot
@@ -26,7 +26,7 @@ def test_a_sign_is_as_wide_as_the_friction_turns_round(
     motion = fourier_motion(arm, 0)
     width = share * float(np.abs(motion.dq).max(axis=0).min())
     log = simulate(arm_plant(velocity_scale=width, torque_noise=0.01), motion, seed=0)
-    recording = record(arm, [log])
+    recording = build_recording(arm, [log])
     chosen = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
     scales = chosen.situation(recording, np.zeros(chosen.base.size)).velocity_scale
     assert np.all(np.abs(np.log(scales / width)) < np.log(2.0))
@@ -56,8 +56,8 @@ def test_beside_reversals_a_fit_to_the_other_rows_leaves_no_more_than_the_torque
     What is above a joint's band is filtered over all rows: such residuals would hide any ripple.
     """
     log = simulate(arm_plant(velocity_scale=1e-3, torque_noise=0.01), fourier_motion(arm, 0, duration=30.0), seed=0)
-    recording = record(arm, [log])
-    recording = replace(recording, unsure=recording.unsure | (np.abs(recording.dq) < 0.05))
+    recording = build_recording(arm, [log])
+    recording = replace(recording, sign_unknown=recording.sign_unknown | (np.abs(recording.dq) < 0.05))
     _, settled = fit_plain(base_parameters(arm, "polynomial", (0.001, 0.001)), recording)
     assert np.all(np.abs(settled.residual).max(axis=0) < np.abs(recording.tau).max(axis=0))
 
@@ -68,14 +68,14 @@ def test_friction_that_is_logged_late_is_as_sharp_as_it_is(arm: Robot, arm_log: 
     coarse, late = 3, 2
     rows = np.arange(coarse, len(log), coarse)
     by = late * float(np.diff(log.t).mean())
-    recordings = [record(arm, [replace(log.rows(rows), tau=log.tau[rows - lag])]) for lag in (0, late)]
+    recordings = [build_recording(arm, [replace(log.rows(rows), tau=log.tau[rows - lag])]) for lag in (0, late)]
 
     def sharpness(recording: Recording, **known: Recording) -> np.ndarray:
         chosen = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording, **known)
         return chosen.situation(recording, np.zeros(chosen.base.size)).velocity_scale
 
     on_time, blurred = (sharpness(recording) for recording in recordings)
-    known = sharpness(recordings[1], known=earlier(recordings[1], by))
+    known = sharpness(recordings[1], known=shift_motion(recordings[1], by))
     assert (known < 0.5 * blurred).all()
     assert (known <= on_time).all()
-    assert earlier(recordings[1], 0.0) is recordings[1]
+    assert shift_motion(recordings[1], 0.0) is recordings[1]

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.diagnosis.base_models.payload_and_gravity import lightened, situation_on
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.base_models.payload_and_gravity import build_situation, subtract_known_payload
+from estimation.diagnosis.recordings.log_reading import build_recording
 from robots.common.errors import InputError
 from robots.regressor import default_model
 from robots.robot import Robot
@@ -35,8 +35,8 @@ def logs(arm: Robot, arm_log: Callable[..., Log]) -> tuple[Log, Log]:
 
 def test_a_known_payload_is_taken_off_and_felt(arm: Robot, logs: tuple[Log, Log]) -> None:
     """What a log loses is pinocchio's torque of the point mass; what effects feel as load grows by the same."""
-    recording = record(arm, logs)
-    light = lightened(arm, recording)
+    recording = build_recording(arm, logs)
+    light = subtract_known_payload(arm, recording)
     run = recording.runs[1]
     expected = torque_of_mass(arm, MASS, CENTRE, recording.q[run], recording.dq[run], recording.ddq[run])
     lost = recording.tau - light.tau
@@ -44,8 +44,8 @@ def test_a_known_payload_is_taken_off_and_felt(arm: Robot, logs: tuple[Log, Log]
     assert not lost[recording.runs[0]].any()
     model = default_model(arm)
     parameters = np.where(np.isfinite(model.nominal), model.nominal, 0.0)
-    with_it = situation_on(light, model, parameters)
-    without = situation_on(replace(light, payloads=()), model, parameters)
+    with_it = build_situation(light, model, parameters)
+    without = build_situation(replace(light, payloads=()), model, parameters)
     felt = with_it.rigid - without.rigid
     assert felt[run] == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
     assert not felt[recording.runs[0]].any()

@@ -10,10 +10,10 @@ import pytest
 
 from estimation import diagnose
 from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
-from estimation.diagnosis.base_models.priors import held, pull_of
+from estimation.diagnosis.base_models.priors import base_model_prior, solve_map
 from estimation.diagnosis.hypothesis_tests.problem_setup import fit_values
-from estimation.diagnosis.recordings.log_reading import record
-from estimation.regressions.parameter_priors import Pull
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.regressions.parameter_priors import GaussianPrior
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -25,13 +25,15 @@ def test_the_fit_is_that_of_rows_and_pull_together() -> None:
     weights = np.array([2.0, 5.0])
     rows = np.vstack([Y, np.column_stack([np.diag(weights), np.zeros(2)])])
     expected = np.linalg.lstsq(rows, np.concatenate([tau, weights * target]), rcond=None)[0]
-    assert held(Y.T @ Y, Y.T @ tau, Pull(np.diag(weights**2), target)) == pytest.approx(expected, rel=1e-9)
+    assert solve_map(Y.T @ Y, Y.T @ tau, GaussianPrior(np.diag(weights**2), target)) == pytest.approx(
+        expected, rel=1e-9
+    )
 
 
 def test_a_direction_without_data_goes_to_the_target() -> None:
     """A parameter whose column never acts takes the value that it is pulled to, the other that of the data."""
     gram, cross = np.diag([100.0, 0.0]), np.array([300.0, 0.0])
-    values = held(gram, cross, Pull(np.diag([1e-9, 1e-9]), np.array([7.0, 5.0])))
+    values = solve_map(gram, cross, GaussianPrior(np.diag([1e-9, 1e-9]), np.array([7.0, 5.0])))
     assert values == pytest.approx([3.0, 5.0], rel=1e-6)
 
 
@@ -41,13 +43,13 @@ def test_a_standing_joint_does_not_make_another_motion_absurd(arm: Robot, arm_lo
     Least squares alone puts the shaking into friction of 1e4 times the joint's torque and more.
     """
     log = arm_log(torque_noise=0.02)
-    other = record(arm, [arm_log(motion_seed=3, torque_noise=0.02)])
+    other = build_recording(arm, [arm_log(motion_seed=3, torque_noise=0.02)])
     q = log.q.copy()
     q[:, 1] = 0.3 + 1e-5 * np.random.default_rng(1).standard_normal(len(q))
-    recording = record(arm, [replace(log, q=q, dq=None, ddq=None)])
+    recording = build_recording(arm, [replace(log, q=q, dq=None, ddq=None)])
     baseline = build_baseline(base_parameters(arm, "polynomial", (0.001, 0.001)), recording)
     scale = 0.02 * recording.tau.std(axis=0)
-    values = fit_values(baseline, scale, recording.unsure, recording.tau, pull_of(baseline, recording))
+    values = fit_values(baseline, scale, recording.sign_unknown, recording.tau, base_model_prior(baseline, recording))
     error = other.tau - baseline.base.torque(other.q, other.dq, other.ddq, values)
     # Wrong by its own size is what the pull allows: three times for friction, which holds where joints are fast.
     assert np.all(np.sqrt((error**2).mean(axis=0)) < 4 * np.sqrt((other.tau**2).mean(axis=0)))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.diagnosis.experiment_plans.detection_limits import Limit, find_limits, told_in_one
+from estimation.diagnosis.experiment_plans.detection_limits import Limit, find_limits, summarise_limits
 from estimation.diagnosis.experiment_plans.planned_limits import planned_limits, planned_problem
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.power import detectable_energy
@@ -167,8 +167,8 @@ def test_what_shows_at_no_size_is_named() -> None:
     seen = Limit(effect="spring", joint=1, detectable=0.01, **known)
     hidden = [Limit(effect="backlash", joint=j + 1, detectable=np.inf, **known) for j in range(6)]
     some = ", ".join(f"backlash of joint {j + 1}" for j in range(4))
-    assert "hidden" not in told_in_one([seen])
-    assert told_in_one([seen, *hidden[:4]]).endswith(f"; at any size hidden: {some}")
-    assert told_in_one([seen, *hidden[:5]]).endswith(f"{some}, backlash of joint 5")
-    assert told_in_one([seen, *hidden]).endswith(f"{some}, and 2 more")
-    assert told_in_one(hidden) == ""
+    assert "hidden" not in summarise_limits([seen])
+    assert summarise_limits([seen, *hidden[:4]]).endswith(f"; at any size hidden: {some}")
+    assert summarise_limits([seen, *hidden[:5]]).endswith(f"{some}, backlash of joint 5")
+    assert summarise_limits([seen, *hidden]).endswith(f"{some}, and 2 more")
+    assert summarise_limits(hidden) == ""

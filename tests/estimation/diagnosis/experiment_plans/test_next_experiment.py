@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from estimation.diagnosis.base_models.payload_and_gravity import situation_on
+from estimation.diagnosis.base_models.payload_and_gravity import build_situation
 from estimation.diagnosis.experiment_plans.experiment_grams import Grams
-from estimation.diagnosis.experiment_plans.experiment_motions import MADE, MAKERS, Stage, room_of
-from estimation.diagnosis.experiment_plans.next_experiment import ENOUGH, LONGEST, _Choice, plan_next, repeated
+from estimation.diagnosis.experiment_plans.experiment_motions import MADE, MAKERS, Stage, motion_range
+from estimation.diagnosis.experiment_plans.next_experiment import ENOUGH, LONGEST, _Choice, plan_next, repeat_stages
 from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from robots.loading import load_robot
@@ -64,7 +64,7 @@ def test_every_kind_has_its_motions(problem):
 @pytest.mark.parametrize("kind", list(MAKERS))
 def test_motions_stay_where_the_robot_has_been(kind, problem):
     """No motion leaves the positions of the logs or is much faster, and its derivatives are those of its positions."""
-    room = room_of(problem.situation.robot, problem.recording)
+    room = motion_range(problem.situation.robot, problem.recording)
     for stage in MAKERS[kind](room, 3, 1):
         m = stage.motion
         reach = room.upper - room.lower
@@ -102,7 +102,7 @@ def test_heat_is_not_told_by_going_on_at_once(problem):
     step = _guess(problem, "friction_step", 2, (0.5 * end,), 0.015)
     causes = [_guess(problem, "thermal_friction", 2, (0.2 * end, 0.0, 0.0), 0.015), step]
     grams = Grams(problem, causes)
-    room = room_of(problem.situation.robot, problem.recording)
+    room = motion_range(problem.situation.robot, problem.recording)
     cold, warm = (grams.chances_of([gram])[0, 1] for gram in grams.later(MAKERS["repeat"](room, 1, 0)))
     assert cold > 0.95
     assert warm < 0.9
@@ -116,7 +116,7 @@ def test_heat_of_the_logs_goes_on_in_the_experiment(problem):
     recording = problem.recording
     logged = Stage(motion=Motion(recording.t - recording.t[0], recording.q, recording.dq, recording.ddq))
     grams = Grams(problem, [_guess(problem, "thermal_friction", 2, (30.0, 0.0, 0.0), 0.02)])
-    (stage,) = MAKERS["repeat"](room_of(problem.situation.robot, recording), 1, 0)
+    (stage,) = MAKERS["repeat"](motion_range(problem.situation.robot, recording), 1, 0)
     cold, warm = (grams.block(gram, 0) for gram in grams.later([stage]))
     both = grams.block(grams.of([logged, stage]), 0) - grams.block(grams.of([logged]), 0)
     np.testing.assert_allclose(warm, both, atol=0.03 * np.abs(both).max())
@@ -183,11 +183,11 @@ def test_what_once_does_not_tell_is_made_several_times(problem):
 
 def test_a_payload_is_mounted_once_however_often_the_motion_is_made(problem):
     """Stages come in a row with what is changed before them; the pause for it is made once."""
-    stages = MAKERS["payload"](room_of(problem.situation.robot, problem.recording), 0, 0)
-    four = repeated(stages, 4)
+    stages = MAKERS["payload"](motion_range(problem.situation.robot, problem.recording), 0, 0)
+    four = repeat_stages(stages, 4)
     assert [stage.payload for stage in four] == [0.0] * 4 + [stages[1].payload] * 4
     assert [stage.pause for stage in four] == [2.0] * 4 + [60.0] + [2.0] * 3
-    assert repeated(stages, 1) == stages
+    assert repeat_stages(stages, 1) == stages
 
 
 def test_where_two_causes_stay_alike_the_others_are_told_apart(problem):
@@ -200,10 +200,10 @@ def test_where_two_causes_stay_alike_the_others_are_told_apart(problem):
     assert "but torque constant error of joint 2 and torque constant error of joint 2 with a chance of 0 %" in plan.why
     grams = Grams(problem, [error, other])
     first, last = (
-        MAKERS[choice.kind](room_of(problem.situation.robot, problem.recording), 1, 0)
+        MAKERS[choice.kind](motion_range(problem.situation.robot, problem.recording), 1, 0)
         for choice in (plan.ranking[0], plan.ranking[-1])
     )
-    assert grams.chance(repeated(first, plan.times)) > grams.chance(last)
+    assert grams.chance(repeat_stages(first, plan.times)) > grams.chance(last)
     pair = plan_next(problem, [error, error])
     assert pair is not None
     assert "with a chance of 0 %" in pair.why
@@ -232,7 +232,7 @@ def test_limits_of_zero_are_no_limits(problem):
     q = problem.recording.q.copy()
     q[:, 2] = 0.3
     still = replace(problem.recording, q=q, dq=np.where(np.arange(6) == 2, 0.0, problem.recording.dq))
-    room = room_of(zero, still)
+    room = motion_range(zero, still)
     assert (np.delete(room.speed, 2) > 0).all()
     for make in MAKERS.values():
         for stage in make(room, 2, 0):
@@ -243,14 +243,14 @@ def test_the_experiment_starts_from_the_arm_itself(problem):
     """A payload that the first log carried has no part in what an experiment without it shows."""
     body = point_mass(6.0, (0.0, 0.1, 0.2))
     carried = replace(problem.recording, payloads=(body,))
-    now = situation_on(carried, problem.situation.model, problem.situation.parameters)
+    now = build_situation(carried, problem.situation.model, problem.situation.parameters)
     laden = replace(problem, recording=carried, situation=now)
     assert np.abs(now.rigid - problem.situation.rigid).max() > 10.0
     causes = [
         _guess(problem, "load_dependent_friction", 4, (1.0, 0.0), 0.02),
         _guess(problem, "stribeck", 4, (0.05, 1.0), 0.02),
     ]
-    room = room_of(problem.situation.robot, problem.recording)
+    room = motion_range(problem.situation.robot, problem.recording)
     stages = MAKERS["payload"](room, 3, 0)
     expected, found = (Grams(some, causes).of(stages) for some in (problem, laden))
     # The parameters were added and taken off again: rounding of sums.
@@ -263,7 +263,7 @@ def test_a_tilted_base_counts_with_the_parameters_that_it_shows(problem):
     grams = Grams(problem, causes)
     names = {column.name for column in grams.base.columns} - {c.name for c in problem.baseline.base.columns}
     assert names == {"mPx_1", "mPy_1"}
-    room = room_of(problem.situation.robot, problem.recording)
+    room = motion_range(problem.situation.robot, problem.recording)
     total = grams.old + grams.of(MAKERS["second_base_pose"](room, 0, 0))
     own = [i for i, column in enumerate(grams.base.columns) if column.name in names]
     level = np.sqrt(np.diag(grams.old)[own])
@@ -273,14 +273,14 @@ def test_a_tilted_base_counts_with_the_parameters_that_it_shows(problem):
 def test_a_base_that_stands_otherwise_stays_there(problem):
     """Without a pose of its own an experiment is made where the last log was; a second pose tilts from there."""
     wall = np.array([-9.81, 0.0, 0.0])
-    stands = replace(problem, recording=replace(problem.recording, fields=(wall,)))
+    stands = replace(problem, recording=replace(problem.recording, gravity_fields=(wall,)))
     causes = [_guess(problem, "stribeck", 4, (0.05, 1.0), 0.02), _guess(problem, "spring", 4, (0.0, 0.0), 0.02)]
-    room = room_of(problem.situation.robot, problem.recording)
+    room = motion_range(problem.situation.robot, problem.recording)
     (stage,) = MAKERS["repeat"](room, 3, 0)
     grams = Grams(stands, causes)
     expected = grams.of([replace(stage, gravity=wall)])
     np.testing.assert_allclose(grams.of([stage]), expected, atol=1e-12 * np.abs(expected).max())
     plan = plan_next(stands, causes)
-    (tilted,) = MAKERS["second_base_pose"](room_of(problem.situation.robot.under(wall), stands.recording), 3, 0)
+    (tilted,) = MAKERS["second_base_pose"](motion_range(problem.situation.robot.under(wall), stands.recording), 3, 0)
     assert plan is not None
     assert tilted.gravity @ wall / 9.81**2 == pytest.approx(np.cos(np.radians(15.0)))

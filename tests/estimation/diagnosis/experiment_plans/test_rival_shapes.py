@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.experiment_plans.experiment_grams import Grams
-from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS, room_of
+from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS, motion_range
 from estimation.diagnosis.experiment_plans.next_experiment import plan_next
 from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
-from estimation.diagnosis.experiment_plans.rival_shapes import Form, imitating_forms
+from estimation.diagnosis.experiment_plans.rival_shapes import RivalShape, find_rival_shapes
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from robots.loading import load_robot
@@ -34,10 +34,12 @@ def problem() -> Problem:
     return planned_problem(model, model.nominal, [Motion(t, q, dq, ddq)], noise=Sensors(torque_noise=0.025))
 
 
-def _cause(problem: Problem, name: str, shape: tuple[float, ...], size: float) -> Form:
+def _cause(problem: Problem, name: str, shape: tuple[float, ...], size: float) -> RivalShape:
     """An effect of one column, of a root mean square torque [N m]."""
     X = EFFECTS[name].columns(problem.situation, JOINT, shape)
-    return Form(Hypothesis(EFFECTS[name], JOINT), shape, np.array([size / np.sqrt(np.mean(X[:, JOINT - 1] ** 2))]))
+    return RivalShape(
+        Hypothesis(EFFECTS[name], JOINT), shape, np.array([size / np.sqrt(np.mean(X[:, JOINT - 1] ** 2))])
+    )
 
 
 def test_the_chance_is_that_of_the_form_that_imitates_best(problem: Problem) -> None:
@@ -45,14 +47,14 @@ def test_the_chance_is_that_of_the_form_that_imitates_best(problem: Problem) -> 
     thinning = _cause(problem, "shear_thinning", (0.3,), 8.0)
     stribeck = _cause(problem, "stribeck", (0.2, 2.0), 8.0)
     causes = [thinning, stribeck]
-    forms = imitating_forms(problem, causes)
+    forms = find_rival_shapes(problem, causes)
     assert all(form.hypothesis.effect.name == ("shear_thinning", "stribeck")[k] for k, form in forms)
     trials = [
         (1, replace(stribeck, shape=(float(v), float(exponent))))
         for v in np.geomspace(0.02, 1.0, 12)
         for exponent in (0.5, 0.7, 1.0, 1.5, 2.0)
     ]
-    stages = MAKERS["micro_reversals"](room_of(problem.situation.robot, problem.recording), JOINT - 1, 0)
+    stages = MAKERS["micro_reversals"](motion_range(problem.situation.robot, problem.recording), JOINT - 1, 0)
     plain, told, least = (
         grams.chances_of([grams.of(stages)])[0, 1]
         for grams in (Grams(problem, causes, some) for some in ((), forms, trials))
@@ -73,6 +75,6 @@ def test_a_plan_counts_with_such_forms(problem: Problem) -> None:
 def test_what_has_no_other_form_is_taken_as_it_was_fitted(problem: Problem) -> None:
     """Effects without a shape, and moments of the logs: those of an experiment to come are others."""
     end = float(problem.recording.t[-1])
-    step = Form(Hypothesis(EFFECTS["friction_step"], JOINT), (0.5 * end,), np.array([2.0, 1.0]))
-    offset = Form(Hypothesis(EFFECTS["encoder_offset"], JOINT), (), np.array([0.01]))
-    assert imitating_forms(problem, [step, offset]) == []
+    step = RivalShape(Hypothesis(EFFECTS["friction_step"], JOINT), (0.5 * end,), np.array([2.0, 1.0]))
+    offset = RivalShape(Hypothesis(EFFECTS["encoder_offset"], JOINT), (), np.array([0.01]))
+    assert find_rival_shapes(problem, [step, offset]) == []

@@ -9,7 +9,7 @@ import pytest
 
 from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.joint_agreement import agreed_gain, joint_by_joint
+from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence, shared_coefficient_gain
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
 from robots.loading import load_robot
@@ -26,7 +26,7 @@ def _shared(*coefficients: float, error: float = 0.01) -> tuple[float, float]:
     """What a shared coefficient explains, and what of it counts, where joints tell these values to an error."""
     gram = np.full(len(coefficients), error**-2)
     cross = gram * coefficients
-    return float(cross.sum() ** 2 / gram.sum()), agreed_gain(gram, cross)
+    return float(cross.sum() ** 2 / gram.sum()), shared_coefficient_gain(gram, cross)
 
 
 def test_joints_that_agree_within_the_formula_count_in_full() -> None:
@@ -64,10 +64,15 @@ def test_reversals_tell_a_delay_no_better_than_their_moments_are_known() -> None
 
     def measured(clear: np.ndarray, moment: float) -> tuple[np.ndarray, np.ndarray]:
         trusted = np.arange(6) < 4
-        known = replace(problem.recording, clear=clear, trusted=trusted, late=np.full(motion.q.shape, moment))
+        known = replace(
+            problem.recording,
+            sign_known_from_velocity=clear,
+            trusted=trusted,
+            reversal_time_error=np.full(motion.q.shape, moment),
+        )
         seen: Problem = replace(problem, recording=known)
-        told = joint_by_joint(seen, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accept(seen, ()))
-        return told.gram, told.sure
+        told = per_joint_evidence(seen, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accept(seen, ()))
+        return told.gram, told.certain_share
 
     everywhere, nowhere = np.ones(motion.q.shape, dtype=bool), np.zeros(motion.q.shape, dtype=bool)
     gram, sure = measured(everywhere, 1e-4)
@@ -84,11 +89,11 @@ def test_a_joint_whose_other_effects_formula_may_hide_it_need_not_agree() -> Non
     gram, own = np.array([1e4, 1e4, 2e3, 1e3]), np.array([2.0, 2.0, 0.1, -0.6])
     cross, apart = gram * own, np.array([0.0, 0.0, 2.0, 2.0]) ** 2
     whole = float(cross.sum() ** 2 / gram.sum())
-    assert agreed_gain(gram, cross, apart) > 0.9 * whole
-    assert agreed_gain(gram, cross) < 0.3 * whole
+    assert shared_coefficient_gain(gram, cross, apart) > 0.9 * whole
+    assert shared_coefficient_gain(gram, cross) < 0.3 * whole
     # What such joints alone tell is no delay either.
     alone = gram * np.array([0.0, 0.0, 1.0, 1.0])
-    assert agreed_gain(gram, alone, apart) < 0.02 * float(alone.sum() ** 2 / gram.sum())
+    assert shared_coefficient_gain(gram, alone, apart) < 0.02 * float(alone.sum() ** 2 / gram.sum())
 
 
 def test_what_other_effects_explain_on_a_joint_makes_its_own_coefficient_doubtful() -> None:
@@ -101,8 +106,8 @@ def test_what_other_effects_explain_on_a_joint_makes_its_own_coefficient_doubtfu
     friction = problem.measured(Hypothesis(EFFECTS["stribeck"], 2), (0.3, 1.0))
     root = 1.0 / np.sqrt(friction.gram)
     accepted = Accepted((friction,), root, np.array([100.0]), np.zeros((1, 0)))
-    told = joint_by_joint(problem, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accepted)
-    np.testing.assert_array_equal(told.apart[[0, 2, 3, 4, 5]], 0.0)
+    told = per_joint_evidence(problem, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accepted)
+    np.testing.assert_array_equal(told.formula_variance[[0, 2, 3, 4, 5]], 0.0)
     coefficients = root.T @ accepted.cross
     torque = friction.columns[0].astype(float) @ coefficients
-    assert told.apart[1] == pytest.approx((0.05**2) * float(torque @ torque) / told.gram[1], rel=1e-4)
+    assert told.formula_variance[1] == pytest.approx((0.05**2) * float(torque @ torque) / told.gram[1], rel=1e-4)

@@ -8,9 +8,9 @@ from scipy.stats import chi2
 
 from estimation.diagnosis.hypothesis_tests.power import (
     POWER,
-    beside,
     chance_to_resolve,
     detectable_energy,
+    residual_energy,
     resolving_energy,
     size_per_energy,
     unit_mixtures,
@@ -59,7 +59,7 @@ def test_what_a_rival_leaves_is_a_projection():
     A[:, 0] += B[:, 0]
     Q = np.linalg.qr(B)[0]
     expected = A.T @ (A - Q @ (Q.T @ A))
-    got = beside(A.T @ A, A.T @ B, B.T @ B, np.sum(B**2, axis=0))
+    got = residual_energy(A.T @ A, A.T @ B, B.T @ B, np.sum(B**2, axis=0))
     np.testing.assert_allclose(got, expected, atol=1e-10)
 
 

@@ -9,10 +9,11 @@ import pytest
 from scipy.stats import chi2
 
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.null_products import null_products
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.scan import measure, scan, surprise
+from estimation.diagnosis.hypothesis_tests.scan import measure, neg_log_p, scan
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.recordings.log_reading import build_recording
 from robots.plants import Plant
 from robots.robot import Robot
 from robots.signals import Log
@@ -22,7 +23,7 @@ from robots.terms.effects import EFFECTS
 @pytest.fixture(scope="module")
 def problem(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]) -> Problem:
     """A log of the arm without effects, white."""
-    return pose_arm(record(arm, [arm_log(torque_noise=0.02)]), draws=300)
+    return pose_arm(build_recording(arm, [arm_log(torque_noise=0.02)]), draws=300)
 
 
 def _written_out(problem: Problem, extra: np.ndarray) -> tuple[float, float]:
@@ -102,7 +103,7 @@ def test_the_null_has_the_size_it_promises(problem: Problem) -> None:
     joints, columns = problem.columns_of(Hypothesis(EFFECTS["asymmetric_friction"], 2), ())
     group = problem.group(joints, columns)
     result = score(problem, group, accept(problem, ()))
-    stats = ((result.root @ problem.null_crosses([group])[0]) ** 2).sum(axis=0)
+    stats = ((result.root @ null_products(problem, [group])[0]) ** 2).sum(axis=0)
     share = float(np.mean(stats > chi2.ppf(0.9, result.degrees)))
     assert share == pytest.approx(0.1, abs=0.07)
 
@@ -121,8 +122,8 @@ def test_surprise_is_the_logarithm_of_the_chi_square_tail() -> None:
     """It equals scipy's where that has digits, and follows the tail where it has none."""
     for degrees in (1, 2, 6, 16):
         x = np.array([0.0, 1.0, 20.0, 300.0, 1200.0])
-        assert surprise(x, degrees) == pytest.approx(-chi2.logsf(x, degrees), rel=0.02, abs=1e-9)
-        assert 1400 < surprise(np.array(3000.0), degrees) < 1510
+        assert neg_log_p(x, degrees) == pytest.approx(-chi2.logsf(x, degrees), rel=0.02, abs=1e-9)
+        assert 1400 < neg_log_p(np.array(3000.0), degrees) < 1510
 
 
 def test_base_parameters_come_back(arm_plant: Callable[..., Plant], problem: Problem) -> None:
@@ -130,5 +131,5 @@ def test_base_parameters_come_back(arm_plant: Callable[..., Plant], problem: Pro
     plant = arm_plant()
     recording = problem.recording
     clean = plant.model.torque(recording.q, recording.dq, recording.ddq, plant.parameters)
-    error = (problem.situation.torque - clean)[~recording.unsure.any(axis=1)]
+    error = (problem.situation.torque - clean)[~recording.sign_unknown.any(axis=1)]
     assert np.all(error.std(axis=0) < 0.0067 * clean.std(axis=0))

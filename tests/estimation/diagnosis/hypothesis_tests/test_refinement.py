@@ -13,12 +13,12 @@ from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests import refinement
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.joint_agreement import Told
-from estimation.diagnosis.hypothesis_tests.refinement import RARE, Member
+from estimation.diagnosis.hypothesis_tests.joint_agreement import PerJointEvidence
+from estimation.diagnosis.hypothesis_tests.refinement import RARE, FittedEffect
 from estimation.diagnosis.hypothesis_tests.scan import Outcome
 from estimation.diagnosis.searches import acceptance
-from estimation.diagnosis.searches.acceptance import SURE, beyond, is_sure, worth_it
-from estimation.diagnosis.searches.candidate_screening import contenders
+from estimation.diagnosis.searches.acceptance import SURE, exceeds_leakage, is_certain, passes_bic
+from estimation.diagnosis.searches.candidate_screening import screen_candidates
 from robots.terms.effects import EFFECTS, Shape
 from robots.terms.effects.stribeck import Stribeck
 
@@ -26,11 +26,11 @@ ROWS, ACTING = 5000, 40
 GAIN, DEGREES = 300.0, 3
 
 
-def _member(name: str, joint: int | None, columns: tuple[np.ndarray, ...]) -> Member:
+def _member(name: str, joint: int | None, columns: tuple[np.ndarray, ...]) -> FittedEffect:
     k = columns[0].shape[1]
     small = tuple(part.astype(np.float32) for part in columns)
     group = Group(tuple(range(len(columns))), small, np.zeros((k, 1)), np.eye(k), np.ones(k), np.ones(k))
-    return Member(Hypothesis(EFFECTS[name], joint), (), group, GAIN, np.ones(k), DEGREES, 1.0)
+    return FittedEffect(Hypothesis(EFFECTS[name], joint), (), group, GAIN, np.ones(k), DEGREES, 1.0)
 
 
 def _boxes(size: float = 1.0) -> tuple[np.ndarray, ...]:
@@ -41,9 +41,9 @@ def _boxes(size: float = 1.0) -> tuple[np.ndarray, ...]:
     return tuple(columns)
 
 
-def _price(member: Member) -> float:
+def _price(member: FittedEffect) -> float:
     """What a degree of freedom costs."""
-    return (GAIN - member.worth(ROWS)) / DEGREES
+    return (GAIN - member.local_bic_gain(ROWS)) / DEGREES
 
 
 @pytest.mark.parametrize("size", [1.0, 0.02, 300.0])
@@ -78,7 +78,9 @@ def test_columns_of_different_length_cost_their_mean_and_two_rows_at_least() -> 
 def test_a_rare_effect_has_to_explain_more() -> None:
     """Its odds are paid for beside its parameters."""
     columns = _boxes()[:1]
-    difference = _member("stribeck", 1, columns).worth(ROWS) - _member("load_stribeck", 1, columns).worth(ROWS)
+    difference = _member("stribeck", 1, columns).local_bic_gain(ROWS) - _member(
+        "load_stribeck", 1, columns
+    ).local_bic_gain(ROWS)
     assert difference == pytest.approx(RARE)
 
 
@@ -95,13 +97,13 @@ def test_a_push_leaves_other_rows_alone() -> None:
 def test_what_errors_of_the_motion_may_make_of_a_gain_says_nothing_of_its_being_there() -> None:
     """It is not counted to say whether an effect is there, alone or beside others, but against what may be instead."""
     delay = _member("time_delay", None, _boxes())
-    doubted = replace(delay, doubt=GAIN - 40.0)
-    assert doubted.bic(ROWS) == delay.bic(ROWS)
-    assert doubted.worth(ROWS) == pytest.approx(delay.worth(ROWS) - GAIN + 40.0)
+    doubted = replace(delay, motion_error_chi2=GAIN - 40.0)
+    assert doubted.bic_gain(ROWS) == delay.bic_gain(ROWS)
+    assert doubted.local_bic_gain(ROWS) == pytest.approx(delay.local_bic_gain(ROWS) - GAIN + 40.0)
     problem = SimpleNamespace(rows=ROWS, recording=SimpleNamespace(runs=(slice(0, ROWS),)))
     for others in ([], [_member("spring", 1, _boxes()[:1])]):
-        assert worth_it(problem, delay, others)  # type: ignore[arg-type]
-        assert not worth_it(problem, replace(doubted, degrees=4), others)  # type: ignore[arg-type]
+        assert passes_bic(problem, delay, others)  # type: ignore[arg-type]
+        assert not passes_bic(problem, replace(doubted, degrees=4), others)  # type: ignore[arg-type]
 
 
 def test_a_contact_that_cannot_win_is_not_searched() -> None:
@@ -114,7 +116,7 @@ def test_a_contact_that_cannot_win_is_not_searched() -> None:
         return Outcome(Hypothesis(EFFECTS[name], joint), (), gain, 1.0, gain / 2, degrees)
 
     situation = SimpleNamespace(t=np.array([0.0, 60.0]), robot=SimpleNamespace(n=2))
-    problem = SimpleNamespace(rows=ROWS, situation=situation, sees=lambda effect: situation)
+    problem = SimpleNamespace(rows=ROWS, situation=situation, state_for=lambda effect: situation)
     best = outcome("asymmetric_friction", 1, 400.0, 3)
     # Of 6 coefficients; the moment, the duration and the hardness of a push are fitted too.
     weak, strong = (outcome("external_contact", None, gain, 6) for gain in (215.0, 250.0))
@@ -122,7 +124,7 @@ def test_a_contact_that_cannot_win_is_not_searched() -> None:
 
     def chosen(*outcomes: Outcome) -> set[str]:
         scanned = SimpleNamespace(outcomes=outcomes)
-        return {o.hypothesis.name for o in contenders(problem, scanned)}  # type: ignore[arg-type]
+        return {o.hypothesis.name for o in screen_candidates(problem, scanned)}  # type: ignore[arg-type]
 
     assert chosen(best, weak, lasting) == {"asymmetric_friction", "stribeck"}
     assert chosen(best, strong, lasting) == {"asymmetric_friction", "external_contact", "stribeck"}
@@ -138,10 +140,10 @@ def test_what_a_log_shows_by_itself_is_no_leftover() -> None:
     small = _member("current_clipping", 1, ((flat - tau)[:, :1],))
     other = _member("stribeck", 1, ((flat - tau)[:, :1],))
 
-    def counts(candidate: Member, measured: np.ndarray) -> bool:
+    def counts(candidate: FittedEffect, measured: np.ndarray) -> bool:
         situation = SimpleNamespace(runs=(slice(0, ROWS),), robot=None, measured=None)
         problem = SimpleNamespace(situation=situation, recording=SimpleNamespace(tau=measured), rows=ROWS)
-        return beyond(problem, replace(candidate, gain=200.0), [large])  # type: ignore[arg-type]
+        return exceeds_leakage(problem, replace(candidate, gain=200.0), [large])  # type: ignore[arg-type]
 
     assert counts(small, flat)
     assert not counts(small, tau)
@@ -165,15 +167,15 @@ def test_what_is_far_from_chance_is_sure_on_a_joint_of_its_own(
     """Joint 1's friction by load, beside effects of other joints, at so many times the chance that is asked for."""
     rng = np.random.default_rng(7)
 
-    def on(joint: int | None) -> Member:
+    def on(joint: int | None) -> FittedEffect:
         name, column = ("external_contact" if joint is None else "stribeck"), rng.normal(size=(ROWS, 1))
         member = _member(name, joint, (column, column) if joint is None else (column,))
         return replace(member, group=replace(member.group, joints=(0, 1) if joint is None else (joint - 1,)))
 
     own = replace(on(1), gain=gain, degrees=2)
-    assert own.bic(ROWS) < MIN_BIC_GAIN
+    assert own.bic_gain(ROWS) < MIN_BIC_GAIN
     problem: Any = SimpleNamespace(rows=ROWS)
-    assert is_sure(problem, own, chance * SURE * 0.01, [on(joint) for joint in beside], 0.01) is sure
+    assert is_certain(problem, own, chance * SURE * 0.01, [on(joint) for joint in beside], 0.01) is sure
 
 
 @pytest.mark.parametrize(
@@ -194,12 +196,12 @@ def test_what_all_joints_share_is_told_by_those_without_a_stronger_effect(
     delay = replace(_member("time_delay", None, (column, column)), gain=sum(gains))
     ripple = replace(_member("torque_ripple", 1, (column,)), gain=other)
     gram = np.array([1e4, 1e4])
-    told = Told(gram, np.sqrt(np.array(gains) * gram), np.ones(2), np.zeros(2))
+    told = PerJointEvidence(gram, np.sqrt(np.array(gains) * gram), np.ones(2), np.zeros(2))
     monkeypatch.setattr(acceptance, "accept", lambda problem, groups: None)
-    monkeypatch.setattr(acceptance, "joint_by_joint", lambda *_: told)
+    monkeypatch.setattr(acceptance, "per_joint_evidence", lambda *_: told)
     situation = SimpleNamespace(runs=(slice(0, ROWS),), robot=None)
     problem = SimpleNamespace(situation=situation, recording=SimpleNamespace(tau=column), rows=ROWS)
-    assert beyond(problem, delay, [ripple]) is counts  # type: ignore[arg-type]
+    assert exceeds_leakage(problem, delay, [ripple]) is counts  # type: ignore[arg-type]
 
 
 class _Summits(Stribeck):
@@ -213,7 +215,7 @@ class _Summits(Stribeck):
     def likely(self, *_: object) -> tuple[tuple[float | None, ...], ...]:
         return ()
 
-    def elsewhere(self, *_: object) -> tuple[tuple[tuple[float, ...], ...], ...]:
+    def other_optima(self, *_: object) -> tuple[tuple[tuple[float, ...], ...], ...]:
         # Too far from the other summit, and near it.
         return (((0.02,), (0.0013,)),) if self.far else ()
 
@@ -235,7 +237,7 @@ def test_a_search_starts_again_from_other_summits(far: bool, expected: float, mo
         joints = group.joints
 
     situation = SimpleNamespace(robot=None)
-    problem = SimpleNamespace(sees=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
+    problem = SimpleNamespace(state_for=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
     effect = _Summits(far)
     member = refinement.refine(problem, Hypothesis(effect, 1), (0.08,), None)  # type: ignore[arg-type]
     assert member.shape[0] == pytest.approx(expected, rel=0.05)
@@ -252,7 +254,7 @@ class _More(Stribeck):
     def likely(self, *_: object) -> tuple[tuple[float | None, ...], ...]:
         return ()
 
-    def elsewhere(self, *_: object) -> tuple[tuple[tuple[float, ...], ...], ...]:
+    def other_optima(self, *_: object) -> tuple[tuple[tuple[float, ...], ...], ...]:
         return ()
 
 
@@ -274,7 +276,7 @@ def test_what_an_effect_is_whole_without_is_a_parameter_only_where_it_pays(
         joints = (0,)
 
     situation = SimpleNamespace(robot=None)
-    problem = SimpleNamespace(sees=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
+    problem = SimpleNamespace(state_for=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
     member = refinement.refine(problem, Hypothesis(_More(), 1), (0.08, 0.0), None)  # type: ignore[arg-type]
     assert member.shape == (pytest.approx(place, rel=0.05), pytest.approx(more, abs=0.05))
     assert member.degrees == degrees
@@ -291,15 +293,15 @@ def test_friction_that_turns_round_over_no_way_is_no_presliding(
         return SimpleNamespace(bounded=lambda *_: (float(gain), np.ones(1)), degrees=1, visible=1.0)
 
     monkeypatch.setattr(refinement, "score", score)
-    monkeypatch.setattr(refinement, "owed_to_moments", lambda *_: 0.0)
+    monkeypatch.setattr(refinement, "gain_from_reversal_errors", lambda *_: 0.0)
     monkeypatch.setattr(Hypothesis, "coefficient_bounds", lambda *_: ((0.0, np.inf),))
 
     class _Shape(tuple):  # type: ignore[type-arg]
         joints = (0,)
 
     situation = SimpleNamespace(robot=None)
-    problem = SimpleNamespace(sees=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
+    problem = SimpleNamespace(state_for=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
     presliding = Hypothesis(EFFECTS["presliding_hysteresis"], 1)
     member = refinement.refine(problem, presliding, (1e-4,), None)  # type: ignore[arg-type]
-    assert (member.bic(ROWS) > 100.0) is worth
-    assert (member.worth(ROWS) > 100.0) is worth
+    assert (member.bic_gain(ROWS) > 100.0) is worth
+    assert (member.local_bic_gain(ROWS) > 100.0) is worth

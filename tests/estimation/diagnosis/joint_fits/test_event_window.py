@@ -12,8 +12,8 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from estimation.diagnosis.joint_fits.event_window import as_it_lasts, going_on
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.joint_fits.event_window import open_event_edges, refit_event_window
+from estimation.diagnosis.recordings.log_reading import build_recording
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import EFFECTS
@@ -37,7 +37,7 @@ def test_a_push_that_goes_on_has_no_edge_there(
     open_: tuple[int, ...],
 ) -> None:
     """Of a push for a second, told as such, with shares of it for as long before and after: 20 of its noise each."""
-    recording = record(arm, [arm_log(torque_noise=0.02)])
+    recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     start = float(recording.t[len(recording) // 2])
     since = recording.t - start
     course = np.select(
@@ -48,20 +48,20 @@ def test_a_push_that_goes_on_has_no_edge_there(
     problem = pose_arm(replace(recording, tau=recording.tau + SIZE * course[:, None]), draws=4)
     member = refine(problem, PUSH, (start, 1.0, 0.05, 0.0, 0.0), accept(problem, ()), effort=0)
     wanted = [np.inf if k in open_ else error for k, error in enumerate(ERRORS)]
-    assert going_on(problem, member, [], ERRORS) == wanted
+    assert open_event_edges(problem, member, [], ERRORS) == wanted
 
 
 def test_a_push_at_the_log_s_end_and_what_is_no_push_have_their_errors(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
     """Beyond the last row nothing is to be seen; a change of friction goes on for good."""
-    recording = record(arm, [arm_log(torque_noise=0.02)])
+    recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     problem = pose_arm(recording, draws=4)
     last = float(recording.t[-1])
     member = refine(problem, PUSH, (last - 1.0, 1.0, 0.05, 0.0, 0.0), accept(problem, ()), effort=0)
-    assert going_on(problem, member, [], ERRORS) == ERRORS
+    assert open_event_edges(problem, member, [], ERRORS) == ERRORS
     step = refine(problem, STEP, (last - 1.0,), accept(problem, ()), effort=0)
-    assert going_on(problem, step, [], [0.01]) == [0.01]
+    assert open_event_edges(problem, step, [], [0.01]) == [0.01]
 
 
 @pytest.mark.parametrize(("begin", "end"), [(0.3, 0.55), (0.4, 0.7)])
@@ -69,7 +69,7 @@ def test_a_push_on_a_moving_arm_is_told_from_its_first_to_its_last_moment(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], begin: float, end: float
 ) -> None:
     """A constant force on the last body, known as a pulse in its middle, by the arm's geometry has both its edges."""
-    recording = record(arm, [arm_log(torque_noise=0.02)])
+    recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     first, last = recording.t[[int(share * len(recording)) for share in (begin, end)]]
     problem = pose_arm(recording, draws=4)
     on_body = (first, last - first, 0.01, 0.0, float(arm.n))
@@ -82,12 +82,12 @@ def test_a_push_on_a_moving_arm_is_told_from_its_first_to_its_last_moment(
     beside = accept(problem, ())
     quarter = (last - first) / 4
     pulse = refine(problem, PUSH, (first + quarter, 2 * quarter, 0.05, 0.0, 0.0), beside, effort=0)
-    found = as_it_lasts(problem, pulse, beside)
+    found = refit_event_window(problem, pulse, beside)
     assert found.shape[4] > 0
     assert found.shape[0] == pytest.approx(first, abs=0.1)
     assert found.shape[0] + found.shape[1] == pytest.approx(last, abs=0.1)
     assert found.gain > pulse.gain
     # It is of that form now, and no other effect has one.
-    assert as_it_lasts(problem, found, beside) is found
+    assert refit_event_window(problem, found, beside) is found
     step = refine(problem, STEP, (first,), beside, effort=0)
-    assert as_it_lasts(problem, step, beside) is step
+    assert refit_event_window(problem, step, beside) is step

@@ -11,11 +11,11 @@ import pytest
 
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import Member, refine
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.extended_fit import _covariance, _narrowed, dense, fit_extended
-from estimation.diagnosis.joint_fits.total_torque import columns_on
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.joint_fits.total_torque import effect_columns
+from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.models.extension import find_effect
 from estimation.models.model import load_model
@@ -30,10 +30,10 @@ MIDDLE = 10.0
 @pytest.fixture(scope="module")
 def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
     """A log of the arm without effects."""
-    return record(arm, [arm_log(torque_noise=0.02)])
+    return build_recording(arm, [arm_log(torque_noise=0.02)])
 
 
-def _estimable(problem: Problem, member: Member) -> np.ndarray:
+def _estimable(problem: Problem, member: FittedEffect) -> np.ndarray:
     """Which coefficients the rows determine: those whose unit row lies in the span of the scaled columns' rows."""
     blocks = [problem.baseline.regressor, problem.baseline.nuisance]
     known = np.concatenate([*blocks, dense(problem, member.hypothesis, member.shape)], axis=2)[::7]
@@ -88,7 +88,7 @@ def test_a_change_between_two_logs_is_within_the_pause(
 ) -> None:
     """Its interval is the pause, whichever end of it the search came to."""
     first, hypothesis = arm_log(torque_noise=0.02), Hypothesis(EFFECTS[effect], joint)
-    logs = record(arm, [first, replace(first, t=first.t + float(np.ptp(first.t)) + 30.0)])
+    logs = build_recording(arm, [first, replace(first, t=first.t + float(np.ptp(first.t)) + 30.0)])
     ends, begins = (float(logs.t[at]) for at in (logs.starts[1] - 1, logs.starts[1]))
     columns = dense(pose_arm(logs), hypothesis, (begins, *known))
     posed = pose_arm(replace(logs, tau=logs.tau + columns @ np.array(size)))
@@ -145,13 +145,13 @@ def test_a_vibration_keeps_its_phase_in_a_later_motion(
     for model in (fitted.model, load_model(tmp_path)):
         told = (model.torque(*motion) - model.torque(*motion[:3]))[:, 0]
         assert np.corrcoef(told, wave[later])[0, 1] > 0.99
-    (states, *_), _ = columns_on(problem, replace(recording, **_rows(recording, later)), [member])
+    (states, *_), _ = effect_columns(problem, replace(recording, **_rows(recording, later)), [member])
     assert states.origin == recording.t[0]
 
 
 def _rows(recording: Recording, rows: slice) -> dict[str, object]:
     """A recording's fields on some of its rows."""
-    names = ("t", "q", "dq", "ddq", "tau", "unsure", "clear")
+    names = ("t", "q", "dq", "ddq", "tau", "sign_unknown", "sign_known_from_velocity")
     return {"starts": (0,), **{name: getattr(recording, name)[rows] for name in names}}
 
 
@@ -159,7 +159,7 @@ def test_no_log_knows_a_delay_better_than_its_formula(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
     """A delay of 10 ms that the noise tells to three per cent is stated to the formula's 5 % and the noise's own."""
-    recording = record(arm, [arm_log(torque_noise=0.002)])
+    recording = build_recording(arm, [arm_log(torque_noise=0.002)])
     hypothesis = Hypothesis(EFFECTS["time_delay"], None)
     delay = 0.01
     problem = pose_arm(recording)
@@ -168,7 +168,7 @@ def test_no_log_knows_a_delay_better_than_its_formula(
     member = refine(posed, hypothesis, (0.008,), accept(posed, ()))
     extension = fit_extended(posed, [member], {}).model.extensions[0]
     (value,), error = extension.coefficients, float(np.sqrt(extension.covariance[0, 0]))
-    by_noise = np.sqrt(member.scatter / member.group.gram[0, 0])
+    by_noise = np.sqrt(member.birge_ratio / member.group.gram[0, 0])
     assert by_noise < 0.04 * delay
     assert (0.05 * value) ** 2 + (0.5 * by_noise) ** 2 < error**2 < (0.05 * value) ** 2 + (2 * by_noise) ** 2
 

@@ -13,19 +13,19 @@ import pytest
 from estimation import load_model
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.problem_setup import pose
-from estimation.diagnosis.hypothesis_tests.refinement import Member, refine
+from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.extended_fit import dense, fit_extended
-from estimation.diagnosis.joint_fits.gear_load import NOTHING, laden
-from estimation.diagnosis.joint_fits.total_torque import fit
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.joint_fits.gear_load import NO_GEAR_LOAD, find_gear_load
+from estimation.diagnosis.joint_fits.total_torque import fit_jointly
+from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.predictions.virtual_robot import virtual_robot
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log, Motion
-from robots.terms.effect_bases.gear_load import Bearing, Weight
+from robots.terms.effect_bases.gear_load import ExtraGearLoad, LoadSource
 from robots.terms.effects import EFFECTS
 
 SPRING, BY_LOAD, BY_PLACE = (
@@ -43,7 +43,7 @@ def _pull(q: np.ndarray) -> np.ndarray:
 @pytest.fixture(scope="module")
 def recording(arm: Robot, arm_log: Callable[..., Log], pinocchio_torque: Callable[..., np.ndarray]) -> Recording:
     """The arm with a hose at its shoulder, whose gear loses a share of all that it bears."""
-    whole = record(arm, [arm_log(torque_noise=0.01)])
+    whole = build_recording(arm, [arm_log(torque_noise=0.01)])
     q, dq = whole.q[:, 0], whole.dq[:, 0]
     load = pinocchio_torque(arm, Motion(whole.t, whole.q, whole.dq, whole.ddq))[:, 0] + _pull(q)
     tau = whole.tau.copy()
@@ -51,9 +51,9 @@ def recording(arm: Robot, arm_log: Callable[..., Log], pinocchio_torque: Callabl
     return replace(whole, tau=tau)
 
 
-def _members(problem: Problem, *places: Hypothesis) -> list[Member]:
+def _members(problem: Problem, *places: Hypothesis) -> list[FittedEffect]:
     """Refines effects beside each other, one after the other, twice."""
-    found: list[Member] = []
+    found: list[FittedEffect] = []
     for place in (*places, *places):
         rest = [m for m in found if m.hypothesis != place]
         start = next((m.shape for m in found if m.hypothesis == place), place.effect.grid(problem.situation, 1)[0])
@@ -67,10 +67,10 @@ def test_a_friction_by_the_load_is_asked_for_with_the_spring_that_the_gear_bears
     """With a load that lacks the spring, friction was told by the position; with it, a share of the load does more."""
     problem = pose_arm(recording, draws=2)
     found = _members(problem, SPRING, BY_PLACE)
-    told = laden(problem, found, fit(problem, found)[0])
-    assert told.shows
-    assert told.bearing is not None
-    (weight,) = told.bearing.weights
+    told = find_gear_load(problem, found, fit_jointly(problem, found)[0])
+    assert told.improves_fit
+    assert told.extra_load is not None
+    (weight,) = told.extra_load.sources
     assert (weight.effect.name, weight.joint, weight.shape) == ("spring", 1, found[0].shape)
 
 
@@ -83,14 +83,14 @@ def test_the_load_is_what_base_model_and_spring_have_together(
     """However much of the hose's pull gravity takes: the load with it is right to a fiftieth, without it by far not."""
     problem = pose_arm(recording, draws=2)
     found = _members(problem, SPRING, BY_LOAD)
-    values = fit(problem, found)[0]
-    told = laden(problem, found, values)
-    assert told.bearing is not None
+    values = fit_jointly(problem, found)[0]
+    told = find_gear_load(problem, found, values)
+    assert told.extra_load is not None
     alone = problem.baseline.situation(recording, values[: problem.baseline.base.size])
     motion = Motion(recording.t, recording.q, recording.dq, recording.ddq)
     true = pinocchio_torque(arm, motion)[:, 0] + _pull(recording.q[:, 0])
     # A pull that is the same at all angles is the offset's.
-    errors = [load[:, 0] - true for load in (told.bearing.on(alone).load, alone.load)]
+    errors = [load[:, 0] - true for load in (told.extra_load.on(alone).load, alone.load)]
     errors = [float(np.std(error) / true.std()) for error in errors]
     assert errors[0] < 0.02
     assert errors[1] > 0.1
@@ -102,19 +102,21 @@ def test_the_model_is_what_was_fitted_with_a_load_that_the_gear_bears(
     """Its torque, from its file too, is that of base model, spring and friction together; the share is the true one."""
     problem = pose_arm(recording, draws=2)
     found = _members(problem, SPRING, BY_LOAD)
-    values, left, full = fit(problem, found)
-    extra = full[:, :, len(problem.pull.target) :] @ values[len(problem.pull.target) :]
-    posed = pose(
+    values, left, full = fit_jointly(problem, found)
+    extra = full[:, :, len(problem.prior.target) :] @ values[len(problem.prior.target) :]
+    posed = build_problem(
         recording,
         problem.baseline,
         problem.whitening,
         draws=2,
         rng=np.random.default_rng(0),
         extra=extra,
-        bearing=laden(problem, found, values).bearing,
+        extra_load=find_gear_load(problem, found, values).extra_load,
     )
     members = _members(posed, SPRING, BY_LOAD)
-    assert np.std(fit(posed, members)[1][~recording.unsure[:, 0], 0]) < np.std(left[~recording.unsure[:, 0], 0])
+    assert np.std(fit_jointly(posed, members)[1][~recording.sign_unknown[:, 0], 0]) < np.std(
+        left[~recording.sign_unknown[:, 0], 0]
+    )
     fitted = fit_extended(posed, members, {"gravities": []})
     by_load = fitted.model.extensions[1]
     error = float(np.sqrt(by_load.covariance[0, 0]))
@@ -148,20 +150,20 @@ def test_nothing_is_borne_of_what_no_gear_feels(recording: Recording, pose_arm: 
     """Friction alone loads no gear; a spring that nothing depends on is borne, and shows no other cause."""
     problem = pose_arm(recording, draws=2)
     (friction,) = _members(problem, BY_LOAD)
-    assert laden(problem, [friction], fit(problem, [friction])[0]) is NOTHING
+    assert find_gear_load(problem, [friction], fit_jointly(problem, [friction])[0]) is NO_GEAR_LOAD
     (spring,) = _members(problem, SPRING)
-    told = laden(problem, [spring], fit(problem, [spring])[0])
-    assert told.bearing is not None
-    assert not told.shows
+    told = find_gear_load(problem, [spring], fit_jointly(problem, [spring])[0])
+    assert told.extra_load is not None
+    assert not told.improves_fit
 
 
 def test_a_spring_that_preloads_its_gear_has_the_offset(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """What the base model has at all angles alike is a part of the load, on the spring's joint alone."""
     now = pose_arm(recording).situation
-    weight = Weight(EFFECTS["spring"], 1, (0.0, 0.0), np.array([3.0, 0.0, 2.0, 0.0]))
+    weight = LoadSource(EFFECTS["spring"], 1, (0.0, 0.0), np.array([3.0, 0.0, 2.0, 0.0]))
     q = recording.q[:, 0]
     offset = (now.torque - now.rigid - now.friction)[:, 0]
-    plain, all_of_it = (Bearing(how, [weight]).on(now).load - now.load for how in ("effects", "preloads"))
+    plain, all_of_it = (ExtraGearLoad(how, [weight]).on(now).load - now.load for how in ("effects", "preloads"))
     np.testing.assert_allclose(plain[:, 0], 3.0 * q + 2.0 * q**3)
     np.testing.assert_allclose(all_of_it[:, 0], plain[:, 0] + offset)
     assert not plain[:, 1].any()

@@ -12,9 +12,9 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from estimation.diagnosis.joint_fits.sensor_nonlinearity import undistorted
-from estimation.diagnosis.recordings.log_reading import record
-from estimation.diagnosis.searches.refit import settle
+from estimation.diagnosis.joint_fits.sensor_nonlinearity import fit_sensor_nonlinearity
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.searches.refit import refit
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effect_bases.static import StaticJointEffect
@@ -28,14 +28,14 @@ def test_base_model_and_a_false_reading_are_told_apart(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], error: float
 ) -> None:
     """The base model, once off by much of the error, by a sixth of that at most; and the error is told to a tenth."""
-    recording = record(arm, [arm_log(torque_noise=0.05)])
+    recording = build_recording(arm, [arm_log(torque_noise=0.05)])
     true = pose_arm(recording).situation.torque[:, 0]
     top = float(np.abs(true).max())
     tau = recording.tau.copy()
     tau[:, 0] += error * true * (np.abs(true) / top) ** 2
     problem = pose_arm(replace(recording, tau=tau))
     member = refine(problem, SATURATION, SATURATION.effect.grid(problem.situation, 1)[1], accept(problem, ()))
-    there, (found,) = undistorted(problem, [member])
+    there, (found,) = fit_sensor_nonlinearity(problem, [member])
     assert found.shape[0] == pytest.approx(2.0, abs=0.4)
     assert found.shape[1] == pytest.approx(top, rel=0.02)
     assert found.coefficients[0] == pytest.approx(error, rel=0.1)
@@ -46,16 +46,16 @@ def test_base_model_and_a_false_reading_are_told_apart(
     followed = off(problem.situation.torque)
     assert followed > 0.6 * abs(error)
     assert off(there.situation.torque) < 0.17 * followed
-    assert off(problem.baseline.regressor @ settle(problem, [member]).values) < 0.17 * followed
+    assert off(problem.baseline.regressor @ refit(problem, [member]).values) < 0.17 * followed
 
 
 def test_what_distorts_no_reading_is_left_as_it_is(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
     """Neither problem nor members are touched."""
-    problem = pose_arm(record(arm, [arm_log(torque_noise=0.05)]))
+    problem = pose_arm(build_recording(arm, [arm_log(torque_noise=0.05)]))
     member = refine(problem, TILT, (0.0,), accept(problem, ()))
-    same, members = undistorted(problem, [member])
+    same, members = fit_sensor_nonlinearity(problem, [member])
     assert same is problem
     assert members == [member]
 
@@ -64,7 +64,7 @@ def test_slopes_of_a_reading_are_exact(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
     """Derivatives by the torque and by the exponent are those of differences of the columns."""
-    situation = pose_arm(record(arm, [arm_log()])).situation
+    situation = pose_arm(build_recording(arm, [arm_log()])).situation
     effect, c = SATURATION.effect, np.array([0.4])
     assert isinstance(effect, StaticJointEffect)
     shape, h = (1.7, 12.0), 1e-6
@@ -82,7 +82,7 @@ def test_a_reading_is_undone(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], error: float
 ) -> None:
     """The torque that was read comes back, from another one as well."""
-    situation = pose_arm(record(arm, [arm_log()])).situation
+    situation = pose_arm(build_recording(arm, [arm_log()])).situation
     effect, c, shape = SATURATION.effect, np.array([error]), (2.0, float(np.abs(situation.torque[:, 0]).max()))
     assert isinstance(effect, StaticJointEffect)
     true = situation.torque[:, 0]

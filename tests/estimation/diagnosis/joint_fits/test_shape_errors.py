@@ -12,8 +12,14 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
-from estimation.diagnosis.joint_fits.shape_errors import CUT, _reach, between_logs, hidden_moments, shape_errors
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.joint_fits.shape_errors import (
+    CUT,
+    _reach,
+    shape_errors,
+    spread_over_pauses,
+    widen_change_times,
+)
+from estimation.diagnosis.recordings.log_reading import build_recording
 from robots.common.stretches import spans
 from robots.robot import Robot
 from robots.signals import Log
@@ -29,7 +35,7 @@ def test_a_velocity_is_as_uncertain_as_its_exponent_lets_it_be(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], size: float
 ) -> None:
     """Its interval is that of the likelihood on a grid of both, and wider than with the exponent held."""
-    recording = record(arm, [arm_log(torque_noise=0.02)])
+    recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     extra = np.zeros_like(recording.tau)
     speed = np.abs(recording.dq[:, 0])
     extra[:, 0] = size * np.exp(-((speed / SPEED) ** EXPONENT)) * np.sign(recording.dq[:, 0])
@@ -57,7 +63,7 @@ def test_a_choice_is_told_where_the_other_explains_less(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], share: float, told: bool
 ) -> None:
     """A ripple by the load is told from one by the motor's torque; one that does not grow with either is not."""
-    recording = record(arm, [arm_log(torque_noise=0.02)])
+    recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     ripple = Hypothesis(EFFECTS["torque_ripple"], 1)
     now = pose_arm(recording).situation
     X = ripple.effect.columns(now, 1, (40.0, 0.0, share))
@@ -74,7 +80,7 @@ def test_a_moment_while_the_drive_is_at_its_limit_may_be_anywhere_there(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
     """A joint whose torque is cut off shows no change of it; before, after, and of another joint, it is as it was."""
-    recording = record(arm, [arm_log(torque_noise=0.02)])
+    recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     tau = recording.tau.copy()
     level = float(np.quantile(np.abs(tau[:, 0]), 0.8))
     tau[:, 0] = np.clip(tau[:, 0], -level, level)
@@ -95,31 +101,31 @@ def test_a_moment_while_the_drive_is_at_its_limit_may_be_anywhere_there(
         (float(recording.t[away[0]]), 1.96 * 0.01),
     ):
         there = replace(step, shape=(moment,))
-        assert 1.96 * hidden_moments(problem, there, [limit], [0.01])[0] == pytest.approx(wanted)
+        assert 1.96 * widen_change_times(problem, there, [limit], [0.01])[0] == pytest.approx(wanted)
         other = replace(there, hypothesis=Hypothesis(EFFECTS["friction_step"], 2))
-        assert hidden_moments(problem, other, [limit], [0.01]) == [0.01]
-        assert hidden_moments(problem, there, [there], [0.01]) == [0.01]
+        assert widen_change_times(problem, other, [limit], [0.01]) == [0.01]
+        assert widen_change_times(problem, there, [there], [0.01]) == [0.01]
 
 
 def test_a_moment_while_the_arm_stands_may_be_anywhere_there(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
     """Friction holds what pushes then; and how long it lasts from there is known as badly."""
-    recording = record(arm, [arm_log(torque_noise=0.02)])
-    stands = recording.unsure.copy()
+    recording = build_recording(arm, [arm_log(torque_noise=0.02)])
+    stands = recording.sign_unknown.copy()
     stands[1000:1200] = True
-    problem = pose_arm(replace(recording, unsure=stands))
+    problem = pose_arm(replace(recording, sign_unknown=stands))
     begins, ends = recording.t[1000], recording.t[1199]
     push = refine(
         problem, Hypothesis(EFFECTS["external_contact"], None), (begins + 0.1, 1.0, 0.5, 0.0, 0.0), accept(problem, ())
     )
     there = replace(push, shape=(begins + 0.1, 1.0, 0.5, 0.0, 0.0))
-    start, duration, *rest = hidden_moments(problem, there, [], [0.01, 0.02, 0.03, 0.0])
+    start, duration, *rest = widen_change_times(problem, there, [], [0.01, 0.02, 0.03, 0.0])
     assert 1.96 * start == pytest.approx(ends - begins - 0.1)
     assert duration == start
     assert rest == [0.03, 0.0]
     before = replace(push, shape=(begins - 0.2, 1.0, 0.5, 0.0))
-    assert hidden_moments(problem, before, [], [0.01, 0.02, 0.03, 0.0]) == [0.01, 0.02, 0.03, 0.0]
+    assert widen_change_times(problem, before, [], [0.01, 0.02, 0.03, 0.0]) == [0.01, 0.02, 0.03, 0.0]
 
 
 def test_a_change_between_two_logs_may_have_come_at_any_time_there(
@@ -127,25 +133,25 @@ def test_a_change_between_two_logs_may_have_come_at_any_time_there(
 ) -> None:
     """From the last row that shows it has not come to the first that shows it has, rests at either end included."""
     first = arm_log(torque_noise=0.02)
-    recording = record(arm, [first, replace(first, t=first.t + 500.0)])
+    recording = build_recording(arm, [first, replace(first, t=first.t + 500.0)])
     border = recording.starts[1]
-    stands = recording.unsure.copy()
+    stands = recording.sign_unknown.copy()
     stands[border : border + 100] = True
-    problem = pose_arm(replace(recording, unsure=stands))
+    problem = pose_arm(replace(recording, sign_unknown=stands))
     ends, begins = float(recording.t[border - 1]), float(recording.t[border + 99])
     step = refine(problem, Hypothesis(EFFECTS["friction_step"], 1), (begins,), accept(problem, ()))
     for moment in (begins + 0.01, ends - 0.01):
-        middle = between_logs(problem, replace(step, shape=(moment,)), [])
+        middle = spread_over_pauses(problem, replace(step, shape=(moment,)), [])
         assert middle.shape[0] == pytest.approx((ends + begins) / 2, abs=0.02)
-        (error,) = hidden_moments(problem, middle, [], [0.01])
+        (error,) = widen_change_times(problem, middle, [], [0.01])
         assert 1.96 * error == pytest.approx((begins - ends) / 2, abs=0.02)
     before = replace(step, shape=(ends - 1.0,))
-    assert between_logs(problem, before, []) is before
+    assert spread_over_pauses(problem, before, []) is before
     # A push has its own beginning and end.
     push = refine(
         problem, Hypothesis(EFFECTS["external_contact"], None), (begins, 1.0, 0.5, 0.0, 0.0), accept(problem, ())
     )
-    assert between_logs(problem, push, []) is push
+    assert spread_over_pauses(problem, push, []) is push
 
 
 @pytest.mark.parametrize("edge", [0.9, 3.17, 11.0])

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from estimation.diagnosis.base_models.priors import held
+from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.hypothesis_tests.groups import Group
-from estimation.diagnosis.hypothesis_tests.refinement import Member
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scoring import Score, visible_root
-from estimation.diagnosis.joint_fits.shrinkage import shrinkage
-from estimation.regressions.parameter_priors import Pull
+from estimation.diagnosis.joint_fits.shrinkage import shrinkage_precision
+from estimation.regressions.parameter_priors import GaussianPrior
 
 
 def _score(X: np.ndarray, base: np.ndarray, y: np.ndarray) -> Score:
@@ -29,7 +29,7 @@ def test_the_energy_makes_the_data_likeliest() -> None:
     rng = np.random.default_rng(0)
     base, X = rng.standard_normal((300, 4)), rng.standard_normal((300, 3)) * [1.0, 5.0, 0.2]
     y = X @ [0.4, -0.05, 1.0] + base @ [3.0, 1.0, -2.0, 0.5] + rng.standard_normal(300)
-    precision = shrinkage(_score(X, base, y))
+    precision = shrinkage_precision(_score(X, base, y))
     Q = np.linalg.qr(base, mode="complete")[0][:, 4:]  # what the base model leaves
     beside, rest = Q.T @ X, Q.T @ y
 
@@ -54,8 +54,8 @@ def test_what_is_well_measured_stays_and_what_two_columns_share_is_shared() -> N
 
     def fit(X: np.ndarray, pulled: bool) -> np.ndarray:
         Y = np.column_stack([base, X])
-        own = shrinkage(_score(X, base, y)) if pulled else np.zeros(X.shape[1])
-        return held(Y.T @ Y, Y.T @ y, Pull(np.diag([0.0, 0.0, 0.0, *own]), np.zeros(Y.shape[1])))[3:]
+        own = shrinkage_precision(_score(X, base, y)) if pulled else np.zeros(X.shape[1])
+        return solve_map(Y.T @ Y, Y.T @ y, GaussianPrior(np.diag([0.0, 0.0, 0.0, *own]), np.zeros(Y.shape[1])))[3:]
 
     alone = x[:, None]
     assert fit(alone, True) == pytest.approx(fit(alone, False), rel=0.01)
@@ -70,9 +70,9 @@ def test_a_column_that_never_acts_stays_at_zero() -> None:
     rng = np.random.default_rng(2)
     base, X = rng.standard_normal((200, 2)), np.column_stack([rng.standard_normal(200), np.zeros(200)])
     y = 2 * X[:, 0] + rng.standard_normal(200)
-    own = shrinkage(_score(X, base, y))
+    own = shrinkage_precision(_score(X, base, y))
     Y = np.column_stack([base, X])
-    values = held(Y.T @ Y, Y.T @ y, Pull(np.diag([0.0, 0.0, *own]), np.zeros(4)))
+    values = solve_map(Y.T @ Y, Y.T @ y, GaussianPrior(np.diag([0.0, 0.0, *own]), np.zeros(4)))
     assert values[2] == pytest.approx(2.0, abs=0.4)
     assert abs(values[3]) < 1e-6
 
@@ -81,6 +81,6 @@ def test_a_gain_is_shared_by_the_energy_on_each_joint() -> None:
     """An effect that makes nine parts of its torque's energy on one joint has nine tenths of its gain there."""
     rows = np.ones((100, 1), dtype=np.float32)
     group = Group((0, 2), (3 * rows, rows), np.zeros((1, 1)), np.eye(1), np.ones(1), np.ones(1))
-    member = Member(SimpleNamespace(), (), group, 50.0, np.array([2.0]), 1, 1.0)
+    member = FittedEffect(SimpleNamespace(), (), group, 50.0, np.array([2.0]), 1, 1.0)
     assert [member.gain_on([j]) for j in range(3)] == pytest.approx([45.0, 0.0, 5.0])
     assert member.gain_on([0, 1, 2]) == pytest.approx(50.0)

@@ -12,9 +12,13 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from estimation.diagnosis.joint_fits.total_torque import composed, known_beside, known_without
-from estimation.diagnosis.recordings.log_reading import record
-from estimation.diagnosis.recordings.thinning import under_its_top
+from estimation.diagnosis.joint_fits.total_torque import (
+    fit_clipped_torque,
+    total_torque_from_unclipped,
+    with_total_torque,
+)
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.recordings.thinning import keep_clipped_level
 from estimation.models.extension import Extension, extension_torque
 from robots.robot import Robot
 from robots.signals import Log
@@ -29,7 +33,7 @@ def hidden(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> tuple[Problem, np.ndarray, float]:
     """A log whose shoulder has asymmetric friction and a limit of torque; its torque without noise and limit; that."""
-    recording = record(arm, [arm_log(torque_noise=0.05)])
+    recording = build_recording(arm, [arm_log(torque_noise=0.05)])
     plain = pose_arm(recording)
     (_,), (X,) = OTHER.columns(plain.situation, ())
     extra = X @ (3.0 / np.std(X, axis=0))
@@ -44,19 +48,19 @@ def test_all_of_the_torque_is_known_beside_what_cuts_it_off(hidden: tuple[Proble
     problem, true, limit = hidden
     flags = CLIPPING.effect.gate(problem.situation, 1, problem.recording.tau)
     other = refine(problem, OTHER, (), accept(problem, ()))
-    rough = known_without(problem, [other], flags)
+    rough = total_torque_from_unclipped(problem, [other], flags)
     clipping = refine(rough, CLIPPING, (limit,), accept(problem, (other.group,)))
-    sharp = known_beside(rough, [other, clipping])
+    sharp = fit_clipped_torque(rough, [other, clipping])
     above = np.abs(true) > limit
 
     def error(torque: np.ndarray) -> float:
         return float(np.sqrt(np.mean((torque - true)[above] ** 2)))
 
     most = float(np.sqrt(np.mean((np.abs(true) - limit)[above] ** 2)))
-    assert sharp.whole is not None
-    assert rough.whole is not None
-    assert error(sharp.whole.whole[:, 0]) < 0.03 * most
-    assert error(rough.whole.whole[:, 0]) < 0.1 * most
+    assert sharp.total_torque_state is not None
+    assert rough.total_torque_state is not None
+    assert error(sharp.total_torque_state.whole[:, 0]) < 0.03 * most
+    assert error(rough.total_torque_state.whole[:, 0]) < 0.1 * most
     assert error(problem.situation.torque[:, 0]) > 0.3 * most
     # All of what is beyond the limit is lost, and the limit is that of the log.
     again = refine(sharp, CLIPPING, clipping.shape, accept(problem, (other.group,)))
@@ -68,8 +72,8 @@ def test_a_problem_whose_torque_nothing_cuts_off_stays_as_it_is(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
     """No flat tops, nothing to know."""
-    problem = pose_arm(record(arm, [arm_log(torque_noise=0.05)]))
-    assert composed(problem, [], [CLIPPING, OTHER]) is problem
+    problem = pose_arm(build_recording(arm, [arm_log(torque_noise=0.05)]))
+    assert with_total_torque(problem, [], [CLIPPING, OTHER]) is problem
 
 
 def test_noise_that_is_cut_off_is_lost_on_average(hidden: tuple[Problem, np.ndarray, float]) -> None:
@@ -110,7 +114,7 @@ def test_flat_tops_stay_flat_where_a_log_is_thinned() -> None:
     t = 0.004 * np.arange(2000)
     tau = np.column_stack([np.clip(np.sin(3 * t), -0.8, 0.8), np.sin(5 * t)])
     passed = tau + 0.01 * np.sin(200 * t)[:, None]
-    kept = under_its_top(tau, passed)
+    kept = keep_clipped_level(tau, passed)
     top = np.abs(tau[:, 0]) == 0.8
     np.testing.assert_array_equal(kept[top, 0], tau[top, 0])
     assert np.abs(kept[:, 0]).max() == 0.8

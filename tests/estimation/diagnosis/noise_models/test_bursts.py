@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from estimation import diagnose
-from estimation.diagnosis.noise_models.bursts import bursts
+from estimation.diagnosis.noise_models.bursts import find_bursts
 from robots.plants import simulate
 from robots.robot import Robot
 from robots.signals import Motion
@@ -29,7 +29,7 @@ def test_noise_has_no_bursts(memory: float) -> None:
     """None in 100 logs of a minute, fast or slow; one by chance in less than a hundredth of such tests."""
     for seed in range(100):
         noise = coloured(np.random.default_rng(seed), 3000, memory)
-        assert not bursts([noise], np.ones(noise.shape, dtype=bool), STEP).any()
+        assert not find_bursts([noise], np.ones(noise.shape, dtype=bool), STEP).any()
 
 
 def test_a_push_is_marked_on_its_joint() -> None:
@@ -37,7 +37,7 @@ def test_a_push_is_marked_on_its_joint() -> None:
     noise = coloured(np.random.default_rng(1), 3000, 0.5)
     pushed = noise.copy()
     pushed[1000:1060, 1] += 8.0
-    marked = bursts([noise, pushed], np.ones((6000, 2), dtype=bool), STEP)
+    marked = find_bursts([noise, pushed], np.ones((6000, 2), dtype=bool), STEP)
     assert not marked[:, 0].any()
     assert marked[4000:4060, 1].all()
     assert set(np.flatnonzero(marked[:, 1])) <= set(range(3940, 4120))
@@ -46,7 +46,7 @@ def test_a_push_is_marked_on_its_joint() -> None:
     often = noise.copy()
     often[np.arange(3000) % 400 < 60, 0] += 8.0
     for piece in (spiky, often):
-        assert not bursts([piece], np.ones((3000, 2), dtype=bool), STEP).any()
+        assert not find_bursts([piece], np.ones((3000, 2), dtype=bool), STEP).any()
 
 
 def test_rows_that_do_not_count_are_no_measure() -> None:
@@ -54,7 +54,7 @@ def test_rows_that_do_not_count_are_no_measure() -> None:
     noise = coloured(np.random.default_rng(2), 3000, 0.5)
     measured = np.zeros((3000, 2), dtype=bool)
     measured[:600, 0] = True
-    assert not bursts([noise * measured], measured, STEP).any()
+    assert not find_bursts([noise * measured], measured, STEP).any()
 
 
 def test_a_hard_push_does_not_hide_in_its_own_noise(

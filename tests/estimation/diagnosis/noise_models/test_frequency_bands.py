@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve, firwin
 
-from estimation.diagnosis.noise_models.frequency_bands import BIAS, Band, unbiased
+from estimation.diagnosis.noise_models.frequency_bands import BIAS, Band, unbiased_frequencies
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening, quiet_joints
-from estimation.diagnosis.recordings.recording import Recording, cut
+from estimation.diagnosis.recordings.recording import Recording, cut_recording
 from tests.estimation.diagnosis.noisy_logs import STEP, noise_of, recording_of
 
 ROWS = 250_000
@@ -37,9 +37,9 @@ def counted() -> tuple[Recording, np.ndarray, np.ndarray]:
         cycles=(None,),
         cutoff=100.0,
         floor=np.array([COUNT**2 / 12 * 2 * STEP]),
-        unsure=np.zeros((ROWS, 1), dtype=bool),
-        clear=np.zeros((ROWS, 1), dtype=bool),
-        jolts=np.zeros(1),
+        sign_unknown=np.zeros((ROWS, 1), dtype=bool),
+        sign_known_from_velocity=np.zeros((ROWS, 1), dtype=bool),
+        reversal_acceleration_error=np.zeros(1),
         names=("log",),
     )
     return recording, accelerations[0], NOISE * rng.standard_normal((ROWS, 1))
@@ -64,7 +64,7 @@ def test_inertia_is_fitted_without_a_bias_that_shows(counted: tuple[Recording, n
     The frequencies are an eighth of a hertz apart, and what is left grows with their tenth power: by a factor of two.
     """
     recording, true, noise = counted
-    (frequency,) = unbiased(recording, np.eye(1), noise)
+    (frequency,) = unbiased_frequencies(recording, np.eye(1), noise)
     assert 5.0 < frequency < 60.0
     assert 0.4 * BIAS < _left(recording, true, frequency) < 2.5 * BIAS
     assert _left(recording, true, 2 * frequency) > 100 * BIAS
@@ -73,25 +73,25 @@ def test_inertia_is_fitted_without_a_bias_that_shows(counted: tuple[Recording, n
 def test_a_larger_inertia_is_known_further(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
     """With the torque, the error grows, and its share of it does not: what it leaves grows with the square."""
     recording, _, noise = counted
-    assert unbiased(recording, 3 * np.eye(1), noise) < unbiased(recording, np.eye(1), noise)
+    assert unbiased_frequencies(recording, 3 * np.eye(1), noise) < unbiased_frequencies(recording, np.eye(1), noise)
 
 
 def test_without_encoder_noise_nothing_is_biased(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
     """Accelerations without error are known at all frequencies; so are those of a joint that has no torque of them."""
     recording, _, noise = counted
-    assert unbiased(replace(recording, floor=np.zeros(1)), np.eye(1), noise) == np.inf
-    assert unbiased(recording, np.zeros((1, 1)), noise) == np.inf
-    assert unbiased(replace(recording, ddq=np.zeros((ROWS, 1))), np.eye(1), np.zeros((ROWS, 1))) == np.inf
+    assert unbiased_frequencies(replace(recording, floor=np.zeros(1)), np.eye(1), noise) == np.inf
+    assert unbiased_frequencies(recording, np.zeros((1, 1)), noise) == np.inf
+    assert unbiased_frequencies(replace(recording, ddq=np.zeros((ROWS, 1))), np.eye(1), np.zeros((ROWS, 1))) == np.inf
 
 
 def test_logs_of_any_length_count(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
     """Cut into two halves and a few rows, a log says the same; a few rows alone say nothing."""
     recording, _, noise = counted
-    whole = unbiased(recording, np.eye(1), noise)
+    whole = unbiased_frequencies(recording, np.eye(1), noise)
     pieces = replace(recording, starts=(0, ROWS // 2, ROWS - 10))
-    assert unbiased(pieces, np.eye(1), noise) == pytest.approx(whole, rel=0.05)
-    few = cut(recording, slice(0, 10))
-    assert unbiased(few, np.eye(1), noise[:10]) == np.inf
+    assert unbiased_frequencies(pieces, np.eye(1), noise) == pytest.approx(whole, rel=0.05)
+    few = cut_recording(recording, slice(0, 10))
+    assert unbiased_frequencies(few, np.eye(1), noise[:10]) == np.inf
 
 
 def test_rows_at_rest_are_told_apart(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
@@ -102,10 +102,10 @@ def test_rows_at_rest_are_told_apart(counted: tuple[Recording, np.ndarray, np.nd
         recording,
         **{name: np.concatenate([getattr(recording, name), still]) for name in ("q", "dq", "ddq", "tau")},
         t=recording.t[0] + STEP * np.arange(2 * ROWS),
-        unsure=np.concatenate([recording.unsure, still == 0.0]),
+        sign_unknown=np.concatenate([recording.sign_unknown, still == 0.0]),
     )
-    whole = unbiased(recording, np.eye(1), noise)
-    rested = unbiased(longer, np.eye(1), np.concatenate([noise, still]), np.array([0.5]))
+    whole = unbiased_frequencies(recording, np.eye(1), noise)
+    rested = unbiased_frequencies(longer, np.eye(1), np.concatenate([noise, still]), np.array([0.5]))
     assert rested == pytest.approx(whole, abs=0.3)
 
 
@@ -154,7 +154,7 @@ def test_kicks_drown_where_their_torque_is_below_the_noise() -> None:
     """Torque per acceleration times the accelerations' error, over a sample's noise: 0.9 drowns, 1.1 does not."""
     residual = np.random.default_rng(0).standard_normal((10_000, 2)) * [3.0, 0.5]
     slow = 100.0 * np.sin(0.5 * STEP * np.arange(10_000))[:, None]
-    recording = replace(recording_of(), jolts=np.array([0.9 * 3.0 / 20.0, 1.1 * 0.5 / 2.0]))
+    recording = replace(recording_of(), reversal_acceleration_error=np.array([0.9 * 3.0 / 20.0, 1.1 * 0.5 / 2.0]))
     # 10 000 samples tell the noise to 1 %.
     assert quiet_joints(recording, residual + slow, np.diag([20.0, 2.0])).tolist() == [True, False]
     assert quiet_joints(recording, 2.0 * residual + slow, np.diag([20.0, 2.0])).tolist() == [True, True]

@@ -10,12 +10,12 @@ import pytest
 from scipy.signal import lfilter
 
 from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
-from estimation.diagnosis.base_models.priors import pull_of
+from estimation.diagnosis.base_models.priors import base_model_prior
 from estimation.diagnosis.hypothesis_tests.problem_setup import fit_values
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening
-from estimation.diagnosis.noise_models.noise_nuisance_basis import own_functions
+from estimation.diagnosis.noise_models.noise_nuisance_basis import build_nuisance_projection
 from estimation.diagnosis.noise_models.whitening import Whitening
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording
 from robots.plants import simulate
 from robots.robot import Robot
@@ -61,13 +61,13 @@ def test_neither_rests_nor_effects_colour_the_noise(arm: Robot, arm_plant: Calla
     rng = np.random.default_rng(1)
     noise = lfilter([NOISE * np.sqrt(1 - 0.8**2)], [1.0, -0.8], rng.standard_normal(log.tau.shape), axis=0)
     tau = log.tau + noise + stiffness * np.column_stack([motion.q[:, 0] ** 3, np.zeros(len(motion.t))])
-    recording = record(arm, [replace(log, tau=tau)])
+    recording = build_recording(arm, [replace(log, tau=tau)])
     baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
-    pull = pull_of(baseline, recording)
-    values = fit_values(baseline, recording.tau.std(axis=0), recording.unsure, recording.tau, pull)
+    pull = base_model_prior(baseline, recording)
+    values = fit_values(baseline, recording.tau.std(axis=0), recording.sign_unknown, recording.tau, pull)
     residual = recording.tau - baseline.regressor @ values
-    assert recording.unsure.mean() > 0.2
-    spared = own_functions(recording, baseline, residual)
+    assert recording.sign_unknown.mean() > 0.2
+    spared = build_nuisance_projection(recording, baseline, residual)
     found = estimate_whitening(recording, residual, baseline.base.size, np.eye(2), spared=spared)
     true = 2 * 0.004 * NOISE**2 * (1 - 0.8**2) / np.abs(1 - 0.8 * np.exp(-2j * np.pi * 0.004 * SLOW)) ** 2
     for joint in range(2):
@@ -81,6 +81,6 @@ def test_a_short_log_has_no_free_functions(arm: Robot, arm_plant: Callable) -> N
     """Of ten seconds they would take the noise itself."""
     log = simulate(arm_plant(torque_noise=0.01), _moves(0), seed=0)
     short = replace(log, t=log.t[:2500], q=log.q[:2500], tau=log.tau[:2500])
-    recording = record(arm, [short])
+    recording = build_recording(arm, [short])
     baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
-    assert own_functions(recording, baseline, recording.tau) == ()
+    assert build_nuisance_projection(recording, baseline, recording.tau) == ()

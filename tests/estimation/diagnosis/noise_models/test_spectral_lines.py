@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.diagnosis.noise_models.spectral_lines import without_lines
+from estimation.diagnosis.noise_models.spectral_lines import remove_lines
 
 ROWS, STEP = 15_000, 0.004
 
@@ -28,7 +28,7 @@ def test_noise_has_no_lines(period: float | None) -> None:
     touched = 0
     for _ in range(30):
         power = _power(_noise(rng))
-        touched += int(np.sum(without_lines(power, 1 / (ROWS * STEP), period) != power))
+        touched += int(np.sum(remove_lines(power, 1 / (ROWS * STEP), period) != power))
     assert touched < 50
 
 
@@ -46,7 +46,7 @@ def test_a_vibration_is_levelled_to_the_noise_about_it(frequency: float, period:
     near = np.abs(np.fft.rfftfreq(ROWS, STEP) - frequency) < 0.5
     level = _power(noise)[near].mean(axis=0)
     assert np.all(_power(shaken)[near].max(axis=0) > 20 * level)
-    left = without_lines(_power(shaken), 1 / (ROWS * STEP), period)[near].mean(axis=0)
+    left = remove_lines(_power(shaken), 1 / (ROWS * STEP), period)[near].mean(axis=0)
     assert left == pytest.approx(level, rel=0.4)
 
 
@@ -56,12 +56,12 @@ def test_what_repeats_with_the_motion_is_no_line() -> None:
     noise = _noise(rng)
     error = np.tile(rng.normal(size=(2500, 2)), (6, 1))
     power = _power(noise + 2 * error)
-    assert np.sum(without_lines(power, 1 / (ROWS * STEP), 10.0) != power) < 50
-    assert np.sum(without_lines(power, 1 / (ROWS * STEP)) != power) > 100
+    assert np.sum(remove_lines(power, 1 / (ROWS * STEP), 10.0) != power) < 50
+    assert np.sum(remove_lines(power, 1 / (ROWS * STEP)) != power) > 100
 
 
 @pytest.mark.parametrize("rows", [1000, 4000])
 def test_a_short_log_tells_no_line(rows: int) -> None:
     """Of 4 and 16 s: a spectrum of few places may be a colour that is as steep."""
     power = _power(_noise(np.random.default_rng(3))[:rows] + 5 * np.sin(70.0 * STEP * np.arange(rows))[:, None])
-    assert without_lines(power, 1 / (rows * STEP)) is power
+    assert remove_lines(power, 1 / (rows * STEP)) is power

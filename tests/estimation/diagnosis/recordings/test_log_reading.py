@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.recordings.log_reading import build_recording
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log, Motion
@@ -26,7 +26,7 @@ def _aperiodic(motion: Callable[..., Motion], arm: Robot) -> Motion:
 def test_derivatives_of_a_single_pass_are_free_of_encoder_noise(arm: Robot, fourier_motion: Callable) -> None:
     """With 2^17 counts a turn accelerations err by less than 2 % of their size; differences would by half of it."""
     motion = _aperiodic(fourier_motion, arm)
-    recording = record(arm, [_log(motion, 2**17)])
+    recording = build_recording(arm, [_log(motion, 2**17)])
     first = int(np.argmin(np.abs(motion.t - recording.t[0])))
     rows = slice(first, first + len(recording))
     assert recording.t == pytest.approx(motion.t[rows])
@@ -40,7 +40,7 @@ def test_derivatives_of_a_single_pass_are_free_of_encoder_noise(arm: Robot, four
 def test_a_repeated_motion_is_known_better_than_a_single_pass(arm: Robot, fourier_motion: Callable) -> None:
     """Two passes and more are averaged: the cycle is found and accelerations err by less than 1 %."""
     motion = fourier_motion(arm, duration=40.0)
-    recording = record(arm, [_log(motion, 2**17)])
+    recording = build_recording(arm, [_log(motion, 2**17)])
     assert recording.periodic
     assert recording.cycles[0] is not None
     assert recording.cycles[0].period == pytest.approx(10.0, abs=1e-4)
@@ -57,7 +57,7 @@ def test_a_log_that_begins_in_motion_is_known_to_its_ends(arm: Robot) -> None:
     q = np.sum(np.sin(phases) / (1 + f[:, :, None]) ** 4, axis=0)
     ddq = -np.sum((2 * np.pi * f[:, :, None]) ** 2 * np.sin(phases) / (1 + f[:, :, None]) ** 4, axis=0)
     count = 1e-7
-    recording = record(arm, [Log(t=t, q=np.round(q / count) * count, tau=np.ones_like(q))])
+    recording = build_recording(arm, [Log(t=t, q=np.round(q / count) * count, tau=np.ones_like(q))])
     first = int(np.argmin(np.abs(t - recording.t[0])))
     error = np.abs(recording.ddq - ddq[first : first + len(recording)])
     ends = np.concatenate([error[:20], error[-20:]])
@@ -75,7 +75,7 @@ def test_a_slow_motion_is_known_to_the_ends_of_a_log_that_cuts_it(arm: Robot) ->
     count = 2 * np.pi / 2**18
     q = np.round(np.sin(phases).sum(axis=0) / count) * count
     ddq = -(w**2 * np.sin(phases)).sum(axis=0)
-    recording = record(arm, [Log(t=t, q=q, tau=np.ones_like(q))])
+    recording = build_recording(arm, [Log(t=t, q=q, tau=np.ones_like(q))])
     first = int(np.argmin(np.abs(t - recording.t[0])))
     error = recording.ddq - ddq[first : first + len(recording)]
     within = error[4000:-4000].std(axis=0)
@@ -87,8 +87,8 @@ def test_logs_share_one_clock(arm: Robot, fourier_motion: Callable) -> None:
     """Logs are put in the order of their times; two at one time are refused, naming the column."""
     log = _log(fourier_motion(arm, duration=20.0), 2**20)
     later = replace(log, t=np.asarray(log.t) + 60.0)
-    recording = record(arm, [later, log])
+    recording = build_recording(arm, [later, log])
     assert len(recording.starts) == 2
     assert np.all(np.diff(recording.t) > 0)
     with pytest.raises(InputError, match="overlaps"):
-        record(arm, [log, replace(log, t=np.asarray(log.t) + 5.0)])
+        build_recording(arm, [log, replace(log, t=np.asarray(log.t) + 5.0)])

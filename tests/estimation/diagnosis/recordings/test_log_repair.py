@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimation import diagnose
-from estimation.diagnosis.recordings.log_repair import mended
+from estimation.diagnosis.recordings.log_repair import repair_log
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log
@@ -39,7 +39,7 @@ def _holed(log: Log, *holes: tuple[float, float]) -> Log:
 
 def test_a_sound_log_is_left_alone(arm: Robot, log: Log) -> None:
     """It is the same object, and nothing is said of it."""
-    result = mended(arm, log, "Log 1")
+    result = repair_log(arm, log, "Log 1")
     assert result.logs == (log,)
     assert result.notes == ()
 
@@ -49,7 +49,7 @@ def test_rows_that_stick_out_lie_between_their_neighbours(arm: Robot, log: Log) 
     rows = (1200, 3000)
     q = np.array(log.q)
     q[3000, 0] += 0.5 * np.ptp(q[:, 0])
-    ((found,), notes) = (lambda m: (m.logs, m.notes))(mended(arm, replace(_glitched(log, rows), q=q), "Log 1"))
+    ((found,), notes) = (lambda m: (m.logs, m.notes))(repair_log(arm, replace(_glitched(log, rows), q=q), "Log 1"))
     others = np.delete(np.arange(len(log)), rows)
     for name in ("t", "q", "tau"):
         np.testing.assert_array_equal(getattr(found, name)[others], getattr(log, name)[others])
@@ -64,13 +64,13 @@ def test_rows_that_stick_out_lie_between_their_neighbours(arm: Robot, log: Log) 
 
 def test_a_log_is_cut_at_its_gaps(arm: Robot, log: Log) -> None:
     """Stretches keep their times and say which they are; one of less than two seconds is no stretch."""
-    result = mended(arm, _holed(log, (6.0, 9.0), (10.5, 11.0)), "Log 1")
+    result = repair_log(arm, _holed(log, (6.0, 9.0), (10.5, 11.0)), "Log 1")
     spans = [(part.t[0] - log.t[0], part.t[-1] - log.t[0]) for part in result.logs]
     np.testing.assert_allclose(spans, [(0.0, 6.0), (11.0, log.duration)], atol=0.0041)
     assert "from 0 to 6 s" in result.logs[0].name
     assert any("gap" in note for note in result.notes)
     # A network that hiccups is no gap.
-    assert len(mended(arm, _holed(log, (6.0, 6.05)), "Log 1").logs) == 1
+    assert len(repair_log(arm, _holed(log, (6.0, 6.05)), "Log 1").logs) == 1
 
 
 def test_faults_of_a_recording_are_no_effects(arm: Robot, log: Log) -> None:
@@ -84,7 +84,7 @@ def test_faults_of_a_recording_are_no_effects(arm: Robot, log: Log) -> None:
         for given, check in ((log, True), (faulty, True), (faulty, False))
     )
     assert sound.verdict == checked.verdict == "none"
-    assert any("stick out" in note for note in checked.notes)
+    assert any("outlier" in note for note in checked.notes)
     assert checked.baseline == pytest.approx(sound.baseline, rel=0.3)
     assert taken.baseline[1] > 3 * sound.baseline[1]
 
@@ -110,23 +110,23 @@ def test_a_log_in_other_units_is_refused(arm: Robot, log: Log, field: str) -> No
 
 def test_what_an_effect_may_look_like_is_told_and_not_refused(arm: Robot, log: Log) -> None:
     """A torque of the wrong sign is a note: the quick fit of the gate knows no effect."""
-    result = mended(arm, replace(log, tau=-np.asarray(log.tau)), "Log 1")
+    result = repair_log(arm, replace(log, tau=-np.asarray(log.tau)), "Log 1")
     assert len(result.logs) == 1
     assert any("sign" in note for note in result.notes)
 
 
 def test_torques_of_another_unit_are_told_first(arm: Robot, log: Log) -> None:
     """Where most joints' torques are far from the description's, a unit is likelier than anything of the robot."""
-    result = mended(arm, replace(log, tau=log.tau / 100.0), "Log 1")
+    result = repair_log(arm, replace(log, tau=log.tau / 100.0), "Log 1")
     assert result.notes[0].startswith(
         "Log 1: the torques of 2 of 2 joints are 0.01 times those of the robot's description"
     )
     one = log.tau / np.array([100.0, 1.0])
-    assert not any("the torques of" in note for note in mended(arm, replace(log, tau=one), "Log 1").notes)
+    assert not any("the torques of" in note for note in repair_log(arm, replace(log, tau=one), "Log 1").notes)
 
 
 def test_torques_of_the_motors_are_refused(arm: Robot, log: Log) -> None:
     """By two signs: joints do not agree on the links they share, and each is a gear ratio smaller than described."""
     gears = np.array([100.0, 40.0])
     with pytest.raises(InputError, match="the motor's, not the joint's"):
-        mended(replace(arm, gear_ratio=gears), replace(log, tau=log.tau / gears), "Log 1")
+        repair_log(replace(arm, gear_ratio=gears), replace(log, tau=log.tau / gears), "Log 1")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimation.diagnosis.recordings.periods import find_cycle, project
+from estimation.diagnosis.recordings.periods import find_cycle, project_on_harmonics
 
 STEP = 0.004
 
@@ -56,7 +56,7 @@ def test_the_projection_is_free_of_encoder_noise() -> None:
     counted = np.round(q / count) * count
     cycle = find_cycle(counted, STEP)
     assert cycle is not None
-    (found_q, found_dq, found_ddq), known, _ = project(counted, STEP, cycle)
+    (found_q, found_dq, found_ddq), known, _ = project_on_harmonics(counted, STEP, cycle)
     rows = slice(cycle.start, cycle.stop)
     # Rounding has a standard deviation of count / sqrt(12); the mean over six passes and few harmonics has far less.
     assert np.abs(found_q - q[rows]).max() < 0.3 * count
@@ -76,7 +76,7 @@ def test_the_noise_of_the_mean_over_repetitions_is_told(period: float, rounded: 
     counted = np.round(q / count) * count if rounded else q + noise
     cycle = find_cycle(counted, STEP)
     assert cycle is not None
-    _, _, density = project(counted, STEP, cycle)
+    _, _, density = project_on_harmonics(counted, STEP, cycle)
     # Where repetitions begin between samples each is rounded anew.
     repeats = 1 if rounded and period == 10.0 else cycle.count
     assert density == pytest.approx(2 * STEP * (counted - q).var(axis=0) / repeats, rel=1 / 3)

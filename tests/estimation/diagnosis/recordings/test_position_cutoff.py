@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.diagnosis.recordings.log_reading import record
-from estimation.diagnosis.recordings.position_cutoff import CAPS, believable_cutoff
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.recordings.position_cutoff import CAPS, select_position_cutoff
 from estimation.diagnosis.recordings.position_spectra import Spectra
-from estimation.diagnosis.recordings.smoothed_motion import smoothed
+from estimation.diagnosis.recordings.smoothed_motion import smooth_motion
 from estimation.regressions.preparation import prepare
 from robots.plants import simulate
 from robots.robot import Robot
@@ -39,25 +39,25 @@ def test_coloured_noise_is_kept_out_of_the_acceleration(arm: Robot, logs: tuple[
     prepared = prepare(arm, noisy)
     spectra = Spectra.of(prepared.positions)
     given = np.array([spectra.of_positions(x).cutoff() for x in prepared.positions.q.T])
-    assert believable_cutoff(arm, [prepared], given) in CAPS
+    assert select_position_cutoff(arm, [prepared], given) in CAPS
     truth = fourier_motion(arm, 4)
 
     def error(t: np.ndarray, ddq: np.ndarray) -> float:
         expected = np.column_stack([np.interp(t, truth.t, x) for x in truth.ddq.T])
         return float(np.sqrt(np.mean((ddq - expected) ** 2) / np.mean(expected**2)))
 
-    recording = record(arm, [noisy])
-    uncapped = smoothed(prepared.positions.q, prepared.positions.period, given)[2]
+    recording = build_recording(arm, [noisy])
+    uncapped = smooth_motion(prepared.positions.q, prepared.positions.period, given)[2]
     assert error(recording.t, recording.ddq) < error(prepared.positions.t, uncapped) / 3
 
 
 def test_a_good_encoder_keeps_its_band(arm: Robot, logs: tuple[Log, Log]) -> None:
     """Positions that spoil nothing are not low-passed further."""
-    assert believable_cutoff(arm, [prepare(arm, logs[0])], np.full(2, 40.0)) == np.inf
+    assert select_position_cutoff(arm, [prepare(arm, logs[0])], np.full(2, 40.0)) == np.inf
 
 
 def test_an_elastic_gear_is_no_noise(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:
     """What an effect of 5 % leaves of the base model is not taken for noise of the positions."""
     log = simulate(arm_plant(torque_noise=0.02), fourier_motion(arm, 5))
     late = replace(log, tau=np.column_stack([np.interp(log.t - 0.01, log.t, x) for x in log.tau.T]))
-    assert believable_cutoff(arm, [prepare(arm, late)], np.full(2, 40.0)) == np.inf
+    assert select_position_cutoff(arm, [prepare(arm, late)], np.full(2, 40.0)) == np.inf

@@ -7,7 +7,7 @@ import pytest
 
 from estimation.diagnosis.recordings.directions import Directions
 from estimation.diagnosis.recordings.position_spectra import Spectra
-from estimation.diagnosis.recordings.smoothed_motion import passed, smoothed
+from estimation.diagnosis.recordings.smoothed_motion import low_pass_gain, smooth_motion
 from estimation.preprocessing import Resampled, resample
 
 NOISE = 5e-6  # [rad]
@@ -51,10 +51,10 @@ def test_between_two_samples_a_joint_may_have_turned_round() -> None:
     known = Directions(unsure, unsure.copy(), np.zeros(2), np.zeros(2))
     # Rows 1 to 3 lie between samples 0 and 4, row 6 between 5 and 7.
     spread = known.spread(np.array([-1, 1, 1, 1, -1, -1, 2, -1]))
-    assert np.flatnonzero(spread.unsure[:, 0]).tolist() == [1, 2, 3]
-    assert np.flatnonzero(spread.unsure[:, 1]).tolist() == [5]
+    assert np.flatnonzero(spread.sign_unknown[:, 0]).tolist() == [1, 2, 3]
+    assert np.flatnonzero(spread.sign_unknown[:, 1]).tolist() == [5]
     # What is told by the velocity must have been sampled.
-    assert np.flatnonzero(spread.clear[:, 0]).tolist() == [2]
+    assert np.flatnonzero(spread.sign_known_from_velocity[:, 0]).tolist() == [2]
     assert known.spread(np.full(8, -1)) is known
 
 
@@ -74,11 +74,11 @@ def test_a_motion_that_ends_at_an_edge_keeps_its_last_sine(noise: float) -> None
     middle = slice(2000, -2000)
 
     def error(x: np.ndarray, cutoff: float) -> float:
-        found = smoothed(x[:, None], PERIOD, np.array([cutoff]))[2][middle, 0]
+        found = smooth_motion(x[:, None], PERIOD, np.array([cutoff]))[2][middle, 0]
         return float(np.sqrt(np.mean((found - a[middle]) ** 2)) / a.std())
 
     lost, both = error(q, cutoff), error(positions.q[:, 0], cutoff)
     assert lost < max(0.01, both)
     assert lost**2 < 0.6 * both**2 or lost < 0.01
     assert error(q, 7.0) > 0.04
-    assert passed(np.array([6.6]), 7.0) == pytest.approx(0.72, abs=0.01)
+    assert low_pass_gain(np.array([6.6]), 7.0) == pytest.approx(0.72, abs=0.01)

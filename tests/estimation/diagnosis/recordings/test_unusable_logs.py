@@ -10,8 +10,8 @@ import pytest
 
 from estimation import diagnose
 from estimation.diagnosis.base_models.baseline import base_parameters
-from estimation.diagnosis.recordings.log_reading import record
-from estimation.diagnosis.recordings.unusable_logs import hopeless_logs
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.recordings.unusable_logs import find_unusable_logs
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -35,7 +35,7 @@ def _ringing(log: Log, joints: Sequence[int]) -> Log:
 
 
 def _found(arm: Robot, logs: Sequence[Log]) -> dict[int, float]:
-    return hopeless_logs(base_parameters(arm, "polynomial", (0.001,) * arm.n), record(arm, logs))
+    return find_unusable_logs(base_parameters(arm, "polynomial", (0.001,) * arm.n), build_recording(arm, logs))
 
 
 def test_only_a_log_that_no_parameters_explain_is_hopeless(arm: Robot, logs: list[Log]) -> None:

@@ -59,7 +59,7 @@ def test_what_is_as_small_as_formulas_leave_is_told_all_the_same() -> None:
     """Beside the name that does most there, with the share; nothing where there is none, or nothing beside it."""
     step, delay, friction, spring = (
         SimpleNamespace(
-            hypothesis=SimpleNamespace(label=label, effect=SimpleNamespace(alike=label == "a delay")),
+            hypothesis=SimpleNamespace(label=label, effect=SimpleNamespace(shared_coefficient=label == "a delay")),
             group=SimpleNamespace(joints=tuple(gains)),
             gain_on=lambda joints, gains=gains: sum(gains.get(j, 0.0) for j in joints),
         )

@@ -11,7 +11,7 @@ import pytest
 
 from estimation.diagnosis.findings import Finding, Gain, Parameter
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import Member
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.results.wording import _parameters, _roughly, _stopped, _when, no_part
 from estimation.models.extension import Extension
 from robots.robot import Robot
@@ -58,7 +58,7 @@ def test_a_size_at_its_bound_is_not_determined(effect: str, shape: int, value: f
 def test_an_interval_holds_what_machines_may_have(arm: Robot) -> None:
     """What the data leave open below zero is no stiffness; a value that is rough stays so, however little is left."""
     hypothesis = Hypothesis(EFFECTS["stribeck"], 1)
-    member = Member(hypothesis, (0.05, 1.0), None, 100.0, np.array([7.9]), 3, 1.0)  # type: ignore[arg-type]
+    member = FittedEffect(hypothesis, (0.05, 1.0), None, 100.0, np.array([7.9]), 3, 1.0)  # type: ignore[arg-type]
     extension = Extension(
         effect="stribeck",
         joint=1,
@@ -77,7 +77,7 @@ def test_an_interval_holds_what_machines_may_have(arm: Robot) -> None:
 def test_levers_that_are_perhaps_none_have_no_dead_centre(arm: Robot, error: float, told: bool) -> None:
     """An angle is told, however narrow its interval, where the ratio beside it is surely more than zero."""
     coefficients = np.array([400.0, -300.0, 0.0, 900.0])
-    member = Member(Hypothesis(EFFECTS["spring"], 1), (0.3, -2.9), None, 100.0, coefficients, 6, 1.0)  # type: ignore[arg-type]
+    member = FittedEffect(Hypothesis(EFFECTS["spring"], 1), (0.3, -2.9), None, 100.0, coefficients, 6, 1.0)  # type: ignore[arg-type]
     covariance = np.diag([4.0, 3.0, 0.0, 9.0, error, 0.1]) ** 2
     extension = Extension(
         effect="spring", joint=1, shape=member.shape, coefficients=coefficients, covariance=covariance
@@ -104,7 +104,7 @@ def test_what_is_no_part_of_the_model_says_so() -> None:
     )
     refuted = no_part(finding)
     assert (refuted.effect, refuted.joint, refuted.parameters, refuted.rivals) == ("unexplained", 2, (), ())
-    assert "looks like a gear that winds up under load" in refuted.sentence
+    assert "looks like joint elasticity" in refuted.sentence
     assert "no part of it" in refuted.sentence
     assert "do not bear that function out" in no_part(finding_of("pattern:load:0:odd", finding)).sentence
 
@@ -141,7 +141,7 @@ def test_what_warms_up_gains_no_friction(arm: Robot, effect: str, falls: tuple[f
     """One kind of friction may rise while the other falls; where it rises at all speeds, it is no heat."""
     shape = tuple(400.0 if own.name == "time_constant" else 0.0 for own in EFFECTS[effect].shapes)
     fast = replace(arm, limits=replace(arm.limits, velocity=np.full(arm.n, 10.0)))
-    assert EFFECTS[effect].believable(fast, 1, np.array(falls), shape) is believed
+    assert EFFECTS[effect].is_plausible(fast, 1, np.array(falls), shape) is believed
 
 
 def test_a_change_is_told_at_its_time_or_between_two() -> None:

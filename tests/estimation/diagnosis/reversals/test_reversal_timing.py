@@ -12,17 +12,18 @@ import pytest
 from estimation import diagnose
 from estimation.diagnosis.base_models.baseline import base_parameters
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.joint_agreement import joint_by_joint
+from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
+from estimation.diagnosis.hypothesis_tests.null_products import null_products
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
-from estimation.diagnosis.joint_fits.shrinkage import pull_on
+from estimation.diagnosis.joint_fits.shrinkage import effects_prior
 from estimation.diagnosis.recordings import log_reading
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording
-from estimation.diagnosis.recordings.smoothed_motion import passed
-from estimation.diagnosis.reversals.reversal_impulses import Table, edges_of
-from estimation.diagnosis.reversals.reversal_timing import Timing, reversal_timing
+from estimation.diagnosis.recordings.smoothed_motion import low_pass_gain
+from estimation.diagnosis.reversals.reversal_impulses import ImpulseResponse, edges_of
+from estimation.diagnosis.reversals.reversal_timing import ReversalTiming, measure_reversal_timing
 from estimation.diagnosis.searches.search import fit_plain
 from robots import load_robot
 from robots.robot import Robot
@@ -57,13 +58,13 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, bool], tup
 @pytest.fixture(scope="module")
 def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
     """A log of the arm without effects."""
-    return record(arm, [arm_log(torque_noise=0.02)])
+    return build_recording(arm, [arm_log(torque_noise=0.02)])
 
 
-def _timed(robot: Robot, log: Log) -> Timing:
-    recording = record(robot, [log])
+def _timed(robot: Robot, log: Log) -> ReversalTiming:
+    recording = build_recording(robot, [log])
     baseline, settled = fit_plain(base_parameters(robot, "polynomial", (0.001,) * robot.n), recording)
-    timing = reversal_timing(recording, baseline, settled.values, settled.residual)
+    timing = measure_reversal_timing(recording, baseline, settled.values, settled.residual)
     assert timing is not None
     return timing
 
@@ -106,18 +107,21 @@ def test_a_delay_is_named_that_only_reversals_tell(cases: Callable) -> None:
 def test_positions_that_say_too_little_of_reversals_say_nothing(cases: Callable) -> None:
     """Of logs whose positions are not at the rows, of few reversals, and of a joint without friction."""
     _, robot, log = cases(1006, True)
-    recording = record(robot, [log])
+    recording = build_recording(robot, [log])
     baseline, settled = fit_plain(base_parameters(robot, "polynomial", (0.001,) * robot.n), recording)
-    assert reversal_timing(replace(recording, rest=None), baseline, settled.values, settled.residual) is None
+    assert (
+        measure_reversal_timing(replace(recording, position_residual=None), baseline, settled.values, settled.residual)
+        is None
+    )
     friction = [i for i, column in enumerate(baseline.base.columns) if column.symbol == "f1" and column.joint == 2]
     values = settled.values.copy()
     values[friction] = 0.0
-    timing = reversal_timing(recording, baseline, values, settled.residual)
+    timing = measure_reversal_timing(recording, baseline, values, settled.residual)
     assert timing is not None
     assert np.isinf(timing.errors[1])
     once = recording.dq.copy()
     once[:, 0] = np.abs(once[:, 0]) + 1e-6
-    timing = reversal_timing(replace(recording, dq=once), baseline, settled.values, settled.residual)
+    timing = measure_reversal_timing(replace(recording, dq=once), baseline, settled.values, settled.residual)
     assert timing is not None
     assert np.isinf(timing.errors[0])
 
@@ -126,7 +130,7 @@ def test_positions_that_say_too_little_of_reversals_say_nothing(cases: Callable)
 def test_a_table_is_the_motion_of_a_force_that_a_loop_undoes(cutoff: float, step: float) -> None:
     """Acceleration integrates to velocity and to position; of a slow force next to nothing is beyond the low-pass."""
     edges = edges_of(cutoff, step)
-    table = Table.of(cutoff, step, edges)
+    table = ImpulseResponse.of(cutoff, step, edges)
     dx = table.x[1] - table.x[0]
     position, velocity, acceleration = table.values
     # Where a force begins, differences are off by what it does in one of them.
@@ -141,23 +145,31 @@ def test_a_table_is_the_motion_of_a_force_that_a_loop_undoes(cutoff: float, step
     # Its spectrum is that of the whole force, less what passes.
     f = np.fft.rfftfreq(len(table.x), dx)
     power = np.abs(np.fft.rfft(position, axis=0)) ** 2
-    slow = passed(f, cutoff) > 0.99
+    slow = low_pass_gain(f, cutoff) > 0.99
     assert power[slow].sum() < 0.05 * power.sum()
 
 
 def test_joints_whose_rows_count_are_timed_where_that_tells_far_more(recording: Recording) -> None:
     """Else the same torque would tell twice."""
-    timing = Timing(np.array([1e-3, 1e-3]), np.array([2e-4, 2e-4]), np.zeros(2))
+    timing = ReversalTiming(np.array([1e-3, 1e-3]), np.array([2e-4, 2e-4]), np.zeros(2))
     everywhere = np.ones(recording.q.shape, dtype=bool)
     for late, kept in ((1e-3, [True, True]), (1e-4, [False, True])):
         counting = replace(
-            recording, clear=everywhere, trusted=np.array([True, False]), late=np.full(recording.q.shape, late)
+            recording,
+            sign_known_from_velocity=everywhere,
+            trusted=np.array([True, False]),
+            reversal_time_error=np.full(recording.q.shape, late),
         )
         told = timing.beside(counting)
         assert told is not None
         np.testing.assert_array_equal(np.isfinite(told.errors), kept)
         np.testing.assert_array_equal(told.residual[~np.array(kept)], 0.0)
-    both = replace(recording, clear=everywhere, trusted=np.ones(2, dtype=bool), late=np.zeros(recording.q.shape))
+    both = replace(
+        recording,
+        sign_known_from_velocity=everywhere,
+        trusted=np.ones(2, dtype=bool),
+        reversal_time_error=np.zeros(recording.q.shape),
+    )
     assert timing.beside(both) is None
 
 
@@ -166,7 +178,7 @@ def test_what_reversals_tell_counts_as_one_row_for_each_joint(
 ) -> None:
     """A delay's squares and products grow by 1 / s^2 and d / s^2 of each joint, a lag's and a spring's by nothing."""
     plain = pose_arm(recording)
-    timing = Timing(np.array([2e-3, 3e-3]), np.array([5e-4, np.inf]), np.zeros(2))
+    timing = ReversalTiming(np.array([2e-3, 3e-3]), np.array([5e-4, np.inf]), np.zeros(2))
     problem = replace(plain, timing=timing)
     for name, joint in (("time_delay", None), ("current_lag", 1), ("spring", 1)):
         hypothesis = Hypothesis(EFFECTS[name], joint)
@@ -177,14 +189,14 @@ def test_what_reversals_tell_counts_as_one_row_for_each_joint(
         assert after.cross == pytest.approx(before.cross + product)
         assert problem.product(after, after) == pytest.approx(after.gram, rel=1e-4)
     delay = Hypothesis(EFFECTS["time_delay"], None)
-    told = [joint_by_joint(p, delay, (2e-3,), accept(p, ())) for p in (plain, problem)]
+    told = [per_joint_evidence(p, delay, (2e-3,), accept(p, ())) for p in (plain, problem)]
     assert told[1].gram - told[0].gram == pytest.approx([4e6, 0.0], abs=1e-3 * told[0].gram.max())
     # The coefficient that is fitted, and the pull on it, are those of rows and reversals together.
     member = refine(problem, delay, (2e-3,), accept(problem, ()))
     rows = score(plain, plain.measured(delay, member.shape), accept(plain, ()))
     both = float((rows.cross + 2e-3 * 4e6)[0] / (rows.gram[0, 0] + 4e6))
     assert member.coefficients[0] == pytest.approx(both, rel=1e-6)
-    pull = pull_on(problem, [member])
+    pull = effects_prior(problem, [member])
     assert pull.precision[-1, -1] * pull.target[-1] == pytest.approx(problem.whitening.row_weight * 2e-3 * 4e6)
     assert 0.0 < pull.target[-1] <= 2e-3
 
@@ -196,9 +208,9 @@ def test_null_logs_meet_reversals_whose_lags_are_noise(pose_arm: Callable[..., P
     """
     plain = pose_arm(recording, draws=200)
     errors = np.array([5e-4, 1e-3])
-    problem = replace(plain, timing=Timing(np.zeros(2), errors, np.zeros(2)))
+    problem = replace(plain, timing=ReversalTiming(np.zeros(2), errors, np.zeros(2)))
     hypothesis = Hypothesis(EFFECTS["time_delay"], None)
-    before, after = (p.null_crosses([p.measured(hypothesis, (1e-3,))])[0] for p in (plain, problem))
+    before, after = (null_products(p, [p.measured(hypothesis, (1e-3,))])[0] for p in (plain, problem))
     assert np.var(after - before) == pytest.approx(np.sum(errors**-2.0), rel=0.2)
 
 
@@ -209,9 +221,9 @@ def test_reversals_of_a_thinned_log_are_timed_by_all_its_samples(
     case, robot, log = cases(1006, True)
     plain = _timed(robot, log)
     monkeypatch.setattr(log_reading, "MOST_ROWS", 8000)
-    recording = record(robot, [log])
-    assert recording.finer is not None
-    assert recording.step == pytest.approx(2 * recording.finer.step)
+    recording = build_recording(robot, [log])
+    assert recording.full_rate is not None
+    assert recording.step == pytest.approx(2 * recording.full_rate.step)
     thinned = _timed(robot, log)
     told = np.isfinite(thinned.errors)
     assert told.sum() >= 3
@@ -220,4 +232,4 @@ def test_reversals_of_a_thinned_log_are_timed_by_all_its_samples(
     # The base model is another, fitted to half of the rows: how sharp its signs are is another chance of the noise.
     assert np.all(np.abs(thinned.lags - plain.lags)[both] < np.hypot(plain.errors, thinned.errors)[both])
     monkeypatch.setattr(log_reading, "MOST_FINE", 10_000)
-    assert record(robot, [log]).finer is None
+    assert build_recording(robot, [log]).full_rate is None

@@ -12,9 +12,9 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from estimation.diagnosis.recordings.log_reading import record
-from estimation.diagnosis.searches.joint_shape_refinement import together
-from estimation.diagnosis.searches.selection import FAR_MORE, _formed_anew
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.searches.joint_shape_refinement import refine_shapes_jointly
+from estimation.diagnosis.searches.selection import FAR_MORE, _refit_with_candidate
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import EFFECTS
@@ -26,7 +26,7 @@ SHARE = 0.12
 @pytest.fixture(scope="module")
 def problem(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]) -> Problem:
     """Joint 2 with a gear that loses alike both ways, and iron that saturates by the square of the torque."""
-    recording = record(arm, [arm_log(torque_noise=0.01)])
+    recording = build_recording(arm, [arm_log(torque_noise=0.01)])
     situation = pose_arm(recording).situation
     top = float(np.abs(situation.torque[:, 1]).max())
     gear = LOAD.effect.columns(situation, 2, (1.0, 0.0))[:, :, 0] * SHARE
@@ -39,23 +39,23 @@ def test_together_they_leave_the_valley_in_which_one_does_what_the_other_should(
     alone = refine(problem, LOAD, (1.0, 0.0), accept(problem, ()))
     assert alone.shape[0] < 0.8
     second = refine(problem, IRON, IRON.effect.grid(problem.situation, 2)[0], accept(problem, (alone.group,)))
-    load, iron = together(problem, [alone, second])
+    load, iron = refine_shapes_jointly(problem, [alone, second])
     assert load.shape[0] == pytest.approx(1.0, abs=0.1)
     assert iron.shape[0] == pytest.approx(2.0, abs=0.2)
     both = accept(problem, (load.group, iron.group)).gain
     assert both > accept(problem, (alone.group, second.group)).gain
     # One that shares its joint with none stays as it is.
-    assert together(problem, [alone]) == [alone]
+    assert refine_shapes_jointly(problem, [alone]) == [alone]
 
 
 def test_what_explains_far_more_beside_another_form_is_taken_with_it(problem: Problem) -> None:
     """The second explains little beside the first as that was; what changes nothing of the first is not taken."""
     alone = refine(problem, LOAD, (1.0, 0.0), accept(problem, ()))
     second = refine(problem, IRON, IRON.effect.grid(problem.situation, 2)[0], accept(problem, (alone.group,)))
-    formed = _formed_anew(problem, second, [alone])
+    formed = _refit_with_candidate(problem, second, [alone])
     assert formed is not None
     assert [member.hypothesis for member in formed] == [LOAD, IRON]
     assert formed[1].gain > FAR_MORE * second.gain
     assert formed[1].coefficients[0] == pytest.approx(SHARE, rel=0.15)
     other = refine(problem, Hypothesis(EFFECTS["stribeck"], 2), (0.1, 1.0), accept(problem, (alone.group,)))
-    assert _formed_anew(problem, other, [alone]) is None
+    assert _refit_with_candidate(problem, other, [alone]) is None

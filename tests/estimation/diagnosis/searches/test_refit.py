@@ -12,8 +12,8 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.noise_models.whitening import Whitening
-from estimation.diagnosis.recordings.log_reading import record
-from estimation.diagnosis.searches.refit import calmer, moved, settle
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.searches.refit import base_torque_changed, noise_decreased, refit
 from robots.plants import simulate
 from robots.robot import Robot
 from robots.signals import Log, Motion
@@ -30,7 +30,7 @@ def test_torque_that_is_cut_off_does_not_draw_the_base_model(
 
     The log is cut with its noise, of which the tops then keep what is negative.
     """
-    recording = record(arm, [arm_log(torque_noise=0.05)])
+    recording = build_recording(arm, [arm_log(torque_noise=0.05)])
     true = recording.tau[:, 0]
     limit = (1 - LOST) * np.abs(true).max()
     tau = recording.tau.copy()
@@ -39,7 +39,7 @@ def test_torque_that_is_cut_off_does_not_draw_the_base_model(
     fitted = problem.situation.torque[:, 0]
     hypothesis = Hypothesis(EFFECTS["current_clipping"], 1)
     member = refine(problem, hypothesis, (0.8 * float(np.abs(fitted).max()),), accept(problem, ()))
-    settled = settle(problem, [member])
+    settled = refit(problem, [member])
     cut = np.abs(true) > limit
     assert 0.03 < cut.mean() < 0.3
     whole = pose_arm(recording)
@@ -52,32 +52,40 @@ def test_torque_that_is_cut_off_does_not_draw_the_base_model(
     assert error((problem.baseline.regressor @ settled.values)[:, 0]) < 0.05
     assert settled.extra is not None
     np.testing.assert_allclose(settled.extra[:, 1], 0.0)
-    kept = ~recording.unsure[:, 0]
-    assert settled.residual[kept, 0].std() < whole.remainder[kept, 0].std() < problem.remainder[kept, 0].std() / 1.5
+    kept = ~recording.sign_unknown[:, 0]
+    assert (
+        settled.residual[kept, 0].std()
+        < whole.base_residual[kept, 0].std()
+        < problem.base_residual[kept, 0].std() / 1.5
+    )
 
 
 def test_little_is_searched_anew_where_it_changes_what_was_found(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
     """Tops of the torque, cut off by a seventh, move the base model by less than counts, and the cut by more."""
-    recording = record(arm, [arm_log(torque_noise=0.05)])
+    recording = build_recording(arm, [arm_log(torque_noise=0.05)])
     limit = 0.85 * np.abs(recording.tau[:, 0]).max()
     tau = recording.tau.copy()
     tau[:, 0] = np.clip(tau[:, 0], -limit, limit)
     problem = pose_arm(replace(recording, tau=tau))
     level = 0.85 * 1.06 * float(np.abs(problem.situation.torque[:, 0]).max())
     member = refine(problem, Hypothesis(EFFECTS["current_clipping"], 1), (level,), accept(problem, ()))
-    values = settle(problem, [member]).values
-    assert not moved(problem, values, [])
-    assert moved(problem, values, [member])
-    assert not moved(problem, problem.parameters_without_payload[list(problem.baseline.base.independent)], [member])
+    values = refit(problem, [member]).values
+    assert not base_torque_changed(problem, values, [])
+    assert base_torque_changed(problem, values, [member])
+    assert not base_torque_changed(
+        problem, problem.parameters_without_payload[list(problem.baseline.base.independent)], [member]
+    )
 
 
 def test_a_search_is_done_again_where_the_slow_part_of_the_noise_is_smaller(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable[..., Motion], pose_arm: Callable[..., Problem]
 ) -> None:
     """Noise as fast as before, of a quarter less power at rest, is calmer; a change of some per cent is none."""
-    problem = pose_arm(record(arm, [simulate(arm_plant(torque_noise=0.05), fourier_motion(arm, duration=30.0))]))
+    problem = pose_arm(
+        build_recording(arm, [simulate(arm_plant(torque_noise=0.05), fourier_motion(arm, duration=30.0))])
+    )
     known = problem.whitening
 
     def less(power: float) -> Whitening:
@@ -86,7 +94,7 @@ def test_a_search_is_done_again_where_the_slow_part_of_the_noise_is_smaller(
         gain = (1.0 - first.sum()) / np.sqrt(power)
         return replace(known, coefficients=(first + (1.0 - first.sum() - gain) / len(first), *known.coefficients[1:]))
 
-    assert calmer(problem, less(0.75))
-    assert not calmer(problem, less(0.9))
-    assert not calmer(problem, less(1.3))
-    assert calmer(problem, replace(known, scale=0.9 * known.scale))
+    assert noise_decreased(problem, less(0.75))
+    assert not noise_decreased(problem, less(0.9))
+    assert not noise_decreased(problem, less(1.3))
+    assert noise_decreased(problem, replace(known, scale=0.9 * known.scale))

@@ -14,7 +14,7 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scan import measure
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.searches import swap_search
 from robots.robot import Robot
 from robots.signals import Log
@@ -31,15 +31,15 @@ def test_a_shape_that_is_known_is_refined_from_too(monkeypatch: pytest.MonkeyPat
 
     def refine(problem, hypothesis, shape, accepted):
         starts.append((hypothesis, shape))
-        return SimpleNamespace(hypothesis=hypothesis, shape=shape, bic=lambda rows: 10.0 * shape[0])
+        return SimpleNamespace(hypothesis=hypothesis, shape=shape, bic_gain=lambda rows: 10.0 * shape[0])
 
     monkeypatch.setattr(swap_search, "refine", refine)
     outcomes = [SimpleNamespace(hypothesis=A, shape=(1.0,)), SimpleNamespace(hypothesis=B, shape=(2.0,))]
     problem = SimpleNamespace(rows=100)
-    best = swap_search.best(problem, outcomes, None, {A: (3.0,), C: (9.0,)})  # type: ignore[arg-type]
+    best = swap_search.refine_candidates(problem, outcomes, None, {A: (3.0,), C: (9.0,)})  # type: ignore[arg-type]
     assert [(m.hypothesis, m.shape) for m in best] == [(A, (3.0,)), (B, (2.0,))]
     assert len(starts) == 3
-    worse = swap_search.best(problem, outcomes, None, {A: (0.5,)})  # type: ignore[arg-type]
+    worse = swap_search.refine_candidates(problem, outcomes, None, {A: (0.5,)})  # type: ignore[arg-type]
     assert [(m.hypothesis, m.shape) for m in worse] == [(B, (2.0,)), (A, (1.0,))]
 
 
@@ -58,8 +58,8 @@ def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
             group=SimpleNamespace(joints=(0,)),
             shape=(),
             gain=gain,
-            bic=lambda rows: gain,
-            worth=lambda rows: gain,
+            bic_gain=lambda rows: gain,
+            local_bic_gain=lambda rows: gain,
         )
 
     looked: list[int] = []
@@ -70,15 +70,17 @@ def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
         return SimpleNamespace(outcomes=[])
 
     monkeypatch.setattr(swap_search, "accept", lambda problem, groups: groups)
-    monkeypatch.setattr(swap_search, "all_but", lambda problem, members, i: ())
-    monkeypatch.setattr(swap_search, "composed", lambda problem, members, hypotheses: problem)
+    monkeypatch.setattr(swap_search, "accept_all_but", lambda problem, members, i: ())
+    monkeypatch.setattr(swap_search, "with_total_torque", lambda problem, members, hypotheses: problem)
     monkeypatch.setattr(swap_search, "refine", lambda problem, h, shape, beside: member(h, gains[h]))
-    monkeypatch.setattr(swap_search, "measured", lambda problem, m, beside: member(m.hypothesis, gains[m.hypothesis]))
+    monkeypatch.setattr(swap_search, "remeasure", lambda problem, m, beside: member(m.hypothesis, gains[m.hypothesis]))
     monkeypatch.setattr(swap_search, "scan", scan)
-    monkeypatch.setattr(swap_search, "contenders", lambda *args: [SimpleNamespace(hypothesis=C)])
-    monkeypatch.setattr(swap_search, "best", lambda problem, rest, beside: [member(C, gains[C])] if rest else [])
+    monkeypatch.setattr(swap_search, "screen_candidates", lambda *args: [SimpleNamespace(hypothesis=C)])
+    monkeypatch.setattr(
+        swap_search, "refine_candidates", lambda problem, rest, beside: [member(C, gains[C])] if rest else []
+    )
     won = {A: 100.0, B: 100.0}
-    members, _ = swap_search.polished(
+    members, _ = swap_search.refine_with_swaps(
         SimpleNamespace(rows=1000),  # type: ignore[arg-type]
         [],
         [member(A, 100.0), member(B, 100.0)],  # type: ignore[list-item]
@@ -96,7 +98,7 @@ def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
 @pytest.fixture(scope="module")
 def late(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]) -> Problem:
     """Torque of all joints 6 ms late, and a large ripple on joint 2 that hides that there."""
-    recording = record(arm, [arm_log(torque_noise=0.01)])
+    recording = build_recording(arm, [arm_log(torque_noise=0.01)])
     situation = pose_arm(recording).situation
     tau = recording.tau + DELAY.effect.columns(situation, None, (0.006,))[:, :, 0] * 0.006
     ripple = RIPPLE.effect.columns(situation, 2, (40.0, 0.006, 0.0))[:, :, 0] * 0.5
@@ -110,7 +112,7 @@ def test_a_rival_on_the_joint_of_the_newest_takes_the_place_of_one_that_won(late
     lag = refine(late, LAG, lag.shape, accept(late, (ripple.group,)))
     won, rng = {LAG: lag.gain, RIPPLE: ripple.gain}, np.random.default_rng(0)
     entries = measure(late, [LAG, RIPPLE, DELAY])
-    members, _ = swap_search.polished(late, entries, [lag, ripple], [0.0, 0.0], set(), won, rng, 0.01)
+    members, _ = swap_search.refine_with_swaps(late, entries, [lag, ripple], [0.0, 0.0], set(), won, rng, 0.01)
     assert [m.hypothesis for m in members] == [DELAY, RIPPLE]
     assert members[0].coefficients[0] == pytest.approx(0.006, rel=0.25)
 
@@ -124,7 +126,12 @@ def test_a_rival_is_tried_with_the_others_refined_beside_it(
     def member(hypothesis: Hypothesis, gain: float, form: str = "") -> SimpleNamespace:
         group = SimpleNamespace(joints={A: (0,), B: (1,), C: (0, 1)}[hypothesis], form=(hypothesis, form))
         return SimpleNamespace(
-            hypothesis=hypothesis, group=group, shape=(), gain=gain, bic=lambda rows: gain, worth=lambda rows: gain
+            hypothesis=hypothesis,
+            group=group,
+            shape=(),
+            gain=gain,
+            bic_gain=lambda rows: gain,
+            local_bic_gain=lambda rows: gain,
         )
 
     def refined(problem, hypothesis, shape, beside) -> SimpleNamespace:
@@ -143,17 +150,17 @@ def test_a_rival_is_tried_with_the_others_refined_beside_it(
 
     for name, value in {
         "accept": accepted,
-        "all_but": others,
-        "composed": lambda problem, members, hypotheses: problem,
+        "accept_all_but": others,
+        "with_total_torque": lambda problem, members, hypotheses: problem,
         "refine": refined,
-        "measured": lambda problem, m, beside: m,
+        "remeasure": lambda problem, m, beside: m,
         "scan": lambda *args, nulls: None,
-        "contenders": lambda *args: [SimpleNamespace(hypothesis=C)],
-        "best": lambda problem, rest, beside: [refined(problem, o.hypothesis, (), beside) for o in rest],
+        "screen_candidates": lambda *args: [SimpleNamespace(hypothesis=C)],
+        "refine_candidates": lambda problem, rest, beside: [refined(problem, o.hypothesis, (), beside) for o in rest],
         "_acts_on": lambda problem, hypothesis: (0, 1),
     }.items():
         monkeypatch.setattr(swap_search, name, value)
-    members, _ = swap_search.polished(
+    members, _ = swap_search.refine_with_swaps(
         SimpleNamespace(rows=1000),  # type: ignore[arg-type]
         [],
         [member(A, 100.0), member(B, 100.0, "late")],  # type: ignore[list-item]

@@ -16,10 +16,10 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
 from estimation.diagnosis.joint_fits.extended_fit import fit_extended
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording
-from estimation.diagnosis.searches.selection import Found
-from estimation.diagnosis.validations.equivalent_shapes import ALIKE, alike_forms, completed
+from estimation.diagnosis.searches.selection import SelectedEffect
+from estimation.diagnosis.validations.equivalent_shapes import ALIKE, complete_effects, equivalent_shapes
 from estimation.models.extension import extension_torque
 from robots.loading import load_robot
 from robots.plants import Sensors
@@ -46,7 +46,7 @@ def _balancer(q: np.ndarray) -> np.ndarray:
 @pytest.fixture(scope="module")
 def narrow(arm: Robot, arm_log: Callable[..., Log]) -> tuple[Recording, Recording]:
     """A motion of few angles, and the wide one, with the torque of one arm that is nearly as described."""
-    whole = record(arm, [arm_log(torque_noise=0.02)])
+    whole = build_recording(arm, [arm_log(torque_noise=0.02)])
     base = base_parameters(arm, "coulomb-viscous", (0.001, 0.001))
     small = replace(whole, q=NARROW * whole.q, dq=NARROW * whole.dq, ddq=NARROW * whole.ddq)
     Y, Y_small = (build_baseline(base, data).regressor for data in (whole, small))
@@ -63,7 +63,7 @@ def test_forms_of_a_spring_that_fit_alike_are_listed(
     extra = np.column_stack([_balancer(small.q[:, 0]), 0 * small.t])
     problem = pose_arm(replace(small, tau=small.tau + extra + rng.normal(size=small.tau.shape) * NOISE))
     plain = refine(problem, SPRING, (0.0, 0.0), accept(problem, ()), effort=0)
-    forms = alike_forms(problem, [plain], 0)
+    forms = equivalent_shapes(problem, [plain], 0)
     assert len(forms) >= 2
     assert all(form.gain > plain.gain - ALIKE and form.shape != plain.shape for form in forms)
     # The likeliest is the one that with the arm as described says most of the angles that were not seen.
@@ -87,9 +87,9 @@ def test_a_form_that_fits_worse_is_not_listed(
     extra = np.column_stack([3.0 * q + 4.0 * q**3, 0 * q])
     problem = pose_arm(replace(wide, tau=wide.tau + extra + rng.normal(size=wide.tau.shape) * NOISE))
     plain = refine(problem, SPRING, (0.0, 0.0), accept(problem, ()), effort=0)
-    assert alike_forms(problem, [plain], 0) == []
+    assert equivalent_shapes(problem, [plain], 0) == []
     stribeck = refine(problem, Hypothesis(EFFECTS["stribeck"], 1), (0.1, 1.0), accept(problem, ()), effort=0)
-    assert alike_forms(problem, [stribeck], 0) == []
+    assert equivalent_shapes(problem, [stribeck], 0) == []
 
 
 def test_a_tilt_is_told_beside_the_first_axis_own_moments() -> None:
@@ -107,20 +107,20 @@ def test_a_tilt_is_told_beside_the_first_axis_own_moments() -> None:
     angles, moments = np.array([0.012, -0.008]), (6.0, -4.0)
     posed = _Tilted(problem, tilt, np.kron([1.0, *moments], angles), rng.normal(size=6))
     plain = refine(posed, tilt, (0.0, 0.0), _nothing(), effort=0)  # type: ignore[arg-type]
-    (told,) = completed(posed, [Found(plain, 1e-9, ())])  # type: ignore[arg-type]
+    (told,) = complete_effects(posed, [SelectedEffect(plain, 1e-9, ())])  # type: ignore[arg-type]
     assert plain.shape == (0.0, 0.0)
     # With the moments free the angles are known as those beside four columns of them are.
     errors = np.sqrt(np.diag(np.linalg.pinv(posed.gram, rcond=1e-10, hermitian=True))[:2])
-    assert np.all(np.abs(told.member.coefficients - angles) < 3 * errors)
+    assert np.all(np.abs(told.effect.coefficients - angles) < 3 * errors)
     assert np.any(np.abs(plain.coefficients - angles) > 3 * errors)
     # The search for the moments has come as far as the true ones are.
     true = refine(posed, tilt, moments, _nothing(), effort=0)  # type: ignore[arg-type]
-    assert told.member.gain > true.gain - 0.1
-    assert told.member.gain > plain.gain + 10.0
+    assert told.effect.gain > true.gain - 0.1
+    assert told.effect.gain > plain.gain + 10.0
     # What is hardly there is not worth two more parameters.
     posed = _Tilted(problem, tilt, 0.02 * np.kron([1.0, *moments], angles), 0.02 * rng.normal(size=6))
     plain = refine(posed, tilt, (0.0, 0.0), _nothing(), effort=0)  # type: ignore[arg-type]
-    assert completed(posed, [Found(plain, 1e-9, ())])[0].member is plain  # type: ignore[arg-type]
+    assert complete_effects(posed, [SelectedEffect(plain, 1e-9, ())])[0].effect is plain  # type: ignore[arg-type]
 
 
 def _nothing() -> Accepted:

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.diagnosis.validations.gain_intervals import Unseen, models, on_held_out
-from estimation.regressions.parameter_priors import Pull
+from estimation.diagnosis.validations.gain_intervals import HeldOutErrors, held_out_errors, model_columns
+from estimation.regressions.parameter_priors import GaussianPrior
 
 
-def _unseen(fall: float, seed: int) -> Unseen:
+def _unseen(fall: float, seed: int) -> HeldOutErrors:
     rng = np.random.default_rng(seed)
     noise = lfilter([np.sqrt(1 - 0.95**2)], [1, -0.95], rng.standard_normal((6000, 1)), axis=0)
     extra = np.sqrt(2 * fall) * np.sin(np.arange(6000) / 37.0)[:, None]
-    return Unseen(
+    return HeldOutErrors(
         "a log",
         0.004 * np.arange(6000),
         0.004,
@@ -31,7 +31,7 @@ def test_nrmse_counts_only_rows_that_count() -> None:
     counts = np.ones((4, 1), dtype=bool)
     counts[3] = False
     errors = np.array([[1.0], [-1.0], [1.0], [100.0]])
-    unseen = Unseen("a log", np.arange(4.0), 1.0, np.array([[2.0], [2.0], [2.0], [9.0]]), (errors,), counts)
+    unseen = HeldOutErrors("a log", np.arange(4.0), 1.0, np.array([[2.0], [2.0], [2.0], [9.0]]), (errors,), counts)
     assert unseen.nrmse(0) == pytest.approx([0.5])
 
 
@@ -54,33 +54,33 @@ def test_no_fall_has_an_interval_about_zero() -> None:
 
 def test_each_effect_is_left_out_once() -> None:
     """Models compared: the base alone, the whole less each effect, the whole."""
-    chosen = models(3, [np.zeros((1, 1, 2)), np.zeros((1, 1, 1))])
+    chosen = model_columns(3, [np.zeros((1, 1, 2)), np.zeros((1, 1, 1))])
     assert [c.tolist() for c in chosen] == [[0, 1, 2], [0, 1, 2, 5], [0, 1, 2, 3, 4], [0, 1, 2, 3, 4, 5]]
 
 
-def _of_sizes(errors: list[float], fitted: list[float] | None) -> Unseen:
+def _of_sizes(errors: list[float], fitted: list[float] | None) -> HeldOutErrors:
     """Errors of given RMS on one joint whose torque has an RMS of one."""
     wave = np.sqrt(2) * np.sin(2 * np.pi * np.arange(1000) / 100)[:, None]
     seen = None if fitted is None else tuple(size * wave for size in fitted)
     counts = np.ones((1000, 1), dtype=bool)
-    return Unseen("", 0.01 * np.arange(1000), 0.01, wave, tuple(size * wave for size in errors), counts, seen)
+    return HeldOutErrors("", 0.01 * np.arange(1000), 0.01, wave, tuple(size * wave for size in errors), counts, seen)
 
 
 def test_what_is_kept_of_a_gain_is_its_share_of_the_fit_s() -> None:
     """A fall of .02 where fits that have seen the rows fall by .05 keeps two fifths; without such fits, all."""
     errors = [0.30, 0.30, 0.28]
-    assert _of_sizes(errors, [0.20, 0.20, 0.15]).kept(1, [0]) == pytest.approx(0.4)
-    assert _of_sizes(errors, None).kept(1, [0]) == 1.0
+    assert _of_sizes(errors, [0.20, 0.20, 0.15]).retained_share(1, [0]) == pytest.approx(0.4)
+    assert _of_sizes(errors, None).retained_share(1, [0]) == 1.0
     # A fit that hardly gains says nothing of what should be left.
-    assert _of_sizes(errors, [0.20, 0.20, 0.195]).kept(1, [0]) == 1.0
+    assert _of_sizes(errors, [0.20, 0.20, 0.195]).retained_share(1, [0]) == 1.0
 
 
 def test_a_model_goes_astray_by_its_error_where_it_was_fitted() -> None:
     """Four times the error of the fit, and a fifth of the torque, is astray; twice it, or a small error, is not."""
-    assert _of_sizes([0.3, 0.2], [0.06, 0.05]).astray(0)
-    assert not _of_sizes([0.3, 0.1], [0.06, 0.05]).astray(0)
-    assert not _of_sizes([0.3, 0.08], [0.06, 0.01]).astray(0)
-    assert not _of_sizes([0.3, 0.2], None).astray(0)
+    assert _of_sizes([0.3, 0.2], [0.06, 0.05]).is_unreliable(0)
+    assert not _of_sizes([0.3, 0.1], [0.06, 0.05]).is_unreliable(0)
+    assert not _of_sizes([0.3, 0.08], [0.06, 0.01]).is_unreliable(0)
+    assert not _of_sizes([0.3, 0.2], None).is_unreliable(0)
 
 
 class Rows(SimpleNamespace):
@@ -90,7 +90,7 @@ class Rows(SimpleNamespace):
         return len(self.tau)
 
 
-def _other_motion(seed: int, effect: float, there: float) -> Unseen:
+def _other_motion(seed: int, effect: float, there: float) -> HeldOutErrors:
     """A log whose two base columns differ by 3 % only, and another that shows each by itself; noise of size one.
 
     The effect looks a little like their difference, and acts `there` times as much in the second log.
@@ -110,14 +110,12 @@ def _other_motion(seed: int, effect: float, there: float) -> Unseen:
     )
     moving = np.zeros((rows, 1), dtype=bool)
     problem = SimpleNamespace(
-        recording=Rows(unsure=moving, tau=tau),
+        recording=Rows(sign_unknown=moving, tau=tau),
         baseline=SimpleNamespace(regressor=Y, nuisance=np.zeros((rows, 1, 0))),
-        whitening=SimpleNamespace(
-            scales=lambda count: np.ones((count, 1)), scale=np.ones(1), at_rest=np.ones(1), stride=1
-        ),
+        whitening=SimpleNamespace(scales=lambda count: np.ones((count, 1)), scale=np.ones(1), row_weight=1.0),
     )
-    other = Rows(unsure=moving, tau=unseen, t=t, step=0.01, runs=[slice(0, rows)], names=("other",))
-    return on_held_out(problem, [X], other, Z, [W], Pull(np.zeros((3, 3)), np.zeros(3)))  # type: ignore[arg-type]
+    other = Rows(sign_unknown=moving, tau=unseen, t=t, step=0.01, runs=[slice(0, rows)], names=("other",))
+    return held_out_errors(problem, [X], other, Z, [W], GaussianPrior(np.zeros((3, 3)), np.zeros(3)))  # type: ignore[arg-type]
 
 
 def test_a_true_effect_is_seldom_called_harmful_by_a_log_that_leaves_the_base_open() -> None:

@@ -12,10 +12,10 @@ from scipy.signal import lfilter
 
 from estimation.diagnosis import Diagnosis, diagnose
 from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
-from estimation.diagnosis.base_models.priors import pull_of
+from estimation.diagnosis.base_models.priors import base_model_prior
 from estimation.diagnosis.hypothesis_tests.problem_setup import fit_values
-from estimation.diagnosis.recordings.log_reading import record
-from estimation.diagnosis.validations.gear_compliance import Windup, measure_windups
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance, measure_gear_compliance
 from robots.plants import simulate
 from robots.robot import Robot
 from robots.signals import Log
@@ -38,13 +38,13 @@ def with_encoders(log: Log, compliance: np.ndarray, seed: int) -> Log:
     return replace(log, qlink=late + wrong + 2e-5 * drift + 1e-5 * rng.standard_normal(q.shape))
 
 
-def found_in(robot: Robot, log: Log, **options: object) -> tuple[Windup, ...]:
+def found_in(robot: Robot, log: Log, **options: object) -> tuple[MeasuredCompliance, ...]:
     """What the wind-up shows, by a fit of the base model alone."""
-    recording = record(robot, [log])
+    recording = build_recording(robot, [log])
     base = build_baseline(base_parameters(robot, "coulomb-viscous", (0.001,) * robot.n), recording)
     scale = recording.tau.std(axis=0)
-    values = fit_values(base, scale, recording.unsure, recording.tau, pull_of(base, recording))
-    return measure_windups(base.situation(recording, values), recording, [log], false_alarm=0.01, **options)
+    values = fit_values(base, scale, recording.sign_unknown, recording.tau, base_model_prior(base, recording))
+    return measure_gear_compliance(base.situation(recording, values), recording, [log], false_alarm=0.01, **options)
 
 
 def test_the_stiffness_of_a_gear_is_measured(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from estimation import diagnose
-from estimation.diagnosis.recordings.log_reading import record
-from estimation.diagnosis.validations.gain_intervals import Unseen
-from estimation.diagnosis.validations.prediction_settings import as_sharp, smoothed_best, with_band
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.validations.gain_intervals import HeldOutErrors
+from estimation.diagnosis.validations.prediction_settings import with_band, with_best_cutoff, with_best_sign_sharpness
 from estimation.models.extension import Extension
 from estimation.predictions.prediction import predict
 from robots.robot import Robot
@@ -28,7 +28,7 @@ def test_a_model_predicts_unseen_motion_about_as_well_as_any_smoothing_lets_it(
         for seen in (arm_log(torque_noise=0.02), arm_log(torque_noise=0.02, motion_seed=5, seed=5))
     )
     model = diagnose(arm, log).model
-    problem = pose_arm(record(arm, [log]))
+    problem = pose_arm(build_recording(arm, [log]))
     lowest, highest = (
         extreme(problem.recording.cutoff, *(band.cutoff for band in problem.whitening.bands)) for extreme in (min, max)
     )
@@ -40,7 +40,7 @@ def test_a_model_predicts_unseen_motion_about_as_well_as_any_smoothing_lets_it(
     own = predict(model, other).relative_spread
     assert np.log(own).mean() < min(np.log(spread).mean() for spread in unseen.values()) + 0.1
     assert np.log(own).mean() < np.log(unseen[3 * highest]).mean() - 0.1
-    again = smoothed_best(replace(model, provenance={**model.provenance, "cutoff_hz": 99.0}), problem, [log])
+    again = with_best_cutoff(replace(model, provenance={**model.provenance, "cutoff_hz": 99.0}), problem, [log])
     assert again.provenance["cutoff_hz"] == pytest.approx(model.provenance["cutoff_hz"], rel=0.3)
 
 
@@ -77,7 +77,7 @@ def test_heat_of_the_logs_before_counts_in_its_errors(arm: Robot, arm_log: Calla
     )
     model = replace(plain, extensions=(heat,))
     parts = np.ones((50, 2))
-    unseen = Unseen("", np.arange(50.0), 1.0, parts, (parts, parts), parts > 0, None)
+    unseen = HeldOutErrors("", np.arange(50.0), 1.0, parts, (parts, parts), parts > 0, None)
     told = with_band(model, [first], [other], unseen).provenance["unseen_nrmse"]
     warm, cold = predict(model, other, before=[first]).nrmse, predict(model, other).nrmse
     np.testing.assert_allclose(told, warm, rtol=1e-9)
@@ -91,7 +91,7 @@ def test_its_band_grows_as_errors_do_on_parts_left_out(arm: Robot, arm_log: Call
     seen = np.quantile(np.abs(log.tau - predict(model, log).predicted), 0.95, axis=0)
     parts = np.ones((50, 2))
     fitted = (parts, np.array([1.5, 4.0]) * parts)
-    unseen = Unseen("", np.arange(50.0), 1.0, parts, (parts, 3.0 * parts), parts > 0, fitted)
+    unseen = HeldOutErrors("", np.arange(50.0), 1.0, parts, (parts, 3.0 * parts), parts > 0, fitted)
     assert with_band(model, [log], [], unseen).provenance["band95"] == pytest.approx((seen * [2.0, 1.0]).tolist())
     plain = replace(unseen, fitted=None)
     assert with_band(model, [log], [], plain).provenance["band95"] == pytest.approx(seen.tolist())
@@ -110,7 +110,7 @@ def test_friction_turns_round_as_sharply_as_all_rows_say(arm: Robot, arm_log: Ca
             for term in model.torque_model.terms
         )
         wrong = replace(model, torque_model=replace(model.torque_model, terms=terms))
-        again = as_sharp(wrong, [log])
+        again = with_best_sign_sharpness(wrong, [log])
         assert again.provenance["velocity_scales"] == pytest.approx([1e-3, 1e-3], rel=0.5)
         before, after = predict(wrong, other).nrmse, predict(again, other).nrmse
         assert np.all(after <= before)

@@ -12,9 +12,9 @@ from scipy.integrate import solve_ivp
 from estimation import load_model
 from estimation.diagnosis import Diagnosis, diagnose
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import Member
-from estimation.diagnosis.recordings.log_reading import record
-from estimation.diagnosis.validations.forward_simulation import Plant, compare
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.validations.forward_simulation import FittedRobot, simulate_both
 from estimation.diagnosis.validations.simulation_result import Simulation, read_simulation
 from robots.base_parameters import find_base_parameters
 from robots.plants import simulate
@@ -25,9 +25,9 @@ from robots.robot import Robot
 from robots.terms.effects import EFFECTS
 
 
-def member(effect: str, joint: int | None, shape: tuple[float, ...], coefficients: list[float]) -> Member:
+def member(effect: str, joint: int | None, shape: tuple[float, ...], coefficients: list[float]) -> FittedEffect:
     """An effect as a diagnosis would have found it."""
-    return Member(Hypothesis(EFFECTS[effect], joint), shape, None, 0.0, np.array(coefficients), 1, 1.0)  # type: ignore[arg-type]
+    return FittedEffect(Hypothesis(EFFECTS[effect], joint), shape, None, 0.0, np.array(coefficients), 1, 1.0)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")
@@ -116,14 +116,14 @@ def test_the_arm_moves_as_an_independent_solver_says(
     torque = log.tau + 0.6 * np.sin(2 * np.pi * 0.7 * t)[:, None] * [1.0, -0.5]
     model = default_model(arm, friction="coulomb-viscous", velocity_scale=width)
     base = find_base_parameters(model)
-    before = Plant(model=model, columns=base.independent, values=base.from_standard(model.nominal))
+    before = FittedRobot(model=model, columns=base.independent, values=base.from_standard(model.nominal))
     after = replace(before, members=(member("stribeck", 2, (speed, 2.0), [size]),), coefficients=(np.array([size]),))
-    whole = replace(record(arm, [log]), starts=(0,))
+    whole = replace(build_recording(arm, [log]), starts=(0,))
     rows = slice(0, len(whole))
     at = np.searchsorted(t, whole.t - 1e-9)
     whole = replace(whole, tau=torque[at], q=motion.q[at], dq=motion.dq[at], ddq=motion.ddq[at])
     loop = Loop(bandwidth=3.0)
-    simulation = compare(before, after, whole, rows, loop)
+    simulation = simulate_both(before, after, whole, rows, loop)
     assert simulation.note == ""
     # The loop is laid out for each joint's own mean inertia: the same as the simulation's, by its definition.
     c2, s2 = np.cos(whole.q[:, 1]), np.sin(whole.q[:, 1])
@@ -155,12 +155,12 @@ def test_what_is_read_wrong_does_not_drive_the_arm(arm: Robot, arm_plant: Callab
     base = find_base_parameters(model)
     top, error = float(np.abs(log.tau[:, 0]).max()), 0.5
     read = log.tau + error * np.column_stack([log.tau[:, 0] * (log.tau[:, 0] / top) ** 2, 0.0 * log.tau[:, 1]])
-    before = Plant(model=model, columns=base.independent, values=base.from_standard(model.nominal))
+    before = FittedRobot(model=model, columns=base.independent, values=base.from_standard(model.nominal))
     saturation = member("torque_constant_saturation", 1, (2.0, top), [error])
     after = replace(before, members=(saturation,), coefficients=(np.array([error]),))
-    whole, distorted = (replace(record(arm, [x]), starts=(0,)) for x in (log, replace(log, tau=read)))
+    whole, distorted = (replace(build_recording(arm, [x]), starts=(0,)) for x in (log, replace(log, tau=read)))
     rows = slice(0, len(whole))
-    plain, simulation = compare(before, before, whole, rows), compare(before, after, distorted, rows)
+    plain, simulation = simulate_both(before, before, whole, rows), simulate_both(before, after, distorted, rows)
     assert plain is not None
     assert simulation is not None
     assert simulation.note == ""

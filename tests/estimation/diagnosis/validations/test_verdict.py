@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import Member
-from estimation.diagnosis.searches.selection import Found
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations import comparison, verdict
-from robots.terms.discrepancies.local_fault import Spot
+from robots.terms.discrepancies.local_fault import LocalFault
 from robots.terms.discrepancies.patterns import Pattern
-from robots.terms.discrepancies.payload_drift import Draining
+from robots.terms.discrepancies.payload_drift import PayloadDrift
 from tests.estimation.diagnosis.verdict_bench import PRICE, ROWS, accepting, member_of
 
 
@@ -43,7 +43,7 @@ def test_a_name_of_the_whole_robot_may_be_what_a_name_on_a_joint_left(
     found = replace(ripple, gain=free, degrees=8, group=replace(ripple.group))
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments: ([found] if push not in arguments[2] else [], []))
     problem = SimpleNamespace(rows=ROWS)
-    assert verdict._holds(problem, 1, [ripple, push], [], [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
+    assert verdict._explains_joint(problem, 1, [ripple, push], [], [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
     assert (free - 8 * PRICE < 400.0 - 10 * PRICE) is (free == 310.0)
 
 
@@ -61,19 +61,21 @@ def test_waves_are_no_catch_at_one_angle(
 ) -> None:
     """A ripple of a gain of 300 and five parameters, beside a spot of the joint's range in its place."""
     own = member_of(name, 1, 300.0, 5)
-    catch = replace(member_of("spring", 1, spot, degrees), hypothesis=Hypothesis(Spot(), 1))
+    catch = replace(member_of("spring", 1, spot, degrees), hypothesis=Hypothesis(LocalFault(), 1))
     gains = {id(own.group): 300.0, id(catch.group): spot}
     accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
     spots = [SimpleNamespace(hypothesis=catch.hypothesis), SimpleNamespace(hypothesis=Hypothesis(Pattern("turns"), 1))]
 
-    def patterns(problem: object, entries: list[SimpleNamespace], *rest: object) -> tuple[list[Member], list[float]]:
+    def patterns(
+        problem: object, entries: list[SimpleNamespace], *rest: object
+    ) -> tuple[list[FittedEffect], list[float]]:
         # Among all free functions another one comes first: that of most parameters.
         wide = replace(member_of("spring", 1, 250.0, 9), hypothesis=Hypothesis(Pattern("turns"), 1))
         return [wide if len(entries) > 1 else catch], []
 
     monkeypatch.setattr(verdict, "free_functions", patterns)
     problem = SimpleNamespace(rows=ROWS)
-    assert verdict._holds(problem, 1, [own], spots, [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
+    assert verdict._explains_joint(problem, 1, [own], spots, [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -95,7 +97,7 @@ def test_a_cause_of_all_joints_is_told_by_more_than_the_joint_of_a_name(
     accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments: ([tilt], []))
     problem = SimpleNamespace(rows=ROWS)
-    assert verdict._holds_together(problem, [drift], [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
+    assert verdict._better_than_one_cause(problem, [drift], [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -118,13 +120,13 @@ def test_a_drift_is_a_free_function_of_time(
 
     def patterns(
         problem: object, entries: list[SimpleNamespace], *rest: object, **kind: bool
-    ) -> tuple[list[Member], list[float]]:
+    ) -> tuple[list[FittedEffect], list[float]]:
         return ([free] if entries else []), []
 
     monkeypatch.setattr(verdict, "free_functions", patterns)
     problem = SimpleNamespace(rows=ROWS)
     entries = [SimpleNamespace(hypothesis=pattern)]
-    assert verdict._holds(problem, 2, [drift], entries, [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
+    assert verdict._explains_joint(problem, 2, [drift], entries, [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -149,14 +151,14 @@ def test_a_formula_is_not_named_for_what_is_unexplained_on_joints_that_it_reache
     accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
     monkeypatch.setattr(comparison, "score", lambda problem, group, beside: SimpleNamespace(gain=left))
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: ([free], [1e-30]))
-    monkeypatch.setattr(verdict, "_holds", lambda *arguments: True)
-    monkeypatch.setattr(verdict, "_believable", lambda *arguments: True)
-    found = Found(offset, 1e-9, ())
+    monkeypatch.setattr(verdict, "_explains_joint", lambda *arguments: True)
+    monkeypatch.setattr(verdict, "_is_plausible", lambda *arguments: True)
+    found = SelectedEffect(offset, 1e-9, ())
     selection = SimpleNamespace(found=(found,), accepted=SimpleNamespace(gain=100.0))
-    said = verdict.judge(SimpleNamespace(rows=ROWS), selection, [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
+    said = verdict.decide_verdict(SimpleNamespace(rows=ROWS), selection, [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
     assert said.verdict == "unexplained"
     assert said.patterns == (free,)
-    assert said.kept == ((found,) if kept else ())
+    assert said.named == ((found,) if kept else ())
 
 
 @pytest.mark.parametrize(
@@ -176,9 +178,9 @@ def test_a_name_of_the_whole_robot_is_weighed_against_functions_of_a_joint(
     pattern = Hypothesis(Pattern("drag", 3), 1)
     other = replace(member_of("spring", 1, free, degrees), hypothesis=pattern)
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: ([other], [1e-30]))
-    found = Found(tilt, 1e-9, ())
+    found = SelectedEffect(tilt, 1e-9, ())
     problem = SimpleNamespace(rows=ROWS)
-    held = verdict._holds_alone(problem, found, [tilt], [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
+    held = verdict._outperforms_free_functions(problem, found, [tilt], [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
     assert held is holds
 
 
@@ -190,9 +192,9 @@ def test_several_names_on_one_joint_must_fit_better_than_one_free_function(monke
     accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
     problem = SimpleNamespace(rows=ROWS)
 
-    def held(functions: list[Member]) -> bool:
+    def held(functions: list[FittedEffect]) -> bool:
         monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: (functions, []))
-        return verdict._holds(problem, 1, pair, [], [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
+        return verdict._explains_joint(problem, 1, pair, [], [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
 
     assert 309.0 - 5 * PRICE - (299.0 - 4 * PRICE) < verdict.LEAST
     assert not held([free])
@@ -214,9 +216,9 @@ def test_what_does_more_than_free_functions_does_not_borrow_from_them(
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: (free, []))
     accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=1000.0 * len(groups)))
     monkeypatch.setattr(comparison, "score", lambda problem, group, beside: SimpleNamespace(gain=450.0))
-    found = Found(delay, 1e-9, ())
+    found = SelectedEffect(delay, 1e-9, ())
     problem: Any = SimpleNamespace(rows=ROWS)
-    assert verdict._stays(problem, found, (found,), [], 0.01, np.random.default_rng(0)) is stays
+    assert verdict._is_robust(problem, found, (found,), [], 0.01, np.random.default_rng(0)) is stays
 
 
 def test_small_names_beside_one_that_holds_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -228,20 +230,20 @@ def test_small_names_beside_one_that_holds_are_left_out(monkeypatch: pytest.Monk
     )
     seen: list[tuple[str, ...]] = []
 
-    def holds(problem: object, joint: int, named: list[Member], *rest: object) -> bool:
+    def holds(problem: object, joint: int, named: list[FittedEffect], *rest: object) -> bool:
         seen.append(tuple(m.hypothesis.label for m in named if m.hypothesis.joint == joint))
         return len(seen[-1]) == 1
 
     accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=800.0))
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: ([], []))
     monkeypatch.setattr(verdict, "refine", lambda problem, hypothesis, shape, beside: replace(stribeck, gain=705.0))
-    monkeypatch.setattr(verdict, "_holds", holds)
-    monkeypatch.setattr(verdict, "_believable", lambda *arguments: True)
-    found = tuple(Found(member, 1e-9, ()) for member in (stribeck, spring, push))
+    monkeypatch.setattr(verdict, "_explains_joint", holds)
+    monkeypatch.setattr(verdict, "_is_plausible", lambda *arguments: True)
+    found = tuple(SelectedEffect(member, 1e-9, ()) for member in (stribeck, spring, push))
     selection = SimpleNamespace(found=found, accepted=SimpleNamespace(gain=800.0))
-    said = verdict.judge(SimpleNamespace(rows=ROWS), selection, [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
+    said = verdict.decide_verdict(SimpleNamespace(rows=ROWS), selection, [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
     assert said.verdict == "named"
-    assert [(f.member.hypothesis.label, f.member.gain) for f in said.kept] == [
+    assert [(f.effect.hypothesis.label, f.effect.gain) for f in said.named] == [
         ("stribeck of joint 3", 705.0),
         ("spring of joint 2", 9.0),
     ]
@@ -252,14 +254,14 @@ def test_small_names_beside_one_that_holds_are_left_out(monkeypatch: pytest.Monk
 def test_a_tank_that_empties_is_no_step(gain: float, holds: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """A step of 468 and five parameters, where a body that changes slowly explains clearly more with twelve."""
     step = member_of("payload_change", None, 468.0, 5)
-    drains = replace(member_of("spring", None, gain, 12), hypothesis=Hypothesis(Draining(), None))
+    drains = replace(member_of("spring", None, gain, 12), hypothesis=Hypothesis(PayloadDrift(), None))
     entry = SimpleNamespace(hypothesis=drains.hypothesis)
 
-    def free(problem: object, patterns: list[Any], *rest: object) -> tuple[list[Member], list[float]]:
+    def free(problem: object, patterns: list[Any], *rest: object) -> tuple[list[FittedEffect], list[float]]:
         return ([drains], [1e-30]) if patterns else ([], [])
 
     monkeypatch.setattr(verdict, "free_functions", free)
     problem = SimpleNamespace(rows=ROWS)
-    found = Found(step, 1e-9, ())
-    held = verdict._holds_alone(problem, found, [step], [entry], 0.01, np.random.default_rng(0))  # type: ignore[arg-type,list-item]
+    found = SelectedEffect(step, 1e-9, ())
+    held = verdict._outperforms_free_functions(problem, found, [step], [entry], 0.01, np.random.default_rng(0))  # type: ignore[arg-type,list-item]
     assert held is holds

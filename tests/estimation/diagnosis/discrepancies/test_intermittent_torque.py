@@ -15,7 +15,7 @@ from robots import load_robot
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log
-from robots.terms.discrepancies.intermittent_torque import Recurring, Spell
+from robots.terms.discrepancies.intermittent_torque import IntermittentTorque, PeriodicTorque
 from robots.terms.discrepancies.patterns import is_of_time, is_plain
 from robots.terms.effects import Situation, situation
 from tests.estimation.diagnosis.pinocchio_chains import chain_of
@@ -54,11 +54,11 @@ def pushed(moved: Situation) -> np.ndarray:
 
 def test_a_force_that_comes_again_is_within_its_columns(moved: Situation, pushed: np.ndarray) -> None:
     """Its torque is pinocchio's, and its coefficients are the force."""
-    X = Recurring().columns(moved, None, (PERIOD, MOMENT, LASTS))
+    X = PeriodicTorque().columns(moved, None, (PERIOD, MOMENT, LASTS))
     values = np.linalg.lstsq(X.reshape(-1, 3), pushed.ravel(), rcond=None)[0]
     np.testing.assert_allclose(values, FORCE, rtol=1e-6)
     np.testing.assert_allclose(X @ values, pushed, atol=1e-6 * np.abs(pushed).max())
-    assert "of 9.9 N on the flange that comes every 4.3 s for 0.2 s" in Recurring().describe(
+    assert "of 9.9 N on the flange that comes every 4.3 s for 0.2 s" in PeriodicTorque().describe(
         None, FORCE, (PERIOD, MOMENT, LASTS)
     )
 
@@ -66,7 +66,7 @@ def test_a_force_that_comes_again_is_within_its_columns(moved: Situation, pushed
 def test_its_period_is_proposed_out_of_noise(moved: Situation, pushed: np.ndarray) -> None:
     """Where each push is a third of the noise, one of six proposals meets their period, moment and length."""
     noise = np.random.default_rng(0).standard_normal(pushed.shape) * np.sqrt(np.mean(pushed**2, axis=0)) * 3.0
-    proposed = Recurring().propose(moved, None, (pushed + noise) / np.var(noise, axis=0), 6)
+    proposed = PeriodicTorque().propose(moved, None, (pushed + noise) / np.var(noise, axis=0), 6)
     assert len(proposed) == 6
     last = (moved.t[-1] - moved.t[0]) / 2 / PERIOD  # pushes between the middle of the data and their end
     middle = MOMENT + LASTS / 2
@@ -81,11 +81,11 @@ def test_its_period_is_proposed_out_of_noise(moved: Situation, pushed: np.ndarra
 def test_a_period_with_which_the_motion_repeats_is_none() -> None:
     """Of a motion of 6 s none is tried that keeps its pace over a minute; nor any where logs are hours apart."""
     periodic = _moved(2 * np.pi / 6.0 * np.array([1.0, 2.0, 3.0, 1.0, 2.0, 3.0]))
-    periods = {shape[0] for shape in Recurring().grid(periodic, None)}
+    periods = {shape[0] for shape in PeriodicTorque().grid(periodic, None)}
     assert periods
     assert not [period for period in periods if abs(1 / period - 1 / 6.0) < 0.3 / 60.0]
     assert [period for period in periods if 4.0 < period < 5.0]
-    assert Recurring().grid(_moved(RATES, pause=3600.0), None) == ()
+    assert PeriodicTorque().grid(_moved(RATES, pause=3600.0), None) == ()
 
 
 def test_friction_of_a_while_is_unexplained_with_its_time(arm: Robot, arm_log: Callable[..., Log]) -> None:
@@ -99,7 +99,7 @@ def test_friction_of_a_while_is_unexplained_with_its_time(arm: Robot, arm_log: C
     assert found.verdict == "unexplained"
     finding = found.findings[0]
     assert finding.joint == 2
-    assert finding.pattern == Spell.name
+    assert finding.pattern == IntermittentTorque.name
     friction, start, duration = (parameter.value for parameter in finding.parameters)
     assert friction == pytest.approx(size, rel=0.25)
     assert start == pytest.approx(8.0, abs=0.3)
@@ -108,15 +108,19 @@ def test_friction_of_a_while_is_unexplained_with_its_time(arm: Robot, arm_log: C
 
 def test_a_spell_is_no_change_for_good(moved: Situation) -> None:
     """It is found by its name and goes by time; none is longer than two fifths of the data."""
-    assert isinstance(find_effect(Spell.name), Spell)
-    assert isinstance(find_effect(Recurring.name), Recurring)
-    assert is_of_time(Spell())
-    assert is_of_time(Recurring())
-    assert not is_plain(Spell())
-    assert Recurring().joints(moved.robot) == (None,)
-    assert max(duration for _, duration in Spell().grid(moved, 1)) <= Spell().bounds(moved, 1)[1][1] <= 24.1
+    assert isinstance(find_effect(IntermittentTorque.name), IntermittentTorque)
+    assert isinstance(find_effect(PeriodicTorque.name), PeriodicTorque)
+    assert is_of_time(IntermittentTorque())
+    assert is_of_time(PeriodicTorque())
+    assert not is_plain(IntermittentTorque())
+    assert PeriodicTorque().joints(moved.robot) == (None,)
+    assert (
+        max(duration for _, duration in IntermittentTorque().grid(moved, 1))
+        <= IntermittentTorque().bounds(moved, 1)[1][1]
+        <= 24.1
+    )
     target = 2.0 * moved.sign[:, 1] * ((moved.t > 60.0) & (moved.t < 66.0))
     noise = np.random.default_rng(1).standard_normal((len(moved), 6)) * 3.0
     noise[:, 1] += target
-    best = Spell().propose(moved, 2, noise, 4)
+    best = IntermittentTorque().propose(moved, 2, noise, 4)
     assert any(abs(start - 60.0) <= 1.5 and duration == 6.0 for start, duration in best)

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from estimation import diagnose
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.recordings.log_reading import record
+from estimation.diagnosis.recordings.log_reading import build_recording
 from robots.plants import simulate
 from robots.robot import Robot
 from robots.signals import Log, Motion
@@ -129,7 +129,7 @@ def test_a_line_is_proposed_at_its_top(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
     """To a fiftieth of what the log resolves: from half of that beside it, a search would leave as much as it takes."""
-    recording = record(arm, [arm_log(torque_noise=0.02)])
+    recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     problem = pose_arm(recording)
     vibration = build_pattern("pattern:vibration:0:even")
     assert vibration is not None

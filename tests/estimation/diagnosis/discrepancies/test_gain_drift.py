@@ -8,7 +8,7 @@ import pytest
 from estimation.models.extension import find_effect
 from robots import load_robot
 from robots.robot import Robot
-from robots.terms.discrepancies.gain_drift import FEWEST, Fading
+from robots.terms.discrepancies.gain_drift import FEWEST, GainDrift
 from robots.terms.discrepancies.patterns import is_of_time
 from robots.terms.effects import Situation
 
@@ -18,24 +18,24 @@ def test_a_slow_gain_of_all_joints_is_within_its_columns(swept: Situation) -> No
     x = (swept.t - swept.t[0]) / np.ptp(swept.t)
     gain = 0.05 * np.exp(-(((x - 0.4) / 0.3) ** 2))
     extra = swept.torque * gain[:, None]
-    X = np.concatenate([Fading().columns(swept, None), swept.torque[:, :, None]], axis=2)
+    X = np.concatenate([GainDrift().columns(swept, None), swept.torque[:, :, None]], axis=2)
     rows, target = X.reshape(-1, X.shape[2]), extra.ravel()
     values = np.linalg.lstsq(rows, target, rcond=None)[0]
     size = np.ptp(gain) * np.abs(swept.torque).max()
     np.testing.assert_allclose(rows @ values, target, atol=0.1 * size)
-    told = Fading().describe(None, values[:-1])
-    assert float(told.split("differs by ")[1].split(" %")[0]) == pytest.approx(100 * np.ptp(gain), rel=0.1)
+    told = GainDrift().describe(None, values[:-1])
+    assert float(told.split("over the logs is ")[1].split(" %")[0]) == pytest.approx(100 * np.ptp(gain), rel=0.1)
 
 
 def test_one_or_two_joints_share_nothing(arm: Robot) -> None:
     """What one joint's torque does with time is that joint's; a share of all is one of three joints and more."""
     assert arm.n < FEWEST
-    assert Fading().joints(arm) == ()
-    assert Fading().joints(load_robot("ur10")) == (None,)
+    assert GainDrift().joints(arm) == ()
+    assert GainDrift().joints(load_robot("ur10")) == (None,)
 
 
 def test_it_is_found_by_its_name_and_knows_only_time() -> None:
     """A model file names it; unseen data cannot say where on its way it is."""
-    found = find_effect(Fading.name)
-    assert isinstance(found, Fading)
+    found = find_effect(GainDrift.name)
+    assert isinstance(found, GainDrift)
     assert is_of_time(found)

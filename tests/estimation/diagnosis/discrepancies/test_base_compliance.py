@@ -11,7 +11,7 @@ from estimation.models.extension import find_effect
 from robots import load_robot
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
-from robots.terms.discrepancies.base_compliance import Leaning
+from robots.terms.discrepancies.base_compliance import BaseCompliance
 from robots.terms.effects import Situation, situation
 
 
@@ -77,7 +77,7 @@ def test_the_columns_are_gravity_on_a_base_that_its_weight_has_turned(robot: Rob
         model.gravity.linear = turned
         expected[k] = pin.computeGeneralizedGravity(model, data, q) - level
         model.gravity.linear = np.array([0, 0, -9.81])
-    X = Leaning().columns(state, None)
+    X = BaseCompliance().columns(state, None)
     found = X @ np.array([4e-7, 9e-7, 1e-7, 0.0, 0.0])
     assert X.shape == (100, 6, 5)
     assert np.abs(expected).max() > 1e-3
@@ -86,11 +86,11 @@ def test_the_columns_are_gravity_on_a_base_that_its_weight_has_turned(robot: Rob
 
 def test_what_the_first_link_adds_goes_round_with_it(robot: Robot, state: Situation) -> None:
     """A mass beside the upright axis is felt by no joint of a level robot, and has the base lean all the same."""
-    whole = Leaning().columns(state, None)
+    whole = BaseCompliance().columns(state, None)
     values = state.parameters.copy()
     values[_rigid(state.model)[:10]] = 0.0
     without = situation(state.model, values, state.t, state.q, state.dq, state.ddq)
-    poorer = Leaning().columns(without, None)
+    poorer = BaseCompliance().columns(without, None)
     # Of bolts alike about both axes, on the joints behind the link: gravity askew turns the first one too.
     lost = (whole - poorer)[:, 1:, :2].sum(axis=2).ravel()
     own = poorer[:, 1:, 3:].reshape(-1, 2)
@@ -102,10 +102,10 @@ def test_what_the_first_link_adds_goes_round_with_it(robot: Robot, state: Situat
 def test_it_is_told_in_words_and_read_from_its_name(robot: Robot) -> None:
     """Compliances by axis, and a sentence with the largest of them."""
     effect = find_effect("pattern:leaning:0:even")
-    assert isinstance(effect, Leaning)
+    assert isinstance(effect, BaseCompliance)
     units = [(c.name, c.unit) for c in effect.parameters(robot, None)]
     assert units[0] == ("compliance_1", "rad/(N m)")
     assert units[-1] == ("own_2", "rad")
     assert "0.29 deg per 1000 N m" in effect.describe(None, np.array([5e-6, 1e-6, 0.0, 0.3, 0.2]))
     # No base leans against its load.
-    assert "leans" not in effect.describe(None, np.array([-5e-6, 1e-6, 0.0, 0.3, 0.2]))
+    assert "under the robot's weight" not in effect.describe(None, np.array([-5e-6, 1e-6, 0.0, 0.3, 0.2]))

@@ -12,7 +12,7 @@ from estimation.models.extension import find_effect
 from robots import load_robot
 from robots.regressor import default_model
 from robots.robot import Robot
-from robots.terms.discrepancies.flange_spring import Pulling
+from robots.terms.discrepancies.flange_spring import FlangeSpring
 from robots.terms.effects import Situation, situation
 from tests.estimation.diagnosis.pinocchio_chains import chain_of
 
@@ -61,13 +61,13 @@ def test_the_columns_are_the_torque_against_springs_at_the_flange(robot: Robot, 
     )
     expected = -np.einsum("tin,ti->tn", jacobians, places @ stiffness.T + steady)
     coefficients = np.concatenate([steady, *stiffness.T])
-    assert Pulling().columns(state, None) @ coefficients == pytest.approx(expected, abs=1e-9)
+    assert FlangeSpring().columns(state, None) @ coefficients == pytest.approx(expected, abs=1e-9)
 
 
 def test_it_is_told_in_words_and_read_from_its_name(robot: Robot) -> None:
     """Three forces, nine stiffnesses named by direction and coordinate, and a sentence with the largest."""
     effect = find_effect("pattern:pulling:0:even")
-    assert isinstance(effect, Pulling)
+    assert isinstance(effect, FlangeSpring)
     units = [(c.name, c.unit) for c in effect.parameters(robot, None)]
     assert len(units) == 12
     assert units[1] == ("force_y", "N")

@@ -13,10 +13,10 @@ from estimation.models.extension import find_effect
 from robots import load_robot
 from robots.regressor import default_model
 from robots.robot import Robot
-from robots.terms.discrepancies.flange_oscillator import Swinging
+from robots.terms.discrepancies.flange_oscillator import FlangeOscillator
 from robots.terms.discrepancies.resonance import DAMPING
 from robots.terms.effects import Situation, situation
-from robots.terms.situations.situation import joined
+from robots.terms.situations.joining import join_situations
 from tests.estimation.diagnosis.pinocchio_chains import chain_of
 
 PERIOD = 0.004
@@ -112,7 +112,7 @@ def test_columns_are_the_torque_against_masses_on_springs(
 
     At 250 Hz the bilinear rule has a frequency of 3 Hz 0.05 % too low, a hundredth of the resonance's half width.
     """
-    X = Swinging().columns(state, None, (frequency,))
+    X = FlangeOscillator().columns(state, None, (frequency,))
     upright = np.array([0.0, 0.0, 1.0])
     for late, force in enumerate(_swung(flange, state.t, frequency, DAMPING)):
         for k, direction in ((late, 1 - upright), (2 + late, upright)):
@@ -131,7 +131,7 @@ def test_a_tank_of_other_damping_is_a_mixture_of_both_phases(
     tenth of the energy.
     """
     mass, damping = 2.0, factor * DAMPING
-    X = Swinging().columns(state, None, (1.5,))[:, :, :2].reshape(-1, 2)
+    X = FlangeOscillator().columns(state, None, (1.5,))[:, :, :2].reshape(-1, 2)
     place, rate = _swung(flange, state.t, 1.5, damping)
     torque = -flange.torque(state.q, mass * (place + 2 * damping * rate) * [1.0, 1.0, 0.0]).reshape(-1)
     found, (energy,), *_ = np.linalg.lstsq(X, torque, rcond=None)
@@ -145,7 +145,7 @@ def test_a_stiff_spring_carries_a_payload_without_weight(flange: Flange, robot: 
 
     The motion has 1.3 Hz at most, so that at 12 Hz a hundredth is left of the swinging: (1.3 / 12)^2.
     """
-    X = Swinging().columns(state, None, (12.0,))
+    X = FlangeOscillator().columns(state, None, (12.0,))
     carried = flange.torque(state.q, np.array([flange.acceleration(t) for t in state.t]))
     error = X[:, :, 0] + X[:, :, 2] - carried
     assert np.sqrt(np.mean(error[250:] ** 2)) < 0.02 * np.sqrt(np.mean(carried**2))
@@ -158,7 +158,7 @@ def test_level_is_across_gravity_and_upright_along_it(
     """On the floor, on a wedge, and in space, where upright is the base's: no force across the split."""
     turned = replace(robot, chain=replace(robot.chain, gravity=np.array(gravity)))
     state = _state(turned, PERIOD * np.arange(400))
-    forces = _forces(robot, flange, state, Swinging().columns(state, None, (1.5,)))
+    forces = _forces(robot, flange, state, FlangeOscillator().columns(state, None, (1.5,)))
     up = np.array(gravity) / np.linalg.norm(gravity) if any(gravity) else np.array([0.0, 0.0, 1.0])
     along = np.einsum("i,tik->tk", up, forces)
     across = forces - up[:, None] * along[:, None, :]
@@ -173,18 +173,18 @@ def test_each_log_begins_at_rest_under_its_own_gravity(robot: Robot) -> None:
     t = PERIOD * np.arange(500)
     one, wedge = _state(robot, t), replace(robot, chain=replace(robot.chain, gravity=np.array([0.0, -6.0, -7.5])))
     two = _state(wedge, t + 100.0)
-    X = Swinging().columns(joined([one, two]), None, (1.5,))
+    X = FlangeOscillator().columns(join_situations([one, two]), None, (1.5,))
     for run, alone in ((slice(0, 500), one), (slice(500, 1000), two)):
-        assert X[run] == pytest.approx(Swinging().columns(alone, None, (1.5,)), abs=1e-9)
-    both = Swinging().columns(_state(robot, np.concatenate([t, t + 100.0]), (0, 500)), None, (1.5,))
-    later = Swinging().columns(_state(robot, t + 100.0), None, (1.5,))
+        assert X[run] == pytest.approx(FlangeOscillator().columns(alone, None, (1.5,)), abs=1e-9)
+    both = FlangeOscillator().columns(_state(robot, np.concatenate([t, t + 100.0]), (0, 500)), None, (1.5,))
+    later = FlangeOscillator().columns(_state(robot, t + 100.0), None, (1.5,))
     assert both[500:] == pytest.approx(later, abs=1e-9)
 
 
 def test_it_is_told_in_words_and_read_from_its_name(robot: Robot, state: Situation) -> None:
     """Four masses, a frequency in its range, and a sentence with both."""
     effect = find_effect("pattern:swinging:0:even")
-    assert isinstance(effect, Swinging)
+    assert isinstance(effect, FlangeOscillator)
     assert effect.joints(robot) == (None,)
     assert [(c.name, c.unit) for c in effect.parameters(robot, None)] == [
         ("mass_level", "kg"),

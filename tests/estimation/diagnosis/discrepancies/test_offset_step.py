@@ -11,7 +11,7 @@ import pytest
 from estimation.models.extension import find_effect
 from robots.robot import Robot
 from robots.signals import Motion
-from robots.terms.discrepancies.offset_step import BaseShift, ZeroShift
+from robots.terms.discrepancies.offset_step import BaseStep, ZeroStep
 from robots.terms.discrepancies.patterns import is_of_time, is_plain
 from robots.terms.effects import Situation
 
@@ -29,11 +29,11 @@ def test_its_torque_is_what_pinocchio_says_changes_at_a_moment(
         c, s = np.cos(angle), np.sin(angle)
         gravity = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ np.asarray(swept.robot.chain.gravity)
         changed = pinocchio_torque(swept.robot, motion, gravity)
-        X = BaseShift().columns(swept, None, (WHEN,))
+        X = BaseStep().columns(swept, None, (WHEN,))
     else:
         q = swept.q + angle * np.eye(6)[2]
         changed = pinocchio_torque(swept.robot, Motion(swept.t, q, swept.dq, swept.ddq))
-        X = ZeroShift().columns(swept, 3, (WHEN,))
+        X = ZeroStep().columns(swept, 3, (WHEN,))
     extra = changed - pinocchio_torque(swept.robot, motion)
     after = swept.t >= WHEN
     assert not X[~after].any()
@@ -42,10 +42,8 @@ def test_its_torque_is_what_pinocchio_says_changes_at_a_moment(
     np.testing.assert_allclose(X[after] @ values, extra[after], atol=2e-3 * np.abs(extra).max())
 
 
-@pytest.mark.parametrize(("effect", "joint"), [(BaseShift(), None), (ZeroShift(), 3)])
-def test_its_moment_is_proposed_out_of_noise(
-    swept: Situation, effect: BaseShift | ZeroShift, joint: int | None
-) -> None:
+@pytest.mark.parametrize(("effect", "joint"), [(BaseStep(), None), (ZeroStep(), 3)])
+def test_its_moment_is_proposed_out_of_noise(swept: Situation, effect: BaseStep | ZeroStep, joint: int | None) -> None:
     """Where noise is as large as the change, one of six proposals is within a fiftieth of the data of its moment."""
     change = effect.columns(swept, joint, (WHEN,)).sum(axis=2)
     size = np.sqrt(np.mean(change**2, axis=0)) + 1e-3 * np.abs(change).max()
@@ -57,12 +55,12 @@ def test_its_moment_is_proposed_out_of_noise(
 
 def test_they_are_found_by_their_names_and_are_causes_of_their_own(arm: Robot, swept: Situation) -> None:
     """A model file names them; they go by time, and names that explain less are none."""
-    for effect in (BaseShift(), ZeroShift()):
+    for effect in (BaseStep(), ZeroStep()):
         assert type(find_effect(effect.name)) is type(effect)
         assert is_of_time(effect)
         assert is_plain(effect)
         assert len(effect.grid(swept, 1)) > 10
-    assert BaseShift().joints(arm) == (None,)
-    assert BaseShift().joints(replace(arm, chain=replace(arm.chain, gravity=(0.0, 0.0, 0.0)))) == ()
-    assert "0.29 deg at t = 104.00 s" in BaseShift().describe(None, np.array([0.003, 0.004]), (WHEN,))
-    assert "joint 2 that stands -0.03 rad" in ZeroShift().describe(2, np.array([-0.03]), (WHEN,))
+    assert BaseStep().joints(arm) == (None,)
+    assert BaseStep().joints(replace(arm, chain=replace(arm.chain, gravity=(0.0, 0.0, 0.0)))) == ()
+    assert "0.29 deg at t = 104.00 s" in BaseStep().describe(None, np.array([0.003, 0.004]), (WHEN,))
+    assert "joint 2 that stands -0.03 rad" in ZeroStep().describe(2, np.array([-0.03]), (WHEN,))

@@ -9,7 +9,7 @@ from estimation.models.extension import find_effect
 from robots import load_robot
 from robots.robot import Robot
 from robots.terms.discrepancies.patterns import is_of_time
-from robots.terms.discrepancies.payload_drift import Draining
+from robots.terms.discrepancies.payload_drift import PayloadDrift
 from robots.terms.effects import Situation
 from tests.estimation.diagnosis.pinocchio_chains import torque_of_mass
 
@@ -24,18 +24,18 @@ def test_a_tank_that_empties_is_within_its_columns(swept: Situation) -> None:
     extra = kilogramme * lost[:, None]
     # The base model has a payload that stays.
     stays = swept.sensitivity("tool")[:, :, :4]
-    X = np.concatenate([Draining().columns(swept, None), stays], axis=2)
+    X = np.concatenate([PayloadDrift().columns(swept, None), stays], axis=2)
     rows = X.reshape(-1, X.shape[2])
     values = np.linalg.lstsq(rows, extra.ravel(), rcond=None)[0]
     np.testing.assert_allclose(rows @ values, extra.ravel(), atol=0.08 * np.abs(extra).max())
-    told = Draining().describe(None, values[:-4])
-    assert float(told.split("does: by ")[1].split(" kg")[0]) == pytest.approx(np.ptp(lost), rel=0.1)
+    told = PayloadDrift().describe(None, values[:-4])
+    assert float(told.split("empties: by ")[1].split(" kg")[0]) == pytest.approx(np.ptp(lost), rel=0.1)
 
 
 def test_it_is_of_a_whole_robot_and_goes_by_time(arm: Robot) -> None:
     """A model file names it; two joints cannot tell a body from what each of them does."""
-    found = find_effect(Draining.name)
-    assert isinstance(found, Draining)
+    found = find_effect(PayloadDrift.name)
+    assert isinstance(found, PayloadDrift)
     assert is_of_time(found)
     assert found.joints(load_robot("ur10")) == (None,)
     assert found.joints(arm) == ()

@@ -14,9 +14,9 @@ from robots import load_robot
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log
-from robots.terms.discrepancies.clock_drift import Parting
+from robots.terms.discrepancies.clock_drift import ClockDrift
 from robots.terms.discrepancies.families import FAMILIES
-from robots.terms.discrepancies.gain_step import Switch
+from robots.terms.discrepancies.gain_step import GainStep
 from robots.terms.discrepancies.patterns import is_of_time, is_plain
 from robots.terms.effects import Situation, situation
 from robots.terms.effects.time_delay import lateness
@@ -46,22 +46,22 @@ def test_clocks_that_part_are_a_delay_that_grows() -> None:
     seen = situation(model, model.nominal, t, q, dq, ddq)
     late = 2e-3 * t / t[-1]
     target = np.column_stack([np.interp(t - late, t, column) - column for column in seen.torque.T])
-    X = Parting().columns(seen, None)
+    X = ClockDrift().columns(seen, None)
     steady = lateness(seen, 1e-3)[:, :, None]
     values = np.linalg.lstsq(np.concatenate([X, steady], axis=2).reshape(-1, 4), target.ravel(), rcond=None)[0]
-    told = Parting().describe(None, values[:-1])
+    told = ClockDrift().describe(None, values[:-1])
     assert float(told.split("about ")[1].split(" ms")[0]) == pytest.approx(2.0, rel=0.2)
 
 
 def test_both_are_found_by_their_names_and_know_only_time(arm: Robot) -> None:
     """A model file names them; a switch is one cause, that another name may not stand for."""
-    assert isinstance(find_effect(Switch.name), Switch)
-    assert isinstance(find_effect(Parting.name), Parting)
-    assert is_of_time(Switch())
-    assert is_of_time(Parting())
-    assert is_plain(Switch())
-    assert Parting().joints(arm) == ()
-    assert Parting().joints(load_robot("ur10")) == (None,)
+    assert isinstance(find_effect(GainStep.name), GainStep)
+    assert isinstance(find_effect(ClockDrift.name), ClockDrift)
+    assert is_of_time(GainStep())
+    assert is_of_time(ClockDrift())
+    assert is_plain(GainStep())
+    assert ClockDrift().joints(arm) == ()
+    assert ClockDrift().joints(load_robot("ur10")) == (None,)
 
 
 def test_a_rotor_that_spins_in_a_turning_arm_feels_products_of_velocities(swept: Situation) -> None:

@@ -1,0 +1,34 @@
+"""Links and pictures of README and documentation lead to files of the repository."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from benchmarks.sentence_lengths import FENCE, ROOT, pages
+
+# Sphinx checks the links between the pages of docs/ itself; nothing else checks those of the other files.
+FILES = [*pages(), ROOT / "CHANGELOG.md", ROOT / "benchmarks" / "README.md"]
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.parent.name + path.stem)
+def test_targets_exist(path):
+    """Every relative link of a page names a file that exists."""
+    prose = FENCE.sub("", path.read_text(encoding="utf-8"))
+    targets = re.findall(r"\]\(([^)#\s]+)", prose)
+    missing = [target for target in targets if "://" not in target and not (path.parent / target).exists()]
+    assert missing == []
+
+
+def test_every_page_is_in_the_contents():
+    """Every page of the documentation is listed on its first page."""
+    listed = (ROOT / "docs" / "index.md").read_text(encoding="utf-8").split("```{toctree}")[1]
+    assert {path.stem for path in pages()} - {"README", "index"} <= set(listed.split())
+
+
+def test_pictures_are_small():
+    """A picture has less than 200 kB: the repository keeps every version of it."""
+    pictures = sorted((ROOT / "docs" / "images").iterdir())
+    assert pictures
+    assert all(picture.stat().st_size < 200_000 for picture in pictures)
