@@ -63,7 +63,7 @@ class FourierProblem:
         self.__dict__.update(state)
 
     def resampled(self, samples: int) -> FourierProblem:
-        """The same problem with the regressor at so many samples a period; what does not depend on them is shared."""
+        """Gives the same problem with another number of regressor samples; compiled functions and limits are shared."""
         other = replace(self, samples=samples)
         known = {name: value for name, value in self.__dict__.items() if name not in ("samples", "_sampled")}
         # Two problems must not write into each other's regressor.
@@ -192,14 +192,14 @@ class FourierProblem:
         return np.concatenate([limit.excess(q, dq, ddq) for limit in self.pointwise], axis=1)
 
     def inside(self, z: Array, stride: int = 1) -> bool:
-        """Whether all limits that are not linear hold, with some room, at every limit sample or at some of them."""
+        """Whether all limits that are not linear hold, with some room, at every `stride`-th limit sample."""
         states = self.limit_states(z, stride)
         if any(limit.excess(*states).max() > -ROOM for limit in self.pointwise):
             return False
         return all(limit.values(*states).max() <= 1 - ROOM for limit in self.averaged)
 
     def limit_states(self, z: Array, stride: int = 1) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration (M, n) at the limit samples, or at every so manieth of them."""
+        """Position, velocity and acceleration (M, n) at every `stride`-th limit sample."""
         free = self.free(z).T
         q, dq, ddq = (np.ascontiguousarray(basis[::stride] @ free) for basis in self.limit_bases[:3])
         return q, dq, ddq
@@ -211,7 +211,7 @@ class FourierProblem:
             z: any point (n K,).
             fraction: of the way to the limits that it may go.
             halvings: of the interval in which the way to the pointwise limits is sought.
-            stride: looks at every so manieth limit sample only for those, to be fast.
+            stride: of the limit samples at which those are checked; more than 1 is faster and may miss a peak.
         """
         still = self.free(np.zeros(self.size))
         room = self.rows.room(still, self.free(z) - still)

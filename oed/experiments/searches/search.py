@@ -23,8 +23,8 @@ THROWS = (0.15, 0.3, 0.6)
 # Per period, by which designs are compared.
 FINE_SAMPLES = 1000
 
-# Screening looks at every so manieth limit sample: what it chooses is looked at closely.
-GLANCE = 5
+# Screening checks only every fifth limit sample. The start that it chooses is then pulled within the limits at all.
+SCREENING_STRIDE = 5
 INTERRUPTED = "interrupted"
 
 
@@ -184,7 +184,7 @@ class Island:
     def _screen(self) -> Array:
         problem = self._problem
         drawn = (self._rng.normal(size=problem.size) for _ in range(self._effort.screened))
-        rough = (problem.shrunk(z, 0.95, halvings=6, stride=GLANCE) for z in drawn)
+        rough = (problem.shrunk(z, 0.95, halvings=6, stride=SCREENING_STRIDE) for z in drawn)
         return problem.shrunk(min(rough, key=problem.cost))
 
     def _thrown(self, pool: list[tuple[float, Array]], hop: int) -> Array:
