@@ -169,11 +169,11 @@ def smallest_singular_value(q: np.ndarray) -> float:
 
 def test_obstacle(arm: Robot, free: Design) -> None:
     """The arm keeps its clearance from a box beside it; without watching, the same design runs into the box."""
-    post = np.array([0.5, 0.45])
+    centre, half = np.array([0.5, 0.45, 0.8]), np.array([0.1, 0.1, 0.8])
 
     def nearest(made: Design) -> float:
-        place = tool(made.motion.q)
-        return float(np.linalg.norm(np.maximum(np.abs(place[:, :2] - post) - 0.1, 0.0), axis=1).min())
+        outside = np.maximum(np.abs(tool(made.motion.q) - centre) - half, 0.0)
+        return float(np.linalg.norm(outside, axis=1).min())
 
     assert nearest(free) == 0.0
     made = design(arm, home=[0.0, 0.6, 0.9], collision=True, clearance=0.02)
