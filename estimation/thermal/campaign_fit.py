@@ -53,9 +53,8 @@ def fit_campaign(
 ) -> CampaignEstimate:
     """Fits rigid body, friction at T0 and each joint's heat to all logs of a campaign.
 
-    The logs are condensed to normal equations of short times, in which a temperature is constant. On those, the linear
-    parameters given the temperatures and the thermal models given the friction of each short time take turns until both
-    stand still: a minimum of the joint problem. Standard errors come from the joint information.
+    The logs are condensed to normal equations of short times, in which a temperature is constant. Linear parameters and
+    thermal models are fitted in turn until both converge. Standard errors come from the joint information.
 
     Args:
         robot: the robot.
@@ -66,8 +65,7 @@ def fit_campaign(
         model: where to begin; identified from the logs by default.
         sensor: where joint temperatures, if any, were measured: ``motor`` or ``housing``.
         width: of the short times [s].
-        start: ``ambient`` or ``free``. If a campaign does not start cold, friction at T0 is
-            extrapolated: `free` finds it only with cooling phases or several powers. A contradiction gives a note.
+        start: ``ambient`` or ``free``, which needs cooling phases or several powers. A contradiction gives a note.
         seed: of the thermal searches.
         progress: receives the progress.
 

@@ -253,9 +253,7 @@ class Campaign:
             for entry in data["stages"]:
                 path = Path(folder) / entry["file"]
                 if sha256(path) != entry["sha256"]:
-                    raise InputError(
-                        "was changed after the campaign wrote it", file=path, remedy="run oed campaign again"
-                    )
+                    raise InputError("changed since the campaign wrote it", file=path, remedy="run oed campaign again")
                 stages.append(Stage.from_dict(entry, read_trajectory(path, n=known.n)[0]))
             expected = data["temperatures"]
             thermal = None
@@ -275,9 +273,7 @@ class Campaign:
                 notes=tuple(data["notes"]),
             )
         except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
-            raise InputError(
-                f"is not a campaign file, or is damaged ({type(error).__name__}: {error})", file=file
-            ) from error
+            raise InputError(f"is damaged, or no campaign: {type(error).__name__} {error}", file=file) from error
 
     def _last_slots(self) -> list[Slot]:
         return list({slot.cycle: slot for slot in self.slots}.values())
