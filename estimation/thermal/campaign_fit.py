@@ -30,8 +30,7 @@ from robots.signals import Log
 Array = NDArray[np.float64]
 
 # The fits of rigid body and heat take turns until no friction changes by more than this share.
-SETTLED = 1e-4
-MOST_ROUNDS = 12
+SETTLED, MOST_ROUNDS = 1e-4, 12
 # Least regularisation that keeps the inverse finite.
 FAINT = 1e-12
 

@@ -95,7 +95,7 @@ def test_predictions_follow_the_heat(run: Callable[..., Any], done: Path, logs: 
     errors = []
     for options, told in (
         ((), "assumed cold"),
-        (("--before", logs / "0.parquet", "--before", logs / "1.parquet"), "2 logs"),
+        (("--before", logs / "0.parquet", "--before", logs / "1.parquet"), "2 earlier logs"),
     ):
         ended = run(
             "predict", "--model", done, "--log", logs / "2.parquet", "--ambient", 20, "--out", tmp_path / "tau.csv",
