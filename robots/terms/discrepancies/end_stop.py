@@ -42,7 +42,7 @@ class EndStop(Placed):
     @property
     def title(self) -> str:  # type: ignore[override]
         """Its name for people."""
-        return f"something that is met {'short of' if self.below else 'beyond'} a place of the joint's range"
+        return f"an elastic stop {'below' if self.below else 'above'} a position of the joint"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the torque per depth, and per depth and velocity."""
@@ -76,7 +76,7 @@ class EndStop(Placed):
     ) -> str:
         """Says where it begins and how stiff it is."""
         return (
-            f"The residual torque of joint {joint} begins {'short of' if self.below else 'beyond'} {shape[0]:.3g} "
-            f"{length} and changes by {coefficients[0]:.3g} {force}/{length} from there: as if a buffer, a stop, or a "
-            f"hose that goes taut were met."
+            f"The residual torque of joint {joint} begins {'below' if self.below else 'above'} {shape[0]:.3g} {length} "
+            f"and changes by {coefficients[0]:.3g} {force}/{length} from there. A buffer, an end stop or a taut hose "
+            "is a typical cause."
         )

@@ -238,36 +238,34 @@ def _turns(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Ar
 
 FAMILIES: dict[str, Family] = {
     "angle": Family(_angle, 8, "depends on the position of {who}"),
-    "angles": Family(_angles, 16, "depends on its own position and that of {who} together"),
+    "angles": Family(_angles, 16, "depends jointly on its own position and that of {who}"),
     "motion": Family(_motion, 5, "depends on the velocity of {who}"),
     "push": Family(_push, 3, "depends on the acceleration of {who}"),
-    "whirl": Family(_whirl, WHIRLING, "depends on the velocity of {who} times those of further joints"),
-    "drag": Family(_drag, 8, "depends on its own position and the velocity of {who} together"),
-    "posture": Family(_posture, 8, "depends on its own velocity and the position of {who} together"),
+    "whirl": Family(_whirl, WHIRLING, "depends on products of the velocity of {who} and those of other joints"),
+    "drag": Family(_drag, 8, "depends jointly on its own position and the velocity of {who}"),
+    "posture": Family(_posture, 8, "depends jointly on its own velocity and the position of {who}"),
     "speed": Family(_speed, 6, "depends on the speed of the joint", _speed_of, "rad/s or m/s"),
     "load": Family(_load, 5, "depends on the load of the joint", _load_of, "N m or N"),
-    "torque": Family(_torque, 6, "depends on the torque of the joint, not in proportion", _torque_of, "N m or N"),
+    "torque": Family(_torque, 6, "depends nonlinearly on the torque of the joint", _torque_of, "N m or N"),
     "acceleration": Family(
         _acceleration,
         3,
-        "depends on the acceleration of the joint, not in proportion",
+        "depends nonlinearly on the acceleration of the joint",
         _acceleration_of,
         "rad/s2 or m/s2",
     ),
-    "memory": Family(_memory, 4, "remembers the velocity of the joint for a while"),
-    "worked": Family(
-        _worked, 2 * len(WORKED), "depends on how fast the joint has moved before", _speed_of, "rad/s or m/s"
-    ),
-    "creep": Family(_creep, 4, "remembers the torque of the joint for a while"),
+    "memory": Family(_memory, 4, "depends on the past velocity of the joint"),
+    "worked": Family(_worked, 2 * len(WORKED), "depends on the past speed of the joint", _speed_of, "rad/s or m/s"),
+    "creep": Family(_creep, 4, "depends on the past torque of the joint"),
     "hysteresis": Family(
-        _hysteresis, len(STRAINS), "differs as its torque grows and as it falls", _torque_of, "N m or N"
+        _hysteresis, len(STRAINS), "shows hysteresis between rising and falling torque", _torque_of, "N m or N"
     ),
-    "supply": Family(_supply, 6, "depends on its own torque and the power that all joints draw together"),
+    "supply": Family(_supply, 6, "depends on its own torque and the total power of all joints"),
     "time": Family(_time, KNOTS, "changes slowly with time"),
     "ageing": Family(_ageing, 2 * AGEING, "depends on its own position, and changes slowly with time"),
-    "start": Family(_start, len(SINCE) - 1, "is another for a while after the joint has stood"),
-    "ringing": Family(_ringing, 4, "rings at {point} Hz after the motion"),
-    "vibration": Family(_vibration, 8, "vibrates at {point} Hz whatever the motion"),
-    "sway": Family(_sway, 2, "swings to and fro at {point} Hz whatever the motion"),
+    "start": Family(_start, len(SINCE) - 1, "differs for a while after the joint was at rest"),
+    "ringing": Family(_ringing, 4, "oscillates at {point} Hz, excited by the motion"),
+    "vibration": Family(_vibration, 8, "vibrates at {point} Hz, independent of the motion"),
+    "sway": Family(_sway, 2, "oscillates slowly at {point} Hz, independent of the motion"),
     "turns": Family(_turns, 8, "repeats {point} times a turn of the joint and grows with its speed"),
 }

@@ -25,7 +25,7 @@ class FlangeOscillator(Effect):
     """
 
     name: ClassVar[str] = "pattern:swinging:0:even"
-    title: ClassVar[str] = "something that swings at the flange"
+    title: ClassVar[str] = "a swinging mass at the flange"
     whole_robot: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("frequency", "Hz", 0.3, 6.0, "log", FREQUENCIES),)
 
@@ -55,8 +55,8 @@ class FlangeOscillator(Effect):
     ) -> str:
         """Says what is seen."""
         return (
-            "The residual torque of all joints looks like that of something at the flange that swings at "
-            f"{shape[0]:.3g} Hz after its motion, of some {np.abs(coefficients).max():.2g} kg."
+            "The residual torque of all joints resembles that of a mass of about "
+            f"{np.abs(coefficients).max():.2g} kg at the flange that oscillates at {shape[0]:.3g} Hz."
         )
 
 

@@ -22,7 +22,7 @@ class FlangeSpring(Effect):
     """
 
     name: ClassVar[str] = "pattern:pulling:0:even"
-    title: ClassVar[str] = "something that pulls at the flange by where it is"
+    title: ClassVar[str] = "a position-dependent force at the flange"
     whole_robot: ClassVar[bool] = True
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
@@ -47,6 +47,6 @@ class FlangeSpring(Effect):
     ) -> str:
         """Says what is seen."""
         return (
-            "The residual torque of all joints looks like that of something that pulls at the flange by where it "
-            f"is, as a hose or a cable does: by up to {np.abs(coefficients[3:]).max():.2g} N/m."
+            "The residual torque of all joints resembles that of a force at the flange that depends on its position, "
+            f"by up to {np.abs(coefficients[3:]).max():.2g} N/m. A hose or cable is a typical cause."
         )

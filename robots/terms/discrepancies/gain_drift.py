@@ -34,7 +34,7 @@ class GainDrift(OverTime):
     """
 
     name: ClassVar[str] = "pattern:fading:0:even"
-    title: ClassVar[str] = "torque of all joints that changes by the same share with time"
+    title: ClassVar[str] = "a torque gain of all joints that drifts with time"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the shares of the half waves."""
@@ -56,8 +56,9 @@ class GainDrift(OverTime):
         """Says what is seen."""
         share = half_waves(np.linspace(0.0, 1.0, 201)) @ coefficients
         return (
-            "The torque of all joints changes slowly with time, by the same share of each: over the logs it differs by "
-            f"{100 * float(np.ptp(share)):.2g} %. A supply, or what all amplifiers are measured by, does that."
+            "The torque of all joints changes slowly with time by the same relative amount, "
+            f"{100 * float(np.ptp(share)):.2g} % over the logs. The power supply or a common current sensor is a "
+            "typical cause."
         )
 
 

@@ -24,7 +24,7 @@ class GainStep(Sudden, JointEffect):
     """
 
     name: ClassVar[str] = "pattern:switch:0:even"
-    title: ClassVar[str] = "torque of a joint that changes by a share of itself at one moment"
+    title: ClassVar[str] = "a step in the torque gain of a joint"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the share by which the torque changes."""
@@ -46,6 +46,6 @@ class GainStep(Sudden, JointEffect):
         """Says what is seen."""
         change = f"{100 * abs(coefficients[0]):.2g} % {'more' if coefficients[0] > 0 else 'less'}"
         return (
-            f"The residual torque of joint {joint} looks like that of a torque logged {change} from t = "
-            f"{shape[0]:.2f} s on than before, as where another amplifier, sensor or range of it is used."
+            f"The residual torque of joint {joint} resembles a step of its gain: the torque is logged {change} from "
+            f"t = {shape[0]:.2f} s on. A changed amplifier, sensor or sensor range is a typical cause."
         )

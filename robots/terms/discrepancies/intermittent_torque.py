@@ -36,7 +36,7 @@ class IntermittentTorque(JointEffect):
     """tau = c sign(dq) p(t), p a pulse: friction that is there for a while."""
 
     name: ClassVar[str] = "pattern:spell:0:odd"
-    title: ClassVar[str] = "friction of a joint that is there for a while"
+    title: ClassVar[str] = "temporary friction of a joint"
     depends_on: ClassVar[Literal["state", "time"]] = "time"
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.03),
@@ -90,8 +90,8 @@ class IntermittentTorque(JointEffect):
     ) -> str:
         """Says what is seen."""
         return (
-            f"The residual torque of joint {joint} looks like that of {coefficients[0]:.2g} {force} of friction from "
-            f"t = {shape[0]:.1f} s for {shape[1]:.2g} s, and not before or after: a brake that drags does that."
+            f"The residual torque of joint {joint} resembles temporary friction of {coefficients[0]:.2g} {force} from "
+            f"t = {shape[0]:.1f} s for {shape[1]:.2g} s. A dragging brake is a typical cause."
         )
 
 
@@ -102,7 +102,7 @@ class PeriodicTorque(OverTime):
     """
 
     name: ClassVar[str] = "pattern:recurring:0:even"
-    title: ClassVar[str] = "a force on the flange that comes again and again"
+    title: ClassVar[str] = "a periodic force pulse at the flange"
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("period", "s", 0.5, np.inf, "log", inexact=0.01),
         Shape("moment", "s", -np.inf, np.inf, "linear", inexact=0.03),
@@ -184,9 +184,9 @@ class PeriodicTorque(OverTime):
     ) -> str:
         """Says what is seen."""
         return (
-            f"The residual torque of all joints looks like that of a force of {np.linalg.norm(coefficients):.2g} N "
-            f"on the flange that comes every {shape[0]:.3g} s for {shape[2]:.2g} s, whatever the motion, as another "
-            "machine's would."
+            f"The residual torque of all joints resembles a force of {np.linalg.norm(coefficients):.2g} N at the "
+            f"flange, every {shape[0]:.3g} s for {shape[2]:.2g} s, independent of the motion. Another machine is a "
+            "typical cause."
         )
 
 

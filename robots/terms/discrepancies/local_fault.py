@@ -63,7 +63,7 @@ class LocalFault(Placed):
     @property
     def title(self) -> str:  # type: ignore[override]
         """Its name for people."""
-        return f"a spot of the joint's range where something {'rubs' if self.odd else 'pushes'}"
+        return f"a local {'friction' if self.odd else 'torque'} peak at one joint position"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the torque at the spot."""
@@ -127,6 +127,6 @@ class LocalFault(Placed):
         """Says where the spot is, how wide and how strong."""
         what = "friction" if self.odd else "torque"
         return (
-            f"The residual torque of joint {joint} looks like that of a spot at {shape[0]:.3g} {length}, "
-            f"{2 * shape[1]:.2g} {length} wide, with {coefficients[0]:.2g} {force} of {what}."
+            f"The residual torque of joint {joint} resembles a local {what} peak of {coefficients[0]:.2g} {force} at "
+            f"{shape[0]:.3g} {length}, {2 * shape[1]:.2g} {length} wide."
         )

@@ -56,7 +56,7 @@ class BaseStep(Step):
     """(d rigid/dg) (g x e_k) a_k from t_c on, e_1 and e_2 level: `base_tilt` that begins while the robot moves."""
 
     name: ClassVar[str] = "pattern:base_shift:0:even"
-    title: ClassVar[str] = "a base that tilts at one moment"
+    title: ClassVar[str] = "a step in the base tilt"
     whole_robot: ClassVar[bool] = True
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
@@ -83,8 +83,8 @@ class BaseStep(Step):
         """Says what is seen."""
         angle = np.degrees(np.hypot(*coefficients))
         return (
-            f"The residual torque of all joints looks like that of a base that tilts by {angle:.2g} deg at t = "
-            f"{shape[0]:.2f} s and stays so, as where its mount gives way."
+            f"The residual torque of all joints resembles a permanent base tilt of {angle:.2g} deg from t = "
+            f"{shape[0]:.2f} s on. A loose mount is a typical cause."
         )
 
 
@@ -92,7 +92,7 @@ class ZeroStep(Step):
     """(d rigid/dq_j) o from t_c on: `encoder_offset` that begins while the robot moves."""
 
     name: ClassVar[str] = "pattern:zero_shift:0:even"
-    title: ClassVar[str] = "a joint zero that jumps at one moment"
+    title: ClassVar[str] = "a step in the joint zero"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the offset."""
@@ -115,7 +115,6 @@ class ZeroStep(Step):
     ) -> str:
         """Says what is seen."""
         return (
-            f"The residual torque looks like that of a joint {joint} that stands {coefficients[0]:.2g} {length} "
-            f"further than its encoder says, from t = {shape[0]:.2f} s on, as where a coupling slips or a reference is "
-            "set anew."
+            f"The residual torque resembles an encoder offset of {coefficients[0]:.2g} {length} on joint {joint} from "
+            f"t = {shape[0]:.2f} s on. A slipped coupling or a new zero reference is a typical cause."
         )

@@ -24,7 +24,7 @@ class PayloadDrift(OverTime):
     """
 
     name: ClassVar[str] = "pattern:draining:0:even"
-    title: ClassVar[str] = "a body at the flange that changes slowly with time"
+    title: ClassVar[str] = "a payload that drifts with time"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes mass and first moments of each half wave."""
@@ -48,6 +48,6 @@ class PayloadDrift(OverTime):
         """Says what is seen."""
         mass = half_waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients[:: len(_PARTS)]
         return (
-            "The residual torque of all joints looks like that of a body at the flange that changes slowly with "
-            f"time, as a tank that empties or a coil that unwinds does: by {float(np.ptp(mass)):.2g} kg over the logs."
+            "The residual torque of all joints resembles a payload that changes slowly, by "
+            f"{float(np.ptp(mass)):.2g} kg over the logs. An emptying tank or unwinding coil is a typical cause."
         )

@@ -68,8 +68,8 @@ class SessionFriction(OverTime):
         most, way = shares[k, j], "more" if shares[k, j] > 0 else "less"
         return (
             "The friction of the joints differs from log to log, most on joint "
-            f"{j + 1} with {100 * abs(most):.2g} % {way} than in the first: they were warmer or colder, or something "
-            "was done to them between."
+            f"{j + 1} with {100 * abs(most):.2g} % {way} than in the first. Different temperature or maintenance "
+            "between the logs is a typical cause."
         )
 
 
