@@ -97,8 +97,8 @@ def notes_of(
         names = ", ".join(map(str, open_))
         notes.append(
             f"Joint{'s' if len(open_) > 1 else ''} {names}: no effect of the catalogue explains the residual. "
-            "The model contains a free function of the inputs named above instead. It is valid only where these logs have "
-            "data."
+            "The model contains a free function of the inputs named above instead. It is valid only where these "
+            "logs have data."
         )
     sprung = {finding.joint for finding in findings if finding.effect == "spring"}
     notes += [text for joint, text in undetectable_springs(problem, false_alarm) if joint not in sprung]
