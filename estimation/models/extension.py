@@ -1,4 +1,4 @@
-"""What was added to a model: effects with their shapes, coefficients and uncertainty."""
+"""Extensions of a model: effects with their shapes, coefficients and uncertainty."""
 
 from __future__ import annotations
 
@@ -132,7 +132,9 @@ def read_gear_load(data: Mapping[str, Any], robot: Robot) -> ExtraGearLoad:
         effect, joint = find_effect(str(item["effect"])), item["joint"]
         values = [np.array(item[key], dtype=float) for key in ("shape", "coefficients")]
         if not effect.loads_gear or joint not in effect.joints(robot):
-            raise InputError(f"borne_by_gears: {effect.name} on joint {joint}", allowed="an effect that gears bear")
+            raise InputError(
+                f"borne_by_gears: {effect.name} on joint {joint}", allowed="an effect whose torque loads the gear"
+            )
         sizes = (len(effect.shapes),), (len(effect.parameters(robot, joint)),)
         if tuple(v.shape for v in values) != sizes or not all(np.isfinite(v).all() for v in values):
             raise InputError(f"borne_by_gears: values of {effect.name} that do not fit it")
@@ -157,9 +159,9 @@ def find_effect(name: str) -> Effect:
 def extension_torque(
     extensions: Sequence[Extension], felt: Situation, own: Situation | None = None, bearing: ExtraGearLoad | None = None
 ) -> Array:
-    """Evaluates the extensions of a model in what its base model says of a motion (N, n) [N m or N].
+    """Evaluates the torque (N, n) [N m or N] of a model's extensions.
 
-    What acts on all of the torque comes after the others: what makes it late, then what cuts it off.
+    Effects on the total torque come after the others: first delays, then the current limit.
 
     Args:
         extensions: the effects.

@@ -177,7 +177,7 @@ class Model:
                 "term": column.term,
                 "value": float(value),
                 "unit": column.unit,
-                # A number that JSON cannot hold, and that nobody should trust, is left out.
+                # A number that is not finite cannot be written as JSON and is left out.
                 "standard_error": float(error) if known else None,
                 "determined": bool(known),
                 "stands_for": formula,
@@ -230,7 +230,7 @@ def load_model(path: str | Path) -> Model:
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise InputError(f"cannot be read as JSON: {error}", file=file) from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InputError("is no model file", file=file, allowed=f'"format": "{FORMAT}"')
+        raise InputError("is not a model file", file=file, allowed=f'"format": "{FORMAT}"')
     version = data.get("format_version")
     if not isinstance(version, int) or version > FORMAT_VERSION:
         raise InputError(f"format version {version!r}", file=file, allowed=f"up to {FORMAT_VERSION}")
@@ -239,7 +239,7 @@ def load_model(path: str | Path) -> Model:
     except InputError as error:
         raise InputError(error.problem, file=file, allowed=error.allowed, remedy=error.remedy) from error
     except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"is damaged: {type(error).__name__} {error}", file=file) from error
+        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error
 
 
 def _from_dict(data: Mapping[str, Any]) -> Model:
@@ -249,7 +249,7 @@ def _from_dict(data: Mapping[str, Any]) -> Model:
     parameters = data["parameters"]
     unknown = [item["name"] for item in parameters if item["name"] not in index]
     if unknown:
-        raise InputError(f"parameter {unknown[0]} is none of the model's terms")
+        raise InputError(f"parameter {unknown[0]} does not belong to the model's terms")
     torque_model.symbolic()  # a term that does not suit the robot says so now, not at the first prediction
     columns = tuple(index[item["name"]] for item in parameters)
     values = np.array([item["value"] for item in parameters], dtype=float)

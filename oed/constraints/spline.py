@@ -177,7 +177,7 @@ def _check_bounds(quantity: str, low: Array, high: Array) -> None:
     lonely = np.isfinite(low) != np.isfinite(high)
     if np.any(lonely):
         raise InputError(
-            f"has a limit of {quantity} on one side only",
+            f"has a {quantity} limit on one side only",
             joint=int(np.argmax(lonely)) + 1,
             allowed="a limit on both sides, or none",
         )

@@ -9,7 +9,7 @@ from oed.experiments.results.result import Design
 from oed.experiments.results.retimed import RetimedExperiment, TorqueUse
 from oed.experiments.retiming import METHODS, retime
 from oed.experiments.searches.search import EFFORTS, Effort
-from oed.experiments.solvers import InteriorPoint, Ipopt, Solver
+from oed.experiments.solvers import InteriorPoint, Ipopt, Slsqp, Solver
 
 __all__ = [
     "METHODS",
@@ -22,6 +22,7 @@ __all__ = [
     "ParetoFront",
     "Quality",
     "RetimedExperiment",
+    "Slsqp",
     "Solver",
     "TorqueUse",
     "design",

@@ -116,7 +116,7 @@ def design(
         solver: the local solver: `InteriorPoint` by default, or `Ipopt`.
         workers: processes; as many as cores by default.
         executor: runs the starts instead of processes of its own.
-        progress: is told how far it is.
+        progress: receives the progress.
 
     Returns:
         The design, checked by its own samples.
@@ -189,7 +189,7 @@ def design(
         home=safety.home,
         weighting=weighting,
     )
-    # The experiment's frame is laid out first: whatever is wrong with a limit or a pose shows before the long work.
+    # Home pose and limits are checked first, so that errors appear before the long search.
     rest = FourierSeries.from_coefficients(np.zeros((robot.n, 2 * harmonics + 1)), base_frequency)
     rest = replace(rest, offsets=problem.centre)
     assemble(rest, limits, period=robot.period, home=safety.home, strokes=strokes)

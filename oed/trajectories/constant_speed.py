@@ -26,7 +26,7 @@ def constant_speed_sweep(
 ) -> Sweep:
     """Drives one joint over its range and back at each speed, the slowest first.
 
-    Where the range is too short to reach a speed for `SHORTEST_PLATEAU`, the speed gives way; the plateaus tell.
+    If the range is too short to keep a speed for `SHORTEST_PLATEAU`, the speed is reduced; see the plateaus.
 
     Args:
         limits: bounds of all joints.

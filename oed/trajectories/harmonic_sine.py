@@ -98,7 +98,9 @@ class HarmonicSine(Trajectory):
         """
         share = frozen(shares, "shares", 2)
         if np.any(np.abs(share) > 1.0) or not np.any(share):
-            raise InputError("found shares outside -1 to 1, or zeros only", allowed="-1 to 1, and one that moves")
+            raise InputError(
+                "the amplitudes lie outside -1 to 1, or are all zero", allowed="-1 to 1, and one that moves"
+            )
         factors = _checked_multiples(multiples, share.shape[1])
         bounds = harmonic_sine_bounds(limits, factors, offsets)
         amplitudes = np.where(share == 0.0, 0.0, share * np.where(share == 0.0, 0.0, bounds.amplitude[:, None]))
@@ -214,7 +216,7 @@ def harmonic_sine_bounds(
     if np.any(reach <= 0.0):
         joint = int(np.argmax(reach <= 0.0))
         raise InputError(
-            f"the offset {centre[joint]:.6g} leaves no room to move",
+            f"with the offset {centre[joint]:.4g} the joint has no range to move",
             joint=joint + 1,
             allowed=f"between {limits.lower[joint]:.6g} and {limits.upper[joint]:.6g}",
         )

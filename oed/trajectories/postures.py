@@ -40,7 +40,7 @@ class Posture(Trajectory):
         if self.pose.size == 0:
             raise InputError("a pose of no joints", allowed="at least one joint")
         if not (np.isfinite(self.duration) and self.duration > 0):
-            raise InputError(f"found a posture held for {self.duration} s", allowed="a positive time")
+            raise InputError(f"found a posture duration of {self.duration} s", allowed="a positive time")
 
     @property
     def n(self) -> int:

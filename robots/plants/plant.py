@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 class Beyond(Protocol):
-    """What a plant has beyond its model: a `PlantEffect`, or an effect as a diagnosis found it."""
+    """An effect of a plant beyond its model: a `PlantEffect`, or a finding of a diagnosis."""
 
     def torque(self, situation: Situation, /) -> Array:
         """Evaluates what it adds to the torque (N, n) [N m or N]."""

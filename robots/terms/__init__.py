@@ -36,7 +36,11 @@ def build_term(description: Mapping[str, Any]) -> Term:
     settings = dict(description)
     name = settings.pop("name", None)
     if name not in TERMS:
-        raise InputError(f"unknown term {name!r}", allowed=", ".join(TERMS), remedy="use a newer version")
+        raise InputError(
+            f"unknown term {name!r}",
+            allowed=", ".join(TERMS),
+            remedy="the file was written by a newer version: update robot-oed",
+        )
     try:
         values = {key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()}
         return TERMS[name](**values)

@@ -25,9 +25,8 @@ class FrictionPolynomial(Term):
 
     Attributes:
         powers: which of f1..f4 are there: (1, 2) is Coulomb and viscous friction.
-        velocity_scale: with a value v0 > 0 [rad/s or m/s], sign(dq) is tanh(dq / v0): differentiable, as a design
-            needs it, and finite in slope where a log's velocity is known to v0 only. With 0 it is the sign. One for
-            all joints, or one each.
+        velocity_scale: v0 [rad/s or m/s], one for all joints or one each. With v0 > 0, sign(dq) is replaced by tanh(dq
+            / v0). This is differentiable, as a design needs, and suits a log whose velocity is known to v0 only.
     """
 
     powers: tuple[int, ...] = POLYNOMIAL

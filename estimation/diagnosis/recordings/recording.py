@@ -211,11 +211,11 @@ def join_recordings(first: Recording, second: Recording) -> Recording:
         dq=both("dq"),
         ddq=both("ddq"),
         tau=both("tau"),
-        sign_unknown=both("unsure").astype(bool),
-        sign_known_from_velocity=both("clear").astype(bool),
+        sign_unknown=both("sign_unknown").astype(bool),
+        sign_known_from_velocity=both("sign_known_from_velocity").astype(bool),
         reversal_time_error=None
         if first.reversal_time_error is None or second.reversal_time_error is None
-        else both("late"),
+        else both("reversal_time_error"),
         position_residual=None,
         cutoffs=None,
         full_rate=None

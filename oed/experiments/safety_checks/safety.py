@@ -29,13 +29,13 @@ Array = NDArray[np.float64]
 SLOWER = (1.0, 0.85, 0.7, 0.5, 0.35, 0.2)
 # From each bound in space [m], of a home pose that had to be moved.
 HOME_ROOM = 0.008
-# The share of a limit on root mean squares that the optimised part may use: moves to and from it need some, too.
+# Fraction of an RMS limit that the optimised part may use; the moves to and from it need the rest.
 MOVES = 0.98
 
 
 @dataclass(frozen=True, kw_only=True)
 class Safety:
-    """What an experiment must keep besides position, velocity, acceleration and jerk.
+    """Limits of an experiment besides position, velocity, acceleration and jerk.
 
     Attributes:
         torque: the torque limit, where it is known.
@@ -102,8 +102,8 @@ class Safety:
             if self._strong_enough(motion):
                 return sequence, report, left_out
         raise InfeasibleError(
-            "the moves pass a torque limit however slow they are",
-            remedy="state another home pose, or leave out the strokes",
+            "the moves between the segments exceed a torque limit, even at low speed",
+            remedy="choose another home pose (--home), or leave out the strokes (--no-strokes)",
         )
 
     def _strong_enough(self, motion: Motion) -> bool:
@@ -112,7 +112,7 @@ class Safety:
         return peak and (self.torque_rms is None or self.torque_rms.values(*states).max() <= 1)
 
     def _broken(self, motion: Motion, report: CollisionReport | None) -> tuple[float, str] | None:
-        """When a motion breaks a limit in space most, and which; None where it keeps all."""
+        """The time and the kind of the largest workspace violation; None without any."""
         if report is not None and report.collides:
             worst = report.worst
             assert worst is not None
@@ -133,7 +133,7 @@ def collision_data(report: CollisionReport) -> dict[str, object]:
 
 
 def _culprit(sequence: Experiment, time: float, what: str) -> int:
-    """The joint in whose stroke, or the move to or from it, that happens."""
+    """The joint whose stroke, or the move before or after it, causes the violation."""
     table = sequence.table()
     here = next(i for i, s in enumerate(table) if time <= float(s["end"]) + 1e-9)  # type: ignore[arg-type]
     for neighbour in (here, here + 1, here - 1):
@@ -141,7 +141,7 @@ def _culprit(sequence: Experiment, time: float, what: str) -> int:
             return int(table[neighbour]["joint"])  # type: ignore[call-overload]
     raise InfeasibleError(
         f"the move at {time:.2f} s {what}",
-        remedy="state another home pose",
+        remedy="choose another home pose (--home)",
     )
 
 
@@ -164,13 +164,13 @@ def choose_safety(
         robot: the robot.
         base: whose model gives the torques.
         home: pose (n,) at both ends.
-        movable: whether another home pose may be taken where this one is in collision.
+        movable: whether another home pose may be used if this one is in collision.
         torque: keep torque limits, where they and the nominal dynamics are described.
         torque_margin: share of them kept in reserve.
         collision: watch the arm's own bodies, and the obstacles of the robot's file.
         clearance: between them [m].
         space: further limits in space.
-        effects: what the robot has beyond its description: its torque counts within the torque limits.
+        effects: effects beyond the robot's description; their torque counts in the torque limits.
 
     Raises:
         InfeasibleError: a home pose that cannot be held, is in collision or breaks another limit in space; a tool box

@@ -26,7 +26,7 @@ class ClockDrift(OverTime):
     """
 
     name: ClassVar[str] = "pattern:parting:0:even"
-    title: ClassVar[str] = "a delay between torque and position that drifts with time"
+    title: ClassVar[str] = "drift between the clocks of torque and position"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the delays of the half waves."""
@@ -46,9 +46,9 @@ class ClockDrift(OverTime):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         late = half_waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients
         return (
-            "The delay between logged torque and position of all joints drifts by about "
-            f"{1000 * float(np.ptp(late)):.2g} ms over the logs. Two unsynchronised clocks are a typical cause."
+            "The delay between logged torque and position changes with time, on all joints: by about "
+            f"{1000 * float(np.ptp(late)):.2g} ms over the logs. Likely cause: two clocks with different rates."
         )

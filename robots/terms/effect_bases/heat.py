@@ -1,4 +1,4 @@
-"""What effects of heat share: they build up and go with a time constant that the data must be long enough to show."""
+"""Base class of thermal effects: they rise and decay with a time constant that the data must be long enough to show."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 LEAST = 1.01
-"""Times the shortest time constant: a faster one is wanted below, and that is none of heat."""
+"""Factor to the shortest time constant: a fit that wants a faster one does not describe heat."""
 
 
 class HeatEffect(JointEffect):
@@ -30,7 +30,7 @@ class HeatEffect(JointEffect):
     """
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
-        """Tells what follows its source within seconds from heat, and what grows from what heat makes fall."""
+        """Distinguishes thermal effects from fast followers of the source, and falling from rising effects."""
         slow = not shape or shape[0] > LEAST * self.shapes[0].lower
         warmer = self.falls and rises(robot, joint, coefficients)
         return slow and not warmer and super().is_plausible(robot, joint, coefficients)

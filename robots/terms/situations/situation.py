@@ -1,4 +1,4 @@
-"""What an effect may depend on: the motion, the base model's torque in it, and how that torque would change."""
+"""Inputs of effects: the motion, the base model's torque, and its sensitivities."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Kept = TypeVar("Kept")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Situation:
-    """What the robot did, all logs one after the other, and what the base model says of it.
+    """The motion of all logs, one after the other, and the base model's torque.
 
     Attributes:
         model: the base model.
@@ -108,7 +108,7 @@ class Situation:
         return self._with("beyond", torque)
 
     def bearing(self, torque: Array | None) -> Situation:
-        """The same with torque (N, n) [N m or N] that the gears bear besides the robot's own; None for none."""
+        """The same with an additional gear load (N, n) [N m or N]; None for none."""
         return self._with("extra_load", torque)
 
     def _with(self, name: str, torque: Array | None) -> Situation:
@@ -145,7 +145,7 @@ class Situation:
 
     @cached_property
     def load(self) -> Array:
-        """The torque that passes the gears (N, n) [N m or N]: the rigid body's without rotors, and what they bear."""
+        """The load of the gears (N, n) [N m or N]: the rigid body's torque without rotors, and the additional load."""
         own = self.rigid - self.ddq * self.rotors.sum(axis=0)
         return own if self.extra_load is None else own + self.extra_load
 
@@ -205,7 +205,7 @@ class Situation:
 
 @dataclass(frozen=True, eq=False)
 class Finer:
-    """Logs before they were thinned: what jumps between samples is evaluated there, and goes their torque's way.
+    """Logs before thinning. Effects that change between samples are evaluated there and filtered like the torque.
 
     Attributes:
         situation: what the robot did, at all samples.

@@ -151,7 +151,7 @@ def test_limits_that_no_joint_has_give_no_rows(limits):
     with pytest.raises(InfeasibleError, match="joint 2"):
         spline_rows(knots, expansion, 5, still)
     lonely = dataclasses.replace(limits, lower=np.array([-np.inf, -0.2]))
-    with pytest.raises(InputError, match="joint 1: has a limit of q on one side"):
+    with pytest.raises(InputError, match="joint 1: has a q limit on one side"):
         spline_rows(knots, expansion, 5, lonely)
     with pytest.raises(InputError, match="torque"):
         spline_rows(knots, expansion, 5, limits, quantities=("torque",))

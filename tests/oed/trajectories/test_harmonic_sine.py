@@ -133,7 +133,7 @@ def test_what_cannot_move_is_told():
     with pytest.raises(InputError, match="velocity, acceleration or jerk limit"):
         HarmonicSine.within(free, [[1.0], [1.0]], period=0.004)
     for shares in ([[1.5], [0.0]], [[0.0], [0.0]]):
-        with pytest.raises(InputError, match="shares"):
+        with pytest.raises(InputError, match="amplitudes lie outside"):
             HarmonicSine.within(limits, shares, period=0.004)
     with pytest.raises(InputError, match="joint 2: the offset"):
         HarmonicSine.within(limits, [[1.0], [1.0]], period=0.004, offsets=[0.0, 0.7])

@@ -104,7 +104,7 @@ def test_what_is_no_part_of_the_model_says_so() -> None:
     )
     refuted = no_part(finding)
     assert (refuted.effect, refuted.joint, refuted.parameters, refuted.rivals) == ("unexplained", 2, (), ())
-    assert "resembles a gear that winds up under load" in refuted.sentence
+    assert "resembles joint elasticity" in refuted.sentence
     assert "the model does not contain it" in refuted.sentence
     assert "did not improve the held-out prediction" in no_part(finding_of("pattern:load:0:odd", finding)).sentence
 

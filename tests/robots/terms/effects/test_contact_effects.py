@@ -193,6 +193,6 @@ def test_a_push_is_told_by_what_joints_feel_of_it() -> None:
         ("a force of 5 N", [3.0, 4.0, 0, 0, 0, 0]),
     ):
         sentence = EFFECTS["external_contact"].describe(None, np.array(size), shape)
-        assert f"with {told} that stayed" in sentence
+        assert f"with {told}, constant" in sentence
     both = EFFECTS["external_contact"].describe(None, np.array([3.0, 4.0, 0.0, 0.0, 2.0, 0.0]), shape)
     assert "with a force of 5 N and a moment of 2 N m" in both
