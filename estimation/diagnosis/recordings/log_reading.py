@@ -96,7 +96,7 @@ def build_recording(
     if total < shortest:
         recorded = sum(log.log.duration for log in prepared)
         raise InputError(
-            f"{total:.1f} s of logs without the ends, where filters err ({recorded:.1f} s with them)",
+            f"{total:.1f} s of usable logs ({recorded:.1f} s recorded, less filter transients at the ends)",
             file=prepared[0].log.metadata.get("file", prepared[0].log.name or None) if len(prepared) == 1 else None,
             allowed=f"{shortest:g} s or more",
             remedy="record a longer log",

@@ -190,7 +190,9 @@ def _unnamed(
     return strongest_pattern(told.problem, entries, beside, told.false_alarm, rng)
 
 
-_LOST = "Simulated forward, the fitted robot ran away from the position loop: its fit suits no simulation."
+_LOST = (
+    "The forward simulation of the extended model was unstable under the position loop. Do not use it for simulation."
+)
 
 
 def _compliances(told: DiagnosisInputs, seen: HeldOutResult) -> tuple[MeasuredCompliance, ...]:

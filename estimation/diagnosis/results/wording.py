@@ -87,25 +87,23 @@ def _when(sentence: str, parameters: Sequence[Parameter]) -> str:
     spell = {own.name: own for own in parameters if own.name in ("start", "duration")}
     if len(spell) == 2 and not all(np.isfinite(own.ci95).all() for own in spell.values()):
         start, duration = (spell[name].value for name in ("start", "duration"))
-        least = f"from t = {start:.1f} to {start + duration:.1f} s at least"
+        least = f"at least from t = {start:.1f} to {start + duration:.1f} s"
         sentence = sentence.replace(f"from t = {start:.2f} s for {duration:.2g} s", least)
     return sentence
 
 
 def no_part(finding: Finding) -> Finding:
-    """Words what shows that something is unexplained, but is no part of the extended model."""
+    """Rewords a finding that the held-out data rejected: it is unexplained, and not part of the extended model."""
     if finding.pattern:
-        return replace(finding, sentence=f"{finding.sentence} {_ERRS}")
-    told = _DENIED.format(EFFECTS[finding.effect].title)
-    return replace(finding, effect="unexplained", parameters=(), rivals=(), sentence=told)
+        return replace(finding, sentence=f"{finding.sentence} {_NOT_IN_MODEL}")
+    sentence = _REJECTED.format(EFFECTS[finding.effect].title)
+    return replace(finding, effect="unexplained", parameters=(), rivals=(), sentence=sentence)
 
 
-_ERRS = (
-    "Unseen data do not bear that function out: it shows where something is unexplained, and is no part of the model."
-)
-_DENIED = (
-    "Something stands out of the noise that looks like {}, but unseen data speak against that: what it is, is not "
-    "known. The model has no part of it."
+_NOT_IN_MODEL = "This correction did not improve the held-out prediction, so the model does not contain it."
+_REJECTED = (
+    "A significant residual resembles {}, but the held-out data contradict this cause. The true cause is unknown, and "
+    "the model does not contain it."
 )
 
 

@@ -137,11 +137,14 @@ def simulate_both(
         return None
     notes = []
     if any(run.filled.any() for run, _ in driven):
-        notes.append("The fitted inertia is not positive in all directions: the loop feeds back acceleration besides.")
+        notes.append("The fitted inertia matrix is not positive definite, so the loop also feeds back acceleration.")
     if not driven[1][1]:
-        notes.append("What was found is taken along the measured motion: along the simulated one it did not settle.")
+        notes.append(
+            "The torque of the findings was computed along the measured motion, because the simulated motion did not "
+            "converge with it."
+        )
     if not all(run.converged for run, _ in driven):
-        notes.append("The simulated motion did not settle to a hundredth.")
+        notes.append("The simulated motion did not converge to 1 %.")
     level = np.maximum(np.sqrt(np.mean(part.tau**2, axis=0)), 1e-300)
     shares, motions = [], []
     for run, _ in driven:

@@ -252,13 +252,13 @@ def _sentence(joint: int, parameters: Sequence[Parameter], force: str, length: s
     low, high = compliance.ci95
     span = f"{1 / high:.3g} to {1 / low:.3g}" if low > 0 else f"above {1 / high:.3g}"
     text = (
-        f"The gear of joint {joint} winds up under load, by its two encoders: a stiffness of "
-        f"{1 / compliance.value:.3g} {force}/{length} (95 % interval {span})"
+        f"The gear of joint {joint} winds up under load, as measured by its two encoders: stiffness "
+        f"{1 / compliance.value:.3g} ({span}) {force}/{length}"
     )
     if motion.determined:
-        text += f", with {abs(motion.value):.2g} {length} of lost motion at reversals"
+        text += f", lost motion {abs(motion.value):.2g} {length} at reversals"
     text += "."
     if delay.determined:
         which = "later" if delay.value > 0 else "earlier"
-        text += f" The encoder behind the gear is logged {1e3 * abs(delay.value):.2f} ms {which} than the motor's."
+        text += f" The link encoder is logged {1e3 * abs(delay.value):.2g} ms {which} than the motor encoder."
     return text

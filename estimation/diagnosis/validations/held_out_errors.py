@@ -136,7 +136,7 @@ def _left_out(problem: Problem, effects: Sequence[Array], pull: GaussianPrior) -
 
 
 _WITHIN = (
-    "each of {} stretches of each of {} logs, predicted from all other stretches: {}, and no other log could tell it"
+    "each of {} stretches of each of {} logs, predicted from all other stretches ({}, so whole logs are not left out)"
 )
 
 
@@ -145,7 +145,7 @@ def found_in_one_log_only(recording: Recording, effects: Sequence[Array]) -> str
     for X in effects:
         energies = np.array([float(np.sum(X[run] ** 2)) for run in recording.runs])
         if energies.max() > ALONE * energies.sum():
-            return "something that was found acts in one log only"
+            return "one finding acts in one log only"
     moves = np.array([~recording.sign_unknown[run].all(axis=0) for run in recording.runs])
     return "a joint moves in one log only" if (moves.sum(axis=0) == 1).any() else ""
 

@@ -147,17 +147,17 @@ def validate_on_held_out(
     )
 
 
-_FAINT = "A fit of {} hardly stood out, and unseen data do not speak for it: left out."
-_DROPPED = "A fit of {} stood out of the noise, but does not help on unseen data: left out."
-_REPLACED = "A fit of {} stood out of the noise, but does not help on unseen data; {}, which fits about as well, does."
+_FAINT = "{} was rejected: it was barely significant, and the held-out data do not support it."
+_DROPPED = "{} was rejected: it was significant in the fit, but does not improve the held-out prediction."
+_REPLACED = "{0} was replaced by {1}: both fit about equally well, but only {1} improves the held-out prediction."
 _UNDONE = (
-    "The unseen data are without {}: they are as they would be if that had been undone before them, as a payload that "
-    "is put down. Errors are measured so; the model has it from its moment on."
+    "{} seems to be absent from the held-out data, for example because a payload was removed before. The held-out "
+    "errors are computed without it. The model keeps it from the time of the change on."
 )
-_WHOLE = "the robot as a whole"
+_WHOLE = "the whole robot"
 _SPOILING = (
-    "On {} something is unexplained, but unseen data do not bear out the free function that shows it: it is no part of "
-    "the extended model."
+    "Part of the residual of {} is unexplained. The free function fitted to it did not improve the held-out "
+    "prediction, so the extended model does not contain it."
 )
 
 

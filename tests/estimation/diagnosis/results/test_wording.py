@@ -104,9 +104,9 @@ def test_what_is_no_part_of_the_model_says_so() -> None:
     )
     refuted = no_part(finding)
     assert (refuted.effect, refuted.joint, refuted.parameters, refuted.rivals) == ("unexplained", 2, (), ())
-    assert "looks like joint elasticity" in refuted.sentence
-    assert "no part of it" in refuted.sentence
-    assert "do not bear that function out" in no_part(finding_of("pattern:load:0:odd", finding)).sentence
+    assert "resembles joint elasticity" in refuted.sentence
+    assert "the model does not contain it" in refuted.sentence
+    assert "did not improve the held-out prediction" in no_part(finding_of("pattern:load:0:odd", finding)).sentence
 
 
 def finding_of(pattern: str, finding: Finding) -> Finding:
@@ -164,4 +164,4 @@ def test_a_push_whose_edges_are_not_told_lasted_at_least_so_long() -> None:
     assert _when(sentence, [start, duration]) == sentence
     open_ = replace(start, ci95=(-np.inf, np.inf), determined=False)
     told = _when(sentence, [open_, duration])
-    assert told == "Something pushed the arm from t = 43.0 to 47.0 s at least: joint 1 felt 1.26 N m."
+    assert told == "Something pushed the arm at least from t = 43.0 to 47.0 s: joint 1 felt 1.26 N m."

@@ -64,7 +64,7 @@ def test_the_stiffness_of_a_gear_is_measured(arm: Robot, arm_plant: Callable, fo
     assert values["compliance"].value == pytest.approx(COMPLIANCE, rel=0.03)
     assert finding.gain.ci95[0] > 0
     assert finding.gain.nrmse_after < 0.2 * finding.gain.nrmse_before
-    assert "by its two encoders" in finding.sentence
+    assert "measured by its two encoders" in finding.sentence
     assert "3.0" in finding.sentence
     assert windup.extension.coefficients == pytest.approx([COMPLIANCE], rel=0.03)
     assert np.std(windup.after) < 0.2 * np.std(windup.before)
