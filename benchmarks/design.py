@@ -6,7 +6,10 @@ none of them optimised on. The rivals are what the literature uses (a genetic al
 finite differences), and are treated well: every individual of an evolution is pulled within the limits instead of being
 punished; SLSQP starts again as often as there is time, and its result is pulled within the limits, too. Once more it
 runs with our screened starts and a working set of limit rows: what is left is due to exact derivatives, smooth
-stand-ins and hops. The genetic algorithm is pymoo's (``pip install .[benchmarks]``); without it, its rows are missing.
+stand-ins and hops. SLSQP with exact gradients inside our own search is the strong rival: it differs by the local solver
+alone, has the same seeds and seconds as ours, and is compared with it at equal times; ``benchmarks/solvers.py`` does
+the same under limits of torque and in space. The genetic algorithm is pymoo's (``pip install .[benchmarks]``); without
+it, its rows are missing.
 
 Each candidate has one process and one thread. Times are the processor's, which on an idle machine are the clock's, so
 that other work on the machine does not count. The compilation, which all share, is not in them. A ratio is the time at
@@ -33,7 +36,7 @@ from numpy.typing import NDArray
 from scipy.optimize import LinearConstraint, differential_evolution, minimize
 
 from oed.criteria import criterion
-from oed.experiments import EFFORTS, InteriorPoint, usable_limits
+from oed.experiments import EFFORTS, InteriorPoint, Slsqp, Solver, usable_limits
 from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.problems.working_set import WorkingSet
 from oed.experiments.searches.search import Island
@@ -49,6 +52,7 @@ Trace = list[tuple[float, float]]
 FRICTION = {52: "coulomb-viscous", 64: "polynomial"}
 OURS, EVOLUTION, GENETIC = "ours", "differential evolution", "genetic algorithm (pymoo)"
 SLSQP, HELPED = "SLSQP", "SLSQP, our starts and rows"
+EXACT = "SLSQP, exact, our search"
 MOMENTS = (5, 10, 20, 60, 120, 240, 600)
 OUR_SECONDS = 30.0
 FINE_SAMPLES = 1000
@@ -103,14 +107,14 @@ def problem_of(columns: int) -> FourierProblem:
     return FourierProblem(base=base, criterion=criterion("cond"), limits=usable_limits(robot.limits))
 
 
-def ours(problem: FourierProblem, seed: int, clock: Clock) -> None:
+def ours(problem: FourierProblem, seed: int, clock: Clock, *, solver: Solver) -> None:
     """The search of ``oed design`` on one island, without its finish on a finer grid."""
 
     def tell(_: int, best: float) -> None:
         clock.note(best)
         clock.check()
 
-    Island(problem, replace(EFFORTS["thorough"], hops=100_000), InteriorPoint(), seed, 0, tell=tell).search()
+    Island(problem, replace(EFFORTS["thorough"], hops=100_000), solver, seed, 0, tell=tell).search()
 
 
 def pulled_in(problem: FourierProblem, clock: Clock) -> Callable[[Array], float]:
@@ -183,7 +187,8 @@ def slsqp(problem: FourierProblem, seed: int, clock: Clock, *, helped: bool = Fa
 
 
 SEARCHES: dict[str, Callable[[FourierProblem, int, Clock], None]] = {
-    OURS: ours,
+    OURS: partial(ours, solver=InteriorPoint()),
+    EXACT: partial(ours, solver=Slsqp()),
     EVOLUTION: evolution,
     GENETIC: genetic,
     SLSQP: slsqp,
@@ -191,7 +196,7 @@ SEARCHES: dict[str, Callable[[FourierProblem, int, Clock], None]] = {
 }
 
 
-RIVALS = {"de": EVOLUTION, "ga": GENETIC, "slsqp": SLSQP, "helped": HELPED}
+RIVALS = {"de": EVOLUTION, "ga": GENETIC, "slsqp": SLSQP, "helped": HELPED, "exact": EXACT}
 
 
 def run(task: Task) -> Trace:
@@ -226,10 +231,11 @@ def reached(trace: Trace, value: float) -> float:
 
 
 def tasks(budget: float, columns: list[int], seeds: int, chosen: list[str]) -> list[Task]:
-    """Every rival gets the budget once, ours half a minute a seed."""
-    rivals = [RIVALS[name] for name in chosen if name != "ga" or find_spec("pymoo")]
+    """Every rival gets the budget once; ours and SLSQP in our search get half a minute a seed."""
+    rivals = [RIVALS[name] for name in chosen if name != "exact" and (name != "ga" or find_spec("pymoo"))]
     plan = [Task(who, c, 0, budget) for c in columns for who in rivals]
-    return plan + [Task(OURS, c, s, min(OUR_SECONDS, budget)) for c in columns for s in range(seeds)]
+    paired = [EXACT, OURS] if "exact" in chosen else [OURS]
+    return plan + [Task(who, c, s, min(OUR_SECONDS, budget)) for c in columns for s in range(seeds) for who in paired]
 
 
 def table(columns: int, results: list[tuple[Task, Trace]]) -> None:
@@ -241,7 +247,7 @@ def table(columns: int, results: list[tuple[Task, Trace]]) -> None:
     for task, trace in chosen:
         cells = (f"{at(trace, m):10.2f}" if m <= task.budget + 1 else f"{'':10}" for m in MOMENTS)
         print(f"  {task.who:28}{task.seed:4}" + "".join(cells).rstrip())
-    for who in RIVALS.values():
+    for who in (rival for rival in RIVALS.values() if rival != EXACT):
         traces = [trace for task, trace in chosen if task.who == who and trace]
         if not traces:
             continue
@@ -251,6 +257,10 @@ def table(columns: int, results: list[tuple[Task, Trace]]) -> None:
         mine = float(np.median(times))
         verdict = f"{when / mine:.0f} times as fast" if np.isfinite(mine) else "which ours did not reach"
         print(f"  {who} needs {when:.0f} s to its best, {value:.2f}; ours {mine:.1f} s: {verdict}")
+    ends = [[trace[-1][1] for task, trace in chosen if task.who == who and trace] for who in (EXACT, OURS)]
+    if all(ends):
+        exact, mine = (float(np.median(values)) for values in ends)
+        print(f"  {EXACT}, at the same time: {exact:.2f}; ours {mine:.2f}; medians of the seeds")
     print()
 
 

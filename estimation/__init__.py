@@ -1,4 +1,4 @@
-"""What the logs say: models identified from measured data, with honest uncertainty."""
+"""Estimation: models identified from measured data, with realistic uncertainty."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a robot is, does and did: description, dynamics, limits, signals and the virtual robot."""
+"""Robots: description, dynamics, limits, signals and the virtual robot."""
 
 from __future__ import annotations
 

@@ -80,8 +80,8 @@ def robot_from_yaml(
     chosen = tip is not None or joints is not None or bool(locked)
     if text.geometry is not None:
         if chosen:
-            problem = "the robot is a Denavit-Hartenberg table, which leaves no joints to choose"
-            raise InputError(problem, file=path, remedy="leave out tip, joints and locked")
+            problem = "the robot is a Denavit-Hartenberg table, so tip, joints and locked do not apply"
+            raise InputError(problem, file=path, remedy="remove tip, joints and locked")
         chain = _chain(text, text.geometry)
         entries = _PerJoint(str(path), chain, chain.names)
         inertia, friction, limits = _inertia(text, text.geometry, str(path)), None, None
@@ -258,7 +258,7 @@ def _drives(text: RobotDescription, entries: _PerJoint) -> tuple[Array, Array, A
     drives = text.dynamics.drives
     at_motor = [name for name in ("rotor_inertia", "torque_constant", "motor_speed") if getattr(drives, name)]
     if drives.gear_ratio is None and at_motor:
-        problem = f"{at_motor[0]} is that of the motor; without gear_ratio it says nothing of the joint"
+        problem = f"{at_motor[0]} refers to the motor, but the gear_ratio needed to convert it is missing"
         raise InputError(problem, file=entries.file, column="dynamics.drives", remedy="state gear_ratio")
     key = "dynamics.drives"
     ratio = _values(drives.gear_ratio, entries, f"{key}.gear_ratio", 1.0)

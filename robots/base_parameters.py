@@ -1,4 +1,4 @@
-"""Which parameters a robot's torques can tell: base parameters, their regrouping, and the essential ones."""
+"""Parameters that the torques determine: base parameters, their regrouping, and the essential ones."""
 
 from __future__ import annotations
 
@@ -166,14 +166,15 @@ def find_base_parameters(
     neglected = float(np.linalg.norm(scaled - scaled[:, independent] @ combination, axis=0).max())
     if neglected > _ROUNDING:
         log.warning(
-            "%s: axes that are nearly parallel, at right angles or through one point are taken to be so "
-            "(%.1e of the regressor is neglected); angles that its description rounds, "
-            "such as 1.5708 for pi / 2, make them so",
+            (
+                "%s: axes that are nearly parallel, perpendicular or intersecting are treated as exactly so (%.1e of "
+                "the regressor is neglected). Usual cause: rounded angles in the description, such as 1.5708 for pi / 2"
+            ),
             model.robot.name,
             neglected,
         )
     grouping = combination * scale[None, :] / scale[independent][:, None]
-    # What is as small as the neglected part is noise of it.
+    # Values as small as the neglected part are its noise.
     grouping = np.where(np.abs(combination) < max(_ROUNDING, 10 * neglected), 0.0, _snap(grouping))
     grouping[:, independent] = np.eye(len(independent))
     return BaseParameters(model, tuple(independent), grouping, singular_values, neglected, others)
@@ -186,7 +187,7 @@ def _random_regressor(model: TorqueModel, samples: int, seed: int) -> Array:
     # Whole turns rather than the limits: which parameters act is the geometry's, not a narrow range's.
     half = np.where(revolute, np.pi, 1.0)
     q, dq, ddq = (rng.uniform(-1, 1, (samples, robot.n)) * factor for factor in (half, 3.0, 10.0))
-    # By CasADi's own machine: to compile or translate the expression takes longer than so few samples.
+    # CasADi's interpreter: compiling or translating the expression takes longer for so few samples.
     Y = model.symbolic().map(samples)(q.T, dq.T, ddq.T).full().reshape(robot.n, samples, model.size)
     return np.asarray(Y.transpose(1, 0, 2).reshape(samples * robot.n, model.size))
 
@@ -219,8 +220,8 @@ def _confirm(singular_values: Array, kept: int) -> None:
     rank = int(np.sum(singular_values > _ROUNDING * singular_values[0]))
     if kept > rank:
         raise NotIdentifiableError(
-            f"{kept} base parameters by QR, {rank} by SVD: columns that differ by rounding were kept",
-            remedy="state a larger tolerance",
+            f"{kept} base parameters by QR, {rank} by SVD: columns that differ only by rounding were kept",
+            remedy="use a larger tolerance",
         )
 
 

@@ -82,7 +82,7 @@ def normalised_eigenvalues(parameters: ArrayLike) -> Array:
         parameters: (..., 10), see `pseudo_inertia`.
 
     Returns:
-        (..., 4) ascending; all positive for a body that can exist.
+        (..., 4) ascending; all positive for a physically possible body.
     """
     pseudo = pseudo_inertia(parameters)
     mass, trace = pseudo[..., 3, 3], np.trace(pseudo[..., :3, :3], axis1=-2, axis2=-1)
@@ -94,7 +94,7 @@ def normalised_eigenvalues(parameters: ArrayLike) -> Array:
 
 
 def entropic_distance(parameters: ArrayLike, reference: ArrayLike) -> Array:
-    """Measures how far bodies are from references, whatever the frame and the units.
+    """Measures the distance of bodies from references, independent of frame and units.
 
     ``-log det(P P0^-1) + tr(P0^-1 P) - 4``, the Bregman divergence of log det (Lee, Wensing, Park 2020,
     10.1109/TRO.2019.2926491).

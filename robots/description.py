@@ -1,4 +1,4 @@
-"""What a robot's YAML file may hold: keys, types, units and the sources of its values."""
+"""Schema of a robot's YAML file: keys, types, units and the sources of values."""
 
 from __future__ import annotations
 
@@ -227,9 +227,9 @@ class RobotDescription(Config):
         if (self.geometry is None) == (self.urdf is None):
             raise ValueError("a robot has either 'geometry' or 'urdf'")
         if self.geometry is not None and (self.tip or self.joints or self.locked):
-            raise ValueError("'tip', 'joints' and 'locked' choose among a URDF's joints; 'geometry' has no choice")
+            raise ValueError("'tip', 'joints' and 'locked' select joints of a URDF; they do not apply to 'geometry'")
         if self.urdf is not None and (self.base or self.flange or self.dynamics.links):
-            raise ValueError("'base', 'flange' and 'dynamics.links' belong to 'geometry'; a URDF states them itself")
+            raise ValueError("'base', 'flange' and 'dynamics.links' belong to 'geometry'; a URDF contains them")
         return self
 
     def assumed(self) -> Iterator[str]:

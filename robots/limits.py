@@ -1,4 +1,4 @@
-"""What the joints may do, and how far a motion stays from it."""
+"""Limits of the joints, and a motion's margins to them."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from robots.common.files import existing_file
 from robots.robot import Robot
 
 CATALOG = Path(__file__).parent / "catalog"
-_warned: set[str] = set()  # robots whose assumed values this process was told of
+_warned: set[str] = set()  # robots whose assumed values were already reported in this process
 
 
 def catalogue() -> tuple[str, ...]:
@@ -64,7 +64,7 @@ def load_robot(
             robot = robot_from_yaml(path, str(path), tip, joints, locked)
     if robot.assumed and robot.origin not in _warned:
         _warned.add(robot.origin)
-        message = f"{robot.name}: these values are assumed, no source backs them: {', '.join(robot.assumed)}"
+        message = f"{robot.name}: these values are assumptions without a source: {', '.join(robot.assumed)}"
         warnings.warn(message, AssumedValueWarning, stacklevel=2)
     return robot
 
@@ -78,7 +78,9 @@ def _robot_file(spec: str | Path) -> Path:
     if suffix == ".xacro":
         raise InputError("a xacro file", file=text, remedy="expand it first: xacro FILE.xacro > FILE.urdf")
     if text and path.exists():
-        raise InputError("not a robot file by its name", file=text, allowed=".urdf, .yaml or .yml")
+        raise InputError(
+            "the file name does not end like that of a robot file", file=text, allowed=".urdf, .yaml or .yml"
+        )
     close = get_close_matches(text.lower(), catalogue(), n=1, cutoff=0.4)
     raise InputError(
         f"unknown robot {text!r}",

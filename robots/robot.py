@@ -1,4 +1,4 @@
-"""What is known of a robot before any experiment: geometry, limits and nominal dynamics."""
+"""Description of a robot before any experiment: geometry, limits and nominal dynamics."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ class Robot:
         return bool(np.isfinite(self.inertia).all())
 
 
-# What was compiled for a robot is kept by the robot: a new one for every log would compile it anew.
+# The robot keeps its compiled functions, so that they are not compiled again for each log.
 @lru_cache(maxsize=64)
 def _standing(robot: Robot, gravity: tuple[float, ...]) -> Robot:
     return replace(robot, chain=Chain(robot.chain.joints, gravity=np.array(gravity), tip=robot.chain.tip))

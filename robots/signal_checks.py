@@ -78,7 +78,7 @@ def require_finite(name: str, array: FloatArray, *, joints: bool, nan_allowed: b
         column=name,
         row=row + 1,
         joint=column + 1 if joints else None,
-        allowed="finite numbers, or nan where a sensor was silent" if nan_allowed else "finite numbers",
+        allowed="finite numbers, or nan where a sensor gave no value" if nan_allowed else "finite numbers",
     )
 
 

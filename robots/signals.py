@@ -125,7 +125,9 @@ class Motion(_Samples):
             offset = 0.0
             if shift:
                 if len(before) < 2:
-                    raise InputError(f"motion {index - 1} has one sample: its step is unknown", remedy="set the times")
+                    raise InputError(
+                        f"motion {index - 1} has one sample, so its time step is unknown", remedy="set the start times"
+                    )
                 offset = float(times[-1][-1] + (before.t[-1] - before.t[-2]) - motion.t[0])
             times.append(motion.t + offset)
         parts = (np.concatenate([getattr(motion, name) for motion in motions]) for name in ("q", "dq", "ddq"))
@@ -144,7 +146,7 @@ class Log(_Samples):
         dq: joint velocities [rad/s], (N, n).
         ddq: joint accelerations [rad/s^2], (N, n).
         temperature: joint temperatures [degC], (N, n); NaN where a sensor was silent.
-        ambient: temperature of the surroundings [degC], (N,); NaN where the sensor was silent.
+        ambient: ambient temperature [degC], (N,); NaN where the sensor was silent.
         qlink: positions behind the gears [rad], (N, n); NaN throughout for a joint that has no encoder there.
         segment: whole number of the part of an experiment, (N,).
         cycle: whole number of the repetition of an experiment, (N,).

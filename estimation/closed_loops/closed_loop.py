@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 ROUNDS, NEWTON_ROUNDS, NEWTON_STEPS = 12, 3, 3
 # Samples handed to CasADi's loop at a time.
 CHUNK = 1000
-# Of a controller that nobody declared [rad/s].
+# Bandwidth of an undeclared controller [rad/s].
 BANDWIDTH = 60.0
 
 
@@ -45,7 +45,7 @@ class Controller:
         for name in ("proportional", "derivative"):
             gains = np.array(getattr(self, name), dtype=float)
             if gains.ndim != 1 or not (np.isfinite(gains) & (gains >= 0)).all():
-                raise InputError(f"{name} gains {gains}", allowed="numbers that are zero or more, one a joint")
+                raise InputError(f"{name} gains {gains}", allowed="numbers that are zero or more, one per joint")
             object.__setattr__(self, name, gains)
         if self.proportional.shape != self.derivative.shape:
             raise InputError(f"{len(self.proportional)} and {len(self.derivative)} gains", allowed="one each a joint")
@@ -85,9 +85,9 @@ def inertia_matrices(base: BaseParameters, values: Array, motion: Motion, count:
 class ClosedLoop:
     """Simulates base parameters under a controller.
 
-    The step is an implicit midpoint rule in which inertia and the smooth torques are taken at the predicted midpoint,
-    and the controller's damping and dry friction at the unknown velocity itself: Coulomb friction may hold a joint, and
-    costs no small steps. Second order in the step.
+    The integration is an implicit midpoint rule of second order. Inertia and smooth torques are evaluated at the
+    predicted midpoint, the controller's damping and dry friction at the unknown velocity. Coulomb friction can
+    therefore hold a joint without small steps.
 
     Args:
         base: base parameters of the model (b).
@@ -133,7 +133,8 @@ class ClosedLoop:
             state = outcome[:, -1]
             if not np.isfinite(state).all() or np.abs(state[:n] - reference.q).min(axis=0).max() > 1e3:
                 raise SolverError(
-                    "the simulated closed loop is not stable", remedy="state the controller's gains, or start from WLS"
+                    "the simulated closed loop is not stable",
+                    remedy="state the real controller's gains, or start from a WLS fit",
                 )
         path = np.concatenate(states, axis=1)
         # Accelerations are those of the steps: at a sample, the mean of the steps before and after.

@@ -37,7 +37,7 @@ class Parameter:
     determined: bool
 
     @property
-    def told(self) -> str:
+    def text(self) -> str:
         """Its name, with its interval where it has one, or its value where that was chosen among a few."""
         low, high = self.ci95
         if not np.isfinite([low, high]).all():

@@ -11,7 +11,6 @@ from estimation.diagnosis.base_models.baseline import base_parameters
 from estimation.diagnosis.base_models.payload_and_gravity import subtract_known_payload
 from estimation.diagnosis.experiment_plans.detection_limits import find_limits
 from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
-from estimation.diagnosis.hypothesis_tests.residual_shares import residual_shares
 from estimation.diagnosis.hypothesis_tests.scan import measure
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.log_repair import repair_log
@@ -19,6 +18,7 @@ from estimation.diagnosis.recordings.unusable_logs import find_unusable_logs
 from estimation.diagnosis.results.assembly import DiagnosisInputs, assemble
 from estimation.diagnosis.results.diagnosis import Diagnosis
 from estimation.diagnosis.searches.search import search
+from estimation.diagnosis.validations.residual_shares import residual_shares
 from estimation.diagnosis.validations.verdict import decide_verdict
 from estimation.logs.clocks import put_on_clock
 from robots.common.errors import InputError, NotIdentifiableError
@@ -79,7 +79,7 @@ def diagnose(
     if not data:
         raise InputError("no logs", allowed="one or more")
     if not 0 < false_alarm < 0.5:
-        raise InputError(f"a false-alarm probability of {false_alarm}", allowed="between 0 and 0.5")
+        raise InputError(f"false-alarm probability {false_alarm}", allowed="between 0 and 0.5")
     effects = _effects(candidates)
     bar = progress or SILENT
     bar.start("diagnosing", 1.0)
@@ -107,21 +107,21 @@ def diagnose(
             recording = subtract_known_payload(robot, build_recording(robot, data))
         searched = search(base, recording, effects, false_alarm, seed, bar)
         problem, selection, entries = searched.problem, searched.selection, searched.entries
-        bar.update(0.75, "limits of what the logs can show")
+        bar.update(0.75, "detection limits")
         limits = find_limits(problem, entries, false_alarm=false_alarm)
         # The columns of all hypotheses are most of what is kept: those of the patterns take their room.
         del searched, entries
         give_back()
-        bar.update(0.83, "what is left")
+        bar.update(0.83, "unexplained residual")
         patterns = measure(problem, all_hypotheses(robot, list(all_patterns(robot))))
         judgement = decide_verdict(problem, selection, patterns, false_alarm, np.random.default_rng(seed + 2))
-        bar.update(0.93, "gain on unseen data")
+        bar.update(0.93, "validation on held-out data")
         del patterns
         give_back()
         told = DiagnosisInputs(
             problem=problem,
             selection=selection,
-            judgement=judgement,
+            verdict=judgement,
             limits=limits,
             excess=residual_shares(problem),
             logs=tuple(data),
@@ -137,8 +137,8 @@ def diagnose(
 
 
 _UNUSABLE = (
-    "Log {}{} is left out: fitted to it alone, the base model still leaves {:.0f} % of the torque on every joint. It "
-    "says nothing of what the arm is like; look at its torque."
+    "Log {}{} is left out: even when fitted to this log alone, the base model leaves {:.0f} % of the torque on every "
+    "joint. Check its torque signal."
 )
 
 

@@ -1,4 +1,4 @@
-"""What an estimator is: how much each joint's rows count, and what more it makes of the data."""
+"""Interface of estimators: weights of the joints' rows, and further results."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Solution:
-    """What an estimator found.
+    """Result of an estimator.
 
     Attributes:
         values: base parameters (b,).

@@ -30,14 +30,14 @@ Array = NDArray[np.float64]
 
 # Smallest eigenvalue of a pseudo-inertia, in units in which the reference body's trace is 2.
 EPSILON = 1e-5
-# What is closer to its bound than this share of its own scale lies at it.
+# A value closer to its bound than this fraction of its scale counts as at the bound.
 AT = 1e-4
-# Of the pull, in units of the data's whole misfit; chosen from, on blocks that were left out.
+# Weights of the prior, in units of the data's whole misfit; chosen by cross-validation.
 PULLS = (1e-5, 1e-4, 1e-3, 1e-2)
 BLOCKS = 4
-# A stronger pull is taken where its left-out error is at most this much worse in mean log.
+# A stronger prior is used if its held-out error is at most this much worse (mean log).
 SLACK = 0.002
-# Of the torque's square, the misfit that counts as exact.
+# Misfit that counts as exact, as a fraction of the squared torque.
 SMALLEST_MISFIT = 1e-4
 # Keeps parameters that the data do not touch where they are; far below what data say of any other.
 FAINT = 1e-9
@@ -45,7 +45,7 @@ FAINT = 1e-9
 
 @dataclass(frozen=True)
 class _Problem:
-    """Constraints and pull in scaled units; the data come with each solve."""
+    """Constraints and prior in scaled units; the data come with each solve."""
 
     grouping: Array  # (b, p), scaled
     scaling: Scaling
@@ -150,7 +150,7 @@ class PhysicallyConsistent(WeightedLeastSquares):
         if pull not in ("entropic", "euclidean"):
             raise InputError(f"pull {pull!r}", allowed="entropic, euclidean")
         if weight is not None and not (np.isfinite(weight) and weight > 0):
-            raise InputError(f"a pull of weight {weight}", allowed="a positive number, or None")
+            raise InputError(f"a prior of weight {weight}", allowed="a positive number, or None")
         self.pull, self.weight = pull, weight
         self.boxes = None if boxes is None else {int(link): _box(link, corners) for link, corners in boxes.items()}
 
@@ -182,7 +182,10 @@ class PhysicallyConsistent(WeightedLeastSquares):
         eigenvalues = normalised_eigenvalues(standard[units.bodies]) if len(units.bodies) else np.zeros((0, 4))
         if not (eigenvalues > 0).all():
             link = int(np.argmin(eigenvalues.min(axis=1))) + 1
-            raise SolverError(f"physically consistent fit: link {link} is no body", remedy="give a larger pull weight")
+            raise SolverError(
+                f"physically consistent fit: the parameters of link {link} are not those of a physical body",
+                remedy="use a larger prior weight",
+            )
         margins = problem.rows @ (standard / units.scale)
         alone = (np.count_nonzero(rows, axis=1) == 1) & (margins < AT)
         flat = np.flatnonzero((eigenvalues < AT).any(axis=1)) + 1
@@ -209,7 +212,7 @@ class PhysicallyConsistent(WeightedLeastSquares):
         return boxes
 
     def _weight(self, problem: _Problem, data: RegressionData, weights: Array) -> float:
-        """The strongest pull whose left-out error is as good as the best."""
+        """The strongest prior whose held-out error is as good as the best."""
         blocks = data.blocks(BLOCKS)
         if len(blocks) < 2:
             return PULLS[0]
@@ -237,7 +240,7 @@ def standard_of(solution: Solution) -> Array | None:
 
 
 def _level(moments: Moments, weights: Array, ridge: float) -> float:
-    """The weighted misfit of least squares, floored at a per cent of the torque: an exact fit still leaves a pull."""
+    """The weighted misfit of least squares, floored at a per cent of the torque: an exact fit still keeps a prior."""
     values = moments.solve(weights, max(ridge, 1e-12))
     floor = SMALLEST_MISFIT * float(weights @ moments.square)
     return max(float(weights @ (np.maximum(moments.count, 1) * moments.level(values) ** 2)), floor)

@@ -12,14 +12,14 @@ from scipy.linalg import null_space
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.wls import WeightedLeastSquares
 from estimation.regressions.covariances import FAINT as OPEN
-from estimation.regressions.covariances import Equations, honest_covariance, regressor_rows
+from estimation.regressions.covariances import Equations, regressor_rows, robust_covariance
 from estimation.regressions.regression_data import RegressionData
 from estimation.regressions.regularisation import regularisation
 from estimation.regressions.standard_parameters import body_columns, largest_speed, nonnegative_rows, scaling
 from robots.common.errors import InfeasibleError, InputError, SolverError
 from robots.regressor import TorqueModel
 
-# Pulls what the data leave open towards the description, or a plausible arm; far below what they say of the rest.
+# Weak prior for undetermined directions: the description, or a plausible arm. Far below the data's information.
 FAINT = 1e-8
 # A parameter within this share of its own scale of a bound lies at it.
 AT = 1e-6
@@ -129,7 +129,7 @@ class ConstrainedLeastSquares(WeightedLeastSquares):
         if self.total_mass is not None:
             bodies = body_columns(model)
             if not len(bodies):
-                raise InputError("a total mass, but the model has no links", remedy="leave it out")
+                raise InputError("a total mass, but the model has no links", remedy="remove the total mass")
             row = np.zeros((1, model.size))
             row[0, bodies[:, 0]] = 1.0
             rows = np.vstack([rows, row])
@@ -155,7 +155,7 @@ def _covariance(data: RegressionData, values: Array, weights: Array, grouping: A
         )
         for part in data.parts
     ]
-    return honest_covariance(equations, weights, gram, (inverse + inverse.T) / 2)
+    return robust_covariance(equations, weights, gram, (inverse + inverse.T) / 2)
 
 
 def _solve(matrix: Array, target: Array, rows: Array, lower: Array, upper: Array) -> Array:
@@ -171,11 +171,11 @@ def _solve(matrix: Array, target: Array, rows: Array, lower: Array, upper: Array
     try:
         problem.solve(solver=cvxpy.CLARABEL, max_threads=1)
     except cvxpy.error.SolverError as error:
-        raise SolverError(f"constrained fit: {error}", remedy="check the bounds' sizes") from error
+        raise SolverError(f"constrained fit: {error}", remedy="check the bounds") from error
     if problem.status in (cvxpy.INFEASIBLE, cvxpy.INFEASIBLE_INACCURATE):
-        raise InfeasibleError("constrained fit: no parameters obey all bounds", remedy="loosen the bounds")
+        raise InfeasibleError("constrained fit: no parameters obey all bounds", remedy="relax the bounds")
     if problem.status not in (cvxpy.OPTIMAL, cvxpy.OPTIMAL_INACCURATE):
-        raise SolverError(f"constrained fit: Clarabel ended with {problem.status}", remedy="check the bounds' sizes")
+        raise SolverError(f"constrained fit: Clarabel ended with {problem.status}", remedy="check the bounds")
     return np.asarray(x.value, dtype=float)
 
 

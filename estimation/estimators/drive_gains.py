@@ -19,7 +19,7 @@ from robots.signals import Motion
 ROUNDS = 8
 # Gains have settled when none moves by more than this share.
 SETTLED = 1e-6
-# Of the smallest to the largest eigenvalue of the scaled normal equations: below it some gain is not told.
+# Ratio of smallest to largest eigenvalue of the scaled normal equations, below which a gain is undetermined.
 REGULAR = 1e-13
 
 
@@ -93,7 +93,9 @@ def fit_drive_gains(base: BaseParameters, runs: Sequence[CurrentRun]) -> DriveGa
     """
     bodies = [k for k, column in enumerate(base.model.columns) if column.term == "rigid_body"]
     if not any(run.payload is not None for run in runs):
-        raise InputError("no run with a known payload", remedy="gains need a torque that is known: give a payload")
+        raise InputError(
+            "no run with a known payload", remedy="drive gains need a known torque: give a run with a known payload"
+        )
     n, size = base.model.robot.n, base.size
     total = np.zeros((n, size + n + 1, size + n + 1))
     count = np.zeros(n)
@@ -140,7 +142,8 @@ def _fit(total: Array, count: Array, size: int, n: int) -> DriveGains:
         lengths = np.linalg.eigvalsh(scaled)
         if lengths[0] < REGULAR * lengths[-1]:
             raise NotIdentifiableError(
-                "the runs leave drive gains open", remedy="move every joint, under a payload that each of them feels"
+                "the runs do not determine all drive gains",
+                remedy="move every joint, with a payload that loads each of them",
             )
         solution = np.linalg.solve(scaled, right / scale) / scale
         before, gains = gains, solution[size:]

@@ -10,7 +10,7 @@ import numpy as np
 
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.wls import WeightedLeastSquares
-from estimation.regressions.covariances import Equations, honest_covariance, regressor_rows
+from estimation.regressions.covariances import Equations, regressor_rows, robust_covariance
 from estimation.regressions.moments import Moments
 from estimation.regressions.regression_data import RegressionData
 from estimation.regressions.regularisation import torque_change
@@ -84,7 +84,7 @@ class ReweightedLeastSquares(WeightedLeastSquares):
             regressor = partial(regressor_rows, data.base, motion, gravity=part.gravity)
             equations.append(Equations(len(motion), regressor, part.mask, residual * self.factors(share)))
         slope = np.maximum(slope / np.maximum(data.moments.count, 1), LEAST_SLOPE)
-        return honest_covariance(equations, weights, np.tensordot(weights * slope, data.moments.gram, axes=1))
+        return robust_covariance(equations, weights, np.tensordot(weights * slope, data.moments.gram, axes=1))
 
     def _settle(self, data: RegressionData, values: Array) -> tuple[Array, Array]:
         scale = _scale(data, values)
@@ -99,7 +99,7 @@ class ReweightedLeastSquares(WeightedLeastSquares):
 
 
 class Huber(ReweightedLeastSquares):
-    """rho quadratic up to the tuning and linear beyond: outliers pull with a bounded force (Huber 1964)."""
+    """rho quadratic up to the tuning and linear beyond: outliers have a bounded influence (Huber 1964)."""
 
     name = "huber"
 

@@ -35,7 +35,7 @@ class InstrumentalVariables(SimulatingEstimator):
 
         Raises:
             InputError: references that do not suit the logs.
-            SolverError: a simulation that is not stable, or instruments that tell nothing.
+            SolverError: the simulation is not stable, or the instruments are not correlated with some parameters.
         """
         instruments = Instruments(data, self.loop)
         level = data.moments.level(values)
@@ -64,4 +64,4 @@ def _solve(matrix: Array, right: Array) -> Array:
     try:
         return solve_scaled(matrix, right)
     except np.linalg.LinAlgError as error:
-        raise SolverError("instrumental variables: the instruments tell nothing of some parameters") from error
+        raise SolverError("instrumental variables: the instruments are not correlated with some parameters") from error

@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.wls import WeightedLeastSquares
-from estimation.regressions.covariances import Equations, honest_covariance, regressor_rows
+from estimation.regressions.covariances import Equations, regressor_rows, robust_covariance
 from estimation.regressions.regression_data import CHUNK, FittedRows, RegressionData
 from estimation.regressions.regularisation import regularisation, solve_scaled
 
@@ -86,7 +86,7 @@ def _covariance(data: RegressionData, values: Array, precision: Array) -> Array:
         for start in range(0, len(motion), CHUNK):
             flat = rows(start, min(start + CHUNK, len(motion))).reshape(-1, size)
             gram += flat.T @ flat
-    return honest_covariance(equations, np.ones(len(root)), gram)
+    return robust_covariance(equations, np.ones(len(root)), gram)
 
 
 def _noise(data: RegressionData, values: Array) -> Array:

@@ -59,7 +59,7 @@ class Payload:
 
     @property
     def eigenvalues(self) -> Array:
-        """Of the normalised pseudo-inertia (4,): all positive for a body that can exist."""
+        """Eigenvalues of the normalised pseudo-inertia (4,): all positive for a physically possible body."""
         return normalised_eigenvalues(self.parameters)
 
 
@@ -146,7 +146,7 @@ def _minimum_norm(moments: Moments, weights: Array) -> tuple[Array, Array, NDArr
     gram = np.tensordot(weights, moments.gram, axes=1)
     scale = np.sqrt(np.diag(gram))
     if not scale.any():
-        raise NotIdentifiableError("the run moves no payload", remedy="record a run in which the arm moves")
+        raise NotIdentifiableError("the payload does not move in the run", remedy="record a run in which the arm moves")
     # Columns of moments of inertia are weaker than that of the mass, not unseen: each is measured by itself.
     used = np.where(scale > UNSEEN * scale.max(), scale, np.inf)
     lengths, vectors = np.linalg.eigh(gram / used[:, None] / used)

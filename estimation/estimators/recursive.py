@@ -103,7 +103,7 @@ class Stream:
         """The estimate now (b,).
 
         Raises:
-            NotIdentifiableError: the stream does not determine all parameters yet.
+            NotIdentifiableError: the data do not yet determine all parameters.
         """
         return self.solution()[0]
 
@@ -111,7 +111,7 @@ class Stream:
     def covariance(self) -> Array:
         """Covariance of the estimate now (b, b), the weights being inverse noise variances up to one common factor.
 
-        White noise is taken for granted: where the residual is coloured it is too small.
+        White noise is assumed: if the residual is correlated in time, it is too small.
         """
         values, inverse = self.solution()
         misfit = max(self._misfit - float(values @ self.right), 0.0)
@@ -124,7 +124,7 @@ class Stream:
             extra: information (b, b) and right-hand side (b,) of a regularisation, which the stream does not keep.
 
         Raises:
-            NotIdentifiableError: the stream does not determine all parameters yet.
+            NotIdentifiableError: the data do not yet determine all parameters.
         """
         information, right = self.information, self.right
         if extra is not None:
@@ -136,7 +136,7 @@ class Stream:
             factor = cho_factor(matrix)
         except np.linalg.LinAlgError as error:
             raise NotIdentifiableError(
-                "the stream does not determine all parameters yet", remedy="give a prior covariance, or more data"
+                "the data do not yet determine all parameters", remedy="give a prior covariance, or more data"
             ) from error
         inverse = cho_solve(factor, np.eye(len(scale))) / scale[:, None] / scale
         return cho_solve(factor, right / scale) / scale, inverse

@@ -1,4 +1,4 @@
-"""What estimators share that simulate the identified robot under its controller."""
+"""Shared part of estimators that simulate the identified robot under its controller."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from estimation.closed_loops.closed_loop import ClosedLoop, Controller, inertia_
 from estimation.estimators.base import Array
 from estimation.estimators.consistent import PhysicallyConsistent
 from estimation.estimators.wls import WeightedLeastSquares
-from estimation.regressions.covariances import Equations, honest_covariance, regressor_rows
+from estimation.regressions.covariances import Equations, regressor_rows, robust_covariance
 from estimation.regressions.moments import Moments
 from estimation.regressions.position_noise import smoothed_noise
 from estimation.regressions.regression_data import FittedRows, RegressionData
@@ -40,7 +40,7 @@ PULL = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class Loop:
-    """What is known of the control loop that made the logs.
+    """The control loop of the logs, as far as it is known.
 
     Attributes:
         controller: None for a stiff one with the model's own feedforward.
@@ -152,7 +152,7 @@ class Instruments:
             moments = simulated_moments(self.data, part, motion, mask)
             total = moments if total is None else total + moments
         assert total is not None
-        return honest_covariance(equations, weights, np.tensordot(weights, total.gram, axes=1))
+        return robust_covariance(equations, weights, np.tensordot(weights, total.gram, axes=1))
 
 
 def instrumented_moments(data: RegressionData, part: FittedRows, motion: Motion, mask: Array) -> tuple[Array, Array]:
@@ -192,7 +192,7 @@ def _assigned(references: Sequence[Motion], parts: Sequence[FittedRows]) -> list
         last = float(t[-1])
         found.append(references[min(index, len(references) - 1)])
     if index != len(references) - 1:
-        raise InputError(f"{len(references)} references", allowed=f"{index + 1}, one a log")
+        raise InputError(f"{len(references)} references", allowed=f"{index + 1}, one per log")
     return found
 
 

@@ -121,7 +121,7 @@ class _Problem:
             return solve_triangular(lower.T, inner) / scale, mu
         except np.linalg.LinAlgError as error:
             raise SolverError(
-                "total least squares: the motion's noise outweighs the motion",
+                "total least squares: the noise of the motion is larger than the motion",
                 remedy="smooth more, or state smaller noise",
             ) from error
 

@@ -1,4 +1,4 @@
-"""What one does with an identified model: an updated URDF, and C code for a controller."""
+"""Exports of an identified model: an updated URDF, and C code for a controller."""
 
 from estimation.exports.c_code import c_code, export_c
 from estimation.exports.standard import standard_parameters

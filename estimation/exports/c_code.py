@@ -63,7 +63,9 @@ def c_code(model: Model, *, prefix: str = "robot") -> str:
         InputError: a model with extensions, which stand for more than its regressor.
     """
     if model.extensions:
-        raise InputError("a model with extensions cannot be written as C", remedy="export the model they extend")
+        raise InputError(
+            "a model with extensions cannot be exported as C code", remedy="export the base model (from oed identify)"
+        )
     torque, gravity = _functions(model, prefix)
     options: dict[str, Any] = {"with_header": False, "casadi_int": "int", "verbose": False}
     generator = casadi.CodeGenerator(f"{prefix}_model", options)

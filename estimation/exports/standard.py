@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 # Smallest eigenvalue of a pseudo-inertia, in units of the link's own mass and reach.
 MARGIN = 1e-6
-REMEDY = "identify with the method consistent, which fits bodies that can exist"
+REMEDY = "identify with --method consistent, which fits physically possible bodies"
 
 
 def standard_parameters(model: Model, inertia: Array | None = None) -> Array:
@@ -47,7 +47,10 @@ def standard_parameters(model: Model, inertia: Array | None = None) -> Array:
     described = np.asarray(model.robot.inertia if inertia is None else inertia, dtype=float)
     if not np.isfinite(described).all():
         raise InputError(
-            f"{model.robot.name}: the description states no inertial parameters to complete the identified ones with",
+            (
+                f"{model.robot.name}: the robot's description states no inertial parameters, which are needed to "
+                f"complete the identified ones"
+            ),
             remedy=REMEDY,
         )
     base = find_base_parameters(torque_model, gravities=model.gravities)
@@ -55,7 +58,7 @@ def standard_parameters(model: Model, inertia: Array | None = None) -> Array:
         raise InputError("the model's parameters are not the robot's base parameters", remedy="identify it again")
     own = [i for i, column in enumerate(base.columns) if column.term == "rigid_body"]
     grouping = base.grouping[np.ix_(own, rigid)]
-    # What is grouped with a rotor's inertia stays with the link: a URDF knows no rotors.
+    # Parameters grouped with a rotor's inertia stay with the link, because a URDF has no rotors.
     return _nearest(grouping, model.values[own], described)
 
 
@@ -78,10 +81,12 @@ def _nearest(grouping: Array, values: Array, described: Array) -> Array:
     try:
         found = program.solve(np.eye(SIZE * n), -start.reshape(-1), "standard parameters")
     except InfeasibleError as error:
-        raise InfeasibleError("no bodies that can exist have the identified base parameters", remedy=REMEDY) from error
+        raise InfeasibleError(
+            "no physically possible bodies have the identified base parameters", remedy=REMEDY
+        ) from error
     # Onto the base parameters to the last digit: the solver stops at some 1e-8.
     found = found + scaled.T @ np.linalg.solve(scaled @ scaled.T, values - scaled @ found)
     standard = np.asarray(found.reshape(n, SIZE) * spread)
     if not (normalised_eigenvalues(standard) > 0).all():
-        raise InfeasibleError("no bodies that can exist have the identified base parameters", remedy=REMEDY)
+        raise InfeasibleError("no physically possible bodies have the identified base parameters", remedy=REMEDY)
     return standard

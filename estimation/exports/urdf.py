@@ -41,9 +41,9 @@ def export_urdf(model: Model, path: str | Path, *, robot: Robot | None = None, f
 def urdf_text(model: Model, robot: Robot | None = None) -> str:
     """Writes the URDF of `export_urdf` as text.
 
-    Where the robot came from a URDF, its file is kept, meshes and all, and only inertials change: the link that a joint
-    moves gets all the inertia that moves with it, and links that are fixed to it, or locked, lose theirs. Any other
-    robot gets a plain chain.
+    If the robot came from a URDF, its file is kept with its meshes, and only the inertials change. The link that a
+    joint moves gets all the inertia that moves with it; links fixed or locked to it lose theirs. Any other robot gets a
+    plain chain.
     """
     known = robot or model.robot
     inertia = standard_parameters(model, None if robot is None else np.asarray(robot.inertia))
@@ -60,7 +60,7 @@ def _updated(source: Path, robot: Robot, inertia: Array) -> Element:
     try:
         root = ElementTree.fromstring(source.read_bytes())
     except (OSError, ElementTree.ParseError) as error:
-        raise InputError(f"cannot be read again: {error}", file=source) from error
+        raise InputError(f"the written URDF could not be read back: {error}", file=source) from error
     links = {link.get("name"): link for link in root.findall("link")}
     moving = set(robot.joint_names)
     bodies: dict[str | None, str | None] = {}
@@ -68,7 +68,7 @@ def _updated(source: Path, robot: Robot, inertia: Array) -> Element:
     for _, child, name in ends:
         if name in moving:
             bodies[child] = name
-    # What hangs on a moved link without a moving joint between moves with it.
+    # Links that are rigidly attached to a moved link move with it.
     pending = list(bodies)
     while pending:
         parent = pending.pop()

@@ -1,4 +1,4 @@
-"""The gate before any fit: what is wrong with a log, how badly, and what to do about it."""
+"""Checks of a log before any fit: its faults, their severity, and what to do."""
 
 from estimation.gate.finding import Finding
 from estimation.gate.gate import check_log

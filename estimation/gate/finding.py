@@ -11,11 +11,11 @@ SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """What was found, how much of it, and what follows.
+    """One finding of a check.
 
     Attributes:
         name: the kind of finding, such as ``gap`` or ``unit_of_position``.
-        severity: ``info`` (the fit bears it), ``warning`` (the result suffers), ``refuse`` (the fit would be wrong).
+        severity: ``info`` (harmless), ``warning`` (the result is worse), ``refuse`` (the fit would be wrong).
         text: what was found, in one clause.
         action: what was done about it, or what to do.
         value: the number behind it.

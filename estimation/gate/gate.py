@@ -47,10 +47,10 @@ Array = NDArray[np.float64]
 
 # Rows by which the smoothing is chosen, and without which nothing is fitted.
 CHOICE_ROWS, FEWEST_ROWS = 1500, 60
-# How much worse (mean log error) a higher cut-off may predict and still be taken: it tells more of inertias; and
+# A higher cut-off is used if its error is at most this much worse (mean log): it shows inertias better; and
 # for the delays, which a low one hides.
 SLACK, SHARP_SLACK = 0.03, 0.3
-# By how much another unit must explain the torque better (mean log error) to be the right one.
+# Improvement (mean log error) with another unit, from which it counts as the right one.
 BETTER = 0.1
 
 

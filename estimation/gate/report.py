@@ -1,4 +1,4 @@
-"""What the gate says of a log."""
+"""Result of the checks of a log."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 # Fewer samples than this carry no derivatives.
 FEWEST = 20
 # Findings of a log that is in order and still does not determine what is asked for.
-UNTOLD = frozenset({"badly_excited"})
+NO_INFORMATION = frozenset({"badly_excited"})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,15 +37,15 @@ class GateReport:
         findings: the worst first.
         parts: (first, stop) sample indices of the stretches without a gap, and in which no column hung; what lies
             between is not bridged.
-        spikes: indices of single rows that stick out of their neighbours, which a fit must leave out.
-        stale: indices of rows that are not of their time, which a fit must leave out: those that repeat the row before
-            while the arm moves, where they are many, and those that were written late, it cannot be told by how much.
-        t: times of the rows [s], those that were written late set back where it can.
-        delay: by which the torque lags the position (n,) [s], NaN where the log does not tell.
+        spikes: indices of outliers in single rows, which a fit must leave out.
+        stale: indices of rows with wrong times, which a fit must leave out: repetitions of the row before while the arm
+            moves, if they are many, and rows that were written late by an unknown time.
+        t: times of the rows [s], corrected for rows that were written late, if possible.
+        delay: by which the torque lags the position (n,) [s], NaN if the log does not determine it.
         delay_error: its standard error (n,) [s].
-        unexplained: torque error on stretches that the fit had not seen over the torque's standard deviation (n,), by
+        unexplained: torque error on held-out data divided by the torque's standard deviation (n,), by
             a quick fit of rigid body and friction; NaN without torque.
-        information: what the log tells of each joint's own parameters: inertia or friction losses over their standard
+        information: evidence for each joint's own parameters: inertia or friction losses over their standard
             errors, the larger of the two (n,); NaN without torque.
     """
 
@@ -82,15 +82,15 @@ class GateReport:
         """Refuses the log with its first reason and the number of the others.
 
         Raises:
-            NotIdentifiableError: nothing is wrong with the log but that no joint's torque follows from its motion.
-            InputError: anything else that would be fitted wrongly.
+            NotIdentifiableError: the only fault is that the motion does not explain any joint's torque.
+            InputError: any other fault that would spoil the fit.
         """
         reasons = self.of("refuse")
         if not reasons:
             return
         first = reasons[0]
         more = f" (and {len(reasons) - 1} more: {', '.join(_names(reasons[1:]))})" if len(reasons) > 1 else ""
-        kind = NotIdentifiableError if all(reason.name in UNTOLD for reason in reasons) else InputError
+        kind = NotIdentifiableError if all(reason.name in NO_INFORMATION for reason in reasons) else InputError
         raise kind(
             f"{first.text}{more}",
             file=self.log or None,
@@ -101,19 +101,19 @@ class GateReport:
         )
 
     def usable(self, log: Log) -> tuple[Log, ...]:
-        """Leaves out spikes and stale rows, and cuts the log at its gaps, so that nothing is interpolated across them.
+        """Removes outliers and repeated rows, and splits the log at its gaps.
 
         Args:
             log: the log that was checked.
 
         Returns:
-            Its stretches of 20 samples or more; the log itself where nothing is wrong with it.
+            Its parts of 20 samples or more; the log itself if it has no fault.
 
         Raises:
             InputError: another log, or nothing is left.
         """
         if len(log) != self.samples:
-            raise InputError(f"{len(log)} rows", allowed=f"{self.samples}, as the log that was checked")
+            raise InputError(f"{len(log)} rows", allowed=f"{self.samples} rows, as in the checked log")
         log = self.on_time(log)
         if self.parts == ((0, len(log)),) and not len(self.spikes) and not len(self.stale):
             return (log,)
@@ -122,11 +122,11 @@ class GateReport:
         parts = [np.arange(first, stop)[kept[first:stop]] for first, stop in self.parts]
         logs = tuple(pick_rows(log, part) for part in parts if len(part) >= FEWEST)
         if not logs:
-            raise InputError("no stretch of the log is long enough", file=self.log or None, allowed=f"{FEWEST} rows")
+            raise InputError("no part of the log is long enough", file=self.log or None, allowed=f"{FEWEST} rows")
         return logs
 
     def on_time(self, log: Log) -> Log:
-        """Gives the log that was checked at the times at which its rows were measured."""
+        """Gives the checked log with corrected time stamps."""
         return log if np.array_equal(self.t, log.t) else replace(log, t=self.t)
 
     def summary(self) -> str:

@@ -71,8 +71,8 @@ class Bootstrap:
     def summary(self) -> str:
         """Says what was resampled, and how the two errors compare."""
         return (
-            f"{len(self.values)} refits to resampled {self.kind} ({self.blocks} of them): standard errors are "
-            f"{self.ratio:.2f} times the stated ones on the median determined parameter"
+            f"{len(self.values)} refits to resampled {self.kind} ({self.blocks} blocks): bootstrap standard errors "
+            f"are {self.ratio:.2f} times the stated ones (median of the determined parameters)"
         )
 
     def to_frame(self) -> pd.DataFrame:
@@ -101,11 +101,11 @@ def bootstrap(
 ) -> Bootstrap:
     """Refits to resampled data, and compares the scatter with the stated standard errors.
 
-    Whole logs are drawn where there are eight or more, whole periods where the motion repeats itself eight times or
-    more, else moving blocks of a thirtieth of the data: what stays together keeps the noise's colour, whatever it is.
-    Normal equations are sums over rows, so that a refit is a sum and a solution, without a pass over the data. The
-    refits are those of least squares without regularisation, smoothing and weights as the estimate has them. With K
-    blocks the scatter is multiplied by sqrt(K / (K - 1)), and is itself uncertain by a share of 1 / sqrt(2 K).
+    Whole logs are drawn if there are eight or more, whole periods if the motion repeats eight times or more, otherwise
+    moving blocks of a thirtieth of the data. The blocks preserve the noise's correlation in time. Normal equations are
+    sums over rows, so that a refit is a sum and a solution, without a pass over the data. The refits are those of least
+    squares without regularisation, smoothing and weights as the estimate has them. With K blocks the scatter is
+    multiplied by sqrt(K / (K - 1)), and is itself uncertain by a share of 1 / sqrt(2 K).
 
     Args:
         robot: the robot.
@@ -132,7 +132,7 @@ def bootstrap(
     data = [logs] if isinstance(logs, Log) else list(logs)
     gates = estimate.gates
     if gates and len(gates) != len(data):
-        raise InputError(f"{len(data)} logs", allowed=f"{len(gates)}, as the estimate was made of")
+        raise InputError(f"{len(data)} logs", allowed=f"{len(gates)}, as in the estimate")
     base = find_base_parameters(model.torque_model, gravities=model.gravities)
     if base.independent != tuple(model.columns) or robot.n != model.robot.n:
         raise InputError("the estimate is of another robot", remedy="identify it again")
@@ -140,7 +140,7 @@ def bootstrap(
     prepared = prepare_all(robot, usable)
     rows = [log.rows(choice.smoother) for log in prepared]
     if sum(len(part.motion) for part in rows) != len(estimate.t):
-        raise InputError("other logs", allowed="those that the estimate was made of")
+        raise InputError("other logs", allowed="the logs of the estimate")
     kind, pieces, moving = _pieces(prepared, rows, estimate)
     regressor = JointRegressor(base)
     found = list(threaded(lambda piece: _moments(regressor, *piece), pieces))
@@ -184,7 +184,7 @@ def _pieces(
     size = -(-total // CELLS)
     cells = [(part, at) for part in rows for at in chunks(len(part.motion), size)]
     if len(cells) < LEAST_BLOCKS * MOVING:
-        raise NotIdentifiableError("too few rows to be resampled", remedy="record a longer log")
+        raise NotIdentifiableError("too few rows for a bootstrap", remedy="record a longer log")
     return "blocks", cells, MOVING
 
 

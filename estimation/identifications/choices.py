@@ -1,4 +1,4 @@
-"""What the data themselves choose: the smoothing, the sharpness of the friction's sign, the regularisation."""
+"""Choices by cross-validation: smoothing, sharpness of the friction's sign, regularisation."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["VELOCITY_SCALES", "Candidates", "Choice", "choose"]
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """What was chosen, and how good it was on blocks that the fit had not seen.
+    """The chosen settings and their error on held-out blocks.
 
     Attributes:
         smoother: of the positions.
@@ -71,7 +71,7 @@ def choose(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator,
     """
     comparison = Comparison(base, logs, estimator, candidates)
     smoother = comparison.smoother()
-    # On torque as it was logged: a ridge biases, and must gain something that stands out of the noise.
+    # On the logged torque: a ridge causes bias, so its gain must be significant.
     blocks = comparison.blocks(smoother, 1)
     choices: list[Choice] = []
     for trial in comparison.regularisation(blocks):

@@ -28,9 +28,9 @@ WIDER = np.array(VELOCITY_SCALES[1:])
 SAVING = 0.03
 # How much worse, in mean log error, a lower cut-off may be and still be taken.
 CUTOFF_SLACK = 0.0005
-# How much better another smoother or a pull towards the description must be than the low-pass and none.
+# Required gain of another smoother over the low-pass, or of a prior over none.
 SMOOTHER_GAIN, PULL_GAIN = 0.005, 0.03
-# How much worse, in log error, a single joint may become by a pull.
+# Largest allowed loss of a single joint by a prior (log error).
 UNFAIR = 0.25
 # Share of the errors that a band is to hold, and up to how many blocks each gets the quantile of all others.
 BAND, FEW = 0.95, 24
@@ -91,10 +91,10 @@ class Comparison:
         return chosen
 
     def regularisation(self, blocks: Sides) -> tuple[Trial, Trial]:
-        """Chooses pull and ridge: towards the description where that clearly helps, else to zero as far as it helps.
+        """Chooses prior and ridge: the description if it clearly helps, otherwise zero.
 
         Returns:
-            The trial with the smallest ridge and no pull, and the chosen one.
+            The trial with the smallest ridge and no prior, and the chosen one.
         """
         ridges = sorted(self.candidates.ridges)
         tried = [self._try(blocks, ridge, None) for ridge in ridges]
@@ -205,15 +205,15 @@ class Comparison:
         return chosen.without(weights, trial.ridge, trial.pull)
 
     def band(self, smoother: Smoother, blocks: Sides, trial: Trial) -> tuple[Array, Array]:
-        """Half-width (n,) that holds `BAND` of the left-out errors, and the share that it holds on unseen blocks (n,).
+        """Half-width (n,) that contains `BAND` of the held-out errors, and its coverage on other blocks (n,).
 
-        Each block's share is counted with the quantile of the other blocks' errors: what a user sees who takes the
-        band to a motion of the same kind (a split conformal interval, block by block).
+        Each block's coverage is counted with the quantile of the other blocks' errors, as for a new motion of the same
+        kind (a split conformal interval, block by block).
         """
         values = iter(self._without(blocks.fitted.columns(self._columns(trial.scales).tolist()), trial))
         rows = self._rows(smoother)
         errors = [np.abs(error) for part in rows for error in self._errors(part, trial.scales, values)]
-        # Of joints that stand in a block its errors are not known.
+        # Errors of joints at rest in a block are unknown.
         told = np.array([~np.isnan(error[0]) for error in errors])
         levels = np.array([band_of(error) for error in errors])
         whole = band_of(np.concatenate(errors))

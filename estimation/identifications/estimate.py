@@ -1,4 +1,4 @@
-"""What an identification found, how sure it is, and how well it predicts what it has not seen."""
+"""Result of an identification: parameters, uncertainty, and errors on held-out data."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MODEL = "model.json"
-# Above this ratio of honest to white-noise standard errors the summary warns.
+# Above this ratio of robust to white-noise standard errors the summary warns.
 COLOURED = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class JointFit:
-    """How well one joint's torque is explained, beside what would flatter or shame it.
+    """Torque errors of one joint, with reference values.
 
     Attributes:
         joint: counted from 1.
@@ -58,7 +58,7 @@ class JointFit:
 
     @property
     def nrmse(self) -> float:
-        """Left-out error over torque RMS."""
+        """Left-out error divided by torque RMS."""
         return self.held_out_rms / self.torque_rms if self.torque_rms else np.inf
 
 
@@ -73,7 +73,7 @@ class Estimate:
         white_noise_errors: standard errors (b,) that white noise would have: too small where noise is coloured.
         t: times (N,) of the fitted rows [s].
         dq: joint velocities (N, n) of the fitted rows.
-        measured: torque (N, n) of the fitted rows, less that of known payloads [N m or N].
+        measured: torque (N, n) of the fitted rows, minus that of known payloads [N m or N].
         predicted: by the model (N, n).
         dropped_rows: rows of the logs that repeated an old position.
         gates: what the gate found in each log; empty where it was not asked.
@@ -97,19 +97,19 @@ class Estimate:
 
     @property
     def colour(self) -> float:
-        """Median ratio of honest to white-noise standard errors of the determined parameters."""
+        """Median ratio of the standard errors to those of white noise, over the determined parameters."""
         return colour_of(self.model.standard_errors, self.white_noise_errors, self.model.determined)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader must know before using the numbers."""
+        """Warnings about the use of the results."""
         found = []
         lost = [joint for joint in self.joints if not joint.identified]
         if lost:
             names = ", ".join(f"{joint.joint} ({joint.name})" for joint in lost)
             found.append(
-                f"Badly excited: joints {names}. Their left-out torque is predicted hardly better than by a constant; "
-                "their friction, rotor inertia and offset mean nothing."
+                f"Not identified: joints {names}. Their held-out torque is predicted no better than by a constant. "
+                "Do not use their friction, rotor inertia and offset."
             )
         unknown = [name for name, known in zip(self.model.names, self.model.determined, strict=True) if not known]
         if unknown:
@@ -118,38 +118,41 @@ class Estimate:
             )
         if self.choice.pull is not None:
             found.append(
-                f"The data leave directions of the parameters open; a pull of {self.choice.ridge:g} towards the "
-                "robot's description fills them, and helps on data left out. Standard errors are those without it, and "
-                "what it moves each value by."
+                f"These logs do not determine some parameter combinations. They were regularised towards the robot's "
+                f"description (weight {self.choice.ridge:.2g}), which improves the prediction of held-out data. The "
+                f"standard errors include the shift by the regularisation."
             )
         elif self.choice.ridge > 1e-6:
             found.append(
-                f"The data leave directions of the parameters open; a ridge of {self.choice.ridge:g} keeps predictions "
-                "sane and pulls those directions towards zero. Standard errors are those without it, and what it moves "
-                "each value by."
+                f"These logs do not determine some parameter combinations. They were regularised towards zero (ridge, "
+                f"weight {self.choice.ridge:.2g}) to keep predictions bounded. The standard errors include the shift "
+                f"by the regularisation."
             )
         if bounds := self.model.provenance.get("at_bounds"):
             found.append(
-                f"At their bounds: {', '.join(bounds)}. Standard errors are those of a fit without bounds: too large "
-                "there rather than too small."
+                f"At their bounds: {', '.join(bounds)}. Their standard errors come from a fit without bounds and are "
+                f"rather too large."
             )
         if self.colour > COLOURED:
             found.append(
-                "The residual is coloured: standard errors by white noise would be too small by "
-                f"{self.colour:.1f} times."
+                f"Residuals are correlated in time; the standard errors allow for it ({self.colour:.1f} times those "
+                f"of white noise)."
             )
         if self.dropped_rows:
             rows = "row repeats" if self.dropped_rows == 1 else "rows repeat"
-            found.append(f"{self.dropped_rows} {rows} an old position: left out.")
+            found.append(f"{self.dropped_rows} {rows} an old position (ignored).")
         return tuple(found)
 
     def summary(self) -> str:
-        """Says how well each joint is explained, and what to beware of."""
+        """Lists the torque errors of each joint, and warnings."""
         model = self.model
         lines = [
             f"{model.robot.name}: {len(model.names)} base parameters from {len(self.t)} samples; "
             f"{self.choice.smoother.text}",
-            "  joint                 torque RMS   fitted   left out   constant    nominal  noise floor",
+            (
+                "  joint                 torque RMS   fitted   held out   constant    nominal  noise floor   (errors "
+                "in % of torque RMS)"
+            ),
         ]
         for joint in self.joints:
             shares = [
@@ -221,6 +224,6 @@ class Estimate:
 
 
 def colour_of(errors: Array, white: Array, determined: NDArray[np.bool_]) -> float:
-    """Gives the median ratio of honest to white-noise errors (b,) of the determined parameters; 1 without any."""
+    """Gives the median ratio of robust to white-noise errors (b,) of the determined parameters; 1 without any."""
     known = determined & (white > 0)
     return float(np.median(errors[known] / white[known])) if known.any() else 1.0

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 # Standard errors are those of the fit without regularisation; this much keeps the inverse finite.
 FAINT = 1e-13
-# Of a longer log, evenly spread stretches stand for the colour of the noise and for the sandwich's meat.
+# In a longer log, evenly spread parts represent the noise's correlation and the sandwich's inner matrix.
 MOST_ROWS, STRETCHES = 100_000, 24
 # For the sandwich the rows of a long log are averaged over so much time [s], ...
 AVERAGED = 0.02
@@ -34,7 +34,7 @@ LEAST_AVERAGES = 10_000
 
 @dataclass(frozen=True, kw_only=True)
 class Fit:
-    """What a fit found.
+    """Result of a fit.
 
     Attributes:
         base: base parameters of the model that was fitted.
@@ -140,7 +140,7 @@ class _Fitted(NamedTuple):
 
 
 class _Pass(NamedTuple):
-    """What one look at the rows gives, besides the torque that the fit predicts.
+    """Results of one pass over the rows, besides the predicted torque.
 
     Attributes:
         nominal: sum of each joint's squared errors (n,) by the robot's description.

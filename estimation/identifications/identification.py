@@ -64,7 +64,7 @@ def identify(
 
     Positions are smoothed and differentiated without phase lag; smoothing, regularisation and the sharpness of the
     friction's sign are chosen by predicting blocks of the logs from the rest. Torque is fitted as it was logged. The
-    standard errors survive coloured noise.
+    standard errors allow for correlated noise.
 
     Args:
         robot: the robot.
@@ -77,7 +77,7 @@ def identify(
         candidates: settings that the data choose from.
         check: whether each log passes the gate first, which refuses what would be fitted wrongly and cuts at gaps.
         seed: of the noise drawn to correct the standard errors.
-        progress: is told how far it is.
+        progress: receives the progress.
 
     Returns:
         The estimate.
@@ -178,11 +178,11 @@ def _predictable(prepared: Sequence[Prepared], choice: Choice) -> NDArray[np.boo
         return np.asarray(moves & varies & follows)
     if not varies.any():
         raise NotIdentifiableError(
-            "no joint's torque varies", remedy="record the torque of the moving arm, and check what tau1.. hold"
+            "no joint's torque varies", remedy="record the torque of the moving arm, and check the meaning of tau1.."
         )
     raise NotIdentifiableError(
         "no joint's torque can be predicted from its motion",
-        allowed="left-out torque errors below its standard deviation",
+        allowed="held-out torque errors below the torque's standard deviation",
         remedy="check units and signs of q and tau, and that the arm moves",
     )
 

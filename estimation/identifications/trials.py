@@ -18,14 +18,14 @@ RIDGE_SLACK = 0.01
 
 @dataclass(frozen=True, kw_only=True)
 class Candidates:
-    """What to choose from.
+    """Candidates of the cross-validation.
 
     Attributes:
         cutoffs: of the smoothing [Hz]; those above 0.4 of the sampling rate are left out.
         ridges: see `Moments.solve`.
         blocks: contiguous pieces of the logs, each predicted from the others.
         smoothers: which smoothers besides the low-pass: ``spline``, and ``harmonics`` where the motion is periodic.
-        pull: whether the regularisation may pull towards the robot's description.
+        pull: whether the regularisation may use the robot's description as prior.
         period: of the motion [s] where it is known; None leaves it to the log.
     """
 

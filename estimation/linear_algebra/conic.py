@@ -10,7 +10,7 @@ from robots.common.errors import InfeasibleError, SolverError
 
 Array = NDArray[np.float64]
 
-# A faint pull on what the data leave open is far below the data's own cost, and must be resolved all the same.
+# A weak prior on undetermined directions is far below the data's cost, but must still be resolved.
 TOLERANCE = 1e-10
 
 
@@ -88,7 +88,7 @@ class ConicProgram:
         solution = clarabel.DefaultSolver(upper, scale * linear, matrix, offset, cones, settings).solve()
         status = str(solution.status)
         if status in ("PrimalInfeasible", "AlmostPrimalInfeasible"):
-            raise InfeasibleError(f"{what}: no parameters obey all constraints", remedy="loosen the bounds")
+            raise InfeasibleError(f"{what}: no parameters obey all constraints", remedy="relax the bounds")
         if status not in ("Solved", "AlmostSolved"):
-            raise SolverError(f"{what}: Clarabel ended with {status}", remedy="check the data and the bounds' sizes")
+            raise SolverError(f"{what}: Clarabel ended with {status}", remedy="check the data and the bounds")
         return np.asarray(solution.x)

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 Real = TypeVar("Real", np.float32, np.float64)
 Piece = tuple[int, Array]
 
-# Functions that the band cannot tell apart, of one stretch or of its neighbours, count once.
+# Functions that are equal within the band, of one part or of its neighbours, count once.
 DISTINCT = 1e-4
 
 

@@ -1,4 +1,4 @@
-"""Logs whose clocks each began anew, put on one."""
+"""Puts logs with separate clocks on one clock."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ OWN = 1.0
 
 
 def on_one_clock(logs: Sequence[Log], pause: float = UNKNOWN_PAUSE) -> list[Log]:
-    """Puts logs that each began at a time of their own one after the other, in the order given.
+    """Puts logs with separate clocks one after the other, in the given order.
 
-    What depends on the time between logs, such as heat, is then known as well as the pause is.
+    Effects that depend on the time between logs, such as heat, are then as uncertain as the pause.
 
     Args:
         logs: in the order in which they were recorded.
@@ -65,10 +65,10 @@ class ClockedLogs:
 
 
 def put_on_clock(logs: Sequence[Log], held_out: Sequence[Log]) -> ClockedLogs:
-    """Puts logs on one clock where their own times say that they are on none.
+    """Puts logs on one clock if their times overlap.
 
-    Two recordings of one robot cannot overlap: where they do, each began its clock anew. Held-out logs that overlap the
-    others count as recorded after them.
+    Two recordings of one robot cannot overlap in time: if they do, each has its own clock. Held-out logs that overlap
+    the others count as recorded after them.
 
     Args:
         logs: to fit to, in the order in which they were recorded where they overlap.
@@ -91,19 +91,20 @@ def put_on_clock(logs: Sequence[Log], held_out: Sequence[Log]) -> ClockedLogs:
 
 
 _OVERLAP = (
-    "The logs overlap in time: each began its clock anew. They count one after the other in the order given, {:.0f} s "
-    "apart; what heats, drifts or happens between them is known as well as that is."
+    "The logs overlap in time, so each one has its own clock. They are taken one after the other in the given order, "
+    "{:.0f} s apart. Results on heating and drift depend on this assumption."
 )
 _UNDATED = (
-    "The held-out logs overlap the others in time: they count as recorded {:.0f} s after them. What changes with time "
-    "may be otherwise there: where they speak against it, it is kept all the same."
+    "The held-out logs overlap the others in time. They are taken as recorded {:.0f} s later. Time-dependent findings "
+    "are kept even if the held-out logs contradict them."
 )
 
 
-def later_by(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
-    """How much later than its own clock says a log counts beside those that a model was fitted to, and a word on that.
+def clock_shift_between(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
+    """Time shift of a log relative to those of a model's fit, and a note on it.
 
-    Two recordings of one robot cannot overlap: one that does began its clock anew, and counts as recorded after them.
+    Two recordings of one robot cannot overlap in time: a log that does has its own clock, and counts as recorded after
+    them.
 
     Args:
         logs: of the model's fit, as its provenance describes them; those of older files state no start.
@@ -124,8 +125,10 @@ def later_by(logs: Sequence[Mapping[str, Any]], log: Log) -> tuple[float, str]:
     return float(last + UNKNOWN_PAUSE - log.t[0]), _LATER.format(UNKNOWN_PAUSE)
 
 
-def before_it(logs: Sequence[Log], motion: Log, start: float, shifts: Sequence[float]) -> tuple[list[Log], str]:
-    """Puts logs of what a robot did before a motion on the clock of that, and says what that takes for granted.
+def earlier_logs_on_clock(
+    logs: Sequence[Log], motion: Log, start: float, shifts: Sequence[float]
+) -> tuple[list[Log], str]:
+    """Puts logs of earlier motions on the clock of a motion, and gives a note on the assumption.
 
     Args:
         logs: of what came before, in the order in which they were recorded where their clocks each began anew.
@@ -138,9 +141,9 @@ def before_it(logs: Sequence[Log], motion: Log, start: float, shifts: Sequence[f
         late = [log for log in placed if log.t[0] > begun.t[0]]
         if late:
             raise InputError(
-                "a log of what came before that comes after the motion",
+                "a log given as earlier motion (--before) starts after the predicted motion",
                 file=late[0].metadata.get("file", late[0].name or None),
-                allowed="logs that end before the motion begins, on one clock, or that each begin their clock anew",
+                allowed="logs that end before the motion starts, or logs that each have their own clock",
             )
         return sorted(placed, key=lambda log: float(log.t[0])), ""
     *earlier, last = on_one_clock([*logs, motion])
@@ -148,11 +151,11 @@ def before_it(logs: Sequence[Log], motion: Log, start: float, shifts: Sequence[f
     return [replace(log, t=log.t + shift) for log in earlier], _ANEW.format(UNKNOWN_PAUSE)
 
 
-_ANEW = "the clocks of those logs and the motion's each began anew: they count in the order given, {:.0f} s apart"
+_ANEW = "each of these logs has its own clock: they are taken in the given order, {:.0f} s apart"
 
 _LATER = (
-    "The log overlaps in time those that the model was fitted to, in which something changed: it counts as recorded "
-    "{:.0f} s after them."
+    "The log overlaps in time with those of the model's fit, and the model changes with time. The log is taken as "
+    "recorded {:.0f} s after them."
 )
 
 
@@ -163,9 +166,11 @@ def _refuse_copies(logs: Sequence[Log], held_out: Sequence[Log]) -> None:
             if _same(log, other):
                 unseen = i < len(logs) <= k
                 raise InputError(
-                    "the held-out log is one of the logs that are fitted to" if unseen else "the log is given twice",
+                    "the held-out log is also one of the logs for the fit" if unseen else "the log is given twice",
                     file=log.metadata.get("file", log.name or None),
-                    remedy="hold out a log of another motion" if unseen else "name it once: it would count double",
+                    remedy="hold out a log of another motion"
+                    if unseen
+                    else "give it once; otherwise it would count twice",
                 )
 
 

@@ -103,10 +103,10 @@ def unit_factors(table: Table, names: Mapping[str, Quantity]) -> dict[str, float
         shared = stated.get(quantity.prefix)
         if own is not None and shared is not None and own != shared:
             raise InputError(
-                f"the column's unit is {table.units[name]!r}, but `units` of the file says {shared!r}",
+                f"the column states the unit {table.units[name]!r}, but `units` in the file's head states {shared!r}",
                 file=table.path,
                 column=name,
-                remedy="state the unit once",
+                remedy="state the unit in one place",
             )
         unit = own if own is not None else shared
         factors[name] = (

@@ -36,7 +36,7 @@ def read_foreign(
 
     Args:
         path: the file, or the folder of a rosbag 2.
-        wanted: tells by name which columns to read.
+        wanted: selects by name which columns to read.
         topic: of a bag.
         joints: of a bag: names in the robot's order.
 

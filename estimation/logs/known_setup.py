@@ -18,8 +18,8 @@ from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
 
-HEAT = "a model of heat"
-"""What does not know payloads and gravities, for `require_plain`."""
+HEAT = "a thermal model"
+"""Models without payloads and gravity vectors, for `require_plain`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ def load_of(robot: Robot, log: Log) -> Load | None:
     return Load(_rigid_body(robot.under(log.gravity)), moved_body(robot.chain.tip) @ log.payload)
 
 
-# What was compiled for a model is kept by the model.
+# The model keeps its compiled functions.
 @lru_cache(maxsize=16)
 def _rigid_body(robot: Robot) -> TorqueModel:
     return TorqueModel(robot, (RigidBody(),))
@@ -87,10 +87,10 @@ def require_plain(logs: Sequence[Log], what: str) -> None:
         stated = "gravity" if log.gravity is not None else "payload" if log.payload is not None else None
         if stated is not None:
             raise InputError(
-                f"the log states a {stated}, which {what} does not know",
+                f"the log states a {stated}, which {what} cannot use",
                 file=log.metadata.get("file", log.name or None),
                 column=stated,
-                allowed="logs without payload, of the base as the robot's description has it",
+                allowed="logs without payload and with the base orientation of the robot's description",
             )
 
 
@@ -115,7 +115,10 @@ def require_known(model: TorqueModel, columns: Sequence[int], known: Sequence[Ar
     if missing:
         some = ", ".join(missing[:3]) + (", ..." if len(missing) > 3 else "")
         raise InputError(
-            f"the gravity {np.array2string(np.asarray(gravity, dtype=float))} shows what the model lacks: {some}",
+            (
+                f"with gravity {np.array2string(np.asarray(gravity, dtype=float), precision=3)} these parameters "
+                f"matter, but the model's logs did not determine them: {some}"
+            ),
             column="gravity",
-            remedy="identify the model with a log under such a gravity besides",
+            remedy="identify the model again with an additional log recorded under this gravity",
         )

@@ -24,7 +24,7 @@ _FIELDS = {
     "segment": "segment",
     "cycle": "cycle",
 }
-# What the gear does to a motor-side value: positions shrink, torques grow.
+# Conversion of motor-side values by the gear: positions are divided, torques multiplied.
 _GEARED = {"q": -1, "dq": -1, "ddq": -1, "qlink": -1, "tau": 1, "current": 0, "temperature": 0}
 
 
@@ -124,7 +124,7 @@ def _converted(
     if entry.unit == "%":
         if entry.rated is None:
             raise InputError(
-                f"the mapping gives {quantity.prefix} in % without `rated`",
+                f"the mapping states {quantity.prefix} in % but lacks `rated`",
                 file=table.path,
                 column=name,
                 remedy="state the rated values [N m, N or A] of all joints",
@@ -170,7 +170,7 @@ def _gear(table: Table, mapping: LogMapping, joint: int, joints: int) -> float:
 
 
 def _columns(entry: PerJoint, mapping: LogMapping, joints: int, present: set[str]) -> list[str]:
-    """The columns of one quantity, one a joint."""
+    """The columns of one quantity, one per joint."""
     pattern = entry.columns[0]
     if len(entry.columns) > 1 or (joints == 1 and pattern in present):
         return list(entry.columns)
@@ -189,7 +189,7 @@ def _value(table: Table, name: str) -> Column:
     if name not in table.columns:
         present = ", ".join((*table.names, *table.skipped))
         raise InputError(
-            "the mapping names a column that is not there",
+            "the mapping names a column that the file does not have",
             file=table.path,
             column=name,
             allowed=present[:300] + (" ..." if len(present) > 300 else ""),

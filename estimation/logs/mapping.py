@@ -26,7 +26,7 @@ class PerJoint(Config):
         columns: one name a joint in the robot's order, or one name for all: a pattern with ``{joint}`` (the joint's
             name where `LogMapping.joints` states them, else its number from 1) or ``{index}`` (its number from 0).
         unit: as in `docs/files.md`, or ``%`` of ``rated``.
-        sign: 1 or -1, one for all or one a joint.
+        sign: 1 or -1, one for all or one per joint.
         scale: factors, after the unit.
         offset: added at the end, in the unit of a log [rad, rad/s, ...].
         side: ``motor`` where the values are the motor's: positions are divided, torques multiplied by ``gear_ratio``.
@@ -69,7 +69,7 @@ class Single(Config):
 
 
 class LogMapping(Config):
-    """What a foreign log's columns mean.
+    """The meaning of a foreign log's columns.
 
     Attributes:
         time: the column of time.
@@ -80,7 +80,7 @@ class LogMapping(Config):
         current: motor currents; with ``torque_constant`` they become torques.
         temperature: joint temperatures.
         link_position: positions behind the gears.
-        ambient: temperature of the surroundings.
+        ambient: ambient temperature.
         segment: part of an experiment.
         cycle: repetition of an experiment.
         joints: names in the robot's order, for ``{joint}`` and for ROS messages.

@@ -25,7 +25,7 @@ def read_matlab(path: Path, wanted: Callable[[str], bool]) -> Table:
 
     Args:
         path: the file.
-        wanted: tells by name which columns to keep.
+        wanted: selects by name which columns to keep.
 
     Raises:
         InputError: no MAT file, or nothing numeric in it.
@@ -44,7 +44,7 @@ def columns_of(variables: Mapping[str, NDArray[Any]], path: Path, wanted: Callab
     Args:
         variables: the arrays by name.
         path: where they are from.
-        wanted: tells by name which columns to keep.
+        wanted: selects by name which columns to keep.
 
     Raises:
         InputError: no array, or none as long as the others.
@@ -126,7 +126,7 @@ def _read_new(path: Path) -> dict[str, NDArray[Any]]:
 def _unreadable(path: Path, error: Exception) -> InputError:
     text = str(error).splitlines()
     return InputError(
-        f"not a MAT file that can be read ({text[0] if text else type(error).__name__})",
+        f"the MAT file cannot be read ({text[0] if text else type(error).__name__})",
         file=path,
-        remedy="save it again in MATLAB, as arrays or a structure of arrays: tables and time series cannot be read",
+        remedy="save numeric arrays or a structure of arrays; MATLAB tables and time series are not supported",
     )

@@ -34,7 +34,7 @@ def read_npz(path: Path, wanted: Callable[[str], bool]) -> Table:
 
     Args:
         path: the file.
-        wanted: tells by name which columns to keep.
+        wanted: selects by name which columns to keep.
 
     Raises:
         InputError: no archive of arrays, or one that holds objects.
@@ -50,8 +50,8 @@ def read_npz(path: Path, wanted: Callable[[str], bool]) -> Table:
     except _DAMAGED as error:
         text = str(error).splitlines()
         raise InputError(
-            f"not an .npz archive that can be read ({text[0] if text else type(error).__name__})",
+            f"the .npz archive cannot be read ({text[0] if text else type(error).__name__})",
             file=path,
-            remedy="write it again by numpy.savez(path, t=..., q=..., tau=...)",
+            remedy="write it with numpy.savez(path, t=..., q=..., tau=...)",
         ) from error
     return columns_of(variables, path, wanted)

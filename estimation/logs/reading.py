@@ -22,6 +22,9 @@ from robots.common.errors import InputError
 from robots.common.tables.table import Table
 from robots.signals import FloatArray, Log
 
+LISTED = 10
+"""Columns of a file that an error message lists."""
+
 
 def read_log(
     path: str | PathLike[str],
@@ -110,7 +113,9 @@ def read_logs(
     def read(path: str | PathLike[str], mapping: LogMapping | str | PathLike[str] | None) -> Log:
         real = os.path.realpath(path)
         if real in seen:
-            raise InputError("the log is given twice", file=path, remedy="name each log once: it would count double")
+            raise InputError(
+                "the log is given twice", file=path, remedy="give each log once; otherwise it would count twice"
+            )
         seen.add(real)
         log = read_log(path, n, mapping=mapping, joints=joints)
         if logs and log.n != logs[0].n:
@@ -165,14 +170,22 @@ def _checked_names(table: Table) -> dict[str, Quantity]:
         quantities[name] = quantity
     if "t" not in quantities:
         raise InputError(
-            "the column is missing",
+            f"the column is missing (found: {_listed(table)})",
             file=table.path,
             column="t",
             row=_header_row(table),
             allowed="t (seconds), q1.. and tau1.. or i1..",
-            remedy="rename or add it",
+            remedy="rename the columns, or describe them in a mapping (--mapping)",
         )
     return quantities
+
+
+def _listed(table: Table, prefix: str = "") -> str:
+    """Lists columns of a file, unknown ones first, then those of a prefix."""
+    names = [*table.skipped, *(name for name in table.names if name.startswith(prefix))]
+    if not names:
+        return "none"
+    return ", ".join(names[:LISTED]) + (f", ... ({len(names)} columns)" if len(names) > LISTED else "")
 
 
 def _count_joints(table: Table, quantities: Mapping[str, Quantity], n: int | None) -> int:
@@ -189,14 +202,14 @@ def _count_joints(table: Table, quantities: Mapping[str, Quantity], n: int | Non
             continue
         for joint in range(1, max(joints, 1) + 1):
             if joint not in found and quantity.complete:
-                others = ", ".join(f"{quantity.prefix}{other}" for other in sorted(found)) or "none"
                 raise InputError(
-                    f"the column is missing (present: {others})",
+                    f"the column is missing (found: {_listed(table, quantity.prefix)})",
                     file=table.path,
                     column=f"{quantity.prefix}{joint}",
                     row=_header_row(table),
                     allowed=f"one column for each of q1..q{joints}" if joints else "q1..qn",
-                    remedy="record the joint, or leave out all columns of this quantity" if found else None,
+                    remedy="rename the columns, or describe them in a mapping (--mapping)"
+                    + (f"; or remove all columns {quantity.prefix}1.." if found and quantity.prefix != "q" else ""),
                 )
         extra = sorted(found - set(range(1, joints + 1)))
         if extra:

@@ -1,4 +1,4 @@
-"""What a reader mends in a log without a guess: rows that were written twice."""
+"""Repairs by the reader that need no guess: rows that were written twice."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def drop_repeated_rows(table: Table) -> tuple[Table, np.ndarray, list[dict[str, 
     kept = np.delete(rows, drop)
     note = {
         "name": "repeated_rows",
-        "text": f"{len(drop)} row{'s repeat' if len(drop) > 1 else ' repeats'} the row before, time and all",
-        "action": "each is kept once",
+        "text": f"{len(drop)} row{'s are' if len(drop) > 1 else ' is'} identical to the row before, including the time",
+        "action": "the copies are ignored",
         "value": len(drop),
     }
     columns = {name: values[kept] for name, values in table.columns.items()}

@@ -37,7 +37,9 @@ def read_bag(path: Path, *, topic: str | None = None, joints: Sequence[str] | No
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
         raise InputError(
-            "a ROS bag, and rosbags is not installed", file=path, remedy="pip install 'robot-oed[ros]'"
+            "reading ROS bags needs the package rosbags, which is not installed",
+            file=path,
+            remedy="pip install 'robot-oed[ros]'",
         ) from error
     messages: list[tuple[float, Any]] = []
     try:
@@ -55,16 +57,16 @@ def read_bag(path: Path, *, topic: str | None = None, joints: Sequence[str] | No
     except Exception as error:
         text = str(error).splitlines()
         raise InputError(
-            f"not a ROS bag that can be read ({text[0] if text else type(error).__name__})",
+            f"the ROS bag cannot be read ({text[0] if text else type(error).__name__})",
             file=path,
-            remedy="check it by `ros2 bag info`, or record it again",
+            remedy="check it with `ros2 bag info`, or record it again",
         ) from error
     if len(topics) != 1:
         raise InputError(
             f"{len(topics) or 'no'} topics with joint states" + (f": {', '.join(topics)}" if topics else ""),
             file=path,
             allowed=f"one {_TYPE}" + ("" if topics else f"; the bag has {', '.join(others) or 'no topics'}"),
-            remedy="name it by `topic` in a mapping" if topics else None,
+            remedy="choose one with `topic` in a mapping (--mapping)" if topics else None,
         )
     if not messages:
         raise InputError("no messages", file=path, column=topics[0])
@@ -91,8 +93,8 @@ def _table(path: Path, messages: list[tuple[float, Any]], joints: Sequence[str] 
         raise InputError(
             f"no message has the joints {', '.join(names)}",
             file=path,
-            allowed=f"those of the messages: {', '.join(first) or 'without names'}",
-            remedy="state `joints` in a mapping, in the robot's order",
+            allowed=f"names in the messages: {', '.join(first) or 'none'}",
+            remedy="list `joints` in a mapping, in the robot's order",
         )
     columns: dict[str, Column] = {"t": np.array(times)}
     for prefix, values in rows.items():
@@ -115,7 +117,7 @@ def _order(path: Path, row: int, found: list[str], wanted: list[str], count: int
     if len(found) != count:
         raise InputError(f"{len(found)} names for {count} positions", file=path, row=row)
     if len(set(found)) < len(found):
-        raise InputError(f"a joint's name stands twice: {', '.join(found)}", file=path, row=row)
+        raise InputError(f"a joint name appears twice: {', '.join(found)}", file=path, row=row)
     if not set(wanted) <= set(found):
         return None
     return [found.index(name) for name in wanted]

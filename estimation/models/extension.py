@@ -1,4 +1,4 @@
-"""What was added to a model: effects with their shapes, coefficients and uncertainty."""
+"""Extensions of a model: effects with their shapes, coefficients and uncertainty."""
 
 from __future__ import annotations
 
@@ -114,9 +114,9 @@ def write_gear_load(bearing: ExtraGearLoad) -> dict[str, Any]:
     """Writes what gears bear of a model's extensions as plain data for `model.json`."""
     weights = [
         {"effect": w.effect.name, "joint": w.joint, "shape": list(w.shape), "coefficients": w.coefficients.tolist()}
-        for w in bearing.weights
+        for w in bearing.sources
     ]
-    return {"how": bearing.how, "weights": weights}
+    return {"how": bearing.path, "weights": weights}
 
 
 def read_gear_load(data: Mapping[str, Any], robot: Robot) -> ExtraGearLoad:
@@ -131,8 +131,10 @@ def read_gear_load(data: Mapping[str, Any], robot: Robot) -> ExtraGearLoad:
     for item in data["weights"]:
         effect, joint = find_effect(str(item["effect"])), item["joint"]
         values = [np.array(item[key], dtype=float) for key in ("shape", "coefficients")]
-        if not effect.borne or joint not in effect.joints(robot):
-            raise InputError(f"borne_by_gears: {effect.name} on joint {joint}", allowed="an effect that gears bear")
+        if not effect.loads_gear or joint not in effect.joints(robot):
+            raise InputError(
+                f"borne_by_gears: {effect.name} on joint {joint}", allowed="an effect whose torque loads the gear"
+            )
         sizes = (len(effect.shapes),), (len(effect.parameters(robot, joint)),)
         if tuple(v.shape for v in values) != sizes or not all(np.isfinite(v).all() for v in values):
             raise InputError(f"borne_by_gears: values of {effect.name} that do not fit it")
@@ -157,9 +159,9 @@ def find_effect(name: str) -> Effect:
 def extension_torque(
     extensions: Sequence[Extension], felt: Situation, own: Situation | None = None, bearing: ExtraGearLoad | None = None
 ) -> Array:
-    """Evaluates the extensions of a model in what its base model says of a motion (N, n) [N m or N].
+    """Evaluates the torque (N, n) [N m or N] of a model's extensions.
 
-    What acts on all of the torque comes after the others: what makes it late, then what cuts it off.
+    Effects on the total torque come after the others: first delays, then the current limit.
 
     Args:
         extensions: the effects.
@@ -178,7 +180,7 @@ def extension_torque(
 
 
 def _stage(effect: Effect) -> int:
-    return 2 if effect.last else int(effect.blurs)
+    return 2 if effect.acts_on_total_torque else int(effect.smooths_friction_sign)
 
 
 def _described(effect: Effect, robot: Robot, joint: int | None, shape: tuple[float, ...]) -> list[tuple[str, str]]:

@@ -23,7 +23,8 @@ from robots.signals import Motion
 from robots.terms import Column, build_term, describe_term
 from robots.terms.effect_bases.gear_load import ExtraGearLoad
 from robots.terms.situations.flange_body import with_body
-from robots.terms.situations.situation import Situation, joined, situation
+from robots.terms.situations.joining import join_situations
+from robots.terms.situations.situation import Situation, situation
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -94,7 +95,7 @@ class Model:
     @property
     def keeps_heat(self) -> bool:
         """Whether what came before a motion acts in it still."""
-        return any(extension.source.keeps for extension in self.extensions)
+        return any(extension.source.has_thermal_memory for extension in self.extensions)
 
     def torque(
         self,
@@ -140,9 +141,11 @@ class Model:
 
         def state(known: Array) -> Situation:
             earlier = [situation(model, known, m.t, m.q, m.dq, m.ddq) for m in before]
-            return replace(joined([*earlier, situation(model, known, *arrays)], self.torque_model), since=self.since)
+            return replace(
+                join_situations([*earlier, situation(model, known, *arrays)], self.torque_model), since=self.since
+            )
 
-        cut = any(extension.source.last for extension in self.extensions)
+        cut = any(extension.source.acts_on_total_torque for extension in self.extensions)
         extended = extension_torque(self.extensions, state(felt), state(parameters) if cut else None, self.bearing)
         return own + extended[-len(own) :]
 
@@ -174,7 +177,7 @@ class Model:
                 "term": column.term,
                 "value": float(value),
                 "unit": column.unit,
-                # A number that JSON cannot hold, and that nobody should trust, is left out.
+                # A number that is not finite cannot be written as JSON and is left out.
                 "standard_error": float(error) if known else None,
                 "determined": bool(known),
                 "stands_for": formula,
@@ -227,7 +230,7 @@ def load_model(path: str | Path) -> Model:
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise InputError(f"cannot be read as JSON: {error}", file=file) from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InputError("is no model file", file=file, allowed=f'"format": "{FORMAT}"')
+        raise InputError("is not a model file", file=file, allowed=f'"format": "{FORMAT}"')
     version = data.get("format_version")
     if not isinstance(version, int) or version > FORMAT_VERSION:
         raise InputError(f"format version {version!r}", file=file, allowed=f"up to {FORMAT_VERSION}")
@@ -236,7 +239,7 @@ def load_model(path: str | Path) -> Model:
     except InputError as error:
         raise InputError(error.problem, file=file, allowed=error.allowed, remedy=error.remedy) from error
     except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"is damaged: {type(error).__name__} {error}", file=file) from error
+        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error
 
 
 def _from_dict(data: Mapping[str, Any]) -> Model:
@@ -246,7 +249,7 @@ def _from_dict(data: Mapping[str, Any]) -> Model:
     parameters = data["parameters"]
     unknown = [item["name"] for item in parameters if item["name"] not in index]
     if unknown:
-        raise InputError(f"parameter {unknown[0]} is none of the model's terms")
+        raise InputError(f"parameter {unknown[0]} does not belong to the model's terms")
     torque_model.symbolic()  # a term that does not suit the robot says so now, not at the first prediction
     columns = tuple(index[item["name"]] for item in parameters)
     values = np.array([item["value"] for item in parameters], dtype=float)

@@ -23,8 +23,8 @@ _BY_JOINT = ("rotor_inertia", "gear_ratio", "torque_constant")
 def describe_robot(robot: Robot) -> dict[str, Any]:
     """Writes a robot as plain data.
 
-    Terms need its chain alone. Effects refer to more of it: a spring to the middle of a joint's range, saturation to
-    the torque limit, what the load does to the rotor that the base model does not tell from the link.
+    Terms need only its chain. Effects need more: a spring the middle of a joint's range, saturation the torque limit,
+    load-dependent effects the rotor inertia that the base model does not separate from the link.
     """
     joints = [
         {
@@ -51,7 +51,7 @@ def build_robot(data: Mapping[str, Any]) -> Robot:
     """Reads what `describe_robot` wrote; what older files do not state is unknown.
 
     Raises:
-        InputError: values that no robot has.
+        InputError: values that are impossible for a robot.
     """
     joints = tuple(Joint(**joint) for joint in data["joints"])
     n, limits = len(joints), data.get("limits", {})
@@ -76,12 +76,12 @@ def require_described(data: Mapping[str, Any]) -> None:
     """
     if "limits" not in data:
         raise InputError(
-            "has effects, but not the robot's limits, to which some of them refer",
+            "the model has effects but lacks the robot's limits, which some of them need",
             remedy="it was written by another version: diagnose the logs again",
         )
 
 
 def _array(values: Any, n: int, unknown: float) -> Array:
-    """What JSON cannot hold was written as null, and what a file does not state is as unknown."""
+    """Null stands for numbers that JSON cannot hold; missing entries are unknown."""
     given = [None] * n if values is None else values
     return np.array([number(value, unknown) for value in given])

@@ -1,4 +1,4 @@
-"""Estimators against each other on the same logs and the same unseen data."""
+"""Estimators against each other on the same logs and the same held-out data."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Of a single log, the last part is what the methods have not seen: a stretch of its own, never shuffled samples.
+# In a single log, the last part is held out: one contiguous part, never shuffled samples.
 SEEN = 0.7
 
 
@@ -33,7 +33,7 @@ class MethodRow:
 
     Attributes:
         method: its name.
-        unseen: standard deviation of the error over that of the torque on unseen data (n,); NaN where it failed.
+        unseen: standard deviation of the error over that of the torque on held-out data (n,); NaN where it failed.
         determined: share of parameters that it determines.
         seconds: of processor time.
         problem: why it failed; empty where it did not.
@@ -60,7 +60,9 @@ class MethodTable:
 
     def summary(self) -> str:
         """Gives a line per estimator: error per joint, their mean, what it determines, and its time."""
-        lines = ["unseen error over torque, standard deviations [%]; mean; parameters determined; seconds"]
+        lines = [
+            "error on held-out data / torque, standard deviations [%] per joint; mean; determined parameters; time"
+        ]
         for row in self.rows:
             if row.problem:
                 lines.append(f"  {row.method:12} {row.problem}")
@@ -101,14 +103,14 @@ def compare_methods(
     progress: Progress | None = None,
     **options: Any,
 ) -> MethodTable:
-    """Identifies with several estimators and predicts data that none of them has seen.
+    """Identifies with several estimators and predicts held-out data.
 
     Args:
         robot: the robot.
         logs: what is fitted.
         methods: names of estimators; all by default.
         held_out: unseen logs; by default the last of several logs, or the last stretch of a single one.
-        progress: is told how far it is.
+        progress: receives the progress.
         options: of `identify`.
 
     Returns:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.logs.clocks import before_it, later_by
+from estimation.logs.clocks import clock_shift_between, earlier_logs_on_clock
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
 from estimation.preprocessing import LowPass, Smoother, SmoothingSpline, resample, smooth
@@ -55,7 +55,7 @@ class Prediction:
 
     @property
     def error_rms(self) -> Array:
-        """RMS of measured less predicted torque (n,); NaN without measurement."""
+        """RMS of measured minus predicted torque (n,); NaN without measurement."""
         if self.measured is None:
             return np.full(self.predicted.shape[1], np.nan)
         return np.sqrt(np.mean((self.measured - self.predicted) ** 2, axis=0))
@@ -105,16 +105,17 @@ class Prediction:
         """Gives the error per joint, where torque was logged."""
         samples = len(self.motion)
         if self.measured is None:
-            return f"torques of {samples} samples; the log has none to compare with"
+            return f"torques of {samples} samples; the log has no torques to compare with"
         limited = f"below {self.cutoff:.3g} Hz"
         lines = [
             f"torques of {samples} samples",
-            f"  joint                  error RMS   over RMS   std over std  {limited:>14}  within the 95 % band",
+            f"  joint                  error RMS  rel. RMS       rel. std  {limited:>14}   in the 95 % band",
         ]
         columns = (self.error_rms, self.nrmse, self.relative_spread, self.band_limited_spread, self.band_coverage)
         for j, (name, rms, *shares) in enumerate(zip(self.joint_names, *columns, strict=True), start=1):
             share, spread, slow, covered = (f"{100 * v:.2f} %" if np.isfinite(v) else "–" for v in shares)
             lines.append(f"  {j} {name[:18]:18} {rms:12.4g} {share:>10} {spread:>14} {slow:>15} {covered:>21}")
+        lines.append("  rel.: error divided by torque; last column: share of the errors within the 95 % band")
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -170,11 +171,11 @@ def predict(
         model: an identified model.
         log: positions over time; its torque, if any, is compared with the prediction and not used otherwise. A payload
             or a gravity that it states counts. Where it overlaps in time the logs in which a model's change was found,
-            it counts as recorded after them (`clock_of`).
+            it counts as recorded after them (`clock_shift`).
         thermal: this model with its thermal models: friction falls as the motion heats the joints.
-        start: temperatures of each joint's zones at first [degC]; those of the surroundings by default.
-        ambient: temperature of the surroundings where the log does not state it [degC]; each model's by default.
-        later: how much later [s] than its own clock says the log counts; by default what `clock_of` says.
+        start: temperatures of each joint's zones at first [degC]; ambient temperature by default.
+        ambient: ambient temperature where the log does not state it [degC]; each model's by default.
+        later: how much later [s] than its own clock says the log counts; by default what `clock_shift` says.
         before: logs of what the robot did before, for a model whose effects keep heat: without any it begins cold.
             With `later` their times are as they count (`warmed`). Beside `thermal`, `start` says what was before.
 
@@ -188,7 +189,7 @@ def predict(
     robot = model.robot
     if log.n != robot.n:
         raise InputError(
-            f"{log.n} joints", file=log.metadata.get("file"), allowed=f"{robot.n}, as the model of {robot.name} has"
+            f"{log.n} joints", file=log.metadata.get("file"), allowed=f"{robot.n}, as in the model of {robot.name}"
         )
     cutoff = float(model.provenance.get("cutoff_hz", 10.0))
     motion = smooth(resample(log.t, log.q), _smoother(model, cutoff))
@@ -196,7 +197,7 @@ def predict(
     if thermal is None:
         states = (motion.q, motion.dq, motion.ddq)
         if later is None:
-            later = clock_of(model, log)[0]
+            later = clock_shift(model, log)[0]
             before = warmed(model, before, log, later)[0]
         smoother, clock = _smoother(model, cutoff), motion.t + later
         earlier = [smooth(resample(own.t, own.q), smoother) for own in before]
@@ -216,47 +217,56 @@ def predict(
     )
 
 
-def clock_of(model: Model, log: Log) -> tuple[float, str]:
-    """How much later [s] than its clock says a log counts for a model that something changed in, and a word on that.
+def clock_shift(model: Model, log: Log) -> tuple[float, str]:
+    """Time shift [s] of a log for a model that changes with time, and a note on it.
 
-    What comes, goes or builds up does so on the clock of the logs that the model was fitted to (`later_by`).
+    Time-dependent effects refer to the clock of the logs of the model's fit (`clock_shift_between`).
     """
     if not any(extension.source.depends_on == "time" for extension in model.extensions):
         return 0.0, ""
-    return later_by(model.provenance.get("logs", ()), log)
+    return clock_shift_between(model.provenance.get("logs", ()), log)
 
 
 def warmed(model: Model, before: Sequence[Log], log: Log, later: float) -> tuple[list[Log], str]:
-    """Puts logs of what warmed a robot before another on the clock of a model, and says what that takes for granted.
+    """Puts earlier logs that warmed the robot up on a model's clock, and gives a note on the assumption.
 
-    Nothing is to be said of a model that keeps no heat.
+    A model without thermal effects needs no note.
 
     Args:
         model: with the effects.
         before: the logs, in the order in which they were recorded where their clocks each began anew.
         log: the motion.
-        later: how much later [s] than its own clock says that counts (`clock_of`).
+        later: how much later [s] than its own clock says that counts (`clock_shift`).
 
     Raises:
         InputError: logs that come after the motion; any, of a model that keeps no heat.
     """
     if not model.keeps_heat:
         if before:
-            raise InputError("the model has no heat", remedy="fit one with oed thermal, or leave out what came before")
+            raise InputError(
+                "the model has no thermal part",
+                remedy="use a model of oed thermal, or remove the earlier logs (--before)",
+            )
         return [], ""
     if not before:
         return [], COLD
-    shifts = [clock_of(model, own)[0] for own in before]
-    placed, anew = before_it(before, log, float(log.t[0]) + later, shifts)
+    shifts = [clock_shift(model, own)[0] for own in before]
+    placed, anew = earlier_logs_on_clock(before, log, float(log.t[0]) + later, shifts)
     count = "one log" if len(before) == 1 else f"{len(before)} logs"
-    return placed, f"heat: warmed by {count} before, beginning cold{f'; {anew}' if anew else ''}"
+    return (
+        placed,
+        (
+            f"thermal friction: initial temperatures from {count} before; the first is assumed to start "
+            f"cold{f'; {anew}' if anew else ''}"
+        ),
+    )
 
 
-COLD = "heat: the motion is taken to begin cold; --before says what warmed the robot"
+COLD = "thermal friction: the robot is assumed cold at the start; give earlier logs with --before if it was warm"
 
 
 def _smoother(model: Model, cutoff: float) -> Smoother:
-    """What smooths another motion as the model's data were; a low-pass in place of a period's harmonics."""
+    """The smoother of the model's data for another motion; a low-pass instead of harmonics."""
     smoothing = model.provenance.get("smoothing")
     kind = smoothing.get("kind") if isinstance(smoothing, Mapping) else None
     return SmoothingSpline(cutoff) if kind == SmoothingSpline.name else LowPass(cutoff)

@@ -40,7 +40,7 @@ def virtual_robot(model: Model, robot: Robot | None = None, sensors: Sensors | N
 
 @dataclass(frozen=True, eq=False)
 class _Beyond:
-    """What a model's extensions do together."""
+    """All extensions of a model together."""
 
     model: Model
 

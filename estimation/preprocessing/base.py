@@ -1,4 +1,4 @@
-"""What a smoother is: positions in, motion out, nothing above a cut-off."""
+"""Interface of smoothers: positions in, motion out, nothing above a cut-off frequency."""
 
 from __future__ import annotations
 

@@ -80,8 +80,8 @@ def resample(t: Array, q: Array) -> Resampled:
 def between_rows(t: Array, q: Array, at: Array, period: float) -> Array:
     """Interpolates positions (N, n) by a cubic spline, and across holes by a cubic that does not overshoot.
 
-    The latter everywhere (Fritsch and Butland 1984) would have slopes too small about turning points: of a fast joint
-    that is sampled with a jitter of a fifth of the period it errs by ten steps of an encoder, the spline by none.
+    The latter alone (Fritsch and Butland 1984) has too small slopes at reversals. For a fast joint sampled with a
+    jitter of a fifth of the period, its error is ten encoder steps; the spline's is none.
 
     Args:
         t: increasing times (N,) [s].

@@ -117,11 +117,11 @@ class Blocks:
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """Blocks as a fit sees them, and as a prediction is judged on them.
+    """Blocks for a fit, and for the validation of a prediction.
 
-    A joint that is almost at rest has friction of no known sign, and its rows do not count in a fit. A prediction has
-    to say something there all the same, and its error at the starts of motions depends on the smoothing more than any
-    other: what is left out of the fit must not be left out of its verdict.
+    A joint almost at rest has friction of unknown sign, and its rows do not count in a fit. A prediction is needed
+    there as well, and its error at the start of motions depends most on the smoothing. Rows left out of the fit
+    therefore count in its validation.
 
     Attributes:
         fitted: of the rows that count.

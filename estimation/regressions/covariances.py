@@ -33,7 +33,7 @@ class Equations:
     residual: Array
 
 
-def honest_covariance(
+def robust_covariance(
     equations: Sequence[Equations], weights: Array, gram: Array, inverse: Array | None = None
 ) -> Array:
     """Estimates the covariance (b, b) of an estimate under coloured noise.

@@ -66,7 +66,7 @@ class Moments:
         )
 
     def pulled(self, pull: GaussianPrior | None) -> Moments:
-        """Gives the same sums with another pull."""
+        """Gives the same sums with another prior."""
         return replace(self, pull=pull)
 
     def columns(self, chosen: NDArray[np.intp]) -> Moments:

@@ -1,4 +1,4 @@
-"""What is known of parameters before a log is read: how far each may lie from the robot's description."""
+"""Priors of the parameters: their expected distance from the robot's description."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class GaussianPrior:
 
 
 def prior_from_description(base: BaseParameters, torque: Array, level: Array) -> GaussianPrior | None:
-    """Pulls towards the robot's description, in steps of what could be wrong with it.
+    """Builds the prior from the robot's description, scaled by its expected errors.
 
     Standard inertial parameters scatter about the description by each link's mass m, m l and m l^2, l its radius of
     gyration about its frame; regrouped, that is the covariance K S K' of base parameters, so that a combination which

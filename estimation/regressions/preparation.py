@@ -34,11 +34,11 @@ OVERLAP = 4.0
 
 @dataclass(frozen=True)
 class Rows:
-    """What a fit sees of a log, or of a piece of a long one.
+    """Data of a log, or of a part of a long one, for a fit.
 
     Attributes:
         motion: smoothed, at the log's own times.
-        tau: measured torque (N, n), as it was logged, less that of a known payload.
+        tau: measured torque (N, n), as it was logged, minus that of a known payload.
         mask: (N, n), zero where a row of a joint does not count.
         gravity: (3,) in the base frame [m/s2]; None as the robot's description says.
         held: joints (n,) that stand here and move in another log: no prediction is judged by them; None for none.
@@ -92,7 +92,7 @@ class Prepared:
         return self._seen(smooth(self.positions, smoother), smoother, ends)
 
     def _seen(self, motion: Motion, smoother: Smoother, ends: bool) -> Rows:
-        """What a fit sees of the smoothed log."""
+        """The smoothed log as regression data."""
         if not ends:
             (rows,) = self._masked([self._inside(motion, smoother)])
             return rows
@@ -180,7 +180,7 @@ def prepare(robot: Robot, log: Log) -> Prepared:
 
 
 def prepare_all(robot: Robot, logs: Sequence[Log]) -> list[Prepared]:
-    """Prepares logs as `prepare` does one, and tells which joints stand in one while they move in another.
+    """Prepares several logs, and marks joints that rest in one log but move in another.
 
     The rows of those do not count where some log moves all joints. Without, they are all that tells how joints feel
     each other's accelerations, friction or not.

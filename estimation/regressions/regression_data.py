@@ -23,7 +23,7 @@ CHUNK = 4096
 
 
 class FittedRows(Protocol):
-    """What a fit sees of one log: smoothed motion, torque (N, n) [N m or N] and the rows that count (N, n)."""
+    """Data of one log for a fit: smoothed motion, torque (N, n) [N m or N] and the rows that count (N, n)."""
 
     @property
     def motion(self) -> Motion:

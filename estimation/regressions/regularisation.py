@@ -1,4 +1,4 @@
-"""What estimators share: the regularisation that the data chose, scaled solving, and when parameters have settled."""
+"""Shared by estimators: the chosen regularisation, scaled solving, and a convergence test."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 # Eigenvalues of a described pseudo-inertia below this share of its trace are lifted: thin rods and point masses, and
 # files that breach the triangle inequality, would pull towards bodies that cannot exist.
 THIN = 0.02
-# Radius of gyration of a link that nobody describes, as a share of its length and of the arm's.
+# Radius of gyration of a link without description, as a fraction of its length and of the arm's.
 OWN_SHARE, ARM_SHARE = 0.2, 0.05
 GRAVITY = 9.81
 # Speeds, as shares of the largest, at which friction must not drive the joint.
@@ -74,11 +74,11 @@ def body_columns(model: TorqueModel) -> NDArray[np.intp]:
 
 
 def reference_bodies(robot: Robot, mass: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Gives a body per link that can exist: the description's, mended where it is degenerate, or a plausible one.
+    """Gives a physically possible body per link: the description's, corrected if degenerate, or a plausible one.
 
     Args:
         robot: the robot.
-        mass: of an arm that nobody describes [kg].
+        mass: of an arm without description [kg].
 
     Returns:
         Parameters (n, 10), and whether the description states them (n,).
@@ -92,7 +92,7 @@ def reference_bodies(robot: Robot, mass: float) -> tuple[Array, NDArray[np.bool_
     described = np.isfinite(inertia).all(axis=1) & (inertia[:, 0] > 0)
     for link in range(robot.n):
         if described[link]:
-            bodies[link] = _mended(inertia[link], 0.01 * arm)
+            bodies[link] = _corrected_body(inertia[link], 0.01 * arm)
         else:
             own, centre = mass / robot.n, ends[link] / 2
             spread = (OWN_SHARE * lengths[link] + ARM_SHARE * arm) ** 2
@@ -105,7 +105,7 @@ def reference_bodies(robot: Robot, mass: float) -> tuple[Array, NDArray[np.bool_
 
 
 def nonnegative_rows(model: TorqueModel, speed: Array) -> Array:
-    """Lists what must not be negative: rotor inertias, Coulomb and viscous friction, and the torque of all friction.
+    """Lists quantities that must not be negative: rotor inertias, Coulomb and viscous friction, and the total friction.
 
     Of a friction polynomial, f1 and f2 must be positive, and the whole must brake at every speed that was seen: its
     higher coefficients alone may have either sign, as measured curves that flatten show.
@@ -165,7 +165,7 @@ def _size(body: Array) -> tuple[float, float]:
     return float(body[0]), float(np.sqrt(np.trace(pseudo[:3, :3]) / body[0]))
 
 
-def _mended(body: Array, shortest: float) -> Array:
+def _corrected_body(body: Array, shortest: float) -> Array:
     """Lifts the eigenvalues of a body's normalised pseudo-inertia to a share of their sum."""
     mass = float(body[0])
     pseudo = pseudo_inertia(body) / mass

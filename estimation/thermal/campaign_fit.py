@@ -30,8 +30,7 @@ from robots.signals import Log
 Array = NDArray[np.float64]
 
 # The fits of rigid body and heat take turns until no friction changes by more than this share.
-SETTLED = 1e-4
-MOST_ROUNDS = 12
+SETTLED, MOST_ROUNDS = 1e-4, 12
 # Least regularisation that keeps the inverse finite.
 FAINT = 1e-12
 
@@ -53,9 +52,8 @@ def fit_campaign(
 ) -> CampaignEstimate:
     """Fits rigid body, friction at T0 and each joint's heat to all logs of a campaign.
 
-    The logs are condensed to normal equations of short times, in which a temperature is constant. On those, the linear
-    parameters given the temperatures and the thermal models given the friction of each short time take turns until both
-    stand still: a minimum of the joint problem. Standard errors come from the joint information.
+    The logs are condensed to normal equations of short times, in which a temperature is constant. Linear parameters and
+    thermal models are fitted in turn until both converge. Standard errors come from the joint information.
 
     Args:
         robot: the robot.
@@ -66,10 +64,9 @@ def fit_campaign(
         model: where to begin; identified from the logs by default.
         sensor: where joint temperatures, if any, were measured: ``motor`` or ``housing``.
         width: of the short times [s].
-        start: ``ambient`` or ``free``. Where a campaign does not start cold, friction at T0 is extrapolated: `free`
-            finds it only if cooling or several powers are in the logs. A contradiction is told.
+        start: ``ambient`` or ``free``, which needs cooling phases or several powers. A contradiction gives a note.
         seed: of the thermal searches.
-        progress: is told how far it is.
+        progress: receives the progress.
 
     Returns:
         The estimate.
@@ -89,14 +86,14 @@ def fit_campaign(
         bar.update(1.0, "condensing")
         condensed = condense(begin, data, width)
         bar.update(2.0, "fitting")
-        return _Turns(begin, condensed, sensor).run(
+        return _AlternatingFit(begin, condensed, sensor).run(
             bar, {"order": order, "alpha": alpha, "fixed": dict(fixed or {}), "start": start, "seed": seed}
         )
     finally:
         bar.finish()
 
 
-class _Turns:
+class _AlternatingFit:
     """The two fits that take turns."""
 
     def __init__(self, model: Model, condensed: Condensed, sensor: str) -> None:
@@ -129,7 +126,11 @@ class _Turns:
             bar.update(2.0 + rounds, f"friction changed by {change:.1e}")
             if change < SETTLED:
                 break
-        notes = [] if change < SETTLED else [f"The turns ended at a change of {change:.1e}, before they had settled."]
+        notes = (
+            []
+            if change < SETTLED
+            else [f"The alternating fit stopped before it converged (last relative change {change:.1e})."]
+        )
         notes += sorted({note for fit in fits if fit is not None for note in fit.notes})
         notes += self._warm(fits, options)
         final = [None if fit is None else self._unit(fit) for fit in fits]
@@ -154,14 +155,14 @@ class _Turns:
         )
 
     def _warm(self, fits: Sequence[ThermalEstimate | None], options: dict[str, Any]) -> list[str]:
-        """Says which joints do not start at the surroundings' temperature although they were taken to."""
+        """Says which joints do not start at ambient temperature although they were taken to."""
         if options["start"] != "ambient":
             return []
         found = []
         for j, (sums, fit) in enumerate(zip(self.condensed.joints, fits, strict=True)):
             if fit is not None:
                 tried = fit_thermal(self._runs(j, sums), starts=1, **{**options, "start": "auto"})
-                found += [note for note in tried.notes if "does not start" in note]
+                found += [note for note in tried.notes if "does not start at ambient temperature" in note]
         return found
 
     def _solve_linear(self) -> None:

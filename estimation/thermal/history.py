@@ -21,13 +21,13 @@ def start_temperatures(
 ) -> list[Array | None]:
     """Follows the joints through earlier logs, and rests between them, up to a time.
 
-    The first log begins at the surroundings' temperature.
+    The first log begins at ambient temperature.
 
     Args:
         model: torque model with thermal models.
         before: logs of what the robot did, on one clock; their torques are not used.
         until: when the motion of interest begins [s].
-        ambient: temperature of the surroundings where logs do not state it [degC]; that of each model by default.
+        ambient: ambient temperature where logs do not state it [degC]; that of each model by default.
 
     Returns:
         Temperatures of each joint's zones (n,) [degC]; None for a joint whose friction does not change.
@@ -64,7 +64,7 @@ def _rest(
         raise InputError(
             "logs that overlap in time",
             file=None if log is None else log.metadata.get("file"),
-            allowed="one clock for all logs, those before ending before the next begins",
+            allowed="logs on one clock, each ending before the next begins",
         )
     first = None if around is None else float(np.ravel(around)[0])
     return [

@@ -1,4 +1,4 @@
-"""The verb: which of the thermal models the data ask for."""
+"""Choice of the thermal model by held-out data."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def choose_thermal(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> ThermalChoice:
-    """Fits several thermal models and compares them by what they have not seen.
+    """Fits several thermal models and compares them on held-out data.
 
     The simplest model whose held-out error is within 3 % of the best is chosen: the larger ones contain it, and a fit
     always profits from more parameters.
@@ -50,7 +50,7 @@ def choose_thermal(
         start: see `fit_thermal`; settled once, by the first model that can tell.
         starts: see `fit_thermal`.
         seed: see `fit_thermal`.
-        progress: is told how far it is.
+        progress: receives the progress.
 
     Returns:
         The comparison.

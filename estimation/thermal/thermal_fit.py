@@ -41,11 +41,11 @@ def fit_thermal(
         fixed: other parameters that are known, by name.
         reference: T0, the temperature at which the cold friction holds [degC]; that of the first run's surroundings by
             default.
-        start: ``ambient`` where all runs start at the surroundings' temperature, ``free`` where none is known to, or
+        start: ``ambient`` where all runs start at ambient temperature, ``free`` where none is known to, or
             ``auto`` to let the data say.
         starts: how many times the search begins anew.
         seed: of where it begins.
-        progress: is told how far it is.
+        progress: receives the progress.
 
     Returns:
         The estimate.

@@ -54,8 +54,8 @@ class ThermalTorqueModel:
 
         Args:
             motion: on the robot's clock; pauses between samples are rests.
-            ambient: temperature of the surroundings, a number or (N,) [degC]; each model's by default.
-            start: temperatures of each joint's zones at first [degC]; those of the surroundings by default.
+            ambient: ambient temperature, a number or (N,) [degC]; each model's by default.
+            start: temperatures of each joint's zones at first [degC]; ambient temperature by default.
             resolution: time over which power is averaged [s].
 
         Returns:

@@ -1,4 +1,4 @@
-"""Honest uncertainty: covariances that survive coloured residuals."""
+"""Uncertainty: covariances that allow for correlated residuals."""
 
 from estimation.uncertainty.autoregressive import Noise
 from estimation.uncertainty.floors import fast_noise, period_noise

@@ -1,4 +1,4 @@
-"""What no model can predict: the noise floor of a torque, from the residual's fastest part or from period to period."""
+"""The noise floor of a torque, from the residual's fastest part or from differences between periods."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Covariance of least squares under coloured noise that is correlated across joints."""
+"""Covariance of least squares under noise that is correlated in time and across joints."""
 
 from __future__ import annotations
 
@@ -66,10 +66,10 @@ def covariance(
 ) -> Array:
     """Estimates the covariance of weighted least squares.
 
-    The meat of the sandwich is Y'W Gamma W Y, Gamma the autocovariance of an autoregressive model of the residual, with
-    innovations correlated across joints. What the fit has taken out of the residual, most of it at low frequency, is
-    given back: noise drawn from the model goes through the same fit, and the model is corrected by what it loses there.
-    A second estimate from the products of innovations guards against noise that is stronger where the arm moves
+    The inner matrix of the sandwich is Y'W Gamma W Y. Gamma is the autocovariance of an autoregressive model of the
+    residual, with innovations correlated across joints. The fit removes noise from the residual, mostly at low
+    frequency. This is corrected: noise drawn from the model goes through the same fit, and the model is scaled by its
+    loss. A second estimate from the products of innovations guards against noise that is stronger where the arm moves
     faster; each parameter's larger standard error counts.
 
     Args:
@@ -83,7 +83,7 @@ def covariance(
     Returns:
         The covariance (p, p).
     """
-    # Of a long log the fit eats too little of the noise to matter.
+    # In a long log, the fit removes too little of the noise to matter.
     long = sum(part.rows for part in parts) > MOST_CORRECTED
     seen: Sequence[Part | Averages] = parts
     lost = np.zeros_like(inverse)

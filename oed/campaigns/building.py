@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.campaigns.checking import TorqueCheck, checked
-from oed.campaigns.clearing import Clearing
+from oed.campaigns.clearing import CollisionFreeRanges
 from oed.campaigns.excitation import excitation_stage
 from oed.campaigns.fitting import fit_stages
 from oed.campaigns.planning import Planner
 from oed.campaigns.programme import Programme
-from oed.campaigns.remarks import remarks_on
+from oed.campaigns.remarks import campaign_notes
 from oed.campaigns.result import Campaign
 from oed.campaigns.stages import Stage
 from oed.campaigns.timetable import make_timetable
@@ -49,38 +49,37 @@ def campaign(
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Campaign:
-    """Plans a campaign: what heats a robot through and tells its parameters and its friction on the way.
+    """Plans a campaign that warms the robot up and measures its parameters and friction meanwhile.
 
-    A heating cycle is an excitation, friction sweeps of every joint at constant speeds both ways, posed so that gravity
-    does no work on the joint where the arm allows, and a warm-up of all joints at full speed over 80 % of their ranges
-    (thesis sections 2.4 and 5.1). Jerk-limited moves join them; every stage begins and ends at rest at home, so that
-    stages can be played in any order. Where they do not fit into the cycle, first the friction stage gives way, then
-    the warm-up, and the notes say so.
+    A heating cycle has three stages (thesis sections 2.4 and 5.1): an excitation, a friction stage and a warm-up. The
+    friction stage moves each joint at constant speeds in both directions, if possible in a pose in which gravity does
+    no work on it. The warm-up moves all joints at full speed over 80 % of their ranges. Jerk-limited moves join them.
+    Every stage starts and ends at rest in the home pose, so stages can be played in any order. If they do not fit into
+    the cycle, the friction stage is shortened first, then the warm-up; the notes say so.
 
     Args:
         robot: the robot.
         programme: what to run how often; 24 cycles of 5 min by default.
         design: the excitation, or its folder; a quick one is designed by default. Its first pose is home.
         velocity_fraction: of the velocity limits that may be used.
-        torque_margin: share of the torque limits kept for what the nominal dynamics are wrong by.
-        collision: keep the stages free of collisions, where the robot's bodies are described: the quick excitation is
-            designed so, the warm-up drives only as much of its range as is free, friction sweeps stay in the free
-            stretch of their joint, and moves go around.
-        ambient: temperature of the surroundings [degC].
+        torque_margin: share of the torque limits kept as reserve for errors of the nominal dynamics.
+        collision: keep the stages free of collisions, if the robot's bodies are described. The quick excitation avoids
+            them, warm-up and friction stages use only the free part of the ranges, and moves go around obstacles.
+        ambient: ambient temperature [degC].
         cold_friction: friction of the cold robot over that of the description, for the expected temperatures: above 1
             where the description is of the warm robot.
         thermal: models of the joints; by default the published ones, if there are any.
         seed: of the quick design.
         workers: processes of the quick design.
         executor: runs the quick design's searches.
-        progress: is told how far it is.
+        progress: receives the progress.
 
     Returns:
         The campaign; all its stages keep all limits by their own samples.
 
     Raises:
         InputError: options out of range, a design for another robot.
-        InfeasibleError: a limit of zero, stages that pass a limit, or a cycle that is too short.
+        InfeasibleError: a limit of zero, stages that exceed a limit, or a cycle that is too short.
     """
     plan = programme or Programme()
     for name, value, allowed, good in (
@@ -108,19 +107,21 @@ def campaign(
                 search=SearchOptions(effort="quick", seed=seed, workers=workers, executor=executor),
                 progress=progress,
             )
-            notes.append("The excitation was designed on the spot, with a quick search; --design takes a better one.")
+            notes.append("The excitation comes from a quick search. For a better one, run oed design and use --design.")
         excitation, remarks = excitation_stage(robot, design)
         notes += remarks
         home = excitation.motion.q[0]
         excitation = checked(excitation, robot, home, torque)
     listener.start(f"planning a campaign for {robot.name}", None)
     try:
-        clearing = Clearing(bodies, home) if bodies is not None else None
-        if clearing is not None and not clearing.possible:
+        free_ranges = CollisionFreeRanges(bodies, home) if bodies is not None else None
+        if free_ranges is not None and not free_ranges.possible:
             if bodies is not None and bodies.pairs:
-                notes.append("Home touches by the shapes of the collision model: stages were not kept clear of bodies.")
-            clearing = None
-        planner = Planner(robot=robot, limits=limits, home=home, torque=torque, clearing=clearing)
+                notes.append(
+                    "The home pose collides in the collision model, so collisions of the stages could not be avoided."
+                )
+            free_ranges = None
+        planner = Planner(robot=robot, limits=limits, home=home, torque=torque, free_ranges=free_ranges)
         stages = [_power_on_stage(plan, home, robot.period)] if plan.power_on else []
         if excitation is not None:
             stages.append(excitation)
@@ -135,7 +136,7 @@ def campaign(
             raise InputError(f"{len(known.models)} thermal models", allowed=f"{robot.n}, one per joint")
         if known is not None:
             known = replace(known, models=tuple(replace(model, ambient=ambient) for model in known.models))
-        notes += remarks_on(stages, planner, known)
+        notes += campaign_notes(stages, planner, known)
     finally:
         listener.finish()
     return Campaign(

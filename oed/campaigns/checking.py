@@ -1,4 +1,4 @@
-"""What every stage must keep: the limits by its own numbers, torque by the nominal dynamics, and rest at home."""
+"""Checks of each stage: kinematic limits, torque by the nominal dynamics, and rest in the home pose."""
 
 from __future__ import annotations
 
@@ -87,10 +87,10 @@ def checked(stage: Stage, robot: Robot, home: Array, torque: TorqueCheck) -> Sta
     require_rest(stage, home)
     for margin in result.violated:
         raise InfeasibleError(
-            f"the {stage.name} stage passes its {margin.quantity} limit: {margin.value:.6g} at {margin.time:.3f} s",
+            f"the {stage.name} stage exceeds the {margin.quantity} limit: {margin.value:.4g} at {margin.time:.3f} s",
             joint=margin.joint,
             allowed=f"{margin.limit:.6g}",
-            remedy="design the excitation within the robot's limits, or lower the velocity fraction",
+            remedy="design the excitation within the robot's limits, or reduce --velocity-fraction",
         )
     return result
 
@@ -112,7 +112,10 @@ def require_rest(stage: Stage, home: Array) -> None:
             off = np.abs(values[row])
             if off.max() > tolerance:
                 raise InfeasibleError(
-                    f"the {stage.name} stage {end} with a {quantity} {off.max():.3g} away from rest at home",
+                    (
+                        f"the {stage.name} stage {end} with a {quantity} that differs by {off.max():.3g} from rest in "
+                        f"the home pose"
+                    ),
                     joint=int(off.argmax()) + 1,
                     allowed=f"{tolerance:g}",
                 )

@@ -31,7 +31,7 @@ STRETCH_STEPS = 181
 """Positions of a joint at which a stretch is looked at."""
 
 
-class Clearing:
+class CollisionFreeRanges:
     """Finds room for motions of one robot.
 
     Args:
@@ -102,7 +102,7 @@ class Clearing:
         before = np.log((hits.sum() + 0.5) / (len(q) + 1.0))
         best, side = -np.inf, (lower, 0, lower[0])
         for joint in range(lower.size):
-            # By order of the joint's values: what is left of a cut is a tail of the list.
+            # In the order of the joint's values, so that what remains of a cut is the end of the list.
             order = q[:, joint].argsort()
             values, tail = q[order, joint], np.cumsum(hits[order][::-1])[::-1]
             for bound, sign in ((lower, 1.0), (upper, -1.0)):

@@ -36,7 +36,9 @@ def excitation_stage(robot: Robot, design: Design | str | PathLike[str]) -> tupl
             data = json.loads(existing_file(file).read_text(encoding="utf-8"))
             _ = data["robot"]["name"], data["robot"]["sha256"], data["segments"], data["quality"], data["criterion"]
         except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
-            raise InputError(f"is no design file: {type(error).__name__} {error}", file=file) from error
+            raise InputError(
+                f"is not a design file, or is damaged ({type(error).__name__}: {error})", file=file
+            ) from error
         motion, _ = read_trajectory(Path(design) / TRAJECTORY)
     known = data["robot"]
     if known["name"] != robot.name or motion.n != robot.n:
@@ -50,8 +52,8 @@ def excitation_stage(robot: Robot, design: Design | str | PathLike[str]) -> tupl
     notes = []
     if known["sha256"] != robot.digest:
         notes.append(
-            f"The excitation was designed for another description of {robot.name}; its limits were checked by the "
-            "present one, its criterion was not computed again."
+            f"The excitation was designed for another description of {robot.name}. Its limits were checked with the "
+            f"present one; its criterion was not recomputed."
         )
     return (
         Stage(

@@ -1,4 +1,4 @@
-"""Fits the stages of a heating cycle into its time: what gives way, in which order, and what is said about it."""
+"""Fits the stages of a heating cycle into its time, and notes what was shortened."""
 
 from __future__ import annotations
 
@@ -23,9 +23,8 @@ STEPS = 10
 def fit_stages(planner: Planner, programme: Programme, excitation: Stage | None) -> tuple[list[Stage], tuple[str, ...]]:
     """Plans friction and warm-up stages that fit into the cycle.
 
-    The warm-up keeps its time as long as it can: first the times at constant speed of the friction stage are shortened,
-    down to `LEAST_PLATEAU`, then the warm-up, down to half of what was asked. What little is left over goes to the
-    warm-up.
+    First, the times at constant speed of the friction stage are shortened, down to `LEAST_PLATEAU`. Then the warm-up is
+    shortened, down to half of its requested time. Remaining time goes to the warm-up.
 
     Args:
         planner: plans the stages.
@@ -67,9 +66,9 @@ def fit_stages(planner: Planner, programme: Programme, excitation: Stage | None)
                 high = middle
         wanted = (cycle - budget + len(longest.motion)) * period
         notes.append(
-            f"Excitation, friction at {programme.plateau:g} s a speed and warm-up take {wanted:.1f} s, more than the "
-            f"cycle of {programme.cycle_time:g} s: the friction stage was shortened from {longest.duration:.1f} s to "
-            f"{chosen.duration:.1f} s, with at most {low:.2f} s at each speed."
+            f"The stages take {wanted:.1f} s, more than the cycle of {programme.cycle_time:g} s. The friction stage "
+            f"was shortened from {longest.duration:.1f} s to {chosen.duration:.1f} s, with {low:.2f} s instead of "
+            f"{programme.plateau:g} s per speed."
         )
     left = budget - len(chosen.motion)
     if left < 0:
@@ -82,8 +81,7 @@ def fit_stages(planner: Planner, programme: Programme, excitation: Stage | None)
             )
             raise _too_short(programme.cycle_time, told, needed)
         notes.append(
-            f"That was not enough: the warm-up was shortened from {programme.warm_up:g} s to "
-            f"{warm_up_time * period:.1f} s."
+            f"The warm-up was shortened from {programme.warm_up:g} s to {warm_up_time * period:.1f} s as well."
         )
     if 0 < left * period <= FILL:
         warm_up_time += left

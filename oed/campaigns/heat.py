@@ -83,7 +83,7 @@ def expected_temperatures(
     *,
     cold_friction: float = 1.0,
 ) -> Temperatures:
-    """Follows each joint through the campaign, from the surroundings' temperature.
+    """Follows each joint through the campaign, from ambient temperature.
 
     Args:
         robot: its described friction gives the power.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.campaigns.checking import TorqueCheck
-from oed.campaigns.clearing import Clearing
+from oed.campaigns.clearing import CollisionFreeRanges
 from oed.campaigns.programme import duty_name
 from oed.campaigns.stages import Stage
 from oed.retiming import plan_move
@@ -50,14 +50,14 @@ class Planner:
         limits: that all motions keep.
         home: pose at both ends of each stage, (n,) [rad or m].
         torque: the torque limits.
-        clearing: keeps motions free of collisions, where the robot's bodies are known.
+        free_ranges: keeps motions free of collisions, where the robot's bodies are known.
     """
 
     robot: Robot
     limits: Limits
     home: Array
     torque: TorqueCheck
-    clearing: Clearing | None = None
+    free_ranges: CollisionFreeRanges | None = None
 
     def poses(self) -> tuple[tuple[Array, float], ...]:
         """Chooses for each joint a pose in which gravity does no work on it, and the angle that is left [rad]."""
@@ -68,12 +68,12 @@ class Planner:
 
     def _room(self, joint: int) -> Callable[[Array], float] | None:
         """Measures how far a joint can go from a pose before bodies meet."""
-        clearing = self.clearing
-        if clearing is None:
+        free_ranges = self.free_ranges
+        if free_ranges is None:
             return None
 
         def room(pose: Array) -> float:
-            low, high = clearing.stretch(self.limits, joint, pose)
+            low, high = free_ranges.stretch(self.limits, joint, pose)
             return high - low
 
         return room
@@ -143,7 +143,7 @@ class Planner:
         for duty in duties:
 
             def build(limits: Limits, duty: float = duty) -> Sequence:
-                box, part = (limits, fraction) if self.clearing is None else (self._box(limits, fraction), 1.0)
+                box, part = (limits, fraction) if self.free_ranges is None else (self._box(limits, fraction), 1.0)
                 warm_up = plan_warm_up(box, duration=rounded, period=period, fraction=part, duty=duty, centre=self.home)
                 return self._joined(limits, [Segment(kind="warm_up", trajectory=warm_up)])
 
@@ -169,9 +169,9 @@ class Planner:
 
     def _box(self, limits: Limits, fraction: float) -> Limits:
         """Gives limits the ranges in which the arm cannot meet itself or its surroundings."""
-        assert self.clearing is not None
+        assert self.free_ranges is not None
         if fraction not in self._boxes:
-            self._boxes[fraction] = self.clearing.box(self.limits, fraction)
+            self._boxes[fraction] = self.free_ranges.box(self.limits, fraction)
         box = self._boxes[fraction]
         return replace(limits, lower=box.lower, upper=box.upper)
 
@@ -181,7 +181,7 @@ class Planner:
 
     def _ranges(self, fraction: float) -> list[float]:
         """Tells which part of each joint's range a warm-up drives (n,)."""
-        if self.clearing is None:
+        if self.free_ranges is None:
             return [fraction] * self.robot.n
         box, span = self._box(self.limits, fraction), self.limits.upper - self.limits.lower
         return np.where(
@@ -190,9 +190,9 @@ class Planner:
 
     def _sweep(self, limits: Limits, joint: int, pose: Array, levels: Many[float], longest: float) -> Sweep:
         period = self.robot.period
-        if self.clearing is not None:
+        if self.free_ranges is not None:
             lower, upper = limits.lower.copy(), limits.upper.copy()
-            low, high = self.clearing.stretch(self.limits, joint, pose)
+            low, high = self.free_ranges.stretch(self.limits, joint, pose)
             # With no room there, the sweep is planned regardless, and the remarks say where it collides.
             if high > low:
                 lower[joint - 1], upper[joint - 1] = low, high
@@ -218,10 +218,10 @@ class Planner:
         assert worst is not None
         usable = (1.0 - self.torque.margin) * worst.limit
         raise InfeasibleError(
-            f"the {name} stage takes {abs(worst.value):.4g} of torque even with soft accelerations",
+            f"the {name} stage needs {abs(worst.value):.3g} N m (prismatic: N) even with low accelerations",
             joint=worst.joint,
-            allowed=f"{usable:.4g}, the torque limit less {100 * self.torque.margin:g} %",
-            remedy="lower the velocity fraction",
+            allowed=f"{usable:.3g}, the torque limit minus {100 * self.torque.margin:g} % reserve",
+            remedy="reduce --velocity-fraction or --torque-margin",
         )
 
     def _joined(self, limits: Limits, parts: list[Segment]) -> Sequence:
@@ -236,12 +236,12 @@ class Planner:
     def move(self, limits: Limits, start: Array, end: Array) -> list[Segment]:
         """Moves from one pose to another, straight or, where bodies are in the way, around them if a way is found."""
         straight = self.stops(limits, (start, end))
-        if self.clearing is None or not straight:
+        if self.free_ranges is None or not straight:
             return straight
-        for poses in self.clearing.ways(start, end):
+        for poses in self.free_ranges.ways(start, end):
             segments = self.stops(limits, poses)
             motions = [segment.trajectory.motion(self.robot.period) for segment in segments]
-            if all(self.clearing.free(motion) for motion in motions):
+            if all(self.free_ranges.free(motion) for motion in motions):
                 return segments
         return straight
 

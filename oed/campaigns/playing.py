@@ -36,7 +36,7 @@ def play(campaign: Campaign, plant: Plant | None = None, seed: int = 0) -> Itera
     """
     virtual = plant or nominal_plant(campaign.robot)
     if virtual.robot.n != campaign.robot.n:
-        raise InputError(f"a plant of {virtual.robot.n} joints", allowed=f"{campaign.robot.n}, as the campaign has")
+        raise InputError(f"the plant has {virtual.robot.n} joints", allowed=f"{campaign.robot.n}, as in the campaign")
     numbers = {stage.name: number for number, stage in enumerate(campaign.stages, start=1)}
     stages = campaign.stages_by_name
     warmth = _warmth(campaign, virtual)
@@ -101,7 +101,7 @@ def record(
         plant: the virtual robot; by default that of the robot's own description.
         seed: of the noise.
         force: whether existing logs may be replaced.
-        progress: is told how far it is.
+        progress: receives the progress.
 
     Returns:
         The names of the files.

@@ -1,4 +1,4 @@
-"""What a campaign consists of: how many cycles of what, and how long."""
+"""The programme of a campaign: number, kind and duration of its cycles."""
 
 from __future__ import annotations
 
@@ -69,14 +69,16 @@ class Programme:
         if not self.levels or not all(0.0 < level <= 1.0 for level in self.levels):
             raise InputError(f"levels are {list(self.levels)}", allowed="fractions above 0 and up to 1")
         if not (self.cycles or self.cooling or self.power_on):
-            raise InputError("a campaign of nothing", allowed="cycles, a cooling test or a power-on test")
+            raise InputError(
+                "the campaign is empty", allowed="at least one of --cycles, --cooling and --power-on above zero"
+            )
         if self.cycles and self.warm_up >= self.cycle_time:
             raise InputError(
-                f"a warm-up of {self.warm_up:g} s leaves nothing of a cycle of {self.cycle_time:g} s",
+                f"a warm-up of {self.warm_up:g} s does not fit into a cycle of {self.cycle_time:g} s",
                 remedy="shorten the warm-up, or lengthen the cycle",
             )
         if self.duration > LONGEST:
-            raise InputError(f"a campaign of {self.duration / 3600:.0f} h", allowed=f"{LONGEST / 3600:.0f} h")
+            raise InputError(f"the campaign lasts {self.duration / 3600:.0f} h", allowed=f"{LONGEST / 3600:.0f} h")
 
     @property
     def runs(self) -> int:

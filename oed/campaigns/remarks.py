@@ -1,4 +1,4 @@
-"""What a user must know of a campaign before playing it."""
+"""Notes on a campaign that a user must know before playing it."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from oed.campaigns.planning import ALIGNED, Planner
 from oed.campaigns.stages import Stage
 from robots.thermal import KnownThermal
 
-NARROWED = 0.99
+SHOWN_REDUCTION = 0.99
 """Part of what was asked below which a joint's warm-up range counts as narrowed."""
 
 
-def remarks_on(stages: Sequence[Stage], planner: Planner, known: KnownThermal | None) -> tuple[str, ...]:
-    """Says what was changed, what could not be checked, and what the stages come too close to.
+def campaign_notes(stages: Sequence[Stage], planner: Planner, known: KnownThermal | None) -> tuple[str, ...]:
+    """Lists changes, missing checks, and collisions or small margins of the stages.
 
     Args:
         stages: the stages, with their margins.
@@ -27,7 +27,7 @@ def remarks_on(stages: Sequence[Stage], planner: Planner, known: KnownThermal | 
         Sentences, collisions first.
     """
     collisions = [remark for stage in stages for remark in _collisions(stage, planner)]
-    others = [remark for stage in stages for remark in _remarks(stage, planner)]
+    others = [remark for stage in stages for remark in _notes(stage, planner)]
     return (*collisions, *others, *_unknown(planner, known))
 
 
@@ -36,58 +36,61 @@ def _collisions(stage: Stage, planner: Planner) -> Iterator[str]:
     if closest is None or closest[1] >= 0.0:
         return
     pair, clearance, time = closest
-    remedy = "Check before playing."
+    remedy = "Check it before playing."
     if stage.kind == "excitation":
-        remedy = "`oed design --collision` keeps clear."
+        remedy = "Use `oed design --collision` to avoid it."
     yield (
-        f"COLLISION in the {stage.name} stage, by the shapes of the collision model: {pair} overlap by "
+        f"COLLISION in the {stage.name} stage: in the collision model {pair} overlap by "
         f"{-1e3 * clearance:.0f} mm at {time:.1f} s. {remedy}"
     )
 
 
-def _remarks(stage: Stage, planner: Planner) -> Iterator[str]:
+def _notes(stage: Stage, planner: Planner) -> Iterator[str]:
     torque = planner.torque
     share = stage.details.get("acceleration_share", 1.0)
     if share < 1.0:
-        yield f"The {stage.name} stage accelerates at {100 * share:g} % of the limits, to keep the torque limits."
+        yield f"The {stage.name} stage uses {100 * share:g} % of the acceleration limits, because of the torque limits."
     for margin in stage.margins:
         if margin.quantity == "torque" and margin.slack_fraction < torque.margin - 1e-9:
             yield (
-                f"The {stage.name} stage leaves {100 * margin.slack_fraction:.1f} % of the torque limit of joint "
-                f"{margin.joint}, less than the {100 * torque.margin:g} % that are asked for."
+                f"The {stage.name} stage keeps a torque reserve of {100 * margin.slack_fraction:.1f} % on joint "
+                f"{margin.joint}; {100 * torque.margin:g} % are required."
             )
     asked = stage.details.get("range", 0.0)
-    narrow = [j for j, part in enumerate(stage.details.get("ranges", []), start=1) if part < NARROWED * asked]
+    narrow = [j for j, part in enumerate(stage.details.get("ranges", []), start=1) if part < SHOWN_REDUCTION * asked]
     if narrow:
         parts = ", ".join(f"{100 * stage.details['ranges'][j - 1]:.0f} %" for j in narrow)
         yield (
-            f"To stay clear of bodies, the {stage.name} stage drives joint {_listed(narrow)} over {parts} of the range "
+            f"To avoid collisions, the {stage.name} stage moves joint {_listed(narrow)} over {parts} of the range "
             f"instead of {100 * asked:g} %."
         )
     slow = sorted({p["joint"] for p in stage.plateaus if abs(p["speed"]) < abs(p["asked"]) - 1e-9})
     if slow:
-        yield f"The range of joint {_listed(slow)} is too short for the highest speeds of the friction stage."
+        yield (
+            f"The range of joint {_listed(slow)} is too short for the highest speeds of the friction stage; they were "
+            f"left out."
+        )
     angles = stage.details.get("angle_to_no_gravity_deg", [])
     loaded = [joint for joint, angle in enumerate(angles, start=1) if angle > np.rad2deg(ALIGNED)]
     if loaded:
         yield (
-            f"The arm does not allow a pose in which gravity does no work on joint {_listed(loaded)}: separate it by a "
-            "fit of sine and cosine (thesis eq. 84)."
+            f"The arm has no pose in which joint {_listed(loaded)} is free of gravity torque. Separate gravity from "
+            f"friction with a sine and cosine fit (thesis eq. 84)."
         )
 
 
 def _unknown(planner: Planner, known: KnownThermal | None) -> Iterator[str]:
     robot = planner.robot
     if not planner.torque.known:
-        yield "Torque was not checked: the description states no nominal dynamics or no torque limits."
+        yield "Torque limits were not checked: the robot's description lacks nominal dynamics or torque limits."
     if not np.any(np.asarray(robot.friction)):
-        yield "The description states no friction: heat is unknown."
+        yield "The robot's description states no friction, so the friction heat is unknown."
     if known is None:
-        yield "No thermal model of this robot is known: no temperatures are expected."
+        yield "No thermal model of this robot is known, so temperatures are not forecast."
     elif any("assumed" in source for source in known.sources):
         yield (
-            "Expected temperatures are by the thesis' parameters of joint 4, assumed for the others, and by friction "
-            "alone: heat of the motors' windings is not in the model."
+            "Expected temperatures are a rough forecast. They use the thesis' parameters of joint 4 for all joints, "
+            "and friction heat only, without the heat of the motor windings."
         )
 
 

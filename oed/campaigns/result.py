@@ -46,7 +46,7 @@ class Campaign:
         stages: the distinct stages.
         slots: what runs when.
         thermal: models of the joints; None where none are known.
-        ambient: temperature of the surroundings [degC].
+        ambient: ambient temperature [degC].
         cold_friction: friction of the cold robot over that of the description, for the expected temperatures.
         torque_margin: share of the torque limits that friction and warm-up stages leave free.
         notes: what a user should know: what was shortened, what could not be checked.
@@ -113,19 +113,19 @@ class Campaign:
         )
 
     def check(self) -> tuple[Stage, ...]:
-        """Measures all stages anew by their samples.
+        """Checks all stages again, from their samples.
 
         Returns:
             The stages with their margins.
 
         Raises:
-            InfeasibleError: a stage that passes a limit or is not at rest at home at its ends.
+            InfeasibleError: a stage exceeds a limit or does not start and end at rest in the home pose.
         """
         torque = TorqueCheck(self.robot, self.torque_margin)
         return tuple(checked(stage, self.robot, self.home, torque) for stage in self.stages)
 
     def summary(self) -> str:
-        """Says in a few lines what runs, how hot it gets, and what to know."""
+        """Lists the stages, the expected heating, and notes."""
         programme = self.programme
         lines = [f"{self.robot.name}: {self.duration / 60:.1f} min, {self.cycles} cycles, {self.samples} samples"]
         for stage in self.stages:
@@ -142,10 +142,10 @@ class Campaign:
         if programme.cycles:
             heating = next(slot.cycle for slot in self.slots if slot.phase == "heating")
             joules = ", ".join(f"{value / 1e3:.1f}" for value in self.cycle_heat[heating - 1])
-            lines.append(f"  friction heat of the first heating cycle, kJ a joint: {joules}")
+            lines.append(f"  friction heat of the first heating cycle, kJ per joint: {joules}")
         if self.temperatures is not None:
             peaks = ", ".join(f"{value:.0f}" for value in self.temperatures.T1.max(axis=0))
-            lines.append(f"  highest expected temperature, degC a joint: {peaks}")
+            lines.append(f"  highest expected temperature, degC per joint: {peaks}")
         lines += [f"  note: {note}" for note in self.notes]
         return "\n".join(lines)
 
@@ -253,7 +253,7 @@ class Campaign:
             for entry in data["stages"]:
                 path = Path(folder) / entry["file"]
                 if sha256(path) != entry["sha256"]:
-                    raise InputError("is not the file that the campaign wrote", file=path, remedy="write it anew")
+                    raise InputError("changed since the campaign wrote it", file=path, remedy="run oed campaign again")
                 stages.append(Stage.from_dict(entry, read_trajectory(path, n=known.n)[0]))
             expected = data["temperatures"]
             thermal = None
@@ -273,7 +273,7 @@ class Campaign:
                 notes=tuple(data["notes"]),
             )
         except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
-            raise InputError(f"is no campaign file: {type(error).__name__} {error}", file=file) from error
+            raise InputError(f"is damaged, or no campaign: {type(error).__name__} {error}", file=file) from error
 
     def _last_slots(self) -> list[Slot]:
         return list({slot.cycle: slot for slot in self.slots}.values())

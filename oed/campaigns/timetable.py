@@ -1,4 +1,4 @@
-"""What runs when."""
+"""Schedule of a campaign."""
 
 from __future__ import annotations
 
@@ -79,8 +79,8 @@ def make_timetable(programme: Programme, samples: Mapping[str, int], period: flo
         left = now + length - ends[-1]
         if left < 0:
             raise InputError(
-                f"{', '.join(names)} take {(length - left) * period:.6g} s, more than the cycle of "
-                f"{length * period:.6g} s"
+                f"{', '.join(names)} take {(length - left) * period:.4g} s, more than the cycle of "
+                f"{length * period:.4g} s"
             )
         stages: list[str | None] = [*names]
         if left:
@@ -107,5 +107,5 @@ def make_timetable(programme: Programme, samples: Mapping[str, int], period: flo
 def _count(duration: float, period: float, name: str) -> int:
     count = round(duration / period)
     if abs(count * period - duration) > 1e-6 * period:
-        raise InputError(f"{name} of {duration:.9g} s is no multiple of the controller's period {period:g} s")
+        raise InputError(f"{name} of {duration:.9g} s is not a multiple of the controller's period of {period:g} s")
     return count

@@ -1,4 +1,4 @@
-"""The command line: thin shells over the functions of the same names."""
+"""The command line: each command calls the library function of its name."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 
 
 def main() -> None:
-    """Runs ``oed``. Exit codes: 0 done, 1 it could not be done, 2 bad input, 130 interrupted."""
+    """Runs ``oed``. Exit codes: 0 success, 1 no solution, 2 bad input, 130 interrupted."""
     from oed.cli.app import app
     from robots.common.errors import OedError
 

@@ -20,7 +20,7 @@ from oed.cli.commands.thermal import thermal
 
 app = typer.Typer(
     name="oed",
-    help="Designs excitation experiments for robots, identifies their dynamics, and says how sure it is.",
+    help="Designs excitation experiments for robots, identifies their dynamics, and diagnoses model errors.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -44,4 +44,4 @@ def options(
         bool, typer.Option("--version", help="Print the version and exit.", is_eager=True, callback=_show_version)
     ] = False,
 ) -> None:
-    """Designs excitation experiments for robots, identifies their dynamics, and says how sure it is."""
+    """Designs excitation experiments for robots, identifies their dynamics, and diagnoses model errors."""

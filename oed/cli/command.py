@@ -1,4 +1,4 @@
-"""A command whose options that may be given again take several values, as shells expand ``--log runs/*.csv``."""
+"""A command whose repeatable options also take several values, as in ``--log runs/*.csv``."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typer.core import TyperCommand
 
 
 class Command(TyperCommand):
-    """Reads ``--log a.csv b.csv`` as ``--log a.csv --log b.csv``, in commands that have no arguments of their own."""
+    """Reads ``--log a.csv b.csv`` as ``--log a.csv --log b.csv``, in commands without positional arguments."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parses the words of a command line."""
@@ -20,7 +20,7 @@ class Command(TyperCommand):
 
 
 def _repeated(words: Sequence[str], again: Collection[str]) -> Iterator[str]:
-    """Writes an option before each of its values but the first, which has it already."""
+    """Repeats an option before its second and later values."""
     option, values = "", 0
     for word in words:
         if word.startswith("-"):

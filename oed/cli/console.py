@@ -1,4 +1,4 @@
-"""What the command line shows: progress on a terminal, a summary or JSON at the end, one clear message on an error."""
+"""Output of the command line: progress on a terminal, a summary or JSON at the end, one message on an error."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Console:
 
     @contextmanager
     def working(self) -> Iterator[Progress]:
-        """Gives a progress bar on a terminal, silence in a pipe; notes come out once each, without a traceback.
+        """Shows a progress bar on a terminal and nothing in a pipe. Each note is printed once.
 
         Raises:
             SystemExit: with code 130, on Ctrl-C.
@@ -44,7 +44,7 @@ class Console:
                     with RichProgress() as progress:
                         yield progress
             except KeyboardInterrupt:
-                # Here, for typer would end without a word.
+                # Without this, typer would end without a message.
                 print("oed: interrupted; nothing was written", file=sys.stderr)
                 raise SystemExit(130) from None
 
@@ -53,7 +53,7 @@ class Console:
             print(f"note: {message}", file=sys.stderr)
 
     def result(self, summary: str, data: Mapping[str, Any]) -> None:
-        """Prints what came out: the summary for people or the data for machines."""
+        """Prints the summary, or the data as JSON."""
         if self.json:
             print(json.dumps(data, indent=2, allow_nan=False))
         elif not self.quiet:

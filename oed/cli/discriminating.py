@@ -1,4 +1,4 @@
-"""``oed design --discriminate``: the experiment that tells two possible causes apart."""
+"""``oed design --discriminate``: an experiment that distinguishes two possible causes."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ APPLY = {
     "json",
     "quiet",
 }
-"""Options of ``oed design`` that mean something beside ``--discriminate``."""
+"""Options of ``oed design`` that apply with ``--discriminate``."""
 
 
 def refuse_others(context: typer.Context) -> None:
-    """Refuses options that an experiment of this kind has no use for.
+    """Refuses options that do not apply with ``--discriminate``.
 
     Raises:
         InputError: naming them.
@@ -46,12 +46,15 @@ def refuse_others(context: typer.Context) -> None:
     if given:
         verb = "does" if len(given) == 1 else "do"
         raise InputError(
-            f"{', '.join(given)} {verb} not apply with --discriminate, which judges by the chance to tell them apart",
-            remedy="leave out one or the other",
+            (
+                f"{', '.join(given)} {verb} not apply with --discriminate, which maximises the probability of the "
+                f"right decision"
+            ),
+            remedy="remove these options, or remove --discriminate",
         )
 
 
-def discriminating(
+def design_discriminating(
     robot: Robot,
     rivals: str,
     *,
@@ -65,7 +68,7 @@ def discriminating(
     force: bool,
     progress: Progress,
 ) -> tuple[str, dict[str, Any]]:
-    """Writes trajectory.csv, design.json and report.html; gives the summary and the data."""
+    """Writes trajectory.csv, design.json and report.html; returns the summary and the data."""
     from oed.campaigns.discriminations.discriminating import discriminate
     from oed.reports.pages.discrimination_report import save_discrimination_report
     from robots.common.files import ResultFolder

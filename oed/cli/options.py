@@ -16,55 +16,56 @@ ROBOT = "a catalogue name (er3a, ur10, panda), a URDF, or a robot YAML"
 
 RobotOption = Annotated[str, typer.Option("--robot", help=f"The robot: {ROBOT}.", show_default=False)]
 TipOption = Annotated[
-    str | None, typer.Option("--tip", help="Of a branched URDF: the link at which the chain ends.", show_default=False)
+    str | None, typer.Option("--tip", help="URDF with branches: the link at which the chain ends.", show_default=False)
 ]
 JointsOption = Annotated[
     str | None,
-    typer.Option("--joints", help="Of a branched URDF: the chain's joints, separated by commas.", show_default=False),
+    typer.Option("--joints", help="URDF with branches: the joints of the chain, comma-separated.", show_default=False),
 ]
 LockOption = Annotated[
     list[str] | None,
-    typer.Option("--lock", help="A joint held at a value [rad or m], as name=value.", show_default=False),
+    typer.Option(
+        "--lock", help="Hold a joint at a position [rad or m], as name=value. Repeatable.", show_default=False
+    ),
 ]
 LogOption = Annotated[
-    list[Path], typer.Option("--log", help="A log, or a folder of logs; may be given again.", show_default=False)
+    list[Path], typer.Option("--log", help="A log, or a folder of logs. Repeatable.", show_default=False)
 ]
 MappingOption = Annotated[
     Path | None,
-    typer.Option("--mapping", help="A YAML file: names, units, signs and order of the columns.", show_default=False),
-]
-ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite results that are there.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
-QuietOption = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
-SeedOption = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
-WorkersOption = Annotated[
-    int | None,
-    typer.Option("--workers", min=1, help="Parallel processes; as many as cores by default.", show_default=False),
-]
-OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
-FrictionOption = Annotated[str, typer.Option("--friction", help="The model to fit: polynomial or coulomb-viscous.")]
-FamilyOption = Annotated[
-    str, typer.Option("--family", help="Of the optimised part: fourier, bspline or fourier-polynomial.")
-]
-HarmonicsOption = Annotated[
-    int,
     typer.Option(
-        "--harmonics", help="Harmonics N of the optimised part; another family gets about as many coefficients."
+        "--mapping", help="A YAML file with names, units, signs and order of the log's columns.", show_default=False
     ),
 ]
+ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite existing results.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+QuietOption = Annotated[bool, typer.Option("--quiet", help="Print only errors.")]
+SeedOption = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random numbers.")]
+WorkersOption = Annotated[
+    int | None,
+    typer.Option("--workers", min=1, help="Number of parallel processes. Default: one per core.", show_default=False),
+]
+OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
+FrictionOption = Annotated[str, typer.Option("--friction", help="Friction model: polynomial or coulomb-viscous.")]
+FamilyOption = Annotated[
+    str, typer.Option("--family", help="Family of the optimised part: fourier, bspline or fourier-polynomial.")
+]
+HarmonicsOption = Annotated[
+    int, typer.Option("--harmonics", help="Number of harmonics; a B-spline gets as many coefficients per joint.")
+]
 BaseFrequencyOption = Annotated[
-    float, typer.Option("--base-frequency", help="One over the duration of one repetition [Hz].")
+    float, typer.Option("--base-frequency", help="Frequency of the first harmonic: one over the period [Hz].")
 ]
 CollisionOption = Annotated[
-    bool, typer.Option("--collision", help="Keep clear of the arm itself and of the obstacles in its file.")
+    bool, typer.Option("--collision", help="Avoid self-collisions and the obstacles in the robot file.")
 ]
 VelocityFractionOption = Annotated[
-    float, typer.Option("--velocity-fraction", help="Share of the velocity limits to use.")
+    float, typer.Option("--velocity-fraction", help="Fraction of the velocity limits to use.")
 ]
 TorqueMarginOption = Annotated[
-    float, typer.Option("--torque-margin", help="Share of the torque limits kept in reserve.")
+    float, typer.Option("--torque-margin", help="Fraction of the torque limits to keep as reserve.")
 ]
-PngOption = Annotated[bool, typer.Option("--png", help="Write the report's pictures as PNG files, too.")]
+PngOption = Annotated[bool, typer.Option("--png", help="Also write the report's figures as PNG files.")]
 
 
 def robot_from(spec: str, tip: str | None = None, joints: str | None = None, lock: list[str] | None = None) -> Robot:
@@ -81,20 +82,22 @@ def robot_from(spec: str, tip: str | None = None, joints: str | None = None, loc
         try:
             locked[name.strip()] = float(value)
         except ValueError:
-            raise InputError(f"--lock {item}", allowed="name=value, the value in rad or m") from None
+            raise InputError(
+                f"--lock {item}", allowed="name=value with the value in rad or m, such as elbow_joint=1.57"
+            ) from None
     names = [name.strip() for name in joints.split(",")] if joints else None
     return load_robot(spec, tip=tip, joints=names, locked=locked or None)
 
 
 def numbers(option: str, text: str | None) -> list[float] | None:
-    """Reads numbers separated by commas.
+    """Reads comma-separated numbers.
 
     Raises:
-        InputError: something else.
+        InputError: the text is something else.
     """
     if text is None:
         return None
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
-        raise InputError(f"{option} {text}", allowed="numbers separated by commas") from None
+        raise InputError(f"{option} {text}", allowed="numbers, separated by commas") from None

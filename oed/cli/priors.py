@@ -1,4 +1,4 @@
-"""What an identified model tells a design."""
+"""The prior information that an identified model gives a design."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from robots.plants import PlantEffect
 
 
 def prior_from(path: Path, n: int) -> tuple[Prior, tuple[PlantEffect, ...]]:
-    """Reads the information that a model file carries, and what the robot has beyond its description.
+    """Reads a model file's information matrix and the model extensions.
 
     Args:
-        path: of a model.json.
+        path: a model.json or its folder.
         n: the number of joints of the robot.
 
     Raises:

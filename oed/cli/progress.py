@@ -1,4 +1,4 @@
-"""A progress bar with an honest remaining time: the measured rate, and nothing before there is one."""
+"""A progress bar. The remaining time follows from the measured rate and is not shown before one is known."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class RichProgress:
         self._bars.stop()
 
     def start(self, task: str, total: float | None = None) -> None:
-        """Begins a task of `total` units, or of unknown length."""
+        """Starts a task of `total` units, or of unknown length."""
         self.finish()
         self._task = self._bars.add_task(task, total=total, note="")
 
     def update(self, done: float, note: str = "") -> None:
-        """Says how many units are done, and what is going on."""
+        """Sets the number of units done and the current status."""
         if self._task is not None:
             self._bars.update(self._task, completed=done, note=note)
 

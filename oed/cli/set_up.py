@@ -1,4 +1,4 @@
-"""What the command line tells of logs: what the robot carried, and how its base stood."""
+"""Known payloads and base orientations of logs, from the command line."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ PayloadOption = Annotated[
     list[str] | None,
     typer.Option(
         "--payload",
-        help="A log that carries a known payload, as NUMBER=KG,X,Y,Z: its centre [m] in the flange's frame.",
+        help=(
+            "Known payload in a log, as NUMBER=KG,X,Y,Z: number of the log, mass [kg], centre of mass in the flange "
+            "frame [m]."
+        ),
         show_default=False,
     ),
 ]
@@ -25,22 +28,25 @@ GravityOption = Annotated[
     list[str] | None,
     typer.Option(
         "--gravity",
-        help="A log of a base that stood otherwise, as NUMBER=X,Y,Z: gravity [m/s2] in the base frame.",
+        help=(
+            "Gravity in the base frame for a log with a tilted base, as NUMBER=X,Y,Z: number of the log, gravity "
+            "[m/s2]."
+        ),
         show_default=False,
     ),
 ]
 
 
-def told(logs: Sequence[Log], payloads: list[str] | None, gravities: list[str] | None) -> list[Log]:
-    """Tells logs, counted from 1 in the order of reading, what they carry and how their base stood.
+def with_known_setup(logs: Sequence[Log], payloads: list[str] | None, gravities: list[str] | None) -> list[Log]:
+    """Adds known payloads and gravity vectors to logs.
 
     Args:
-        logs: as they were read.
-        payloads: each NUMBER=KG,X,Y,Z, a point mass [kg] and its place [m] in the flange's frame.
+        logs: in the order in which they were read; they are numbered from 1.
+        payloads: each NUMBER=KG,X,Y,Z, a point mass [kg] and its position [m] in the flange's frame.
         gravities: each NUMBER=X,Y,Z [m/s2], in the base frame.
 
     Raises:
-        InputError: a text of another form, a number without a log, or one that is told twice.
+        InputError: a text of another form, a number without a log, or a number given twice.
     """
     from dataclasses import replace
 
@@ -69,16 +75,18 @@ def _by_number(
         except ValueError:
             raise InputError(f"{option} {text}", allowed=_EXAMPLES[option]) from None
         if not 1 <= number <= count:
-            raise InputError(f"{option} of log {number}", allowed=f"1 to {count}: the logs in the order they are read")
+            raise InputError(
+                f"{option} of log {number}", allowed=f"1 to {count}, the number of the log in reading order"
+            )
         if number in found:
-            raise InputError(f"{option} of log {number} twice", allowed="once a log")
+            raise InputError(f"{option} of log {number} twice", allowed="one per log")
         found[number] = value
     return found
 
 
 _EXAMPLES = {
-    "--payload": ("NUMBER=KG,X,Y,Z, as 2=5,0,0,0.1 for 5 kg a tenth of a metre ahead of the flange in the second log"),
-    "--gravity": "NUMBER=X,Y,Z, as 2=0,-2.54,-9.48 for a base that was tilted by 15 degrees in the second log",
+    "--payload": ("NUMBER=KG,X,Y,Z; 2=5,0,0,0.1 means log 2 with 5 kg, centred 0.1 m in front of the flange"),
+    "--gravity": "NUMBER=X,Y,Z; 2=0,-2.54,-9.48 means log 2 with the base tilted by 15 degrees",
 }
 
 

@@ -1,4 +1,4 @@
-"""Limits in space from the command line's options."""
+"""Workspace limits from the command line's options."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ if TYPE_CHECKING:
 
 
 def spaces_from(tool_box: str | None, singularity: float | None) -> tuple[GeometricLimit, ...]:
-    """Builds the limits that the options state.
+    """Builds the workspace limits of the options.
 
     Args:
         tool_box: six numbers, from and to in x, y and z [m]; None for no box.
-        singularity: smallest singular value to keep; None for no such limit.
+        singularity: lower bound of the smallest singular value; None for no such limit.
 
     Raises:
         InputError: other than six numbers, an empty box, or a value that is not positive.
@@ -30,7 +30,7 @@ def spaces_from(tool_box: str | None, singularity: float | None) -> tuple[Geomet
         if len(sides) != 6:
             raise InputError(
                 f"--tool-box {tool_box}",
-                allowed="six numbers: x from, to, y from, to, z from, to, such as 0.1,0.6,-0.5,0.5,0.05,inf",
+                allowed="six numbers xmin,xmax,ymin,ymax,zmin,zmax, such as 0.1,0.6,-0.5,0.5,0.05,inf",
             )
         low, high = sides[::2], sides[1::2]
         limits.append(ToolBox(lower=(low[0], low[1], low[2]), upper=(high[0], high[1], high[2])))

@@ -110,7 +110,7 @@ def tightened_bounds(lower: ArrayLike, upper: ArrayLike, share: float) -> tuple[
     lonely = np.isfinite(low) != np.isfinite(high)
     if np.any(lonely):
         raise InputError(
-            "has a limit on one side only, which samples cannot guarantee",
+            "has a limit on one side only, which cannot be guaranteed between samples",
             joint=int(np.argmax(lonely)) + 1,
             allowed="a limit on both sides, or none",
         )

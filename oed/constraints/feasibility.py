@@ -1,4 +1,4 @@
-"""Whether limits in space leave an experiment any room: told before a solver starts, with the number that would do."""
+"""Checks before the solver starts whether workspace limits allow any experiment, and which limit would."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def check_feasible(robot: Robot, limits: GeometricLimits, home: ArrayLike) -> No
         row = min(wrong, key=lambda index: values[index])
         unit = f" {limits.units[row]}" if limits.units[row] else ""
         raise InfeasibleError(
-            f"the start pose breaks the limit {limits.labels[row]!r} by {-values[row]:.4g}{unit}",
-            allowed=f"a limit that is {-values[row]:.4g}{unit} wider, or another start pose",
+            f"the start pose violates the limit {limits.labels[row]!r} by {-values[row]:.3g}{unit}",
+            allowed=f"a limit that is {-values[row]:.3g}{unit} wider, or another start pose",
             remedy=_advice(nearest_feasible(limits, q)),
         )
 
@@ -80,9 +80,12 @@ def _check_feet(limit: CollisionLimit) -> None:
             height = float(obstacle.normal @ foot)
             if obstacle.offset > height:
                 raise InfeasibleError(
-                    f"{obstacle.name!r} at {obstacle.offset:.4g} m lies above the first joint, at {height:.4g} m",
-                    allowed=f"{height:.4g} m at the most, less the size of the first link",
-                    remedy="lengths are in the robot's base frame: a floor below its foot has a negative height",
+                    (
+                        f"{obstacle.name!r} at {obstacle.offset:.4g} m is above the first joint, which is at "
+                        f"{height:.4g} m"
+                    ),
+                    allowed=f"less than {height:.4g} m minus the size of the first link",
+                    remedy="heights refer to the robot's base frame: a floor below the base has a negative height",
                 )
 
 
@@ -106,8 +109,8 @@ def _check_clearance(limit: CollisionLimit, limits: GeometricLimits, q: Array) -
 
 def _advice(pose: Array | None) -> str:
     if pose is None:
-        return "no pose nearby keeps all limits: widen them"
-    return f"the nearest pose found that keeps all limits is {', '.join(f'{x:.3f}' for x in pose)} rad"
+        return "no pose nearby respects all limits: widen them"
+    return f"the nearest pose that respects all limits is {', '.join(f'{x:.3f}' for x in pose)} rad"
 
 
 def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0, room: float = 0.0) -> Array | None:
@@ -207,7 +210,9 @@ def _check_box(robot: Robot, box: ToolBox) -> None:
         elif x > high:
             wider.append(f"{axis} up to {x:.4g} m instead of {high:g} m")
     raise InfeasibleError(
-        f"the tool cannot enter its box: it comes no nearer than {distance:.4g} m, at"
-        f" ({', '.join(f'{x:.4g}' for x in place)}) m",
+        (
+            f"the tool cannot reach its box; the smallest distance is {distance:.3g} m, at "
+            f"({', '.join(f'{x:.4g}' for x in place)}) m"
+        ),
         allowed=f"a box with {' and '.join(wider)}",
     )

@@ -51,7 +51,7 @@ class TorqueLimit(PointwiseLimit):
             raise InputError("the torque limit needs all nominal parameters", remedy="describe the robot's dynamics")
         if (bound <= 0).any():
             joint = int(np.argmax(bound <= 0)) + 1
-            raise InfeasibleError("its torque limit is zero: it cannot even hold itself", joint=joint)
+            raise InfeasibleError("its torque limit is zero, so it cannot hold its own weight", joint=joint)
         limited = np.flatnonzero(np.isfinite(bound))
         if not limited.size:
             raise InputError("no joint has a torque limit")
@@ -65,10 +65,10 @@ class TorqueLimit(PointwiseLimit):
         total = symbolic(*symbols) @ casadi.SX(pi)
         borne = casadi.SX.zeros(model.robot.n)
         for effect in self.effects:
-            if effect.term.borne:
+            if effect.term.loads_gear:
                 borne += effect.expression(model, pi, *symbols)
         for effect in self.effects:
-            if not effect.term.borne:
+            if not effect.term.loads_gear:
                 total += effect.expression(model, pi, *symbols, borne=borne)
         total += borne
         torque = total[limited.tolist()] / casadi.SX((1 - margin) * bound[limited])
@@ -123,9 +123,10 @@ def refuse_holding(
         usable = (1 - margin) * float(limit[joint - 1])
         need = float(shares[worst]) * usable
         raise InfeasibleError(
-            f"holding the pose takes {need:.4g}, more than the {usable_name} {usable:.4g}",
+            f"holding the pose takes {need:.3g} N m (prismatic: N); the {usable_name} is {usable:.3g} "
+            f"({float(limit[joint - 1]):.3g} minus {100 * margin:g} % reserve)",
             joint=joint,
-            allowed=f"a {name} of {need / (1 - margin):.4g} or more",
+            allowed=f"a {name} of {need / (1 - margin):.3g} or more, another home pose or a smaller reserve",
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,12 @@ class Information:
         self._reverse = batch_function(model.adjoint(columns))
         self._motion: tuple[Array, Array, Array] | None = None
         self._Y: Array | None = None
+
+    def unshared(self) -> Information:
+        """The same functions, with a memory of its own."""
+        other = copy(self)
+        other._motion = other._Y = None
+        return other
 
     def gram(self, q: Array, dq: Array, ddq: Array) -> Array:
         """Evaluates Y'Y (m, m) on samples (N, n), and remembers them for `pullback`."""

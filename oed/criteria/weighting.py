@@ -92,7 +92,7 @@ class Weighting:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prior:
-    """What an earlier identification knows.
+    """Information from an earlier identification.
 
     Attributes:
         names: of its parameters (p,).
@@ -117,7 +117,10 @@ class Prior:
         place = {name: i for i, name in enumerate(self.names) if known[i]}
         shared = [(j, place[name]) for j, name in enumerate(names) if name in place]
         if not shared:
-            raise InputError("the earlier model shares no parameter with the design", remedy="use one of this robot")
+            raise InputError(
+                "the earlier model (--after) has no parameter in common with the design",
+                remedy="use a model of the same robot",
+            )
         ours, theirs = (list(side) for side in zip(*shared, strict=True))
         block = self.covariance[np.ix_(theirs, theirs)]
         scale = np.sqrt(np.diag(block))
@@ -142,7 +145,8 @@ def nominal_scale(base: BaseParameters) -> Array:
     nominal = base.model.nominal
     if not np.isfinite(nominal).all():
         raise InputError(
-            "scaling by nominal sizes needs the robot's nominal dynamics", remedy="describe them, or use none or unit"
+            "nominal scaling needs the robot's nominal dynamics",
+            remedy="add them to the robot file, or use --scaling none or unit",
         )
     size = np.abs(base.from_standard(nominal))
     kinds = [(column.unit, column.term) for column in base.columns]

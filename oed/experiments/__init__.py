@@ -10,7 +10,7 @@ from oed.experiments.results.result import Design
 from oed.experiments.results.retimed import RetimedExperiment, TorqueUse
 from oed.experiments.retiming import METHODS, retime
 from oed.experiments.searches.search import EFFORTS, Effort
-from oed.experiments.solvers import InteriorPoint, Ipopt, Solver
+from oed.experiments.solvers import InteriorPoint, Ipopt, Slsqp, Solver
 
 __all__ = [
     "METHODS",
@@ -26,6 +26,7 @@ __all__ = [
     "Quality",
     "RetimedExperiment",
     "SearchOptions",
+    "Slsqp",
     "Solver",
     "TorqueUse",
     "TrajectoryOptions",

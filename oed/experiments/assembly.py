@@ -75,14 +75,14 @@ def rest_pose(limits: Limits, home: ArrayLike | None) -> Array:
     """
     pose = limits.home if home is None else np.asarray(home, dtype=float)
     if pose.shape != limits.lower.shape:
-        raise InputError(f"a home pose of shape {pose.shape}", allowed=f"{limits.lower.shape}")
+        raise InputError(f"the home pose has shape {pose.shape}", allowed=f"{limits.lower.shape}")
     outside = ~((pose >= limits.lower) & (pose <= limits.upper))
     if outside.any():
         joint = int(np.argmax(outside))
         raise InputError(
             f"the home pose {pose[joint]:g} lies outside the position limits",
             joint=joint + 1,
-            allowed=f"{limits.lower[joint]:g} to {limits.upper[joint]:g}",
+            allowed=f"{limits.lower[joint]:.4g} to {limits.upper[joint]:.4g} [rad or m]",
         )
     return pose
 

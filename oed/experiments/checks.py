@@ -1,4 +1,4 @@
-"""What is wrong with a design's options or limits is told before any search."""
+"""Checks of a design's options and limits before the search."""
 
 from __future__ import annotations
 
@@ -39,10 +39,12 @@ def check_period(limits: Limits, duration: float) -> None:
     joint = int(np.argmax(shortest))
     if np.isfinite(shortest[joint]) and shortest[joint] > duration:
         raise InfeasibleError(
-            f"a period of {duration:.4g} s is too short: within its velocity, acceleration and jerk limits it"
-            f" travels less than {100 * TRAVEL:g} % of its range",
+            (
+                f"a period of {duration:.4g} s is too short: within its velocity, acceleration and jerk "
+                f"limits the joint covers less than {100 * TRAVEL:g} % of its range"
+            ),
             joint=joint + 1,
-            allowed=f"{shortest[joint]:.3g} s or longer, that is a base frequency up to {1 / shortest[joint]:.3g} Hz",
+            allowed=f"{shortest[joint]:.3g} s or longer (base frequency up to {1 / shortest[joint]:.3g} Hz)",
         )
 
 

@@ -106,7 +106,7 @@ def design(
         home=safety.home,
         weighting=weighting,
     )
-    # The experiment's frame is laid out first: whatever is wrong with a limit or a pose shows before the long work.
+    # Home pose and limits are checked first, so that errors appear before the long search.
     assemble(
         problem.series(np.zeros(problem.size)),
         bounds,

@@ -77,7 +77,7 @@ class ParetoFront:
         lines = [f"{self.designs[0].robot.name}: {len(self.designs)} designs; {labels}", head]
         for point, (values, efficient) in enumerate(zip(self.values, self.efficient, strict=True), start=1):
             numbers = "".join(f"{value:14.6g}" for value in values)
-            lines.append(f"  {point:5}  {numbers}{'' if efficient else '   beaten by another'}")
+            lines.append(f"  {point:5}  {numbers}{'' if efficient else '   dominated'}")
         return "\n".join(lines)
 
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -153,7 +153,7 @@ def pareto(
         raise InputError(f"criteria {', '.join(names) or 'none'}", allowed="two or three different ones")
     if "i" in names:
         raise InputError(
-            "criterion i in a front", remedy="it judges other directions than the others: design for it alone"
+            "criterion i is not possible in a Pareto front", remedy="use oed design with --criterion i and --task"
         )
     if points < 2 or points != int(points):
         raise InputError(f"{points} points", allowed="a whole number, at least 2")

@@ -1,4 +1,4 @@
-"""What a motion tells of the parameters."""
+"""Information of a motion on the parameters."""
 
 from __future__ import annotations
 
@@ -16,10 +16,12 @@ from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Motion
 
+_LABELS = {"fourier": "Fourier series", "sinusoid": "velocity strokes", "whole": "whole experiment"}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Quality:
-    """What a part of the experiment tells of the parameters.
+    """Information of a part of the experiment on the parameters.
 
     Attributes:
         part: which segments, such as ``fourier`` or ``whole``.
@@ -30,6 +32,12 @@ class Quality:
     part: str
     samples: int
     singular_values: tuple[float, ...]
+
+    @property
+    def label(self) -> str:
+        """The part's name in reports."""
+        kind, *rest = self.part.split(" ", 1)
+        return " ".join([_LABELS.get(kind, kind), *rest])
 
     def value(self, criterion: str | Criterion) -> float:
         """Evaluates a criterion."""

@@ -47,7 +47,9 @@ def write_trajectory(
         InputError: a motion with uneven steps, an existing file without force, or a path that cannot be written.
     """
     if motion.period is None:
-        raise InputError("the motion is not uniform in time", file=path, remedy="sample it at the controller's period")
+        raise InputError(
+            "the motion is not uniform in time", file=path, remedy="resample it at the controller's period"
+        )
     columns: dict[str, Array] = {"t": motion.t}
     units = {"t": "s"}
     for quantity in QUANTITIES[:1] if positions_only else QUANTITIES:
@@ -106,7 +108,10 @@ def _count_joints(table: Table, n: int | None) -> int:
             file=table.path,
             column=missing[0],
             allowed=f"t,q1..q{count},dq1..dq{count},ddq1..ddq{count}",
-            remedy="a file of positions only is for the controller; keep the full one",
+            remedy=(
+                "use the trajectory.csv of oed design with columns t, q, dq and ddq; a positions-only export is for "
+                "the controller"
+            ),
         )
     if max(found) > count:
         raise InputError(f"columns for {max(found)} joints", file=table.path, allowed=f"{count} joints")
@@ -136,7 +141,7 @@ def _angles(table: Table, name: str) -> Array:
 
 def _check_time(t: Array, table: Table) -> None:
     if t.size < 2:
-        raise InputError("one sample makes no trajectory", file=table.path, allowed="two rows or more")
+        raise InputError("the trajectory has only one sample", file=table.path, allowed="two rows or more")
     steps = np.diff(t)
     backward = np.flatnonzero(steps <= 0.0)
     if backward.size:
@@ -154,7 +159,7 @@ def _check_time(t: Array, table: Table) -> None:
     if uneven.size:
         row = int(np.abs(steps - np.median(steps)).argmax()) + 1
         raise InputError(
-            f"a step of {steps[row - 1]:.9g} s where the others are {np.median(steps):.9g} s",
+            f"the time step is {steps[row - 1]:.9g} s, the others are {np.median(steps):.9g} s",
             file=table.path,
             column="t",
             row=table.line(row),
@@ -167,7 +172,7 @@ def _check_derivatives(motion: Motion, table: Table) -> None:
     """Compares each step with the trapezoidal rule, whose error the change of the next derivative bounds."""
     step = np.diff(motion.t)[:, None]
     change = np.abs(np.diff(motion.ddq, axis=0))
-    # The acceleration may rise and fall again within a step: the steps around it tell how fast it can.
+    # The acceleration may rise and fall within one step; the steps around it bound how fast.
     padded = np.pad(change, ((1, 1), (0, 0)), mode="edge")
     change = np.maximum(change, np.maximum(padded[:-2], padded[2:]))
     checks = (
@@ -182,9 +187,12 @@ def _check_derivatives(motion: Motion, table: Table) -> None:
             row, joint = (int(index) for index in bad[0])
             derived = (integral[row + 1, joint] - integral[row, joint]) / step[row, 0]
             raise InputError(
-                f"found {rate[row + 1, joint]:.6g}, but {name[1:]}{joint + 1} changes at {derived:.6g} per second",
+                (
+                    f"{rate[row + 1, joint]:.4g} is not the derivative of {name[1:]}{joint + 1}, which changes by "
+                    f"{derived:.4g} per second"
+                ),
                 file=table.path,
                 column=f"{name}{joint + 1}",
                 row=table.line(row + 1),
-                allowed="the derivative (radians and seconds, or degrees if the block says so)",
+                allowed="the derivative, in radians and seconds (degrees only if the comment block says so)",
             )

@@ -23,7 +23,7 @@ def hermite_curve(motion: Motion) -> PPoly:
     h = np.diff(motion.t)[:, None]
     q, dq, ddq = motion.q, motion.dq, motion.ddq
     c0, c1, c2 = q[:-1], dq[:-1], ddq[:-1] / 2
-    # What the first three terms leave over at the end of each step.
+    # The remainder of the first three terms at the end of each step.
     rest = (q[1:] - (c0 + h * (c1 + h * c2))) / h**3
     slope = (dq[1:] - (c1 + 2 * h * c2)) / h**2
     bend = (ddq[1:] - 2 * c2) / h

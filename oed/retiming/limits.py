@@ -98,9 +98,9 @@ def require_inside(q: Array, limits: Limits, tolerance: float = 1e-9) -> None:
     if np.any(outside):
         row, column = np.argwhere(outside)[0]
         raise InfeasibleError(
-            f"its position {q[row, column]:.6g} rad lies outside its limits",
+            f"the position {q[row, column]:.4g} rad is outside its limits",
             joint=int(column) + 1,
-            allowed=f"{limits.lower[column]:.6g} to {limits.upper[column]:.6g} rad",
+            allowed=f"{limits.lower[column]:.4g} to {limits.upper[column]:.4g} rad",
         )
 
 
@@ -117,8 +117,8 @@ def too_weak_to_hold(held: Array, limit: Array, what: str) -> InfeasibleError | 
     if ratio[row, column] <= 1.0:
         return None
     return InfeasibleError(
-        f"{what} {abs(held[row, column]):.4g} N m on the path",
+        f"{what} {abs(held[row, column]):.3g} N m on the path",
         joint=int(column) + 1,
         allowed=f"{limit[column]:.4g} N m",
-        remedy="choose a path through poses that the joint can hold, or correct the torque limit",
+        remedy="choose a path with poses that the joint can hold, or correct the torque limit",
     )

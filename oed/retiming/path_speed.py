@@ -161,4 +161,6 @@ def _infeasible(path: _SplinePath, grid: Array, torque: TorqueConstraint | None)
         weak = too_weak_to_hold(held, torque.limit, "gravity and friction alone need")
         if weak is not None:
             return weak
-    return InfeasibleError("TOPP-RA finds no timing of this path within the limits", remedy="smooth the path")
+    return InfeasibleError(
+        "TOPP-RA finds no timing of this path within the limits", remedy="smooth the path, or check the limits"
+    )

@@ -26,7 +26,7 @@ ORDERS = {"velocity": 1.0, "acceleration": 2.0, "jerk": 3.0, "torque": 2.0}
 """The powers of speed with which quantities grow."""
 
 PASSED = 1.0005
-"""Use of a limit above which it is tightened; stretching mends the rest."""
+"""Use of a limit above which it is tightened; stretching corrects the rest."""
 
 _TIGHTENINGS = 4
 

@@ -59,25 +59,25 @@ class Retimed:
             return ""
         change = abs(self.duration_after - self.duration_before)
         if self.slower and self.given_keeps_limits:
-            return f"The new timing is {change:.3f} s slower than the given one, which keeps all limits: keep that one."
+            return f"The new timing is {change:.3f} s slower. The given timing respects all limits: keep it."
         if self.slower:
             name, joint, fraction = _peak(self.usage_before)
             return (
-                f"The new timing is {change:.3f} s slower: the given one uses {100 * fraction:.1f} % "
-                f"of the {name} limit of joint {joint}."
+                f"The new timing is {change:.3f} s slower, because the given one uses {100 * fraction:.1f} % of the "
+                f"{name} limit of joint {joint}."
             )
         if change <= 1e-9:
-            return "The new timing is no faster: the limits leave nothing to gain."
+            return "The new timing is as fast as the given one, which already uses the limits."
         return f"The new timing is {change:.3f} s faster."
 
     def summary(self) -> str:
-        """A few words for people."""
+        """Describes the new timing in two lines."""
         name, joint, fraction = self.peak
         before = "" if np.isnan(self.duration_before) else f"{self.duration_before:.3f} s -> "
         line = (
             f"{self.method}: {before}{self.duration_after:.3f} s, "
             f"{100 * fraction:.1f} % of the {name} limit of joint {joint}, "
-            f"path kept to {self.deviation:.2g} rad, {self.stops} stops on the way"
+            f"path deviation {self.deviation:.2g} rad, {self.stops} intermediate stops"
         )
         return f"{line}\n  {self.verdict()}" if self.verdict() else line
 

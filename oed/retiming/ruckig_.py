@@ -54,7 +54,7 @@ def retime_with_stops(path: Motion | ArrayLike, limits: Limits, *, period: float
             t = period * np.arange(round(move.duration / period) + 1, dtype=np.float64)
             parts.append(Motion(t, *move.sample(t)))
     if not parts:
-        raise InfeasibleError("the path does not move: there is nothing to retime")
+        raise InfeasibleError("the path contains no motion to retime")
     joined = [parts[0], *(part.slice(1, None) for part in parts[1:])]
     q, dq, ddq = (np.concatenate([getattr(part, name) for part in joined]) for name in ("q", "dq", "ddq"))
     motion = Motion(period * np.arange(q.shape[0], dtype=np.float64), q, dq, ddq)

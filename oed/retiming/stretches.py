@@ -1,4 +1,4 @@
-"""A motion taken apart where it rests: what lies between can be timed anew on its own."""
+"""Splits a motion at its rests; each part can be retimed separately."""
 
 from __future__ import annotations
 

@@ -57,14 +57,14 @@ def retime(
 ) -> Retimed:
     """Runs through the path of a motion as fast as the limits allow, at rest at both ends.
 
-    The path is split where it has to rest (see `split_path`). Each piece, a cubic spline, is timed by TOPP-RA (Pham
-    and Pham 2018), the law averaged over a short window (`TimeLaw`) to end without acceleration and keep the jerk
-    limits, sampled at the controller's period, and stretched until its own samples keep every limit. Friction enters
-    at the speed of the solution before, for the algorithm knows torque that is quadratic in speed only.
+    The path is split where it has to rest (see `split_path`). Each piece, a cubic spline, is timed by TOPP-RA (Pham and
+    Pham 2018). The time law is averaged over a short window (`TimeLaw`), to end without acceleration and to respect the
+    jerk limits. It is sampled at the controller's period and stretched until its samples respect every limit. Friction
+    uses the speed of the previous solution, because the algorithm allows only torques quadratic in speed.
 
-    TOPP-RA knows no jerk, and averaging pays for it dearly. So `refine` goes on from there, and, from one rest of a
-    motion to the next, from the motion's own timing too; the fastest is kept. A motion whose own timing keeps the
-    limits thus never becomes slower, and its path is kept exactly.
+    TOPP-RA has no jerk limits, and averaging costs time. Therefore `refine` improves the result and, between two rests
+    of a motion, also the motion's own timing; the fastest is kept. A motion whose own timing respects the limits never
+    becomes slower, and its path is kept exactly.
 
     Args:
         path: a motion, or waypoints (W, n) [rad].
@@ -100,7 +100,7 @@ def retime(
     else:
         chosen = [_by_toppra(path, task)]
     if not any(len(timing.motion) > 1 for timing in chosen):
-        raise InfeasibleError("the path does not move: there is nothing to retime")
+        raise InfeasibleError("the path contains no motion to retime")
     motion = _join([timing.motion for timing in chosen], period)
     return Retimed(
         motion=motion,
@@ -175,7 +175,7 @@ def _by_toppra(path: Motion | ArrayLike, task: _Task) -> _Timing:
     limits = task.limits
     pieces = split_path(path, limits.velocity)
     if not pieces:
-        raise InfeasibleError("the path does not move: there is nothing to retime")
+        raise InfeasibleError("the path contains no motion to retime")
     timed = []
     for piece in pieces:
         require_inside(piece.spline(np.linspace(0.0, piece.length, 2001)), limits, tolerance=1e-6)
@@ -223,7 +223,7 @@ def _too_weak(piece: PathPiece, limits: Limits, torque: Torque) -> InfeasibleErr
         weak = too_weak_to_hold(held, limits.torque, "gravity alone needs")
         if weak is not None:
             return weak
-    return InfeasibleError("no slower timing of this path keeps the limits", remedy="check the torque limits")
+    return InfeasibleError("no slower timing of this path respects the limits", remedy="check the torque limits")
 
 
 def _stretched(

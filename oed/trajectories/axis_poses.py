@@ -85,7 +85,7 @@ def vertical_axis_pose(
         InputError: no such joint, limits of another size, a home pose outside of them, or no gravity.
     """
     if not 1 <= joint <= chain.n:
-        raise InputError("no such joint", joint=joint, allowed=f"1 to {chain.n}")
+        raise InputError("the joint does not exist", joint=joint, allowed=f"1 to {chain.n}")
     if limits.n != chain.n:
         raise InputError(f"limits of {limits.n} joints", allowed=f"{chain.n}, as in the chain")
     down = frozen(chain.gravity if gravity is None else gravity, "gravity", 1)

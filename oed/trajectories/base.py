@@ -1,4 +1,4 @@
-"""What every trajectory can do: tell its kinematics at given times, and become a sampled motion."""
+"""The interface of trajectories: kinematics at given times, and a sampled motion."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def count_periods(duration: float, period: float) -> int:
     count = round(duration / period)
     if abs(duration / period - count) > WHOLE_PERIOD_TOLERANCE * max(1, count * 1e-3):
         raise InputError(
-            f"a duration of {duration:.9g} s is no multiple of the sample period {period:.9g} s",
+            f"the duration {duration:.9g} s is not a multiple of the sample period {period:.9g} s",
             remedy=f"use {np.ceil(duration / period) * period:.9g} s, or another period",
         )
     return count
@@ -122,6 +122,6 @@ def frozen(values: ArrayLike, name: str, ndim: int) -> Array:
     if array.ndim != ndim:
         raise InputError(f"{name} has {array.ndim} dimensions", allowed=f"{ndim}")
     if not np.all(np.isfinite(array)):
-        raise InputError(f"{name} holds a number that is not finite", allowed="finite numbers")
+        raise InputError(f"{name} contains a value that is not finite", allowed="finite numbers")
     array.setflags(write=False)
     return array

@@ -136,7 +136,7 @@ def joint_bounds(limits: Limits, joint: int, *, reserve: float = HAIR) -> JointB
         InfeasibleError: one of these is zero.
     """
     if not 1 <= joint <= limits.n:
-        raise InputError("no such joint", joint=joint, allowed=f"1 to {limits.n}")
+        raise InputError("the joint does not exist", joint=joint, allowed=f"1 to {limits.n}")
     rates = {name: float(getattr(limits, name)[joint - 1]) for name in ("velocity", "acceleration", "jerk")}
     for name, value in rates.items():
         if not np.isfinite(value):

@@ -35,7 +35,7 @@ class Segment:
         joint: the joint it is about, counted from 1, or None.
 
     Raises:
-        InputError: the kind is none of those.
+        InputError: the kind is unknown.
     """
 
     kind: str
@@ -149,9 +149,11 @@ class Sequence(Trajectory):
                 worst = int(np.argmax(jumps))
                 if jumps[worst] > tolerance:
                     raise InputError(
-                        f"the {name} jumps by {jumps[worst]:.3g} {unit} between segment {number} ({before.kind}) "
-                        f"and segment {number + 1} ({after.kind})",
+                        (
+                            f"the {name} jumps by {jumps[worst]:.3g} {unit} between segments {number} ({before.kind}) "
+                            f"and {number + 1} ({after.kind})"
+                        ),
                         joint=worst + 1,
                         allowed=f"{tolerance:g} {unit}",
-                        remedy="put a move between them",
+                        remedy="insert a move between them",
                     )

@@ -42,7 +42,7 @@ class Sinusoid(Trajectory):
     def __post_init__(self) -> None:
         object.__setattr__(self, "start", frozen(self.start, "start", 1))
         if not 1 <= self.joint <= self.start.size:
-            raise InputError("no such joint", joint=self.joint, allowed=f"1 to {self.start.size}")
+            raise InputError("the joint does not exist", joint=self.joint, allowed=f"1 to {self.start.size}")
         if not (np.isfinite(self.stroke_duration) and self.stroke_duration > 0 and np.isfinite(self.delta)):
             raise InputError(
                 f"found a stroke of {self.delta} rad in {self.stroke_duration} s",
@@ -164,7 +164,7 @@ def velocity_reaching_stroke(limits: Limits, joint: int, centre: ArrayLike, *, p
 def _bounds(limits: Limits, joint: int) -> tuple[float, float, float]:
     count = limits.velocity.size
     if not 1 <= joint <= count:
-        raise InputError("no such joint", joint=joint, allowed=f"1 to {count}")
+        raise InputError("the joint does not exist", joint=joint, allowed=f"1 to {count}")
     bounds = {name: float(getattr(limits, name)[joint - 1]) for name in ("velocity", "acceleration", "jerk")}
     for name, value in bounds.items():
         if value <= 0.0:

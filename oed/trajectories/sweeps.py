@@ -1,4 +1,4 @@
-"""Friction sweeps: one joint to and fro at constant speeds, between jerk-limited ramps (thesis section 2.4)."""
+"""Friction sweeps: one joint back and forth at constant speeds, between jerk-limited ramps (thesis section 2.4)."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class Sweep(Trajectory):
         object.__setattr__(self, "pose", frozen(self.pose, "pose", 1))
         object.__setattr__(self, "plateaus", tuple(self.plateaus))
         if not 1 <= self.joint <= self.pose.size:
-            raise InputError("no such joint", joint=self.joint, allowed=f"1 to {self.pose.size}")
+            raise InputError("the joint does not exist", joint=self.joint, allowed=f"1 to {self.pose.size}")
         if self.path.n != 1:
             raise InputError(f"found a path of {self.path.n} joints", allowed="that of one joint")
 
@@ -132,7 +132,7 @@ def friction_sweep(
 
     Travel grows with speed and is centred on the pose, shifted where the range ends. Between levels of different travel
     the joint moves to where the next begins. Where the range is too short for the time at a level, the time shortens,
-    down to `SHORTEST_PLATEAU`; where it is too short even for that, the speed gives way. The plateaus tell.
+    down to `SHORTEST_PLATEAU`; if it is too short even for that, the speed is reduced. See the plateaus.
 
     Args:
         limits: bounds of all joints.

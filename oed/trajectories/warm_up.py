@@ -1,4 +1,4 @@
-"""The warm-up: all joints to and fro at full speed at once, each in its own time (thesis section 2.4.1)."""
+"""The warm-up: all joints back and forth at full speed at once, each in its own time (thesis section 2.4.1)."""
 
 from __future__ import annotations
 
@@ -114,9 +114,9 @@ def plan_warm_up(
 ) -> WarmUp:
     """Plans a warm-up of all joints at full speed over a part of their ranges, back and forth.
 
-    Each joint goes as fast as its velocity, acceleration and jerk allow, as often as whole cycles fit in the move, and
-    spends what is left at its turns, evenly: speed and travel are not reduced. All joints start at the lower ends of
-    their strokes, and end there, together.
+    Each joint moves as fast as its velocity, acceleration and jerk limits allow, for as many whole cycles as fit. The
+    remaining time is distributed evenly over its reversals; speed and travel are not reduced. All joints start and end
+    together at the lower ends of their strokes.
 
     Args:
         limits: bounds of all joints.

@@ -116,14 +116,14 @@ def _build(source: str) -> Path:
         try:
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             if folder.stat().st_uid != os.getuid():
-                raise PermissionError(f"{folder} is somebody else's")  # who could leave any code there
+                raise PermissionError(f"{folder} belongs to another user")  # who could leave any code there
             if not library.exists():
                 _compile(path, source, library)
         except OSError as error:
             log.info("cannot keep compiled code in %s: %s", folder, error)
             continue
         return library
-    raise CompilerError("no folder for compiled code can be written")
+    raise CompilerError("no writable folder for compiled code")
 
 
 def _compile(path: str, source: str, library: Path) -> None:

@@ -1,4 +1,4 @@
-"""What stands around a robot: boxes, planes such as the floor, and capsules, all fixed in the base frame."""
+"""Obstacles: boxes, planes such as the floor, and capsules, all fixed in the base frame."""
 
 from __future__ import annotations
 
@@ -39,7 +39,9 @@ class Box:
             raise InputError(f"{self.name}: the size is {size} m", allowed="positive lengths")
         rotation = pose[:3, :3]
         if pose.shape != (4, 4) or not np.allclose(rotation @ rotation.T, np.eye(3), rtol=0, atol=1e-9):
-            raise InputError(f"{self.name}: the pose is no rotation and shift", allowed="a homogeneous matrix (4, 4)")
+            raise InputError(
+                f"{self.name}: the pose is not a rotation and translation", allowed="a homogeneous matrix (4, 4)"
+            )
         pose.flags.writeable = False
         object.__setattr__(self, "size", size)
         object.__setattr__(self, "pose", pose)

@@ -24,7 +24,7 @@ class CoalChecker:
         model: the collision model.
 
     Raises:
-        InputError: coal is not installed.
+        InputError: the package coal is not installed.
     """
 
     def __init__(self, model: CollisionModel) -> None:
@@ -96,4 +96,4 @@ def _coal() -> Any:
             return import_module(name)
         except ImportError:
             continue
-    raise InputError("coal is not installed", remedy="pip install coal (it comes with pin)")
+    raise InputError("the package coal is not installed", remedy="pip install coal (it comes with pin)")

@@ -20,8 +20,8 @@ Box = tuple[Array, Array]
 def link_boxes(robot: Robot) -> dict[int, Box]:
     """Finds the axis-aligned box about each link's collision shapes (visual ones where it has none).
 
-    A link counts only where all that hangs rigidly on it is drawn with boxes, cylinders and spheres: of a mesh the
-    extent is not in the file, and of a branch behind a locked joint the pose is not known here.
+    A link counts only if all shapes rigidly attached to it are boxes, cylinders and spheres. The file does not state
+    the extent of a mesh, and the pose of a branch behind a locked joint is unknown here.
 
     Args:
         robot: a robot that was read from a URDF; any other gives no boxes.

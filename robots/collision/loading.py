@@ -18,7 +18,7 @@ from robots.robot import Robot
 RADIUS_FRACTION = 0.06
 """Radius of a link without stated capsules as a share of the reach: 42 mm of 0.7 m, 78 mm of 1.3 m."""
 
-_warned: set[str] = set()  # models whose assumed shapes this process was told of
+_warned: set[str] = set()  # models whose assumed shapes were already reported in this process
 
 
 def collision_model(
@@ -77,7 +77,7 @@ def collision_model(
 
 
 def _stated(robot: Robot) -> tuple[CollisionDescription, bool]:
-    """What the robot's file states, and whether its link numbers are those of the robot in hand."""
+    """Reads the collision part of the robot's file, and whether its link numbers are those of this robot."""
     if robot.origin in catalogue():
         path = CATALOG / f"{robot.origin}.yaml"
     else:
@@ -99,6 +99,7 @@ def _warn(robot: Robot, capsules: tuple[Capsule, ...], reason: str) -> None:
     if assumed and key not in _warned:
         _warned.add(key)
         message = (
-            f"{robot.name}: the shapes of its links are assumed ({reason}{', '.join(assumed)}), no source backs them"
+            f"{robot.name}: the link shapes for collision checks are assumed values without a source "
+            f"({reason}{', '.join(assumed)})"
         )
         warnings.warn(message, AssumedValueWarning, stacklevel=3)

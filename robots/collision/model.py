@@ -167,9 +167,9 @@ class CollisionModel:
                 f" radius {1e3 * capsule.radius:.0f} mm, spine {1e3 * length:.0f} mm{origin}"
             )
         lines += [f"  {obstacle.name}: {type(obstacle).__name__.lower()}" for obstacle in self.obstacles]
-        lines += [f"{len(self.pairs)} pairs watched: {', '.join(self.names) or 'none'}"]
-        lines += [f"not watched: {name} ({reason})" for name, reason in self.excluded]
-        lines += ["not watched: bodies of one link and of neighbouring links"]
+        lines += [f"{len(self.pairs)} pairs checked: {', '.join(self.names) or 'none'}"]
+        lines += [f"not checked: {name} ({reason})" for name, reason in self.excluded]
+        lines += ["not checked: bodies of one link and of neighbouring links"]
         return "\n".join(lines)
 
     def __getstate__(self) -> dict[str, object]:

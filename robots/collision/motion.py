@@ -62,7 +62,7 @@ def check_motion(
 
 
 class _Search:
-    """What is known of each pair so far."""
+    """The bounds of each pair so far."""
 
     def __init__(self, model: CollisionModel, margin: float, max_halvings: int) -> None:
         pairs = len(model.pairs)
@@ -103,7 +103,7 @@ class _Search:
 
 
 def _disagreement(model: CollisionModel, motion: Motion, sampled: Array) -> float:
-    """By how much coal differs [m]; where both see an overlap, depths don't count, for coal measures them otherwise."""
+    """Largest difference to coal [m]; depths of overlaps do not count, because coal defines them differently."""
     from robots.collision.coal_ import CoalChecker
 
     other = CoalChecker(model).clearance(motion.q)

@@ -1,4 +1,4 @@
-"""Which bodies can meet: neighbours are left out, and whatever touches by its construction."""
+"""Pairs of bodies that can collide, without neighbours and pairs that touch by construction."""
 
 from __future__ import annotations
 
@@ -101,9 +101,9 @@ def choose_pairs(
 ) -> tuple[tuple[Pair, ...], tuple[tuple[str, str], ...]]:
     """Lists the pairs to watch, and why the others are not.
 
-    Left out are capsules of one link and of neighbouring links, pairs that are to be ignored, and pairs of links that
-    overlap at the pose zero or in all of many random poses: these touch by construction, as planners assume too
-    (MoveIt's default and always colliding pairs). A pair of a link and an obstacle is never left out by itself.
+    Left out are capsules of one link and of neighbouring links, and pairs to be ignored. Pairs of links that overlap at
+    pose zero, or in all of many random poses, are left out as well: they touch by construction, as planners assume
+    (MoveIt's default and always colliding pairs). A pair of a link and an obstacle is never left out automatically.
 
     Args:
         chain: the chain.

@@ -1,4 +1,4 @@
-"""What a motion's check for collisions came to."""
+"""Result of the collision check of a motion."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ class CollisionReport:
     def summary(self) -> str:
         """Says in a few lines whether the motion is free, and what comes closest when."""
         if self.worst is None:
-            return "no pair of bodies to watch"
-        state = "proved free at all times" if self.certified else "undecided between two samples"
+            return "no pair of bodies to check"
+        state = "proved free of collisions at all times" if self.certified else "not proved between samples"
         if self.collides:
             state = "not free"
         lines = [f"{state}, margin {1e3 * self.margin:.1f} mm, {self.evaluations} poses"]

@@ -1,1 +1,1 @@
-"""What every package needs: errors, files, tables, configuration, parallel work, progress."""
+"""Shared tools: errors, files, tables, configuration, parallel work, progress."""

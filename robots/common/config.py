@@ -103,7 +103,7 @@ def _check_keys(node: yaml.Node, file: str, visited: set[int], above: tuple[int 
                 raise InputError("a key that is not plain text", file=file, row=_line(key))
             loc = (*above, key.value)
             if key.value in seen:
-                raise InputError("the key stands twice", file=file, column=_key_path(loc), row=_line(key))
+                raise InputError("the key appears twice", file=file, column=_key_path(loc), row=_line(key))
             seen.add(key.value)
             _check_keys(value, file, visited, loc)
     elif isinstance(node, yaml.SequenceNode):

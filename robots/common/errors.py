@@ -1,4 +1,4 @@
-"""The one family of errors: what was found, where, what is allowed, and what to do."""
+"""The errors of all packages: what was found, where, what is allowed, and what to do."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from os import PathLike, fspath
 
 
 class OedError(Exception):
-    """Root of every error this software raises on purpose.
+    """Base class of all errors that this software raises on purpose.
 
     The message reads ``file: column c, row r, joint j: problem; allowed: ...; remedy``; the parts that do not
     apply are left out. They stay available as attributes, for programs that act on them.
@@ -66,16 +66,16 @@ class InputError(OedError):
 
 
 class InfeasibleError(OedError):
-    """A request that no motion or parameter satisfies, such as an experiment under a velocity limit of zero."""
+    """A request without a solution, such as an experiment with a velocity limit of zero."""
 
 
 class NotIdentifiableError(OedError):
-    """Data that do not determine what was asked for."""
+    """The data do not determine the requested quantities."""
 
 
 class SolverError(OedError):
-    """A numerical solver that ended without a usable answer."""
+    """A numerical solver ended without a usable result."""
 
 
 class AssumedValueWarning(UserWarning):
-    """A robot description holds values that no source backs; results that rest on them deserve doubt."""
+    """A robot description contains values without a source; results that depend on them are uncertain."""

@@ -136,7 +136,7 @@ class ResultFolder:
     def __enter__(self) -> ResultFolder:
         for ancestor in (self.folder, *self.folder.parents):
             if os.path.lexists(ancestor) and not ancestor.is_dir():
-                raise InputError("a file stands where a folder is needed", file=ancestor, allowed="a folder")
+                raise InputError("this is a file, but a folder is needed", file=ancestor, allowed="a folder")
         for name in self.names:
             _check_target(self.folder / self._relative(name), self.force)
         token = secrets.token_hex(4)
@@ -234,7 +234,9 @@ class ResultFolder:
 def _check_target(path: Path, force: bool) -> None:
     with _as_input_error(path):
         if path.is_dir():
-            raise InputError("a folder stands where the file should go", file=path, remedy="choose another name")
+            raise InputError(
+                "this is a folder, but a file should be written here", file=path, remedy="choose another name"
+            )
         if os.path.lexists(path) and not force:
             raise InputError("the file exists", file=path, remedy=_OVERWRITE)
 

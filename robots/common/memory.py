@@ -7,9 +7,9 @@ import sys
 
 
 def give_back() -> None:
-    """Returns freed memory to the system, where the C library keeps it otherwise (glibc).
+    """Returns freed memory to the system, which glibc would keep.
 
-    What threads allocate and free in pieces stays in their arenas: after a search, half of what a process holds.
+    Memory that threads free in pieces stays in their arenas: after a search, half of the process's memory.
     """
     if not sys.platform.startswith("linux"):
         return

@@ -51,11 +51,11 @@ def parallel_map(
         items: the items.
         executor: any executor, such as that of a Dask client; it is left running.
         workers: the number of processes where no executor is given; None for one per available core.
-        progress: hears how many items are done, as they finish in any order.
+        progress: receives the number of finished items.
         task: the name of the work for ``progress``.
 
     Returns:
-        One result an item, in order.
+        One result per item, in order.
 
     Raises:
         InputError: ``workers`` is below 1.

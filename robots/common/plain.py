@@ -1,4 +1,4 @@
-"""Numbers as plain data: JSON has none for what is not known or infinite, and says null."""
+"""Numbers as plain data: unknown or infinite numbers become null in JSON."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def _frozen_rotation(value: ArrayLike, what: str, joint: str | None = None) -> A
     rotation = np.array(_frozen(value, (3, 3), what, joint))
     error = np.abs(rotation @ rotation.T - np.eye(3)).max()
     if error > _ORTHONORMAL or np.linalg.det(rotation) < 0.0:
-        raise InputError(f"{what} is no rotation (off by {error:.1e})", joint=joint)
+        raise InputError(f"{what} is not a proper rotation matrix (orthonormality error {error:.1e})", joint=joint)
     # Exact zeros keep the symbolic dynamics sparse, and structurally absent columns exactly absent.
     rotation[np.abs(rotation) < _ROUNDING] = 0.0
     rotation.flags.writeable = False

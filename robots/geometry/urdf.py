@@ -94,7 +94,7 @@ class UrdfTree:
             stack.extend(children)
         lost = next((name for name in self.links if name not in reached), None)
         if lost is not None:
-            raise InputError(f"link {lost!r} is part of a loop that hangs on no root", file=self.file)
+            raise InputError(f"link {lost!r} is part of a loop without a root link", file=self.file)
         return roots[0]
 
     def path(self, link: str) -> tuple[UrdfJoint, ...]:
@@ -190,9 +190,11 @@ class UrdfTree:
             return 0.0
         leader, multiplier, offset = joint.mimic
         if leader in seen or leader == joint.name:
-            raise InputError("it mimics itself, through other joints or directly", file=self.file, joint=joint.name)
+            raise InputError("it mimics itself, directly or through other joints", file=self.file, joint=joint.name)
         if any(leader == moving.name for moving in selection.moving):
-            _log.warning("%s: joint %s mimics the moving joint %s; taken as locked", self.file, joint.name, leader)
+            _log.warning(
+                "%s: joint %s mimics the moving joint %s; it is treated as locked", self.file, joint.name, leader
+            )
             return offset
         return multiplier * self._locked_value(self.joints[leader], selection, (*seen, joint.name)) + offset
 
@@ -224,11 +226,11 @@ class UrdfTree:
                 file=self.file,
                 joint=joint.name,
                 allowed="velocity [rad/s or m/s] and effort [N m or N]",
-                remedy="state it there",
+                remedy="add it there",
             )
         velocity = np.inf if limit.velocity is None else limit.velocity
         effort = np.inf if limit.effort is None else limit.effort
-        # Both zero is what exporters write, and what URDF assumes, where nothing was filled in.
+        # Exporters write zeros, and URDF assumes them, if the values are unknown.
         if joint.type == "continuous" or limit.lower == limit.upper == 0.0:
             return -np.inf, np.inf, velocity, effort
         if limit.lower >= limit.upper:

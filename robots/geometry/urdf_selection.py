@@ -11,7 +11,7 @@ from typing import Protocol
 from robots.common.errors import InputError
 from robots.geometry.urdf_xml import UrdfJoint, UrdfLink
 
-_LISTED = 12  # a humanoid has dozens of tips; more than these help nobody
+_LISTED = 12  # a humanoid has dozens of tips; a longer list does not help
 
 
 class _Tree(Protocol):
@@ -35,7 +35,7 @@ class Selection:
 
 
 def nearest(name: str, choices: Iterable[str]) -> str | None:
-    """A remedy that names what was probably meant.
+    """A remedy that names the most similar choice.
 
     Args:
         name: what was found.
@@ -77,7 +77,7 @@ def select(tree: _Tree, tip: str | None, joints: Sequence[str] | None, locked: M
             f"the joint lies on the chain but mimics {follower.mimic and follower.mimic[0]!r}",
             file=tree.file,
             joint=follower.name,
-            allowed="joints that move by themselves",
+            allowed="joints that move independently",
             remedy="choose the moving joints by name (joints), or lock it (locked)",
         )
     return Selection(moving=moving, tip=tip or _flange(tree, moving), locked=values)
@@ -112,7 +112,7 @@ def _by_names(tree: _Tree, names: Sequence[str], tip: str | None, locked: Mappin
     moving = tuple(_known(tree, name) for name in names)
     for joint in moving:
         if not joint.moves:
-            raise InputError("a fixed joint cannot be a moving one", file=tree.file, joint=joint.name)
+            raise InputError("a fixed joint cannot be selected as a moving joint", file=tree.file, joint=joint.name)
         if joint.name in locked:
             raise InputError("the joint is both moving and locked", file=tree.file, joint=joint.name)
         if list(names).count(joint.name) > 1:

@@ -19,7 +19,7 @@ from robots.geometry.inertia import symmetric
 Array = NDArray[np.float64]
 JointType = Literal["revolute", "continuous", "prismatic", "fixed", "floating", "planar"]
 
-# Elements whose values are used here; what stands in meshes and plugins is none of our business.
+# Elements whose values are used here; meshes and plugins are ignored.
 _KINEMATIC = frozenset(
     ("link", "joint", "origin", "axis", "limit", "mass", "inertia", "parent", "child", "mimic", "dynamics")
 )

@@ -157,7 +157,7 @@ def drive(
         # A friction that drives cannot be solved for: it is taken as it was.
         smooth = smooth + np.minimum(turning, 0.0) * sign
         known = smooth - _times(M, ddq) - _times(tangent.damping, dq) - _times(tangent.stiffness, q)
-        with np.errstate(over="ignore", invalid="ignore"):  # of a motion that diverges, which is told below
+        with np.errstate(over="ignore", invalid="ignore"):  # of a motion that diverges, which is reported below
             q, dq, ddq = _follow(r, inverse, from_state, held - known, np.maximum(turning, 0.0), width)
             before, correction = correction, -stiffness * (q - r.q) - damping * (dq - r.dq) - filled * (ddq - r.ddq)
             size = np.maximum(_rms(correction), FAINT * level)

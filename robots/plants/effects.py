@@ -1,4 +1,4 @@
-"""What a virtual robot has besides its model: an effect of the catalogue with its true size and shape."""
+"""Effects of a virtual robot beyond its model: an effect of the catalogue with its true size and shape."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class PlantEffect:
         term = self.term
         if not isinstance(term, StaticEffect):
             raise InputError(
-                f"{self.label} depends on the past", allowed="an effect of position, velocity, acceleration"
+                f"{self.label} depends on the motion's history", allowed="an effect of position, velocity, acceleration"
             )
         Y = model.symbolic()(q, dq, ddq)
         pi = np.asarray(parameters, dtype=float)
@@ -121,8 +121,12 @@ def plant_effect(robot: Robot, effect: str, joint: int | None, values: Mapping[s
     term = EFFECTS[effect]
     places = term.joints(robot)
     if joint not in places:
-        allowed = "no joint: it is the whole robot's" if term.whole_robot else ", ".join(str(place) for place in places)
-        raise InputError(f"{effect} on joint {joint}", column="effects", allowed=allowed or "none of this robot's")
+        allowed = (
+            "no joint, because the effect acts on the whole robot"
+            if term.whole_robot
+            else ", ".join(str(place) for place in places)
+        )
+        raise InputError(f"{effect} on joint {joint}", column="effects", allowed=allowed or "a joint of this robot")
     coefficients = term.parameters(robot, joint)
     names = [c.name for c in coefficients] + [s.name for s in term.shapes]
     for name, value in values.items():
@@ -132,7 +136,9 @@ def plant_effect(robot: Robot, effect: str, joint: int | None, values: Mapping[s
             raise InputError(f"{effect}: {name} is {value}", column="effects", allowed="a finite number")
     if not any(c.name in values for c in coefficients):
         raise InputError(
-            f"{effect} has no size", column="effects", allowed=f"one of {', '.join(c.name for c in coefficients)}"
+            f"{effect} needs at least one nonzero coefficient",
+            column="effects",
+            allowed=f"one of {', '.join(c.name for c in coefficients)}",
         )
     ranges = [(c.name, c.unit, c.lower, c.upper) for c in coefficients]
     ranges += [(s.name, s.unit, s.lower, s.upper) for s in term.shapes]

@@ -69,12 +69,12 @@ class Warmth:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlantHeat:
-    """What a plant's joints do with the heat of their friction.
+    """Friction heat of a plant's joints.
 
     Attributes:
         models: of each joint (n,); None for one whose friction does not change.
-        ambient: temperature of the surroundings [degC].
-        start: temperature of all zones when the robot is switched on [degC]; that of the surroundings by default.
+        ambient: ambient temperature [degC].
+        start: temperature of all zones when the robot is switched on [degC]; ambient temperature by default.
         thermometers: what the log sees of it: ``none``, ``ambient``, or ``all``, the joints too.
     """
 
@@ -94,7 +94,7 @@ class PlantHeat:
         for piece in pieces[1:]:
             rest = float(piece.edges[0]) - last
             if rest < -1e-9:
-                raise InputError("a motion that begins before the last one ends", allowed="times that go on [s]")
+                raise InputError("a motion begins before the last one ends", allowed="increasing times [s]")
             if rest > 1e-9:
                 steps.append(np.array([rest]))
                 powers.append(np.zeros((1, piece.power.shape[1])))
@@ -150,8 +150,8 @@ def plant_heat(
         robot: the robot.
         known: whether joints have the published models of this robot, see `robots.thermal.known_thermal`.
         joints: model and parameters by joint, counted from 1; ``beta`` is 1 by default. They go before published ones.
-        ambient: temperature of the surroundings [degC].
-        start: temperature of all zones when the robot is switched on [degC]; that of the surroundings by default.
+        ambient: ambient temperature [degC].
+        start: temperature of all zones when the robot is switched on [degC]; ambient temperature by default.
         thermometers: what the log sees of it.
 
     Raises:

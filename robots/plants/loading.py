@@ -53,13 +53,16 @@ class _Plant(Config):
 def load_plant(path: str | PathLike[str], robot: Robot) -> Plant:
     """Reads a plant YAML.
 
-    Keys, all optional: ``friction`` (polynomial, coulomb-viscous) with ``velocity_scale``, ``spread`` (relative
-    difference of the truth from the robot's description) with ``spread_seed``, ``parameters`` (standard parameters by
-    name, such as ``f1_3: 7.5``), ``sensors`` (see `Sensors`), and ``effects``: a list of what the robot has beyond its
-    model, each with ``effect`` (a name of `EFFECTS`), ``joint`` (from 1; none for an effect of the whole robot) and
-    ``parameters`` (its coefficients and shape parameters by name), and ``thermal``: what its joints do with the heat of
-    their friction, with ``known`` (published models), ``joints`` (model and parameters by joint), ``ambient``,
-    ``start`` and ``thermometers``, see `plant_heat`.
+    All keys are optional:
+
+    - ``friction``: polynomial or coulomb-viscous, with ``velocity_scale``;
+    - ``spread``: relative difference of the truth from the robot's description, with ``spread_seed``;
+    - ``parameters``: standard parameters by name, such as ``f1_3: 7.5``;
+    - ``sensors``: see `Sensors`;
+    - ``effects``: a list of effects beyond the model, each with ``effect`` (a name of `EFFECTS`), ``joint`` (from 1;
+      none for an effect of the whole robot) and ``parameters`` (coefficients and shape parameters by name);
+    - ``thermal``: thermal models of the joints, with ``known`` (published models), ``joints`` (model and parameters
+      by joint), ``ambient``, ``start`` and ``thermometers``; see `plant_heat`.
 
     Raises:
         InputError: a missing file, an unknown key or parameter, a value out of range.
@@ -69,7 +72,9 @@ def load_plant(path: str | PathLike[str], robot: Robot) -> Plant:
         thermal = config.thermal
         heat = None if thermal is None else plant_heat(robot, **thermal.model_dump())
         if heat is not None and any(e.effect == "thermal_friction" for e in config.effects):
-            raise InputError("both thermal and the effect thermal_friction", column="thermal", allowed="one of them")
+            raise InputError(
+                "both thermal and the effect thermal_friction", column="thermal", allowed="only one of them"
+            )
         plant = nominal_plant(
             robot,
             friction=config.friction,

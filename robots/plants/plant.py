@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 class Beyond(Protocol):
-    """What a plant has beyond its model: a `PlantEffect`, or an effect as a diagnosis found it."""
+    """An effect of a plant beyond its model: a `PlantEffect`, or a finding of a diagnosis."""
 
     def torque(self, situation: Situation, /) -> Array:
         """Evaluates what it adds to the torque (N, n) [N m or N]."""
@@ -92,7 +92,7 @@ class Plant:
         if not self.effects:
             return self.model.torque(motion.q, motion.dq, motion.ddq, self.parameters)
         now = situation(self.model, self.parameters, motion.t, motion.q, motion.dq, motion.ddq)
-        own = [effect for effect in self.effects if isinstance(effect, PlantEffect) and effect.term.borne]
+        own = [effect for effect in self.effects if isinstance(effect, PlantEffect) and effect.term.loads_gear]
         weights = [LoadSource(e.term, e.joint, e.shape, np.asarray(e.coefficients)) for e in own]
         felt = ExtraGearLoad("effects", weights).on(now) if own else now
         return np.sum([now.torque, *(effect.torque(felt) for effect in self.effects)], axis=0)

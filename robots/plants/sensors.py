@@ -1,4 +1,4 @@
-"""What a controller's log makes of the truth: encoder steps and coloured torque noise."""
+"""Sensors of a virtual robot: encoder steps and correlated torque noise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a physical effect must say of itself to be simulated, designed for, fitted and diagnosed."""
+"""Interface of the terms of a torque model."""
 
 from __future__ import annotations
 

@@ -28,9 +28,9 @@ class Advanced(PairExponential, ThermalModel):
 
     Args:
         K12: heat exchange between the zones [W/K].
-        K2e: heat exchange with the surroundings [W/K].
-        C1: heat capacity where heat is produced [J/K].
-        C2: heat capacity around it [J/K].
+        K2e: heat exchange with the environment [W/K].
+        C1: heat capacity of the heat source [J/K].
+        C2: heat capacity of the surrounding structure [J/K].
         W_e: heat of the powered drive: Joule effect and eddy currents [W].
         K13: heat exchange of zone 1 with zone 3 [W/K].
         K23: heat exchange of zone 2 with zone 3 [W/K].
@@ -41,9 +41,9 @@ class Advanced(PairExponential, ThermalModel):
         ALPHA,
         BETA,
         exchange("K12", "heat exchange between the zones"),
-        exchange("K2e", "heat exchange with the surroundings"),
-        capacity("C1", "heat capacity where heat is produced", 700.0),
-        capacity("C2", "heat capacity around it", 7000.0),
+        exchange("K2e", "heat exchange with the environment"),
+        capacity("C1", "heat capacity of the heat source", 700.0),
+        capacity("C2", "heat capacity of the surrounding structure", 7000.0),
         _optional("W_e", "W", 1e4, "heat of the powered drive"),
         _optional("K13", "W/K", 1e4, "heat exchange of zone 1 with zone 3"),
         _optional("K23", "W/K", 1e4, "heat exchange of zone 2 with zone 3"),

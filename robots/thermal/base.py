@@ -1,4 +1,4 @@
-"""What every thermal model of a joint says of itself: the contract, and all that follows from its heat balance."""
+"""Interface of the thermal models of a joint, and everything that follows from the heat balance."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class ThermalModel(ABC):
 
     Args:
         alpha: relative change of friction per degree [1/K], zero or less.
-        beta: friction at T0 over its reference, 1 but for errors of the fit.
-        ambient: temperature of the surroundings Te where none is given [degC].
+        beta: friction at T0 divided by its reference; 1 except for errors of the fit.
+        ambient: ambient temperature Te where none is given [degC].
         reference: T0, the temperature at which the cold friction holds [degC]; ``ambient`` by default.
 
     Raises:
@@ -130,7 +130,7 @@ class ThermalModel(ABC):
         Args:
             state: (..., s).
             power: W [W], (...).
-            ambient: temperature of the surroundings [degC]; that of the model by default.
+            ambient: ambient temperature [degC]; that of the model by default.
             drives: 1 where the drives are powered.
         """
         x = np.moveaxis(np.asarray(state, dtype=np.float64), -1, 0)
@@ -149,7 +149,7 @@ class ThermalModel(ABC):
 
         Args:
             power: W [W], of any shape, zero or more.
-            ambient: temperature of the surroundings [degC]; that of the model by default.
+            ambient: ambient temperature [degC]; that of the model by default.
             T3: reading of a thermocouple beside the joint [degC]; only the advanced model uses it.
             drives: 1 where the drives are powered.
 
@@ -163,7 +163,7 @@ class ThermalModel(ABC):
         u = Inputs(checked_power(power), self._ambient(ambient), third, np.asarray(drives, dtype=np.float64))
         shape = np.broadcast_shapes(*(np.shape(value) for value in u if value is not None))
         size, p = self.state_count(), self.values
-        # Without surroundings at zero the constant part would swallow digits of A.
+        # The ambient temperature is set to zero, because a large constant part would cost digits of A.
         still = Inputs(u.power, 0.0, None if third is None else 0.0, 0.0)
         homogeneous = self.rates({**p, "T0": 0.0}, [0.0] * size, still)
         A, b = np.empty((*shape, size, size)), np.empty((*shape, size))
@@ -192,7 +192,7 @@ class ThermalModel(ABC):
 
         Args:
             power: W [W], of any shape.
-            ambient: temperature of the surroundings [degC]; that of the model by default.
+            ambient: ambient temperature [degC]; that of the model by default.
             drives: 1 where the drives are powered.
 
         Returns:
@@ -236,8 +236,8 @@ class ThermalModel(ABC):
         Args:
             power: W in each step, (N,) [W].
             steps: how long each lasts [s], (N,) or one number.
-            start: temperatures of the zones at first, (z,) [degC]; those of the surroundings by default.
-            ambient: temperature of the surroundings, one number or one in each step [degC].
+            start: temperatures of the zones at first, (z,) [degC]; ambient temperature by default.
+            ambient: ambient temperature, one number or one in each step [degC].
             T3: reading of a thermocouple beside the joint in each step [degC].
             drives: 1 in steps in which the drives are powered.
 
@@ -273,7 +273,7 @@ class ThermalModel(ABC):
         Args:
             t: times since the start (N,) [s].
             power: W [W].
-            start: temperatures of the zones at first, (z,) [degC]; those of the surroundings by default.
+            start: temperatures of the zones at first, (z,) [degC]; ambient temperature by default.
 
         Returns:
             (N, z) [degC].

@@ -35,7 +35,7 @@ def checked_steps(steps: ArrayLike) -> Array:
 
 
 def checked_ambient(ambient: ArrayLike) -> Array:
-    """Gives temperatures of the surroundings as an array [degC].
+    """Gives ambient temperatures as an array [degC].
 
     Raises:
         InputError: one is not finite.

@@ -12,14 +12,14 @@ from robots.thermal.parameters import ALPHA, BETA, Inputs, ThermalParameter, cap
 
 @dataclass(frozen=True, kw_only=True)
 class FirstOrder(ThermalModel):
-    """One zone that gives its heat to the surroundings.
+    """One zone that gives its heat to the environment.
 
         C dT/dt = W (alpha (T - T0) + beta) - K (T - Te)
 
     The time constant is C / (K - W alpha) under power and C / K without (thesis eq. 112 and 115).
 
     Args:
-        K: heat exchange with the surroundings [W/K].
+        K: heat exchange with the environment [W/K].
         C: heat capacity [J/K].
     """
 
@@ -27,7 +27,7 @@ class FirstOrder(ThermalModel):
     parameters: ClassVar[tuple[ThermalParameter, ...]] = (
         ALPHA,
         BETA,
-        exchange("K", "heat exchange with the surroundings", 3.0),
+        exchange("K", "heat exchange with the environment", 3.0),
         capacity("C", "heat capacity", 3000.0),
     )
     zones: ClassVar[tuple[str, ...]] = ("T",)

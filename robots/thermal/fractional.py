@@ -52,7 +52,7 @@ class Fractional(ThermalModel):
     A joint that starts warm is taken to have been that warm for ever: a fractional model's state is its whole past.
 
     Args:
-        K: heat exchange with the surroundings [W/K].
+        K: heat exchange with the environment [W/K].
         C: J s^(nu - 1) / K; a heat capacity only where nu is 1.
         nu: the order, above 0 and below 1.
     """
@@ -61,7 +61,7 @@ class Fractional(ThermalModel):
     parameters: ClassVar[tuple[ThermalParameter, ...]] = (
         ALPHA,
         BETA,
-        exchange("K", "heat exchange with the surroundings", 2.5),
+        exchange("K", "heat exchange with the environment", 2.5),
         capacity("C", "fractional heat capacity", 150.0, "J s^(nu-1)/K"),
         ThermalParameter(
             name="nu", unit="1", lower=0.1, upper=0.995, typical=0.7, positive=True, meaning="order of the derivative"
@@ -171,7 +171,7 @@ def memory_weights(nu: Any, count: int) -> list[Any]:
     grid, rates = _grid(count), memory_rates(count).tolist()
     of: Any = math if isinstance(nu, float | int) else casadi
     scale = of.sin(math.pi * nu) / math.pi * grid.step
-    # What the rule leaves out at both ends are geometric series: slower rates count as constant, and faster ones,
+    # The rule omits geometric series at both ends: slower rates count as constant, and faster ones,
     # which have long settled, by what they add at rest.
     down, up = of.exp(-(1.0 - nu) * grid.step), of.exp(-nu * grid.step)
     slower = scale * rates[1] ** (1.0 - nu) * down / (1.0 - down)

@@ -29,7 +29,7 @@ def known_thermal(robot: Robot, *, ambient: float = 20.0) -> KnownThermal | None
 
     Args:
         robot: the robot.
-        ambient: temperature of its surroundings [degC].
+        ambient: ambient temperature [degC].
 
     Returns:
         The models; None where nothing is published for this robot.

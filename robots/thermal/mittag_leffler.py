@@ -1,4 +1,4 @@
-"""The Mittag-Leffler function on the negative axis, where it says how a fractional model forgets."""
+"""The Mittag-Leffler function on the negative axis: the decay of a fractional model."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ PAUSE = 20.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ThermalPath:
-    """What a joint's heat did during a motion.
+    """Thermal state of a joint during a motion.
 
     Attributes:
         t: times (N,) [s].
@@ -89,10 +89,10 @@ def simulate_motion(
         t: increasing times (N,) [s].
         dq: joint velocity (N,) [rad/s or m/s].
         friction: torque that the friction would take at T0 (N,) [N m or N], see `cold_friction`.
-        ambient: temperature of the surroundings, a number or (N,) [degC]; that of the model by default.
+        ambient: ambient temperature, a number or (N,) [degC]; that of the model by default.
         T3: reading of a thermocouple beside the joint (N,) [degC].
         drives: 1 where the drives are powered, a number or (N,).
-        start: temperatures of the zones at first (z,) [degC]; those of the surroundings by default.
+        start: temperatures of the zones at first (z,) [degC]; ambient temperature by default.
         resolution: time over which the power is averaged [s].
 
     Returns:
@@ -172,7 +172,7 @@ def simulate_cycles(
         friction: torque that the friction would take at T0 (N,) [N m or N].
         cycles: how often it is repeated.
         pause: rest after each cycle [s]: the duty cycle is the motion's share of the time.
-        ambient: temperature of the surroundings [degC].
+        ambient: ambient temperature [degC].
         drives: 1 where the drives are powered.
         start: temperatures of the zones at first (z,) [degC].
 

@@ -135,10 +135,10 @@ class OnlineFriction:
         self.reset()
 
     def reset(self, temperatures: ArrayLike | None = None, *, spread: float = 0.0) -> None:
-        """Begins anew.
+        """Starts again.
 
         Args:
-            temperatures: of the zones (z,) [degC]; those of the surroundings by default.
+            temperatures: of the zones (z,) [degC]; ambient temperature by default.
             spread: how unsure they are [K]: some 20 after a restart of a robot that may be warm.
 
         Raises:
@@ -188,12 +188,12 @@ class OnlineFriction:
         drives: float = 1.0,
         T3: float = 0.0,
     ) -> float:
-        """Goes on by one period.
+        """Advances by one period.
 
         Args:
             dq: joint velocity [rad/s or m/s].
-            measured: friction torque of this sample: measured torque less that of the rigid body [N m or N].
-            ambient: temperature of the surroundings [degC]; that of the model by default.
+            measured: friction torque of this sample: measured torque minus that of the rigid body [N m or N].
+            ambient: ambient temperature [degC]; that of the model by default.
             drives: 1 where the drives are powered.
             T3: reading of the thermocouple, if there is one [degC].
 

@@ -1,4 +1,4 @@
-"""What a thermal model says of its parameters, and what acts on it."""
+"""Parameters and inputs of a thermal model."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class ThermalParameter:
 
 
 class Inputs(NamedTuple):
-    """What acts on a joint: numbers, arrays or CasADi expressions.
+    """Inputs of a joint's thermal model: numbers, arrays or CasADi expressions.
 
     Attributes:
         power: W, power that the friction would take at the temperature T0 [W].
-        ambient: temperature of the surroundings Te [degC].
+        ambient: ambient temperature Te [degC].
         T3: reading of a thermocouple beside the joint [degC]; None where there is none.
         drives: 1 where the drives are powered, 0 where not.
     """
@@ -49,7 +49,13 @@ ALPHA = ThermalParameter(
     name="alpha", unit="1/K", lower=-0.2, upper=0.0, typical=-0.01, positive=False, meaning="slope of the friction"
 )
 BETA = ThermalParameter(
-    name="beta", unit="1", lower=0.2, upper=5.0, typical=1.0, positive=True, meaning="friction at T0 over its reference"
+    name="beta",
+    unit="1",
+    lower=0.2,
+    upper=5.0,
+    typical=1.0,
+    positive=True,
+    meaning="friction at T0 divided by its reference",
 )
 
 

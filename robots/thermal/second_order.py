@@ -13,16 +13,16 @@ from robots.thermal.parameters import ALPHA, BETA, Inputs, ThermalParameter, cap
 
 @dataclass(frozen=True, kw_only=True)
 class SecondOrder(PairExponential, ThermalModel):
-    """Zone 1 is heated by friction and gives heat to zone 2, which gives it to the surroundings.
+    """Zone 1 is heated by friction and gives heat to zone 2, which passes it to the environment.
 
         C1 dT1/dt = W (alpha (T1 - T0) + beta) - K1 (T1 - T2)
         C2 dT2/dt = K1 (T1 - T2) - K2 (T2 - Te)
 
     Args:
         K1: heat exchange between the zones [W/K].
-        K2: heat exchange with the surroundings [W/K].
-        C1: heat capacity where heat is produced [J/K].
-        C2: heat capacity around it [J/K].
+        K2: heat exchange with the environment [W/K].
+        C1: heat capacity of the heat source [J/K].
+        C2: heat capacity of the surrounding structure [J/K].
     """
 
     name: ClassVar[str] = "second"
@@ -30,9 +30,9 @@ class SecondOrder(PairExponential, ThermalModel):
         ALPHA,
         BETA,
         exchange("K1", "heat exchange between the zones"),
-        exchange("K2", "heat exchange with the surroundings"),
-        capacity("C1", "heat capacity where heat is produced", 700.0),
-        capacity("C2", "heat capacity around it", 7000.0),
+        exchange("K2", "heat exchange with the environment"),
+        capacity("C1", "heat capacity of the heat source", 700.0),
+        capacity("C2", "heat capacity of the surrounding structure", 7000.0),
     )
     zones: ClassVar[tuple[str, ...]] = ("T1", "T2")
 

@@ -59,7 +59,7 @@ def test_tiago_is_told_to_be_badly_excited(data):
     lost = {joint.name for joint in estimate.joints if not joint.identified}
     assert lost == {"arm_5_joint", "arm_6_joint", "arm_7_joint"}
     assert not estimate.success
-    assert "Badly excited" in estimate.warnings[0]
+    assert "Not identified" in estimate.warnings[0]
     assert all(name in estimate.warnings[0] for name in lost)
     own = [
         known

@@ -88,9 +88,9 @@ def test_clocks_that_began_anew_count_a_pause_apart(warming: Model, motion: Log)
 def test_what_comes_after_or_warms_nothing_is_refused(warming: Model, motion: Log) -> None:
     """A log that begins when the motion has ended, and any beside a model that keeps no heat."""
     after = replace(motion, t=motion.t + 1000.0)
-    with pytest.raises(InputError, match="comes after the motion"):
+    with pytest.raises(InputError, match="starts after the predicted motion"):
         predict(warming, motion, before=[after])
     plain = replace(warming, extensions=())
     assert warmed(plain, [], motion, 0.0) == ([], "")
-    with pytest.raises(InputError, match="no heat"):
+    with pytest.raises(InputError, match="no thermal part"):
         predict(plain, motion, before=[motion])

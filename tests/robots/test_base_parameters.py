@@ -249,7 +249,7 @@ def test_nearly_right_angles_are_no_failure(size, catalogue_robot, states, caplo
     with caplog.at_level(logging.WARNING):
         base = find_base_parameters(model)
     assert 70 <= base.size <= 73  # 64 and six offsets; a leaning first axis shows mPx_1, mPy_1 and Im_2 too
-    assert ("angles that its description rounds" in caplog.text) == (base.neglected > 1e-9)
+    assert ("rounded angles in the description" in caplog.text) == (base.neglected > 1e-9)
     assert find_base_parameters(model, seed=3).size == base.size
     state, pi = states(robot, 50), np.abs(model.nominal)
     error = base.torque(*state, base.from_standard(pi)) - model.torque(*state, pi)
@@ -257,8 +257,8 @@ def test_nearly_right_angles_are_no_failure(size, catalogue_robot, states, caplo
 
 
 def test_a_tolerance_below_rounding_is_refused(catalogue_robot):
-    """Where the singular values show a lower rank than the columns kept, the error says to state a larger tolerance."""
-    with pytest.raises(NotIdentifiableError, match=r"by QR, \d+ by SVD.*state a larger tolerance"):
+    """Where the singular values show a lower rank than the columns kept, the error says to use a larger tolerance."""
+    with pytest.raises(NotIdentifiableError, match=r"by QR, \d+ by SVD.*use a larger tolerance"):
         find_base_parameters(rigid(catalogue_robot("ur10")), tolerance=1e-18)
 
 

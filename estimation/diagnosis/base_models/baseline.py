@@ -117,7 +117,7 @@ def _nuisance(recording: Recording, chosen: tuple[float, ...] | None) -> Array:
     result = np.zeros((len(recording), recording.n, recording.n))
     for j, v0 in enumerate(chosen):
         change = evaluate_at_full_rate(recording, partial(_change, joint=j, v0=v0))
-        if np.sum(change[~recording.unsure[:, j]] ** 2) > SHOWN * np.sum(change**2):
+        if np.sum(change[~recording.sign_unknown[:, j]] ** 2) > SHOWN * np.sum(change**2):
             result[:, j, j] = change
     return result
 
@@ -147,7 +147,7 @@ class _Signs:
         ]
         rows = slice(None, None, self.stride)
         self.weights = np.broadcast_to(weights, recording.tau.shape)[rows]
-        self.counts = ~recording.unsure[rows] * self.weights
+        self.counts = ~recording.sign_unknown[rows] * self.weights
         rest = np.delete(Y[rows], signs, axis=2) * self.counts[:, :, None]
         self.Q = orthonormal(rest.reshape(-1, rest.shape[2]), FAINT).reshape(len(rest), recording.n, -1)
         self.tau = recording.tau[rows] * self.counts

@@ -15,8 +15,9 @@ from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.terms.effects import Situation
 from robots.terms.situations.flange_body import with_body
+from robots.terms.situations.joining import join_situations
 from robots.terms.situations.of_model import sign_of, velocity_scale
-from robots.terms.situations.situation import Finer, joined, situation, with_finer
+from robots.terms.situations.situation import Finer, situation, with_finer
 
 Array = NDArray[np.float64]
 
@@ -33,7 +34,9 @@ def subtract_known_payload(robot: Robot, recording: Recording) -> Recording:
             motion = (recording.q[run], recording.dq[run], recording.ddq[run])
             tau[run] -= model.under(gravity).torque(*motion, parameters)
     return replace(
-        recording, tau=tau, finer=None if recording.finer is None else subtract_known_payload(robot, recording.finer)
+        recording,
+        tau=tau,
+        full_rate=None if recording.full_rate is None else subtract_known_payload(robot, recording.full_rate),
     )
 
 
@@ -43,7 +46,7 @@ def base_regressor(base: BaseParameters, recording: Recording) -> Array:
     Signs are low-passed as the torque was, where logs are thinned.
     """
     Y = _regressor(base, recording)
-    if recording.finer is None:
+    if recording.full_rate is None:
         return Y
     scales = velocity_scale(base.model)
     for i, column in enumerate(base.columns):
@@ -59,7 +62,7 @@ def friction_signs(recording: Recording, joint: int, scales: Array) -> Array:
 
 
 def _regressor(base: BaseParameters, recording: Recording) -> Array:
-    if not recording.fields:
+    if not recording.gravity_fields:
         return base.regressor(recording.q, recording.dq, recording.ddq)
     Y = np.empty((len(recording), recording.n, base.size))
     for run, gravity in zip(recording.runs, recording.gravities, strict=True):
@@ -91,10 +94,10 @@ def build_situation(
     full = np.zeros(model.size)
     full[slice(None) if columns is None else list(columns)] = parameters
     coarse = _situation(recording, model, full)
-    if recording.finer is None:
+    if recording.full_rate is None:
         return coarse
-    starts, stride = recording.finer.starts, recording.stride
-    whole = _situation(recording.finer, model, full)
+    starts, stride = recording.full_rate.starts, recording.stride
+    whole = _situation(recording.full_rate, model, full)
     return with_finer(coarse, Finer(whole, lambda rows: decimate(rows, starts, stride)))
 
 
@@ -108,7 +111,7 @@ def _situation(recording: Recording, model: TorqueModel, full: Array) -> Situati
         motion = (recording.t[rows], recording.q[rows], recording.dq[rows], recording.ddq[rows])
         starts = tuple(run.start - rows.start for run, *_ in members)
         parts.append(situation(model.under(gravity), with_body(model, full, body), *motion, starts=starts))
-    return joined(parts, model)
+    return join_situations(parts, model)
 
 
 __all__ = ["subtract_known_payload", "base_regressor", "build_situation"]

@@ -23,10 +23,10 @@ FAINT = 1e-12
 def base_model_prior(baseline: Baseline, recording: Recording, strength: float = 1.0) -> GaussianPrior:
     """Pulls base parameters as `identify` does, as strongly as the noise makes right.
 
-    Parameters scatter about the robot's description by their own size (`prior_from_description`). Against rows that count by
-    their noise's inverse variance the pull is then their a-priori precision, and the fit is that of the largest
-    posterior density. Coloured noise makes rows tell less than their number: the pull counts by the noise's power
-    density at rest over that of white noise.
+    Parameters scatter about the robot's description by their own size (`prior_from_description`). Against rows that
+    count by their noise's inverse variance the pull is then their a-priori precision, and the fit is that of the
+    largest posterior density. Coloured noise makes rows tell less than their number: the pull counts by the noise's
+    power density at rest over that of white noise.
 
     Where nothing is described, no base parameter is to make more than some times the torque that its joints have.
 
@@ -38,7 +38,7 @@ def base_model_prior(baseline: Baseline, recording: Recording, strength: float =
     Returns:
         Of base parameters and the baseline's nuisance (b + m), in units of rows over the noise's scale.
     """
-    counts = ~recording.unsure
+    counts = ~recording.sign_unknown
     number = np.maximum(counts.sum(axis=0), 1)
     torque = np.sqrt((recording.tau**2 * counts).sum(axis=0) / number)
     torque = np.maximum(torque, 1e-3 * max(float(torque.max()), 1e-12))

@@ -27,18 +27,18 @@ from robots.terms.effects import EFFECTS
 
 Array = NDArray[np.float64]
 
-HIDDEN = "the base model absorbs it: no size shows in this motion"
-UNSURE = "nearly all of it is at rest or beside reversals, where friction may have either sign: no size shows"
-FEW = "of {} kinds of it that were tried only {} show, from {:.2g} % of the torque on"
+HIDDEN = "not detectable at any size: the base model absorbs it in this motion"
+UNSURE = "not detectable at any size: it acts only at rest or near reversals, where the friction sign is unknown"
+FEW = "only {1} of its {0} tested shapes are detectable, from {2:.2g} % of the torque"
 RESTING = 0.02
 """Share of a log from which it is said that nothing is seen in rests."""
-RESTS = "{:.0f} % of the log the arm stands, where its torque is that of a friction nobody knows: nothing is seen there"
+RESTS = "not detectable while the arm is at rest ({:.0f} % of the log), because static friction is unknown"
 STILL = 1e-3
 """Travel of a joint [rad or m] below which it hardly moves."""
 MOST = 0.9
+"""Share of effects and joints whose limits a sentence covers."""
 NAMED = 4
-"""Effects that show at no size that a sentence names."""
-"""Share of effects and places whose limits a sentence covers."""
+"""Number of undetectable effects that a sentence names."""
 SHAPES = 3
 """Shapes of an effect that its limit is the median of."""
 RIVAL_SHAPES = 4
@@ -120,18 +120,18 @@ def summarise_limits(limits: Sequence[Limit]) -> str:
         if not np.isfinite(limit.detectable)
     ]
     more = len(hidden) - NAMED
-    rest = f"; at any size hidden: {', '.join(hidden if more <= 1 else [*hidden[:NAMED], f'and {more} more'])}"
+    rest = f"; not detectable at any size: {', '.join(hidden if more <= 1 else [*hidden[:NAMED], f'and {more} more'])}"
     rest = rest if hidden else ""
     return (
-        f"Of {len(sizes)} effects and places half would have shown from {half} of the joint's torque on, nine in ten "
-        f"from {most}{rest}"
+        f"Detection limits of {len(sizes)} combinations of effect and joint: half are detectable from {half} of the "
+        f"joint's torque, 90 % from {most}{rest}"
     )
 
 
 def _why_nothing(problem: Problem, hypothesis: Hypothesis) -> str:
     joint = hypothesis.joint
     still = joint is not None and np.ptp(problem.recording.q[:, joint - 1]) < STILL
-    return "joint hardly moves" if still else "nothing of it shows in this motion"
+    return "joint hardly moves" if still else "not excited by this motion"
 
 
 def _limit(
@@ -189,7 +189,7 @@ def _limit(
 def _certain_share(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> float:
     """Gives the share of an effect's energy that counts, where joints tell it by reversals."""
     told = per_joint_evidence(problem, hypothesis, shape, accept(problem, ()))
-    return float(np.sum(told.sure * told.gram) / np.sum(told.gram)) if told.gram.any() else 1.0
+    return float(np.sum(told.certain_share * told.gram) / np.sum(told.gram)) if told.gram.any() else 1.0
 
 
 def _toughest(
@@ -213,17 +213,15 @@ def _note(problem: Problem, hypothesis: Hypothesis) -> str:
 
     What acts for a moment may do so in a rest.
     """
-    if hypothesis.effect.passing:
-        resting = float(np.mean(problem.recording.unsure.all(axis=1)))
+    if hypothesis.effect.transient:
+        resting = float(np.mean(problem.recording.sign_unknown.all(axis=1)))
         if resting > RESTING:
             return RESTS.format(100 * resting)
     duration = float(problem.recording.t[-1] - problem.recording.t[0])
     slow = [shape for shape in hypothesis.effect.shapes if shape.name == "time_constant" and shape.upper > duration]
     if not slow:
         return ""
-    return (
-        f"in {duration:.0f} s of data, time constants beyond {duration:.0f} s look alike: how fast it goes stays open"
-    )
+    return f"time constants above {duration:.0f} s, the length of the data, cannot be distinguished"
 
 
 def _rivals(

@@ -25,7 +25,8 @@ from robots.terms.effect_bases.heat import HeatEffect
 from robots.terms.effects import situation
 from robots.terms.effects.base_tilt import level_axes
 from robots.terms.situations.flange_body import point_mass, with_body
-from robots.terms.situations.situation import Situation, joined
+from robots.terms.situations.joining import join_situations
+from robots.terms.situations.situation import Situation
 
 Array = NDArray[np.float64]
 
@@ -71,7 +72,7 @@ class Grams:
         self.model: TorqueModel = problem.situation.model
         # A base that is tilted shows parameters that the logs do not: they take a part of what it shows of a cause.
         gravity = np.asarray(self.model.robot.chain.gravity, dtype=float)
-        fields = [field for field in problem.recording.fields if field is not None]
+        fields = [field for field in problem.recording.gravity_fields if field is not None]
         tilted = [gravity + np.linalg.norm(gravity) * axis for axis in level_axes(gravity)] if gravity.any() else []
         self.base = find_base_parameters(self.model, gravities=[*fields, *tilted])
         self.columns = self.base.independent
@@ -126,7 +127,7 @@ class Grams:
             model = self.model.under(self.problem.recording.gravities[-1] if part.gravity is None else part.gravity)
             before = self._logged if warm and not number else None
             played, first = self._played(model, part, t0, before)
-            now = joined([played], self.model)
+            now = join_situations([played], self.model)
             bases.append(model.regressor(now.q[first:], now.dq[first:], now.ddq[first:], columns=self.columns))
             for columns, cause in zip(effects, self.every, strict=True):
                 values = cause.hypothesis.effect.columns(now, cause.hypothesis.joint, cause.shape)
@@ -135,7 +136,7 @@ class Grams:
             rows += len(part.motion)
             t0 = float(now.t[-1]) + 60.0
         base = np.concatenate(bases)
-        plain = replace(self.problem.whitening, gaps=no_masked_rows(base.shape[1]), weights=None, levels=None)
+        plain = replace(self.problem.whitening, masked=no_masked_rows(base.shape[1]), weights=None, levels=None)
         whitening = replace(plain, starts=tuple(starts))
         return self._gram(base, [np.concatenate(parts) for parts in effects], whitening)
 

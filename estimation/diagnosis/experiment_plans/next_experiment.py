@@ -186,14 +186,17 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
     # What builds up or comes at a moment does not tell twice as much in twice the time.
     chance = best.chance if best.times == 1 else grams.chance(stages)
     names = [c.hypothesis.label.replace("_", " ") for c in possible]
-    often = f" ({best.times} times over)" if best.times > 1 else ""
-    why = f"{_and(names)} explain the logs about equally well; {EXPERIMENTS[best.kind]}{often} would tell "
+    often = f" ({best.times} times)" if best.times > 1 else ""
+    why = f"{_and(names)} explain the logs about equally well. Proposed: {EXPERIMENTS[best.kind]}{often}. "
     if len(possible) > 2 and chance < HOPELESS:
         alike = np.unravel_index(int(np.argmin(best.chances)), best.chances.shape)
         close = _and([names[k] for k in sorted(alike)])
-        why += f"most of them apart, but {close} with a chance of {100 * chance:.0f} %: no experiment tried does better"
+        why += (
+            f"It distinguishes most of them, but {close} only with {100 * chance:.0f} % probability; no tested "
+            "experiment is better"
+        )
     else:
-        why += f"them apart with a chance of {100 * chance:.0f} %"
+        why += f"It distinguishes them with {100 * chance:.0f} % probability"
     why += _by_hand(robot, best.stages)
     return NextExperiment(
         kind=best.kind,
@@ -212,8 +215,8 @@ def _by_hand(robot: Robot, stages: Sequence[Stage]) -> str:
     load = max(stage.payload for stage in stages)
     down = np.asarray(robot.chain.gravity, dtype=float)
     angles = [float(np.arccos(_along(down, stage.gravity))) for stage in stages if stage.gravity is not None]
-    told = f"; the payload is {load:.2g} kg, {ARM:g} m ahead of the flange" if load else ""
-    return told + (f"; the base is tilted by {np.degrees(max(angles)):.0f} degrees" if angles else "")
+    payload = f"; payload {load:.2g} kg, {ARM:g} m from the flange" if load else ""
+    return payload + (f"; base tilted by {np.degrees(max(angles)):.0f} deg" if angles else "")
 
 
 def _along(one: Array, other: Array) -> float:

@@ -86,9 +86,9 @@ def planned_problem(
         step=step,
         cycles=(None,) * len(motions),
         cutoff=0.5 / step,
-        unsure=_at_reversals(joined.dq, starts),
-        clear=np.zeros(joined.q.shape, dtype=bool),
-        jolts=np.zeros(joined.q.shape[1]),
+        sign_unknown=_at_reversals(joined.dq, starts),
+        sign_known_from_velocity=np.zeros(joined.q.shape, dtype=bool),
+        reversal_acceleration_error=np.zeros(joined.q.shape[1]),
         floor=np.zeros(joined.q.shape[1]),
         names=tuple(f"motion {i}" for i in range(1, len(motions) + 1)),
     )
@@ -129,7 +129,7 @@ def expected_whitening(recording: Recording, noise: Sensors, level: Array | None
         scale=size * innovation,
         precision=np.eye(n),
         starts=recording.starts,
-        gaps=no_masked_rows(n),
+        masked=no_masked_rows(n),
         bands=(Band(np.zeros(0), 1, 0.5 / recording.step),) * recording.n,
         innovations=np.random.default_rng(0).standard_normal((1024, n)),
     )

@@ -55,7 +55,7 @@ def find_rival_shapes(problem: Problem, causes: Sequence[Cause]) -> list[tuple[i
 
 def _shapes(problem: Problem, cause: Cause) -> Iterator[tuple[float, ...]]:
     effect, joint = cause.hypothesis.effect, cause.hypothesis.joint
-    state = problem.sees(effect)
+    state = problem.state_for(effect)
     seen = {cause.shape}
     for shape in (*_around(problem, cause), *_spread(effect.grid(state, joint))):
         # A moment of the logs says nothing of an experiment.
@@ -69,7 +69,7 @@ def _shapes(problem: Problem, cause: Cause) -> Iterator[tuple[float, ...]]:
 
 def _around(problem: Problem, cause: Cause) -> Iterator[tuple[float, ...]]:
     effect = cause.hypothesis.effect
-    bounds = effect.bounds(problem.sees(effect), cause.hypothesis.joint)
+    bounds = effect.bounds(problem.state_for(effect), cause.hypothesis.joint)
     for k, ((low, high), shape, value) in enumerate(zip(bounds, effect.shapes, cause.shape, strict=True)):
         if not high > low or shape.choices or shape.is_left(value):
             continue

@@ -27,7 +27,7 @@ def undetectable_springs(problem: Problem, false_alarm: float) -> tuple[tuple[in
     robot, recording = problem.situation.robot, problem.recording
     torque = problem.rms
     needed = detectable_energy(1, robot.n, false_alarm=false_alarm)
-    told = []
+    notes = []
     for j in range(robot.n):
         x = recording.q[:, j] - recording.q[:, j].mean()
         if np.ptp(x) < MOVED:
@@ -41,8 +41,8 @@ def undetectable_springs(problem: Problem, false_alarm: float) -> tuple[tuple[in
         force, length = force_unit(robot, j), length_unit(robot, j)
         size = f"{stiffness:.2g} {force}/{length} ({own:.2g} {force} RMS)" if energy > 1e-200 else "any size"
         text = (
-            f"A spring or a counterbalance on joint {j + 1} is not excluded: over the {np.ptp(x):.2g} {length} that it "
-            f"moved, gravity and offset of the base model follow a linear one of up to {size}."
+            f"Joint {j + 1}: a spring or counterbalance of up to {size} cannot be detected. The joint moved only "
+            f"{np.ptp(x):.2g} {length}, where gravity and offset of the base model fit a spring too."
         )
-        told.append((j + 1, text))
-    return tuple(told)
+        notes.append((j + 1, text))
+    return tuple(notes)

@@ -22,8 +22,10 @@ class Group:
         gram: of what the base model leaves of the columns (k, k).
         raw: squared norms (k,) before that; infinite for columns that are nearly all in rows that do not count.
         cross: with the residual (k,).
-        above: white columns (N', k) of each of the joints above its band; none for effects that are not `fast`.
-        timed: what each joint's reversals tell of it (n, k), over their errors; None for what is no lag of all torque.
+        high_band_columns: white columns (N', k) of each of the joints above its band; none for effects that are not
+            `independent_of_acceleration`.
+        reversal_columns: what each joint's reversals tell of it (n, k), over their errors; None for what is no lag of
+            all torque.
     """
 
     joints: tuple[int, ...]
@@ -32,8 +34,8 @@ class Group:
     gram: Array
     raw: Array
     cross: Array
-    above: tuple[Small, ...] = ()
-    timed: Array | None = None
+    high_band_columns: tuple[Small, ...] = ()
+    reversal_columns: Array | None = None
 
     @property
     def size(self) -> int:
@@ -43,4 +45,6 @@ class Group:
     @property
     def by_reversals(self) -> bool:
         """Whether most of what tells it are reversals whose rows count neither in a fit nor on unseen data."""
-        return self.timed is not None and 2.0 * float(np.sum(self.timed**2)) > float(self.gram[0, 0])
+        return self.reversal_columns is not None and 2.0 * float(np.sum(self.reversal_columns**2)) > float(
+            self.gram[0, 0]
+        )

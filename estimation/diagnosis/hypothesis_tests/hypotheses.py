@@ -41,9 +41,9 @@ class Hypothesis:
 
     def columns(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[int, ...], tuple[Array, ...]]:
         """Evaluates the columns (N, k) on each joint, from 0, on which they are not zero throughout."""
-        if self.effect.sharp and situation.finer is not None:
-            joints, parts = self.columns(situation.finer.situation, shape)
-            return joints, tuple(situation.finer.thinned(part) for part in parts)
+        if self.effect.needs_full_rate and situation.full_rate is not None:
+            joints, parts = self.columns(situation.full_rate.situation, shape)
+            return joints, tuple(situation.full_rate.thinned(part) for part in parts)
         if isinstance(self.effect, JointEffect) and self.joint is not None:
             return (self.joint - 1,), (_finite(self.effect.local(situation, self.joint, shape)),)
         X = _finite(self.effect.columns(situation, self.joint, shape))

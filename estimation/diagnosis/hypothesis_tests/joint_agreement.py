@@ -26,23 +26,25 @@ class PerJointEvidence:
     Attributes:
         gram: squares of the column (m,).
         cross: its products with the residual (m,).
-        sure: share (m,) of what they tell that errors of the motion leave.
-        apart: variance (m,) of a joint's own coefficient that the formulas of other effects there may make.
+        certain_share: share (m,) of what they tell that errors of the motion leave.
+        formula_variance: variance (m,) of a joint's own coefficient that the formulas of other effects there may make.
     """
 
     gram: Array
     cross: Array
-    sure: Array
-    apart: Array
+    certain_share: Array
+    formula_variance: Array
 
-    def some(self, joints: NDArray[np.bool_]) -> PerJointEvidence:
+    def subset(self, joints: NDArray[np.bool_]) -> PerJointEvidence:
         """Gives what some of the joints (m,) tell."""
-        return PerJointEvidence(self.gram[joints], self.cross[joints], self.sure[joints], self.apart[joints])
+        return PerJointEvidence(
+            self.gram[joints], self.cross[joints], self.certain_share[joints], self.formula_variance[joints]
+        )
 
     def gain(self, *, surely: bool = False) -> float:
         """What one coefficient of all joints explains, over their Birge ratio; of what is sure of that, where asked."""
-        share = self.sure if surely else 1.0
-        return shared_coefficient_gain(share * self.gram, share * self.cross, self.apart)
+        share = self.certain_share if surely else 1.0
+        return shared_coefficient_gain(share * self.gram, share * self.cross, self.formula_variance)
 
 
 def per_joint_evidence(
@@ -60,12 +62,12 @@ def per_joint_evidence(
         group = problem.group((j,), (X,), effect=hypothesis.effect)
         own = score(problem, group, accepted)
         gram[k], cross[k] = float(np.ravel(own.gram)[0]), float(np.ravel(own.cross)[0])
-        late = problem.late(j)
+        late = problem.reversal_time_error(j)
         if late.any() and gram[k] > 0:
             told = score(problem, problem.split(group, np.ones(1), late > 0), accepted).gram.sum(axis=1)
             told = np.maximum(told, 0.0)
             # What is told by the balance of impulses has its error already.
-            timed = 0.0 if group.timed is None else float(np.sum(group.timed**2))
+            timed = 0.0 if group.reversal_columns is None else float(np.sum(group.reversal_columns**2))
             if told.sum() > 0:
                 # What each of them has of the column's squares weighs its moment.
                 squares = np.where(late > 0, group.columns[0][:, 0], 0.0) ** 2

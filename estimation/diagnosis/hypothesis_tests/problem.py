@@ -42,42 +42,48 @@ class Problem:
         baseline: the base model.
         whitening: makes the noise white.
         situation: what effects depend on.
-        mixed: P times the base model's orthonormal columns, (n, N, b).
+        weighted_base_columns: P times the base model's orthonormal columns, (n, N, b).
         residual: P times the white residual of the base model (N, n).
         white: the white residual of the base model (N, n).
         energy: <r, r> of the residual.
         nulls: P times white noise (n, N, draws), and its products with Q (b, draws).
-        remainder: torque less base model (N0, n) [N m or N], at the recording's own rows.
-        pull: what holds base parameters that the data leave open, in units of rows over the noise's scale.
-        upper: the frequencies above the bands; None where nothing is asked of them.
-        whole: what effects depend on that act on all of the torque, as far as that is known; None where none is seen.
+        base_residual: torque less base model (N0, n) [N m or N], at the recording's own rows.
+        prior: what holds base parameters that the data leave open, in units of rows over the noise's scale.
+        high_band: the frequencies above the bands; None where nothing is asked of them.
+        total_torque_state: what effects depend on that act on all of the torque, as far as that is known; None where
+            none is seen.
         timing: how late torque is against reversals whose rows do not count; None where that is not known.
-        followed: what those depend on that make all of it late, with the other effects found before; None without any.
-        bearing: what of the effects found before the gears bear, in `situation`; None for nothing.
+        delayed_torque_state: what those depend on that make all of it late, with the other effects found before; None
+            without any.
+        extra_load: what of the effects found before the gears bear, in `situation`; None for nothing.
     """
 
     recording: Recording
     baseline: Baseline
     whitening: Whitening
     situation: Situation
-    mixed: Small
+    weighted_base_columns: Small
     residual: Array
     white: Array
     energy: float
     nulls: tuple[Small, Array]
-    remainder: Array
-    pull: GaussianPrior
-    upper: HighBand | None = None
+    base_residual: Array
+    prior: GaussianPrior
+    high_band: HighBand | None = None
     timing: ReversalTiming | None = None
-    whole: Situation | None = None
-    followed: Situation | None = None
-    bearing: ExtraGearLoad | None = None
+    total_torque_state: Situation | None = None
+    delayed_torque_state: Situation | None = None
+    extra_load: ExtraGearLoad | None = None
 
-    def sees(self, effect: Effect) -> Situation:
+    def state_for(self, effect: Effect) -> Situation:
         """Gives what an effect depends on."""
-        if effect.last and self.whole is not None:
-            return self.whole
-        return self.followed if effect.blurs and self.followed is not None else self.situation
+        if effect.acts_on_total_torque and self.total_torque_state is not None:
+            return self.total_torque_state
+        return (
+            self.delayed_torque_state
+            if effect.smooths_friction_sign and self.delayed_torque_state is not None
+            else self.situation
+        )
 
     @property
     def n(self) -> int:
@@ -100,7 +106,7 @@ class Problem:
         return len(self.residual)
 
     @cached_property
-    def slope(self) -> Array:
+    def score_gradient(self) -> Array:
         """What torque in each of the recording's rows (N0, n) explains, per unit: half the slope of <r, r>.
 
         The sum of its products with an effect's torque is that effect's product with the residual, as far as the base
@@ -110,28 +116,36 @@ class Problem:
         return np.column_stack([self.whitening.adjoint(self.residual[:, j], j, rows) for j in range(self.n)])
 
     @cached_property
-    def steep(self) -> Array:
-        """The slope (N0, n) for what is `fast`: with the frequencies above the bands."""
-        return self._steep(bare=False)
+    def score_gradient_with_high_band(self) -> Array:
+        """The slope (N0, n) for what is `independent_of_acceleration`: with the frequencies above the bands."""
+        return self._with_high_band(bare=False)
 
     @cached_property
-    def steepest(self) -> Array:
-        """The slope (N0, n) for what is `unmoved` besides."""
-        return self._steep(bare=True)
+    def score_gradient_exogenous(self) -> Array:
+        """The slope (N0, n) for what is `exogenous` besides."""
+        return self._with_high_band(bare=True)
 
-    def _steep(self, *, bare: bool) -> Array:
-        if self.upper is None:
-            return self.slope
+    def _with_high_band(self, *, bare: bool) -> Array:
+        if self.high_band is None:
+            return self.score_gradient
         rows = len(self.recording)
-        return self.slope + np.column_stack([self.upper.slope(j, rows, bare=bare) for j in range(self.n)])
+        return self.score_gradient + np.column_stack(
+            [self.high_band.score_gradient(j, rows, bare=bare) for j in range(self.n)]
+        )
 
-    def slope_of(self, effect: Effect) -> Array:
+    def score_gradient_for(self, effect: Effect) -> Array:
         """Gives the slope (N0, n) by which the points of an effect's grid are ranked."""
-        return self.steepest if effect.unmoved else self.steep if effect.fast else self.slope
+        return (
+            self.score_gradient_exogenous
+            if effect.exogenous
+            else self.score_gradient_with_high_band
+            if effect.independent_of_acceleration
+            else self.score_gradient
+        )
 
     def columns_of(self, hypothesis: Hypothesis, shape: tuple[float, ...]) -> tuple[tuple[int, ...], tuple[Array, ...]]:
         """Evaluates a hypothesis: the joints it acts on, and its columns (N, k) on each."""
-        return hypothesis.columns(self.sees(hypothesis.effect), shape)
+        return hypothesis.columns(self.state_for(hypothesis.effect), shape)
 
     def measured(self, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Group:
         """Evaluates a hypothesis at a shape and measures it."""
@@ -155,22 +169,22 @@ class Problem:
         P = self.whitening.precision
         power = [sum(P[j, j] * _squares(part) for j, part in zip(joints, kind, strict=True)) for kind in (white, whole)]
         above: list[Array] = []
-        if self.upper is not None and effect is not None and effect.fast:
-            how = {"calm": effect.kicks, "bare": effect.unmoved}
-            above = [self.upper.columns(part, j, **how) for j, part in zip(joints, columns, strict=True)]
+        if self.high_band is not None and effect is not None and effect.independent_of_acceleration:
+            how = {"calm": effect.acceleration_driven, "bare": effect.exogenous}
+            above = [self.high_band.columns(part, j, **how) for j, part in zip(joints, columns, strict=True)]
             above = above if any(map(len, above)) else []
         # What acts above the bands counts there, however little of it those let through.
         power = [own + sum(map(_squares, above)) for own in power]
         raw = np.where(power[0] > COUNTED * power[1], power[0], np.inf)
         doubtful = np.flatnonzero(np.isinf(raw) & (power[0] > FAINT * power[1]))
-        if effect is not None and effect.alike and len(doubtful):
+        if effect is not None and effect.shared_coefficient and len(doubtful):
             known = self._known(joints, [part[:, doubtful] for part in columns])
             raw[doubtful] = np.where(known > KNOWN * power[0][doubtful], power[0][doubtful], np.inf)
         against, cross, gram = self._products(joints, white, count)
         for j, part in zip(joints, above, strict=False):
-            assert self.upper is not None
+            assert self.high_band is not None
             assert effect is not None
-            cross += self.upper.cross(part, j, bare=effect.unmoved)
+            cross += self.high_band.cross(part, j, bare=effect.exogenous)
             apart = part.T.reshape(count, k, -1)
             gram += apart @ apart.transpose(0, 2, 1)
         timed = None
@@ -189,8 +203,8 @@ class Problem:
                 gram=gram[i] - against[own] @ against[own].T,
                 raw=np.asarray(raw[own]),
                 cross=cross[own],
-                above=tuple(part[:, own] for part in high),
-                timed=timed,
+                high_band_columns=tuple(part[:, own] for part in high),
+                reversal_columns=timed,
             )
             for i, own in enumerate(slice(i * k, (i + 1) * k) for i in range(count))
         ]
@@ -214,11 +228,11 @@ class Problem:
     def _products(self, joints: tuple[int, ...], white: Sequence[Small], count: int) -> tuple[Array, Array, Array]:
         """Products of white columns (N, count k) with base model (count k, b), residual, each other (count, k, k)."""
         total = white[0].shape[1]
-        against, cross = np.zeros((total, self.mixed.shape[2])), np.zeros(total)
+        against, cross = np.zeros((total, self.weighted_base_columns.shape[2])), np.zeros(total)
         gram = np.zeros((count, total // count, total // count))
         split = [part.T.reshape(count, total // count, -1) for part in white]
         for a, j in enumerate(joints):
-            against += white[a].T @ self.mixed[j]
+            against += white[a].T @ self.weighted_base_columns[j]
             cross += white[a].T @ self._residual[:, j]
             gram += self.whitening.precision[j, j] * (split[a] @ split[a].transpose(0, 2, 1)).astype(float)
             for b in range(a):
@@ -239,54 +253,26 @@ class Problem:
         return Group(joints, small, against, gram - against @ against.T, np.diag(gram).copy(), cross)
 
     @cached_property
-    def calm(self) -> NDArray[np.bool_]:
+    def far_from_reversals(self) -> NDArray[np.bool_]:
         """Marks white rows (N,) in which no joint has turned round, come to rest or left it, nor is about to."""
-        return self.recording.calm(self.whitening.stride)
+        return self.recording.far_from_reversals(self.whitening.stride)
 
-    def late(self, joint: int) -> Array:
+    def reversal_time_error(self, joint: int) -> Array:
         """How late a joint may turn round [s] by what is not known of its velocity, in white rows (N,)."""
-        return self.recording.late_beside(joint, self.whitening.stride)
+        return self.recording.reversal_time_error_near(joint, self.whitening.stride)
 
     def _known(self, joints: tuple[int, ...], columns: Sequence[Array]) -> Array:
         """Energy (k,) of whitened columns (N, k) of some joints that is not from beside rows of unknown direction."""
         total = np.zeros(columns[0].shape[1])
         for j, X in zip(joints, columns, strict=True):
-            apart = self.whitening.apply(X * self._away[:, j, None], j)
+            apart = self.whitening.apply(X * self._distant_from[:, j, None], j)
             total += self.whitening.precision[j, j] * _squares(apart)
         return total
 
     @cached_property
-    def _away(self) -> NDArray[np.bool_]:
+    def _distant_from(self) -> NDArray[np.bool_]:
         """Marks rows (N, n) away from those of unknown direction."""
-        return self.recording.away(self.recording.unsure)
-
-    def null_crosses(self, groups: Sequence[Group]) -> Array:
-        """Products (count, k, draws) of groups of one size on the same joints with noise that has a fit of its own."""
-        noise, projected = self.nulls
-        total = -(np.concatenate([group.against for group in groups]) @ projected)
-        for a, j in enumerate(groups[0].joints):
-            total += np.concatenate([group.columns[a] for group in groups], axis=1).T @ noise[j]
-        null = np.asarray(total.reshape(len(groups), -1, projected.shape[1]))
-        for at, group in enumerate(groups):
-            for part in group.above:
-                null[at] += self._drawn(part)
-            if group.timed is not None:
-                null[at] += group.timed.T @ self._drawn_timing
-        return null
-
-    def _drawn(self, columns: Small) -> Array:
-        """Products (k, draws) of columns above the band with noise: of many rows, and so as good as normal.
-
-        The same columns meet the same noise.
-        """
-        gram = (columns.T @ columns).astype(float)
-        values, vectors = np.linalg.eigh(gram)
-        unit = np.random.default_rng(gram.ravel().view(np.uint64)).standard_normal((len(gram), self.nulls[1].shape[1]))
-        return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ unit)
-
-    @cached_property
-    def _drawn_timing(self) -> Array:
-        return np.random.default_rng(self.n).standard_normal((self.n, self.nulls[1].shape[1]))
+        return self.recording.distant_from(self.recording.sign_unknown)
 
     def product(self, first: Group, second: Group) -> Array:
         """Inner products (k1, k2) of what the base model leaves of two groups."""
@@ -296,12 +282,12 @@ class Problem:
             for b, right in zip(second.joints, second.columns, strict=True):
                 if P[a, b]:
                     total = total + P[a, b] * (left.T @ right).astype(float)
-        for a, left in zip(first.joints, first.above, strict=False):
-            for b, right in zip(second.joints, second.above, strict=False):
+        for a, left in zip(first.joints, first.high_band_columns, strict=False):
+            for b, right in zip(second.joints, second.high_band_columns, strict=False):
                 if a == b:
                     total = total + (left.T @ right).astype(float)
-        if first.timed is not None and second.timed is not None:
-            total = total + first.timed.T @ second.timed
+        if first.reversal_columns is not None and second.reversal_columns is not None:
+            total = total + first.reversal_columns.T @ second.reversal_columns
         return total
 
 

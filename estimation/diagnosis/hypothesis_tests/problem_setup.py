@@ -70,14 +70,14 @@ def build_problem(
         pressed[k] = sum(P[j, k] * noise[:, j] for j in range(n) if P[j, k])
     scales = whitening.scales(len(recording))
     own = recording.tau if extra is None else recording.tau - extra
-    gram, cross = normal_equations(baseline, ~recording.unsure / scales, own)
+    gram, cross = normal_equations(baseline, ~recording.sign_unknown / scales, own)
     if pull is None:
         strength = whitening.row_weight
         pull = inflate_conflicting_prior(
             base_model_prior(baseline, recording, strength), gram.sum(axis=0), cross.sum(axis=0), strength
         )
     values = solve_map(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
-    alone = values if extra is None else fit_values(baseline, scales, recording.unsure, recording.tau, pull)
+    alone = values if extra is None else fit_values(baseline, scales, recording.sign_unknown, recording.tau, pull)
     remainder = recording.tau - baseline.regressor @ alone
     now = with_gear_load(baseline.situation(recording, values), bearing)
     return Problem(
@@ -85,16 +85,16 @@ def build_problem(
         baseline=baseline,
         whitening=whitening,
         situation=now,
-        mixed=np.ascontiguousarray(np.einsum("jk,nkb->jnb", root, Q, optimize=True), dtype=np.float32),
+        weighted_base_columns=np.ascontiguousarray(np.einsum("jk,nkb->jnb", root, Q, optimize=True), dtype=np.float32),
         residual=tilted @ root.T,
         white=np.linalg.solve(root.T, tilted.T).T,
         energy=float(np.sum(tilted**2)),
         nulls=(pressed, projected),
-        remainder=remainder,
-        pull=pull,
-        upper=upper,
-        followed=None if followed is None else now.beside(followed),
-        bearing=bearing,
+        base_residual=remainder,
+        prior=pull,
+        high_band=upper,
+        delayed_torque_state=None if followed is None else now.beside(followed),
+        extra_load=bearing,
     )
 
 

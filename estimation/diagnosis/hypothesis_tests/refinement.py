@@ -51,11 +51,11 @@ class FittedEffect:
         coefficients: (k,) beside the others.
         degrees: coefficients that show, and shape parameters that are free: one whose bounds are equal is known.
         visible: largest share of a column's energy that the model before leaves.
-        scatter: of what each joint says of a coefficient that all have alike, or rows beside reversals and others, as a
-            variance over that of the noise and of the formula (Birge ratio, one at least): the gain counts for so much
-            less.
-        doubt: of the gain so counted, what errors of the motion may make: another cause would owe it to them, too, but
-            whether there is one at all is told by the rest.
+        birge_ratio: of what each joint says of a coefficient that all have alike, or rows beside reversals and others,
+            as a variance over that of the noise and of the formula (Birge ratio, one at least): the gain counts for so
+            much less.
+        motion_error_chi2: of the gain so counted, what errors of the motion may make: another cause would owe it to
+            them, too, but whether there is one at all is told by the rest.
     """
 
     hypothesis: Hypothesis
@@ -65,26 +65,26 @@ class FittedEffect:
     coefficients: Array
     degrees: int
     visible: float
-    scatter: float = 1.0
-    doubt: float = 0.0
+    birge_ratio: float = 1.0
+    motion_error_chi2: float = 0.0
 
-    def bic(self, rows: int) -> float:
+    def bic_gain(self, rows: int) -> float:
         """Gain less what its parameters are worth: Schwarz's criterion, larger is better."""
-        return self._less(rows * len(self.group.joints))
+        return self._penalised_gain(rows * len(self.group.joints))
 
-    def worth(self, rows: int) -> float:
-        """Does what `bic` does, to say whether it is there at all, not whether another is there instead.
+    def local_bic_gain(self, rows: int) -> float:
+        """Does what `bic_gain` does, to say whether it is there at all, not whether another is there instead.
 
         What acts for a moment is told by the rows of that moment: the other ones are not data of its parameters.
         """
-        told = self._acting() if self.hypothesis.effect.passing else np.inf
-        return self._less(min(rows * len(self.group.joints), told)) - self.doubt
+        told = self._acting_rows() if self.hypothesis.effect.transient else np.inf
+        return self._penalised_gain(min(rows * len(self.group.joints), told)) - self.motion_error_chi2
 
-    def _less(self, rows: float) -> float:
+    def _penalised_gain(self, rows: float) -> float:
         prior = RARE if self.hypothesis.effect.rare else 0.0
-        return self.gain / self.scatter - self.degrees * float(np.log(rows)) - prior
+        return self.gain / self.birge_ratio - self.degrees * float(np.log(rows)) - prior
 
-    def _acting(self) -> float:
+    def _acting_rows(self) -> float:
         """Rows that the columns act on: (sum x^2)^2 / sum x^4, mean over columns, two at least."""
         whole = np.concatenate(self.group.columns).astype(float) ** 2
         square, fourth = whole.sum(axis=0), (whole**2).sum(axis=0)
@@ -125,7 +125,7 @@ def refine(
     1973), so that the search has as many dimensions as the effect has shape parameters. Shapes that machines are built
     with are then tried, without a parameter to pay for.
     """
-    situation = problem.sees(hypothesis.effect)
+    situation = problem.state_for(hypothesis.effect)
     bounds = hypothesis.effect.bounds(situation, hypothesis.joint)
     scales = [shape.scale for shape in hypothesis.effect.shapes]
     loose = [k for k, (low, high) in enumerate(bounds) if high > low]
@@ -139,8 +139,8 @@ def refine(
         result = score(problem, group, accepted)
         gain, coefficients = result.bounded(*hypothesis.coefficient_bounds(situation.robot, shape))
         member = FittedEffect(hypothesis, shape, group, gain, coefficients, result.degrees + fitted, result.visible)
-        worth = member.bic(problem.rows)
-        if not best or worth > best[0].bic(problem.rows):
+        worth = member.bic_gain(problem.rows)
+        if not best or worth > best[0].bic_gain(problem.rows):
             best[:] = [member]
         # What is climbed has no step where a parameter that costs begins to count.
         return gain
@@ -164,13 +164,13 @@ def refine(
             limits, kinds = tuple(bounds[k] for k in free), [scales[k] for k in free]
             climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)
             summit = best[0]
-            others = hypothesis.effect.elsewhere(situation, hypothesis.joint, summit.shape, summit.coefficients)
+            others = hypothesis.effect.other_optima(situation, hypothesis.joint, summit.shape, summit.coefficients)
             for slopes in others:
                 gains = [evaluate(slope) for slope in slopes]
                 at[:] = slopes[int(np.argmax(gains))]
                 climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)
 
-    if hypothesis.effect.last or hypothesis.effect.distorts:
+    if hypothesis.effect.acts_on_total_torque or hypothesis.effect.distorts:
         # What is known now may have been free, or another, where the search comes from.
         start = clip_shape(start, bounds)
     evaluate(start)
@@ -188,12 +188,16 @@ def refine(
     found = best[0]
     if hypothesis.effect.lags:
         return _with_scatter(problem, found, accepted)
-    if hypothesis.effect.turns and hypothesis.joint is not None:
+    if hypothesis.effect.acts_at_reversals and hypothesis.joint is not None:
         if found.shape[0] < SHORT_TRAVEL_FACTOR * bounds[0][0]:
-            return replace(found, scatter=np.inf)
+            return replace(found, birge_ratio=np.inf)
         owed = gain_from_reversal_errors(problem, hypothesis.joint, found.group, found.gain, accepted)
-        return replace(found, doubt=owed)
-    return replace(found, scatter=_reversal_scatter(problem, found, accepted)) if hypothesis.effect.kicks else found
+        return replace(found, motion_error_chi2=owed)
+    return (
+        replace(found, birge_ratio=_reversal_scatter(problem, found, accepted))
+        if hypothesis.effect.acceleration_driven
+        else found
+    )
 
 
 def clip_shape(shape: Sequence[float], bounds: Sequence[tuple[float, float]]) -> tuple[float, ...]:
@@ -206,10 +210,10 @@ def _with_scatter(problem: Problem, member: FittedEffect, accepted: Accepted) ->
     told = per_joint_evidence(problem, member.hypothesis, member.shape, accepted)
     if not (acts := told.gram > 0).any():
         return member
-    told = told.some(acts)
+    told = told.subset(acts)
     agreed = told.gain()
     scatter = max(1.0, float(told.cross.sum() ** 2 / told.gram.sum()) / agreed)
-    return replace(member, scatter=scatter, doubt=max(0.0, agreed - told.gain(surely=True)))
+    return replace(member, birge_ratio=scatter, motion_error_chi2=max(0.0, agreed - told.gain(surely=True)))
 
 
 def _reversal_scatter(problem: Problem, member: FittedEffect, accepted: Accepted) -> float:
@@ -218,7 +222,7 @@ def _reversal_scatter(problem: Problem, member: FittedEffect, accepted: Accepted
     Beside reversals accelerations are not known to all of their kicks. What is missing of them looks like an effect of
     the changes of acceleration, on every joint that feels them, and is the same at each.
     """
-    parts = score(problem, problem.split(member.group, member.coefficients, problem.calm), accepted)
+    parts = score(problem, problem.split(member.group, member.coefficients, problem.far_from_reversals), accepted)
     # What each part says of the whole, were it as large as it is: the base model may take of one what the other has.
     expected = parts.gram.sum(axis=1)
     if (expected <= 0).any():

@@ -17,7 +17,7 @@ def gain_from_reversal_errors(problem: Problem, joint: int, group: Group, gain: 
     Friction that turns round over a short way is late for that. What the moments' error allows is fitted beside it,
     with that error as its prior.
     """
-    late = problem.late(joint - 1)
+    late = problem.reversal_time_error(joint - 1)
     if not late.any():
         return 0.0
     usual = float(np.sqrt(np.mean(late[late > 0] ** 2)))

@@ -13,6 +13,7 @@ from scipy.stats import gumbel_r
 
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.null_products import null_products
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from robots.common.memory import give_back
@@ -126,14 +127,14 @@ def measure(
 
 def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
     joint = hypothesis.joint
-    if joint is not None and problem.recording.unsure[:, joint - 1].all():
+    if joint is not None and problem.recording.sign_unknown[:, joint - 1].all():
         # A joint that rests throughout: friction holds against whatever acts there.
         return None
-    situation = problem.sees(hypothesis.effect)
+    situation = problem.state_for(hypothesis.effect)
     shapes = hypothesis.effect.grid(situation, joint)
     tries = len(shapes)
     if tries > LONG:
-        slope = problem.slope_of(hypothesis.effect)
+        slope = problem.score_gradient_for(hypothesis.effect)
         shapes = hypothesis.effect.propose(situation, hypothesis.joint, slope, PROPOSED)
     kept: list[tuple[float, ...]] = []
     batches: dict[tuple[int, ...], list[tuple[int, tuple[Array, ...]]]] = {}
@@ -162,12 +163,12 @@ def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
         sizes.update((at, _size(problem, joints, columns)) for at, columns in members)
     ordered = tuple(groups[at] for at in range(len(kept)))
     nulls = np.zeros((0, 0, 0), np.float32)
-    charged = tries > LONG or any(group.above for group in ordered)
+    charged = tries > LONG or any(group.high_band_columns for group in ordered)
     if not charged and problem.nulls[1].shape[1]:
         nulls = np.empty((len(kept), ordered[0].size, problem.nulls[1].shape[1]), np.float32)
         for members in batches.values():
             places = [at for at, _ in members]
-            nulls[places] = problem.null_crosses([groups[at] for at in places])
+            nulls[places] = null_products(problem, [groups[at] for at in places])
     return Entry(
         hypothesis=hypothesis,
         shapes=tuple(kept),

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from estimation.diagnosis.hypothesis_tests.groups import Group
+from estimation.diagnosis.hypothesis_tests.null_products import null_products
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ def accept(problem: Problem, groups: tuple[Group, ...]) -> Accepted:
     raw = np.concatenate([group.raw for group in groups])
     root = visible_root(gram, raw)
     cross = np.concatenate([group.cross for group in groups])
-    nulls = np.concatenate([problem.null_crosses([group])[0] for group in groups])
+    nulls = np.concatenate([null_products(problem, [group])[0] for group in groups])
     return Accepted(groups, root, root @ cross, root @ nulls)
 
 

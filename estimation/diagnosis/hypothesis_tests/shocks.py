@@ -46,7 +46,7 @@ def gain_beside_shock(problem: Problem, member: FittedEffect, accepted: Accepted
     likely = _chance(problem, elsewhere, joints, float(sizes[best, place].max())) >= LIKELY
     struck = joints if likely else joints[largest : largest + 1]
     beside = accept(problem, (*accepted.groups, _shock(problem, struck, place, offset)))
-    situation = problem.sees(member.hypothesis.effect)
+    situation = problem.state_for(member.hypothesis.effect)
     gain, _ = score(problem, member.group, beside).bounded(
         *member.hypothesis.coefficient_bounds(situation.robot, member.shape)
     )

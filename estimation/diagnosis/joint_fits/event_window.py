@@ -38,26 +38,26 @@ def open_event_edges(
 def refit_event_window(problem: Problem, member: FittedEffect, beside: Accepted) -> FittedEffect:
     """Gives an effect of a moment by the formula that stays true while it lasts, where that is worth its parameters."""
     hypothesis = member.hypothesis
-    if not hypothesis.effect.passing:
+    if not hypothesis.effect.transient:
         return member
-    shapes = hypothesis.effect.lasting(problem.sees(hypothesis.effect), member.shape)
+    shapes = hypothesis.effect.sustained_shapes(problem.state_for(hypothesis.effect), member.shape)
     if not shapes:
         return member
     start, duration = member.shape[:2]
     windows = threaded(lambda shape: best_window(problem, hypothesis, shape, beside, (start, start + duration)), shapes)
     forms = [(own.gain, (own.start, own.duration, *shape[2:])) for own, shape in zip(windows, shapes, strict=True)]
     near = refine(problem, hypothesis, max(forms)[1], beside, effort=0)
-    if near.bic(problem.rows) + NEAR * near.gain < member.bic(problem.rows):
+    if near.bic_gain(problem.rows) + NEAR * near.gain < member.bic_gain(problem.rows):
         return member
     best = refine(problem, hypothesis, near.shape, beside)
-    return best if best.bic(problem.rows) > member.bic(problem.rows) + MIN_BIC_GAIN else member
+    return best if best.bic_gain(problem.rows) > member.bic_gain(problem.rows) + MIN_BIC_GAIN else member
 
 
 def _open(problem: Problem, member: FittedEffect, beside: Accepted) -> set[int]:
     """Which shape parameters of a member, beside what is accepted, the data say are not where the effect ends."""
-    further = member.hypothesis.effect.further(member.shape)
+    further = member.hypothesis.effect.open_edges(member.shape)
     if not further:
         return set()
     rest = accept(problem, (member.group, *beside.groups))
     more = ((k, refine(problem, member.hypothesis, shape, rest, effort=0)) for k, shape in further)
-    return {k for k, form in more if form.worth(problem.rows) > MIN_BIC_GAIN}
+    return {k for k, form in more if form.local_bic_gain(problem.rows) > MIN_BIC_GAIN}

@@ -78,10 +78,10 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
     fast, kicks = np.zeros((2, columns.shape[2]), dtype=bool)
     for member, (start, size, shapes) in zip(members, slices, strict=True):
         rows, effect = slice(start, start + size + shapes), member.hypothesis.effect
-        fast[rows], kicks[rows] = effect.fast, effect.kicks
+        fast[rows], kicks[rows] = effect.independent_of_acceleration, effect.acceleration_driven
     flat, tau = white.independent(columns), white.independent(problem.recording.tau)
-    if problem.upper is not None and fast.any():
-        above, beyond = problem.upper.regression(columns[:, :, fast], calm=kicks[fast])
+    if problem.high_band is not None and fast.any():
+        above, beyond = problem.high_band.regression(columns[:, :, fast], calm=kicks[fast])
         higher = np.zeros((len(above), len(fast)))
         higher[:, fast] = above
         flat, tau = np.concatenate([flat, higher]), np.concatenate([tau, beyond])
@@ -103,7 +103,7 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
     ):
         rows = slice(start, start + size + shapes)
         # Joints that differ in what they should agree on know it so much worse.
-        own = covariance[rows, rows] * member.scatter
+        own = covariance[rows, rows] * member.birge_ratio
         scale = np.concatenate([np.ones(size), np.abs(steps)])
         # What is not known at all stays so, whatever its slope's covariance.
         open_ = ~np.isfinite(scale)
@@ -150,7 +150,7 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
         provenance=provenance,
         extensions=tuple(extensions),
         felt=problem.parameters_without_payload[list(baseline.base.independent)],
-        bearing=problem.bearing,
+        bearing=problem.extra_load,
         since=problem.situation.origin,
     )
     return ExtendedFit(model, tuple(known), values[: base.shape[2]])
@@ -169,8 +169,8 @@ def reversal_columns(members: Sequence[FittedEffect], starts: Sequence[int], sha
     """What each joint's reversals tell beside the rows (n, p) of members whose columns start at these."""
     told = np.zeros(shape)
     for member, start in zip(members, starts, strict=True):
-        if member.group.timed is not None:
-            told[:, start : start + member.group.size] = member.group.timed
+        if member.group.reversal_columns is not None:
+            told[:, start : start + member.group.size] = member.group.reversal_columns
     return told
 
 
@@ -178,7 +178,7 @@ def _slope(problem: Problem, member: FittedEffect, k: int, step: float) -> Array
     """How the member's torque changes by one standard error of a shape parameter (N, n, 1)."""
     value = member.shape[k]
     h = step if np.isfinite(step) else 0.3 * abs(value)
-    low, high = member.hypothesis.effect.bounds(problem.sees(member.hypothesis.effect), member.hypothesis.joint)[k]
+    low, high = member.hypothesis.effect.bounds(problem.state_for(member.hypothesis.effect), member.hypothesis.joint)[k]
     up, down = min(value + h, high), max(value - h, low)
     if up <= down:
         return np.zeros((len(problem.recording), problem.n, 1))

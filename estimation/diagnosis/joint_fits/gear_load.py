@@ -29,12 +29,12 @@ class GearLoad:
     """What gears bear of some effects.
 
     Attributes:
-        bearing: that; None for nothing.
-        shows: whether it explains more than what was found without it, so that a search should be made with it.
+        extra_load: that; None for nothing.
+        improves_fit: whether it explains more than what was found without it, so that a search should be made with it.
     """
 
-    bearing: ExtraGearLoad | None = None
-    shows: bool = False
+    extra_load: ExtraGearLoad | None = None
+    improves_fit: bool = False
 
 
 NO_GEAR_LOAD = GearLoad()
@@ -52,32 +52,32 @@ def find_gear_load(problem: Problem, members: Sequence[FittedEffect], values: Ar
         members: the effects.
         values: of base model, nuisance and all members, fitted together.
     """
-    at, weights = len(problem.pull.target), []
+    at, weights = len(problem.prior.target), []
     for member in members:
         place, own = member.hypothesis, values[at : at + len(member.coefficients)]
         at += len(own)
-        if place.effect.borne:
+        if place.effect.loads_gear:
             weights.append(LoadSource(place.effect, place.joint, member.shape, own))
     if not weights:
         return NO_GEAR_LOAD
     ways: list[LoadPath] = ["effects", "preloads"] if any(w.effect.preloads for w in weights) else ["effects"]
     bearings = [ExtraGearLoad(way, weights) for way in ways]
     state = problem.baseline.situation(problem.recording, values[: problem.baseline.base.size])
-    borne = bearings[0].on(state).borne
+    borne = bearings[0].on(state).extra_load
     assert borne is not None
     size, other = (np.sqrt(np.mean(torque**2, axis=0)) for torque in (borne, state.load))
     felt = set((np.flatnonzero(size > FELT * other) + 1).tolist())
-    on_them = [m for m in members if m.hypothesis.joint in felt and not m.hypothesis.effect.borne]
+    on_them = [m for m in members if m.hypothesis.joint in felt and not m.hypothesis.effect.loads_gear]
     if not on_them:
         return GearLoad(bearings[0])
     before = _set_bic_gain(problem, members)
     best, most = GearLoad(bearings[0]), before
     for bearing in bearings:
-        now = replace(problem, situation=bearing.on(state), bearing=bearing)
+        now = replace(problem, situation=bearing.on(state), extra_load=bearing)
         for told in _alternatives(now, members, on_them):
             worth = _set_bic_gain(now, told)
-            if worth > most + (0.0 if best.shows else MIN_BIC_GAIN):
-                best, most = GearLoad(bearing, shows=True), worth
+            if worth > most + (0.0 if best.improves_fit else MIN_BIC_GAIN):
+                best, most = GearLoad(bearing, improves_fit=True), worth
     return best
 
 
@@ -85,7 +85,7 @@ def _alternatives(
     problem: Problem, members: Sequence[FittedEffect], on_them: Sequence[FittedEffect]
 ) -> list[list[FittedEffect]]:
     """Lists what the members would be with this load: those that feel it fitted anew, and one name or none left out."""
-    feel = [m for m in on_them if m.hypothesis.effect.loaded]
+    feel = [m for m in on_them if m.hypothesis.effect.depends_on_gear_load]
     result = []
     for out in (None, *(m for m in on_them if m not in feel)):
         rest = [m for m in members if m is not out and m not in feel]

@@ -49,7 +49,7 @@ class _Search:
 
     def __init__(self, problem: Problem, plain: Sequence[FittedEffect], wrong: Sequence[FittedEffect]) -> None:
         self.problem, self.wrong = problem, list(wrong)
-        self.fit = JointFit(problem, plain, np.ones_like(problem.recording.unsure))
+        self.fit = JointFit(problem, plain, np.ones_like(problem.recording.sign_unknown))
         # What is known, such as the torque that a formula is relative to, stays.
         self.bounds = [_bounds(problem, member) for member in wrong]
         self.loose = [[k for k, (low, high) in enumerate(own) if low < high] for own in self.bounds]
@@ -91,7 +91,7 @@ class _Search:
         # Nuisance and other effects are read as they are: what distorts is told by the base model's torque.
         columns[:, :, : self.problem.baseline.base.size] *= passes[:, :, None]
         left = self.problem.recording.tau - self.fit.full @ values - self._distortion(now, members)
-        return solve_map(*self.fit.normal(left + columns @ np.concatenate(own), columns), self.problem.pull)
+        return solve_map(*self.fit.normal(left + columns @ np.concatenate(own), columns), self.problem.prior)
 
     def _moved(
         self, values: Array, members: Sequence[FittedEffect], goal: Array, share: float
@@ -117,7 +117,7 @@ class _Search:
 
     def _cost(self, values: Array, now: Problem, members: Sequence[FittedEffect]) -> float:
         """What is left, weighed, and what the pull and reversals say against it."""
-        fit, problem, pull = self.fit, self.problem, self.problem.pull
+        fit, problem, pull = self.fit, self.problem, self.problem.prior
         left = (problem.recording.tau - fit.full @ values - self._distortion(now, members)) * fit.weights
         off = values[: len(pull.target)] - pull.target
         cost = float(np.sum(left**2) + off @ pull.precision @ off)

@@ -44,7 +44,7 @@ def shape_errors(problem: Problem, member: FittedEffect, others: Accepted) -> li
 
     One whose bounds are equal is known, unless it is a choice and another would do about as well.
     """
-    situation = problem.sees(member.hypothesis.effect)
+    situation = problem.state_for(member.hypothesis.effect)
     bounds = member.hypothesis.effect.bounds(situation, member.hypothesis.joint)
     steps = []
     for k, (value, (low, high), shape) in enumerate(
@@ -149,7 +149,7 @@ def _along_ridge(problem: Problem, member: FittedEffect, k: int, others: Accepte
     way counts.
     """
     shapes = member.hypothesis.effect.shapes
-    bounds = member.hypothesis.effect.bounds(problem.sees(member.hypothesis.effect), member.hypothesis.joint)
+    bounds = member.hypothesis.effect.bounds(problem.state_for(member.hypothesis.effect), member.hypothesis.joint)
     other, value = 1 - k, member.shape[k]
     best: list[float] = []
 
@@ -239,9 +239,9 @@ def _hidden(
     A drive is at its limit, and its torque is all that; the joints stand; or no log was running.
     """
     t, joints = problem.recording.t, member.hypothesis.effect.acts_on(problem.situation.robot, member.hypothesis.joint)
-    blind = [np.asarray(problem.recording.unsure[:, list(joints)].all(axis=1))]
+    blind = [np.asarray(problem.recording.sign_unknown[:, list(joints)].all(axis=1))]
     for other in others:
-        if other.hypothesis.effect.last and set(other.group.joints) & set(joints):
+        if other.hypothesis.effect.acts_on_total_torque and set(other.group.joints) & set(joints):
             lost = [np.abs(X).max(axis=1) for X in problem.columns_of(other.hypothesis, other.shape)[1]]
             blind.append(np.asarray(np.any([loss > CUT * loss.max() for loss in lost], axis=0)))
     found = [(float(t[start]), float(t[stop - 1])) for rows in blind for start, stop in spans(rows)]
@@ -262,9 +262,9 @@ def formula_errors(problem: Problem, member: FittedEffect, coefficients: Array) 
     described = zip(effect.shapes, member.shape, strict=True)
     shapes = [s.inexact * (abs(value) if s.scale == "log" else 1.0) for s, value in described]
     own = np.array([c.inexact for c in effect.parameters(robot, member.hypothesis.joint)])
-    agreed = member.gain / member.scatter
-    if 0 < member.doubt < agreed:
-        own = np.hypot(own, np.sqrt(1.0 / (agreed - member.doubt) - 1.0 / agreed))
+    agreed = member.gain / member.birge_ratio
+    if 0 < member.motion_error_chi2 < agreed:
+        own = np.hypot(own, np.sqrt(1.0 / (agreed - member.motion_error_chi2) - 1.0 / agreed))
     return np.array([*(own * np.abs(coefficients)), *shapes])
 
 

@@ -51,14 +51,14 @@ def shrinkage_precision(result: Score) -> Array:
 
 def effects_prior(problem: Problem, members: Sequence[FittedEffect]) -> GaussianPrior:
     """Gives the pull on base model, nuisance and the coefficients of members (b + m + k,), in units of plain rows."""
-    pull = problem.pull
+    pull = problem.prior
     own, targets = [], []
     for i, member in enumerate(members):
         others = accept(problem, tuple(m.group for k, m in enumerate(members) if k != i))
         precision, target = shrinkage_precision(score(problem, member.group, others)), np.zeros(member.group.size)
-        if member.group.timed is not None and problem.timing is not None:
-            timed = np.sum(member.group.timed**2, axis=0)
-            target = member.group.timed.T @ problem.timing.residual / (timed + precision)
+        if member.group.reversal_columns is not None and problem.timing is not None:
+            timed = np.sum(member.group.reversal_columns**2, axis=0)
+            target = member.group.reversal_columns.T @ problem.timing.residual / (timed + precision)
             precision = precision + timed
         own.append(problem.whitening.row_weight * precision)
         targets.append(target)

@@ -39,13 +39,13 @@ def with_total_torque(problem: Problem, members: Sequence[FittedEffect], hypothe
         members: what is known to act.
         hypotheses: of which some may act on all of the torque.
     """
-    others = [member for member in members if not member.hypothesis.effect.blurs]
-    if others and any(hypothesis.effect.blurs for hypothesis in hypotheses):
+    others = [member for member in members if not member.hypothesis.effect.smooths_friction_sign]
+    if others and any(hypothesis.effect.smooths_friction_sign for hypothesis in hypotheses):
         beyond = np.sum([dense(problem, m.hypothesis, m.shape) @ m.coefficients for m in others], axis=0)
-        problem = replace(problem, followed=problem.situation.beside(beyond))
-    useless = np.zeros_like(problem.recording.unsure)
+        problem = replace(problem, delayed_torque_state=problem.situation.beside(beyond))
+    useless = np.zeros_like(problem.recording.sign_unknown)
     for hypothesis in hypotheses:
-        if hypothesis.effect.last:
+        if hypothesis.effect.acts_on_total_torque:
             flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
             useless |= False if flags is None else flags
     return (
@@ -57,9 +57,9 @@ def with_total_torque(problem: Problem, members: Sequence[FittedEffect], hypothe
 
 def total_torque_from_unclipped(problem: Problem, members: Sequence[FittedEffect], useless: Flags) -> Problem:
     """Tells all of the torque by the rows (N, n) that are of use, and members that do not act on all of it."""
-    before = [member for member in members if not member.hypothesis.effect.last]
+    before = [member for member in members if not member.hypothesis.effect.acts_on_total_torque]
     known = JointFit(problem, before, ~useless)
-    return known.told(known.values(problem.recording.tau))
+    return known.total_torque(known.values(problem.recording.tau))
 
 
 def fit_clipped_torque(problem: Problem, members: Sequence[FittedEffect]) -> Problem:
@@ -68,20 +68,20 @@ def fit_clipped_torque(problem: Problem, members: Sequence[FittedEffect]) -> Pro
     Without the useless rows alone, those that noise has kept from being so would make it too small. So the torque as it
     is cut on average is fitted to all of them (Gauss and Newton): a row counts by what of its torque's changes passes.
     """
-    last = [member for member in members if member.hypothesis.effect.last]
-    if not last or problem.whole is None:
+    last = [member for member in members if member.hypothesis.effect.acts_on_total_torque]
+    if not last or problem.total_torque_state is None:
         return problem
-    before = [member for member in members if not member.hypothesis.effect.last]
-    known = JointFit(problem, before, np.ones_like(problem.recording.unsure))
+    before = [member for member in members if not member.hypothesis.effect.acts_on_total_torque]
+    known = JointFit(problem, before, np.ones_like(problem.recording.sign_unknown))
     step = STEP * np.sqrt(np.mean(problem.recording.tau**2, axis=0))
     values = known.values(problem.recording.tau - _lost(problem, last))
     for _ in range(ROUNDS):
-        problem = known.told(values)
+        problem = known.total_torque(values)
         lost, more, less = (_lost(_with_more(problem, by), last) for by in (0.0 * step, step, -step))
         passes = np.clip(1.0 + (more - less) / (2.0 * step), 0.0, 1.0)
         torque = known.full @ values
         values = known.values(problem.recording.tau - torque - lost + passes * torque, passes)
-    return known.told(values)
+    return known.total_torque(values)
 
 
 def _lost(problem: Problem, members: Sequence[FittedEffect]) -> Array:
@@ -89,9 +89,11 @@ def _lost(problem: Problem, members: Sequence[FittedEffect]) -> Array:
 
 
 def _with_more(problem: Problem, torque: Array) -> Problem:
-    whole = problem.whole
+    whole = problem.total_torque_state
     assert whole is not None
-    return replace(problem, whole=whole.beside(torque + (whole.beyond if whole.beyond is not None else 0.0)))
+    return replace(
+        problem, total_torque_state=whole.beside(torque + (whole.beyond if whole.beyond is not None else 0.0))
+    )
 
 
 class JointFit:
@@ -104,11 +106,11 @@ class JointFit:
         self.full = np.concatenate([baseline.regressor, baseline.nuisance, *blocks], axis=2)
         edges = np.cumsum([baseline.regressor.shape[2] + baseline.nuisance.shape[2], *(b.shape[2] for b in blocks)])
         self.timed = reversal_columns(members, edges[:-1].tolist(), (recording.n, self.full.shape[2]))
-        self.weights = (counted & ~recording.unsure) / problem.whitening.scales(len(recording))
+        self.weights = (counted & ~recording.sign_unknown) / problem.whitening.scales(len(recording))
 
     def values(self, tau: Array, passes: Array | None = None) -> Array:
         """Fits torque (N, n), of whose changes a share passes (N, n)."""
-        return solve_map(*self.moments(tau, passes), self.problem.pull)
+        return solve_map(*self.moments(tau, passes), self.problem.prior)
 
     def moments(self, tau: Array, passes: Array | None = None) -> tuple[Array, Array]:
         """Gives the normal equations (b, b), (b,) of such a fit."""
@@ -123,12 +125,12 @@ class JointFit:
             cross[:b] += self.timed.T @ self.problem.timing.residual
         return gram, cross
 
-    def told(self, values: Array) -> Problem:
+    def total_torque(self, values: Array) -> Problem:
         """The problem, all of the torque known by these values."""
-        problem, known = self.problem, len(self.problem.pull.target)
+        problem, known = self.problem, len(self.problem.prior.target)
         now = problem.baseline.situation(problem.recording, values[: problem.baseline.base.size])
         beyond = self.full[:, :, known:] @ values[known:] if len(values) > known else None
-        return replace(problem, whole=now.beside(beyond))
+        return replace(problem, total_torque_state=now.beside(beyond))
 
 
 def fit_jointly(problem: Problem, members: Sequence[FittedEffect]) -> tuple[Array, Array, Array]:
@@ -137,9 +139,9 @@ def fit_jointly(problem: Problem, members: Sequence[FittedEffect]) -> tuple[Arra
     Returns:
         All values (b,); what the fit leaves (N, n) on which noise is measured; all columns (N, n, b).
     """
-    both, tau = JointFit(problem, members, np.ones_like(problem.recording.unsure)), problem.recording.tau
+    both, tau = JointFit(problem, members, np.ones_like(problem.recording.sign_unknown)), problem.recording.tau
     gram, cross = both.moments(tau)
-    values = solve_map(gram, cross, problem.pull)
+    values = solve_map(gram, cross, problem.prior)
     return (
         values,
         tau - both.full @ (values if is_short(problem.recording) else solve_least_squares(gram, cross)),
@@ -153,20 +155,26 @@ def effect_columns(
     """Evaluates what members depend on in another recording, and their columns (N, n, k) there."""
     model = problem.situation.model
     own = build_situation(recording, model, problem.parameters_without_payload)
-    now = with_gear_load(replace(own, since=problem.situation.origin), problem.bearing)
+    now = with_gear_load(replace(own, since=problem.situation.origin), problem.extra_load)
     states, columns = [now] * len(members), [_dense(now, member) for member in members]
-    late = [k for k, member in enumerate(members) if member.hypothesis.effect.blurs]
-    if problem.followed is not None and 0 < len(late) < len(members):
+    late = [k for k, member in enumerate(members) if member.hypothesis.effect.smooths_friction_sign]
+    if problem.delayed_torque_state is not None and 0 < len(late) < len(members):
         plain = [columns[k] @ member.coefficients for k, member in enumerate(members) if k not in late]
         followed = now.beside(np.sum(plain, axis=0))
         for k in late:
             states[k], columns[k] = followed, _dense(followed, members[k])
-    if problem.whole is not None:
-        whole = build_situation(recording, model, replace(problem, situation=problem.whole).parameters_without_payload)
-        parts = [X @ m.coefficients for X, m in zip(columns, members, strict=True) if not m.hypothesis.effect.last]
+    if problem.total_torque_state is not None:
+        whole = build_situation(
+            recording, model, replace(problem, situation=problem.total_torque_state).parameters_without_payload
+        )
+        parts = [
+            X @ m.coefficients
+            for X, m in zip(columns, members, strict=True)
+            if not m.hypothesis.effect.acts_on_total_torque
+        ]
         whole = whole.beside(np.sum(parts, axis=0) if parts else None)
         for k, member in enumerate(members):
-            if member.hypothesis.effect.last:
+            if member.hypothesis.effect.acts_on_total_torque:
                 states[k], columns[k] = whole, _dense(whole, member)
     return states, columns
 

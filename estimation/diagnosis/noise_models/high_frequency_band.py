@@ -37,23 +37,23 @@ class JointHighBand:
     """What one joint's torque is above its band.
 
     Attributes:
-        passing: lets through what is above, at the white rows, and levels its noise.
+        high_pass: lets through what is above, at the white rows, and levels its noise.
         counts: weights of the rows (N',): none for those whose direction of motion is not known.
         base: orthonormal columns of the base model (N', b).
         residual: white torque that the base model leaves, fitted anew (N',).
-        bare: what it leaves as it was fitted to the band (N',).
+        residual_of_band_fit: what it leaves as it was fitted to the band (N',).
     """
 
-    passing: Band
+    high_pass: Band
     counts: Array
     base: Array
     residual: Array
-    bare: Array
+    residual_of_band_fit: Array
 
 
 @dataclass(frozen=True, eq=False)
 class HighBand:
-    """A second regression, in the frequencies above each joint's band, for effects that are `fast`.
+    """A second regression above each joint's band, for effects that are `independent_of_acceleration`.
 
     The noise is the residual's own there, with what unknown accelerations add to it. Each joint's columns of the base
     model are fitted anew, for what is left of friction and inertia there is not what they are below; but not for what
@@ -62,24 +62,24 @@ class HighBand:
     Attributes:
         whitening: makes the noise white in a band that is far wider.
         joints: each joint's; None where its band leaves nothing above it.
-        calm: white rows (N',) in which no joint turns round.
+        far_from_reversals: white rows (N',) in which no joint turns round.
     """
 
     whitening: Whitening
     joints: tuple[JointHighBand | None, ...]
-    calm: NDArray[np.bool_]
+    far_from_reversals: NDArray[np.bool_]
 
     def columns(self, series: Array, joint: int, *, calm: bool = False, bare: bool = False) -> Array:
         """Whitens columns (N, k) of a joint, from 0, above its band and projects the base model out (N', k).
 
-        Those that are to be `calm` count where no joint turns round: all feel what is not known of its acceleration.
-        From those that are `bare` nothing is projected.
+        Those that are to be `far_from_reversals` count where no joint turns round: all feel what is not known of its
+        acceleration. From those that are `bare` nothing is projected.
         """
         above = self.joints[joint]
         if above is None:
             return np.zeros((0, series.shape[1]))
-        counts = above.counts * self.calm if calm else above.counts
-        white = _passed(self.whitening, series, joint, above.passing) * counts[:, None]
+        counts = above.counts * self.far_from_reversals if calm else above.counts
+        white = _passed(self.whitening, series, joint, above.high_pass) * counts[:, None]
         return white if bare else np.asarray(white - above.base @ (above.base.T @ white))
 
     def cross(self, columns: Array, joint: int, *, bare: bool = False) -> Array:
@@ -87,22 +87,22 @@ class HighBand:
         above = self.joints[joint]
         if above is None:
             return np.zeros(columns.shape[1])
-        return np.asarray(columns.T @ (above.bare if bare else above.residual))
+        return np.asarray(columns.T @ (above.residual_of_band_fit if bare else above.residual))
 
-    def slope(self, joint: int, rows: int, *, bare: bool = False) -> Array:
+    def score_gradient(self, joint: int, rows: int, *, bare: bool = False) -> Array:
         """Gives what torque in each of a joint's rows (N,) has to do with the residual above its band."""
         above = self.joints[joint]
         if above is None:
             return np.zeros(rows)
-        left = above.counts * (above.bare if bare else above.residual)
+        left = above.counts * (above.residual_of_band_fit if bare else above.residual)
         runs = _runs(left, self.whitening.starts, rows, self.whitening.stride)
         # Without delay, what is above is let through alike from either side.
-        return self.whitening.unfiltered(np.concatenate([above.passing.passed(run) for run in runs]), joint, rows)
+        return self.whitening.unfiltered(np.concatenate([above.high_pass.passed(run) for run in runs]), joint, rows)
 
     def regression(self, columns: Array, *, calm: NDArray[np.bool_]) -> tuple[Array, Array]:
         """Gives the rows (R, k) of columns (N, n, k) above the bands of joints that they act on, and torque (R,).
 
-        Those marked in `calm` (k,) count where no joint turns round.
+        Those marked in `far_from_reversals` (k,) count where no joint turns round.
         """
         rows, torque = [np.zeros((0, columns.shape[2]))], [np.zeros(0)]
         for j, above in enumerate(self.joints):
@@ -129,7 +129,7 @@ def build_high_band(
         wide: whitens the noise in wider bands.
     """
     # Rows beside reversals are left out after the filters: a ripple goes on through them, and need not be bridged.
-    wide = replace(wide, gaps=find_masked_rows(recording.unsure, recording.starts, rest_rows(recording.step)))
+    wide = replace(wide, masked=find_masked_rows(recording.sign_unknown, recording.starts, rest_rows(recording.step)))
     joints: list[JointHighBand | None] = []
     for j, (band, wider) in enumerate(zip(bands, wide.bands, strict=True)):
         if band.cutoff > NEARLY * wider.cutoff:
@@ -144,7 +144,7 @@ def build_high_band(
         base = orthonormal(_passed(wide, own[:, own.any(axis=0)], j, passing) * counts[:, None], FAINT)
         white = _passed(wide, remainder[:, j, None], j, passing)[:, 0] * counts
         joints.append(JointHighBand(passing, counts, base, white - base @ (base.T @ white), white))
-    return HighBand(wide, tuple(joints), recording.calm(wide.stride))
+    return HighBand(wide, tuple(joints), recording.far_from_reversals(wide.stride))
 
 
 def _levelling(
@@ -230,7 +230,7 @@ def _counts(wide: Whitening, recording: Recording, joint: int, edge: int) -> Arr
     reach = int(np.ceil(0.5 / wide.bands[joint].cutoff / recording.step))
     parts = []
     for run in recording.runs:
-        part = ~maximum_filter1d(recording.unsure[run, joint], 2 * reach + 1)[:: wide.stride]
+        part = ~maximum_filter1d(recording.sign_unknown[run, joint], 2 * reach + 1)[:: wide.stride]
         part[:edge] = False
         part[max(len(part) - edge, 0) :] = False
         parts.append(part)

@@ -42,7 +42,7 @@ class MaskedRows:
         result[rows] = (1 - w) * series[before] + w * series[after]
         return result
 
-    def gathered(self, slope: Array, joint: int) -> Array:
+    def bridge_adjoint(self, slope: Array, joint: int) -> Array:
         """Hands on to the rows beside a joint's gaps what (N,) has to do with the bridge: the adjoint of `bridged`."""
         rows, before, after, weight = self.bridges[joint]
         result = slope.copy()
@@ -51,7 +51,7 @@ class MaskedRows:
         np.add.at(result, after, weight * slope[rows])
         return result
 
-    def freed(self, white: NDArray[Real], joint: int) -> NDArray[Real]:
+    def project_out(self, white: NDArray[Real], joint: int) -> NDArray[Real]:
         """Projects the short gaps' torques out of white columns of a joint."""
         return self.free[joint].projected_out(white) if joint < len(self.free) else white
 

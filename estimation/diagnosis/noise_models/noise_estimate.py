@@ -66,14 +66,14 @@ def estimate_whitening(
     """
     colour = WITHOUT_LOW_FREQUENCIES if len(spared) else ALL_FREQUENCIES
     longest = rest_rows(recording.step)
-    rests = find_masked_rows(recording.unsure, recording.starts, longest)
+    rests = find_masked_rows(recording.sign_unknown, recording.starts, longest)
     # Where the direction of motion is not known the residual is no noise.
-    gaps = find_masked_rows(recording.unsure, recording.starts)
+    gaps = find_masked_rows(recording.sign_unknown, recording.starts)
     bridged = np.column_stack([gaps.bridged(column, j) for j, column in enumerate(residual.T)])
     pieces = [bridged[run] for run in recording.runs]
     moving = np.array([1.0 - len(rows) / len(residual) for rows, *_ in rests.bridges])
     highest = unbiased_frequencies(recording, inertia, bridged, moving) if share == SHARE else np.inf
-    known = [~recording.unsure[run] for run in recording.runs]
+    known = [~recording.sign_unknown[run] for run in recording.runs]
     bands = find_bands(recording, inertia, _density(pieces, recording.step, known), share, highest)
     pieces = [
         np.column_stack([band.passed(column) for band, column in zip(bands, piece.T, strict=True)]) for piece in pieces
@@ -127,12 +127,12 @@ def estimate_whitening(
         precision=np.asarray(np.linalg.inv(correlation), dtype=np.float64),
         starts=recording.starts,
         innovations=white,
-        gaps=gaps,
+        masked=gaps,
         bands=bands,
         levels=levels,
     )
-    free = free_columns(recording.unsure, longest, plain, widths.tolist())
-    plain = replace(plain, gaps=replace(gaps, free=free))
+    free = free_columns(recording.sign_unknown, longest, plain, widths.tolist())
+    plain = replace(plain, masked=replace(gaps, free=free))
     white_left = np.where(resting, np.nan, np.abs(plain.all(residual)))
     level = np.array([np.nanmedian(column) if np.isfinite(column).any() else 1.0 for column in white_left.T]) / 0.6745
     weights = np.minimum(1.0, HUBER * np.maximum(level, 0.1) / np.maximum(white_left, 1e-12))
@@ -147,7 +147,7 @@ def _measured(recording: Recording, stride: int, widths: Array, moving: NDArray[
     """
     result = moving.copy()
     for j, width in enumerate(widths):
-        bridges = find_masked_rows(recording.unsure[:, [j]], recording.starts, max(SHORT, round(width)))
+        bridges = find_masked_rows(recording.sign_unknown[:, [j]], recording.starts, max(SHORT, round(width)))
         held = bridges.resting(recording.starts, len(recording), stride, int(np.ceil(width)))[:, 0]
         if np.sum(moving[:, j] & ~held) > ENOUGH * np.sum(moving[:, j]):
             result[:, j] &= ~held
@@ -165,7 +165,7 @@ def _pushed(outside: NDArray[np.bool_], recording: Recording, stride: int, cutof
         width = max(3, round(max(TOGETHER, 1.5 / cutoff) / step))
         crowded[:, j] = uniform_filter1d(outside[:, j].astype(float), width) >= 0.5
     near = [
-        maximum_filter1d(recording.unsure[run].astype(np.int8), 2 * reach + 1, axis=0)[::stride]
+        maximum_filter1d(recording.sign_unknown[run].astype(np.int8), 2 * reach + 1, axis=0)[::stride]
         for run in recording.runs
     ]
     return outside & crowded & (np.concatenate(near) == 0)
@@ -210,7 +210,7 @@ def quiet_joints(recording: Recording, residual: Array, inertia: Array) -> NDArr
     density = _density([residual[run] for run in recording.runs], recording.step)
     # Of the samples themselves, which are as many as a kick lasts for.
     noise = np.sqrt(density * recording.stride / (2 * recording.step))
-    return np.asarray(np.diag(inertia) * recording.jolts < DROWNED * noise)
+    return np.asarray(np.diag(inertia) * recording.reversal_acceleration_error < DROWNED * noise)
 
 
 def _density(pieces: Sequence[Array], step: float, known: Sequence[NDArray[np.bool_]] | None = None) -> Array:

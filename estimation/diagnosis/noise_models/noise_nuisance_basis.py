@@ -86,7 +86,7 @@ def build_nuisance_projection(recording: Recording, baseline: Baseline, residual
     """
     if is_short(recording):
         return ()
-    known = ~recording.unsure
+    known = ~recording.sign_unknown
     weights = known / np.maximum(recording.tau.std(axis=0), 1e-12)
     sign = baseline.situation(recording, np.zeros(baseline.base.size)).sign
     size = baseline.regressor.shape[2] + baseline.nuisance.shape[2]

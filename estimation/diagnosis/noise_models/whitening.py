@@ -32,7 +32,7 @@ class Whitening:
         precision: inverse correlation of the innovations of the joints (n, n).
         starts: rows at which a log begins: the filters start anew.
         innovations: what the noise looks like when white (M, n), for drawing more of it.
-        gaps: rows of each joint that do not count.
+        masked: rows of each joint that do not count.
         bands: each joint's: where motion is known. Rows are thinned alike.
         weights: of the white rows (N, n): those that no noise explains count less; None for ones.
         levels: of the noise of each log, in units of `scale` (logs, n); None for ones.
@@ -43,7 +43,7 @@ class Whitening:
     precision: Array
     starts: tuple[int, ...]
     innovations: Array
-    gaps: MaskedRows
+    masked: MaskedRows
     bands: tuple[Band, ...]
     weights: Array | None = None
     levels: Array | None = None
@@ -91,7 +91,7 @@ class Whitening:
     def filtered(self, series: Array, joint: int, *, single: Literal[True]) -> Small: ...
     def filtered(self, series: Array, joint: int, *, single: bool = False) -> Array | Small:
         """Does what `apply` does, rows that do not count included; in `single` precision twice as fast."""
-        series = self.gaps.bridged(series, joint)
+        series = self.masked.bridged(series, joint)
         taps = self.taps(joint)
         parts: list[Any] = []
         for run, (start, stop) in enumerate(pairwise((*self.starts, len(series)))):
@@ -107,7 +107,7 @@ class Whitening:
 
     def counted(self, white: NDArray[Real], joint: int) -> NDArray[Real]:
         """Leaves out of white columns what is in rows that do not count."""
-        white = self.gaps.freed(white, joint)
+        white = self.masked.project_out(white, joint)
         if self.weights is None:
             return white
         weights = self.weights[:, joint, *(None,) * (white.ndim - 1)]
@@ -120,7 +120,7 @@ class Whitening:
         """
         if self.weights is not None:
             white = white * self.weights[:, joint]
-        return self.unfiltered(self.gaps.freed(white, joint), joint, rows)
+        return self.unfiltered(self.masked.project_out(white, joint), joint, rows)
 
     def unfiltered(self, white: Array, joint: int, rows: int) -> Array:
         """The same of `filtered`."""
@@ -133,7 +133,7 @@ class Whitening:
             thinned[:: band.stride] = np.convolve(white[first : first + count], taps[::-1])[len(taps) - 1 :]
             parts.append(replace(band, stride=1).passed(thinned) / self.level(run, joint))
             first += count
-        return self.gaps.gathered(np.concatenate(parts), joint)
+        return self.masked.bridge_adjoint(np.concatenate(parts), joint)
 
     def all(self, series: Array) -> Array:
         """Whitens (N, n) or (N, n, k)."""

@@ -45,20 +45,27 @@ class Directions:
     """What is known of the directions of a log's joints.
 
     Attributes:
-        unsure: rows (N, n) in which a joint's direction is not known, or not to be relied on beside its reversals.
-        clear: those of them (N, n) in which the velocity tells it.
-        jolts: error of the accelerations (n,) beside reversals [rad/s2 or m/s2].
-        late: how late joints may turn round (N, n) [s] by their velocities' error, where rows beside reversals count.
+        sign_unknown: rows (N, n) in which a joint's direction is not known, or not to be relied on beside its
+            reversals.
+        sign_known_from_velocity: those of them (N, n) in which the velocity tells it.
+        reversal_acceleration_error: error of the accelerations (n,) beside reversals [rad/s2 or m/s2].
+        reversal_time_error: how late joints may turn round (N, n) [s] by their velocities' error, where rows beside
+            reversals count.
     """
 
-    unsure: Flags
-    clear: Flags
-    jolts: Array
-    late: Array
+    sign_unknown: Flags
+    sign_known_from_velocity: Flags
+    reversal_acceleration_error: Array
+    reversal_time_error: Array
 
     def rows(self, kept: slice) -> Directions:
         """Gives what is known of some rows."""
-        return replace(self, unsure=self.unsure[kept], clear=self.clear[kept], late=self.late[kept])
+        return replace(
+            self,
+            sign_unknown=self.sign_unknown[kept],
+            sign_known_from_velocity=self.sign_known_from_velocity[kept],
+            reversal_time_error=self.reversal_time_error[kept],
+        )
 
     def spread(self, between: NDArray[np.intp]) -> Directions:
         """Takes no row as sure whose torque comes of two samples between which a joint may have turned round.
@@ -69,11 +76,15 @@ class Directions:
         inner = np.flatnonzero(between >= 0)
         if not len(inner):
             return self
-        unsure = self.unsure.copy()
+        unsure = self.sign_unknown.copy()
         begins = np.flatnonzero(np.diff(between[inner], prepend=-1))
         found = np.logical_or.reduceat(unsure[inner], begins, axis=0)
         unsure[inner] = np.repeat(found, np.diff([*begins, len(inner)]), axis=0)
-        return replace(self, unsure=unsure, clear=self.clear & ~(unsure & ~self.unsure))
+        return replace(
+            self,
+            sign_unknown=unsure,
+            sign_known_from_velocity=self.sign_known_from_velocity & ~(unsure & ~self.sign_unknown),
+        )
 
 
 def find_directions(

@@ -96,7 +96,7 @@ def build_recording(
     if total < shortest:
         recorded = sum(log.log.duration for log in prepared)
         raise InputError(
-            f"{total:.1f} s of logs without the ends, where filters err ({recorded:.1f} s with them)",
+            f"{total:.1f} s of usable logs ({recorded:.1f} s recorded, less filter transients at the ends)",
             file=prepared[0].log.metadata.get("file", prepared[0].log.name or None) if len(prepared) == 1 else None,
             allowed=f"{shortest:g} s or more",
             remedy="record a longer log",
@@ -114,15 +114,15 @@ def build_recording(
         cycles=tuple(part[5] for part in parts),
         cutoff=min(float(part[6].min()) for part in parts),
         floor=np.max([part[8] for part in parts], axis=0),
-        unsure=np.concatenate([part[7].unsure for part in parts]),
-        clear=np.concatenate([part[7].clear for part in parts]),
-        jolts=np.max([part[7].jolts for part in parts], axis=0),
-        late=np.concatenate([part[7].late for part in parts]),
-        rest=np.concatenate(rests) if len(rests) == len(parts) else None,
+        sign_unknown=np.concatenate([part[7].sign_unknown for part in parts]),
+        sign_known_from_velocity=np.concatenate([part[7].sign_known_from_velocity for part in parts]),
+        reversal_acceleration_error=np.max([part[7].reversal_acceleration_error for part in parts], axis=0),
+        reversal_time_error=np.concatenate([part[7].reversal_time_error for part in parts]),
+        position_residual=np.concatenate(rests) if len(rests) == len(parts) else None,
         cutoffs=np.array([part[6] for part in parts]) if len(rests) == len(parts) else None,
         names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
         payloads=_payloads(prepared),
-        fields=_fields(prepared),
+        gravity_fields=_fields(prepared),
     )
 
 
@@ -138,10 +138,10 @@ def _zero_resting_joints(parts: Sequence[_Part], held: NDArray[np.bool_]) -> lis
         dq, ddq, floor = (np.where(stands, 0.0, values) for values in (dq, ddq, floor))
         still = replace(
             turns,
-            unsure=turns.unsure | stands,
-            clear=turns.clear & ~stands,
-            jolts=np.where(stands, 0.0, turns.jolts),
-            late=np.where(stands, 0.0, turns.late),
+            sign_unknown=turns.sign_unknown | stands,
+            sign_known_from_velocity=turns.sign_known_from_velocity & ~stands,
+            reversal_acceleration_error=np.where(stands, 0.0, turns.reversal_acceleration_error),
+            reversal_time_error=np.where(stands, 0.0, turns.reversal_time_error),
         )
         result.append((t, q, dq, ddq, tau, cycle, cutoffs, still, floor, rest))
     return result

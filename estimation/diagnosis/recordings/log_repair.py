@@ -38,7 +38,7 @@ OWN = frozenset({"badly_excited", "clipped", "delay", "hardly_moves", "poorly_ex
 # A stretch between gaps that is shorter than this [s] tells nothing that its ends do not spoil.
 SHORTEST = 2.0
 
-_BY_FIT = ", by a quick look at rigid body and friction alone"
+_BY_FIT = " (from a quick fit of rigid body and friction)"
 
 
 @dataclass(frozen=True)
@@ -85,8 +85,8 @@ def repair_log(robot: Robot, log: Log, which: str) -> RepairedLog:
 
 
 _SIZES = (
-    "{}: the torques of {} of {} joints are {} times those of the robot's description: check unit and gear ratios (a "
-    "mapping states them) before anything else that is said here; they are right if the description is that wrong."
+    "{}: the torques of {} of {} joints are {} times those of the robot's description. Check torque units and gear "
+    "ratios first (a mapping states them); otherwise the description is wrong by this factor."
 )
 
 

@@ -36,18 +36,23 @@ class Recording:
         cycles: per log the repeated part, in rows of the log; None where nothing repeats.
         cutoff: lowest frequency [Hz] above which positions are taken for noise.
         floor: power density of each joint's position noise (n,) [rad^2/Hz].
-        unsure: rows (N, n) in which the direction of motion is not known: friction may have either sign there.
-        clear: those of them (N, n) in which the velocity tells the direction, if kicks at reversals do not show.
-        jolts: error of each joint's acceleration (n,) beside its reversals [rad/s2 or m/s2].
+        sign_unknown: rows (N, n) in which the direction of motion is not known: friction may have either sign there.
+        sign_known_from_velocity: those of them (N, n) in which the velocity tells the direction, if kicks at reversals
+            do not show.
+        reversal_acceleration_error: error of each joint's acceleration (n,) beside its reversals [rad/s2 or m/s2].
         names: of the logs.
-        late: how late joints may turn round (N, n) [s] by their velocities' error; None where motion is known exactly.
-        rest: what positions (N, n) as logged have besides `q`; None where not all were logged at these rows.
-        cutoffs: of each log's joints (logs, n) [Hz], above which positions are taken for noise; None as `rest`.
-        finer: the same logs at the rate of their samples, where this one is thinned: each log's first row and every so
-            many; None where those are too many.
+        reversal_time_error: how late joints may turn round (N, n) [s] by their velocities' error; None where motion is
+            known exactly.
+        position_residual: what positions (N, n) as logged have besides `q`; None where not all were logged at these
+            rows.
+        cutoffs: of each log's joints (logs, n) [Hz], above which positions are taken for noise; None as
+            `position_residual`.
+        full_rate: the same logs at the rate of their samples, where this one is thinned: each log's first row and every
+            so many; None where those are too many.
         payloads: per log a known body at the flange (10,), in its frame; empty where no log has one.
-        fields: per log gravity (3,) in the base frame [m/s2], None as the robot is described; empty where all are so.
-        trusted: joints (n,) whose clear rows count, and are `unsure` no more; None before that is known.
+        gravity_fields: per log gravity (3,) in the base frame [m/s2], None as the robot is described; empty where all
+            are so.
+        trusted: joints (n,) whose clear rows count, and are `sign_unknown` no more; None before that is known.
     """
 
     t: Array
@@ -60,16 +65,16 @@ class Recording:
     cycles: tuple[Cycle | None, ...]
     cutoff: float
     floor: Array
-    unsure: NDArray[np.bool_]
-    clear: NDArray[np.bool_]
-    jolts: Array
+    sign_unknown: NDArray[np.bool_]
+    sign_known_from_velocity: NDArray[np.bool_]
+    reversal_acceleration_error: Array
     names: tuple[str, ...]
-    late: Array | None = None
-    rest: Array | None = None
+    reversal_time_error: Array | None = None
+    position_residual: Array | None = None
     cutoffs: Array | None = None
-    finer: Recording | None = None
+    full_rate: Recording | None = None
     payloads: tuple[Array, ...] = ()
-    fields: tuple[Array | None, ...] = ()
+    gravity_fields: tuple[Array | None, ...] = ()
     trusted: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
@@ -93,7 +98,7 @@ class Recording:
     @property
     def gravities(self) -> tuple[Array | None, ...]:
         """Each log's gravity (3,) in the base frame [m/s2], None as the robot is described."""
-        return self.fields or (None,) * len(self.starts)
+        return self.gravity_fields or (None,) * len(self.starts)
 
     @property
     def duration(self) -> float:
@@ -103,7 +108,7 @@ class Recording:
     @property
     def stride(self) -> int:
         """Rows of the finer recording that became one; 1 without any."""
-        return 1 if self.finer is None else round(self.step / self.finer.step)
+        return 1 if self.full_rate is None else round(self.step / self.full_rate.step)
 
     @property
     def periodic(self) -> bool:
@@ -111,42 +116,50 @@ class Recording:
         return all(cycle is not None for cycle in self.cycles)
 
     @property
-    def counting(self) -> NDArray[np.bool_]:
+    def counted_rows(self) -> NDArray[np.bool_]:
         """Joints (n,) of which rows at reversals count."""
-        return np.zeros(self.n, dtype=bool) if self.trusted is None else self.trusted & self.clear.any(axis=0)
+        return (
+            np.zeros(self.n, dtype=bool)
+            if self.trusted is None
+            else self.trusted & self.sign_known_from_velocity.any(axis=0)
+        )
 
-    def calm(self, stride: int = 1) -> NDArray[np.bool_]:
+    def far_from_reversals(self, stride: int = 1) -> NDArray[np.bool_]:
         """Marks every `stride`-th row of each log in which no joint turns round, comes to rest, or has just done so."""
         turns = np.zeros((len(self), 1), dtype=bool)
         for run in self.runs:
-            for column in self.unsure[run].T:
+            for column in self.sign_unknown[run].T:
                 for start, stop in spans(column):
                     at_rest = stop - start > rest_rows(self.step)
                     rows = [start, stop - 1] if at_rest else slice(start, stop)
                     turns[run][rows] = True
-        away = self.away(turns)[:, 0]
+        away = self.distant_from(turns)[:, 0]
         return np.concatenate([away[run][::stride] for run in self.runs])
 
-    def late_beside(self, joint: int, stride: int = 1) -> Array:
+    def reversal_time_error_near(self, joint: int, stride: int = 1) -> Array:
         """How late a joint may turn round [s] by what is not known of its velocity, every `stride`-th row of each log.
 
         Zero in rows that are not beside reversals, and where those do not count.
         """
         late = np.zeros(len(self))
-        if self.late is not None and self.trusted is not None and self.trusted[joint]:
-            late = np.where(self.away(self.clear[:, joint, None])[:, 0], 0.0, self.late[:, joint])
+        if self.reversal_time_error is not None and self.trusted is not None and self.trusted[joint]:
+            late = np.where(
+                self.distant_from(self.sign_known_from_velocity[:, joint, None])[:, 0],
+                0.0,
+                self.reversal_time_error[:, joint],
+            )
         return np.concatenate([late[run][::stride] for run in self.runs])
 
-    def away(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def distant_from(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Marks rows of each log farther than `BESIDE` from marked ones, both (N, k)."""
         reach = 2 * round(BESIDE / self.step) + 1
         return np.concatenate([maximum_filter1d(rows[run].astype(np.int8), reach, axis=0) == 0 for run in self.runs])
 
-    def trusting(self, joints: NDArray[np.bool_] | None) -> Recording:
+    def with_trusted(self, joints: NDArray[np.bool_] | None) -> Recording:
         """Lets the clear rows of some joints (n,) count too."""
         if joints is None:
             return self
-        return replace(self, unsure=self.unsure & ~(self.clear & joints), trusted=joints)
+        return replace(self, sign_unknown=self.sign_unknown & ~(self.sign_known_from_velocity & joints), trusted=joints)
 
 
 def cut_recording(whole: Recording, rows: slice) -> Recording:
@@ -162,25 +175,25 @@ def cut_recording(whole: Recording, rows: slice) -> Recording:
         dq=whole.dq[rows],
         ddq=whole.ddq[rows],
         tau=whole.tau[rows],
-        unsure=whole.unsure[rows],
-        clear=whole.clear[rows],
-        late=None if whole.late is None else whole.late[rows],
-        rest=None,
+        sign_unknown=whole.sign_unknown[rows],
+        sign_known_from_velocity=whole.sign_known_from_velocity[rows],
+        reversal_time_error=None if whole.reversal_time_error is None else whole.reversal_time_error[rows],
+        position_residual=None,
         cutoffs=None,
-        finer=None if whole.finer is None else cut_recording(whole.finer, _at_all_samples(whole, rows)),
+        full_rate=None if whole.full_rate is None else cut_recording(whole.full_rate, _at_all_samples(whole, rows)),
         cycles=(None,) * len(begins),
         names=whole.names[logs],
         payloads=whole.payloads[logs],
-        fields=whole.fields[logs],
+        gravity_fields=whole.gravity_fields[logs],
     )
 
 
 def _at_all_samples(thinned: Recording, rows: slice) -> slice:
     """Gives the rows of the finer recording from the first to the last of some."""
-    assert thinned.finer is not None
+    assert thinned.full_rate is not None
     starts, ends = np.array(thinned.starts), np.array([rows.start, rows.stop - 1])
     own = np.searchsorted(starts, ends, side="right") - 1
-    first, last = np.array(thinned.finer.starts)[own] + thinned.stride * (ends - starts[own])
+    first, last = np.array(thinned.full_rate.starts)[own] + thinned.stride * (ends - starts[own])
     return slice(int(first), int(last) + 1)
 
 
@@ -198,17 +211,21 @@ def join_recordings(first: Recording, second: Recording) -> Recording:
         dq=both("dq"),
         ddq=both("ddq"),
         tau=both("tau"),
-        unsure=both("unsure").astype(bool),
-        clear=both("clear").astype(bool),
-        late=None if first.late is None or second.late is None else both("late"),
-        rest=None,
+        sign_unknown=both("sign_unknown").astype(bool),
+        sign_known_from_velocity=both("sign_known_from_velocity").astype(bool),
+        reversal_time_error=None
+        if first.reversal_time_error is None or second.reversal_time_error is None
+        else both("reversal_time_error"),
+        position_residual=None,
         cutoffs=None,
-        finer=None if first.finer is None or second.finer is None else join_recordings(first.finer, second.finer),
+        full_rate=None
+        if first.full_rate is None or second.full_rate is None
+        else join_recordings(first.full_rate, second.full_rate),
         starts=starts,
         cycles=(*first.cycles, *second.cycles),
         names=(*first.names, *second.names),
         payloads=(*first.bodies, *second.bodies) if first.payloads or second.payloads else (),
-        fields=(*first.gravities, *second.gravities) if first.fields or second.fields else (),
+        gravity_fields=(*first.gravities, *second.gravities) if first.gravity_fields or second.gravity_fields else (),
     )
 
 

@@ -40,7 +40,7 @@ def decimate_recording(finer: Recording, stride: int) -> Recording:
         spread = [maximum_filter1d(np.asarray(flags[run], dtype=float), width, axis=0) for run in finer.runs]
         return np.concatenate(spread)[rows]
 
-    unsure = near(finer.unsure) > 0
+    unsure = near(finer.sign_unknown) > 0
     passed = keep_clipped_level(
         finer.tau, np.concatenate([low_pass_rows(finer.tau[run], stride) for run in finer.runs])
     )
@@ -55,12 +55,12 @@ def decimate_recording(finer: Recording, stride: int) -> Recording:
         tau=passed[rows],
         step=stride * finer.step,
         cycles=tuple(None if cycle is None else _cycle(cycle, stride, finer.step) for cycle in finer.cycles),
-        unsure=unsure,
-        clear=unsure & ~(near(finer.unsure & ~finer.clear) > 0),
-        late=None if finer.late is None else near(finer.late),
-        rest=None,
+        sign_unknown=unsure,
+        sign_known_from_velocity=unsure & ~(near(finer.sign_unknown & ~finer.sign_known_from_velocity) > 0),
+        reversal_time_error=None if finer.reversal_time_error is None else near(finer.reversal_time_error),
+        position_residual=None,
         cutoffs=None,
-        finer=finer,
+        full_rate=finer,
     )
 
 
@@ -76,19 +76,19 @@ def shift_motion(recording: Recording, by: float) -> Recording:
             t = recording.t[run]
             at = np.clip(t - by, t[0], t[-1])
             moved[name][run] = np.column_stack([np.interp(at, t, x) for x in values[run].T])
-    finer = None if recording.finer is None else shift_motion(recording.finer, by)
-    return replace(recording, **moved, finer=finer)  # type: ignore[arg-type]
+    finer = None if recording.full_rate is None else shift_motion(recording.full_rate, by)
+    return replace(recording, **moved, full_rate=finer)  # type: ignore[arg-type]
 
 
 def evaluate_at_full_rate(recording: Recording, evaluate: Callable[[Recording], Array]) -> Array:
     """Evaluates rows (N, ...) on a recording: of one that is thinned, on all samples, and thinned as its torque was."""
-    if recording.finer is None:
+    if recording.full_rate is None:
         return evaluate(recording)
-    return decimate(evaluate(recording.finer), recording.finer.starts, recording.stride)
+    return decimate(evaluate(recording.full_rate), recording.full_rate.starts, recording.stride)
 
 
 def low_pass_rows(series: Array, ratio: float, kept: int = 1) -> Array:
-    """Low-passes rows (N, ...) of one log without delay, to be `ratio` times as far apart; every `kept`-th of them."""
+    """Low-passes rows (N, ...) of one log without delay for a period `ratio` times as long; gives every `kept`-th."""
     half = int(np.ceil(REACH * ratio))
     taps = firwin(2 * half + 1, min(1.0 / ratio, 0.99), window=("kaiser", WINDOW))
     # Beyond its ends a log goes on as it does when it is turned about them.

@@ -33,7 +33,7 @@ def find_unusable_logs(base: BaseParameters, recording: Recording) -> dict[int, 
     for k, (run, gravity) in enumerate(zip(recording.runs, recording.gravities, strict=True)):
         rows = slice(run.start, run.stop, max(1, (run.stop - run.start) // ROWS))
         motion = recording.q[rows], recording.dq[rows], recording.ddq[rows]
-        counts = ~recording.unsure[rows]
+        counts = ~recording.sign_unknown[rows]
         Y = base.regressor(*motion, gravity=gravity) * counts[:, :, None]
         tau = recording.tau[rows] * counts
         squares = (tau**2).sum(axis=0)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
 from estimation.diagnosis.experiment_plans.detection_limits import Limit
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
@@ -29,12 +30,14 @@ from estimation.diagnosis.results.notes import (
 )
 from estimation.diagnosis.results.wording import no_part, word_finding
 from estimation.diagnosis.searches.selection import SelectedEffect, Selection
+from estimation.diagnosis.validations.comparison import has_close_rivals
 from estimation.diagnosis.validations.equivalent_shapes import complete_effects, equivalent_shapes
 from estimation.diagnosis.validations.free_functions import strongest_pattern
 from estimation.diagnosis.validations.gain_intervals import HeldOutErrors
 from estimation.diagnosis.validations.gear_compliance import EFFECT as ELASTICITY
 from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance, measure_gear_compliance
-from estimation.diagnosis.validations.held_out_errors import HeldOutResult, measure_held_out, simulate_held_out
+from estimation.diagnosis.validations.held_out_errors import HeldOutResult, measure_held_out
+from estimation.diagnosis.validations.held_out_simulation import simulate_held_out
 from estimation.diagnosis.validations.held_out_validation import validate_on_held_out
 from estimation.diagnosis.validations.prediction_settings import (
     all_row_errors,
@@ -42,7 +45,7 @@ from estimation.diagnosis.validations.prediction_settings import (
     with_best_cutoff,
     with_best_sign_sharpness,
 )
-from estimation.diagnosis.validations.verdict import CLOSE, Verdict, has_close_rivals
+from estimation.diagnosis.validations.verdict import Verdict
 from estimation.logs.provenance import describe_logs
 from robots.robot import Robot
 from robots.signals import Log
@@ -61,7 +64,7 @@ class DiagnosisInputs:
 
     problem: Problem
     selection: Selection
-    judgement: Verdict
+    verdict: Verdict
     limits: tuple[Limit, ...]
     excess: Array
     logs: tuple[Log, ...]
@@ -75,19 +78,19 @@ class DiagnosisInputs:
 def assemble(robot: Robot, told: DiagnosisInputs) -> Diagnosis:
     """Fits the extended model, measures it on unseen data, and puts the findings into words."""
     problem = told.problem
-    judgement = replace(told.judgement, kept=complete_effects(problem, told.judgement.kept))
+    judgement = replace(told.verdict, named=complete_effects(problem, told.verdict.named))
     held = validate_on_held_out(
         judgement,
         lambda members, gone: measure_held_out(robot, problem, members, told.held_out, told.seed + 3, gone),
         partial(_is_beyond, told),
         partial(equivalent_shapes, problem),
-        lambda member: member.worth(problem.rows),
+        lambda member: member.local_bic_gain(problem.rows),
         partial(_unnamed, robot, told),
     )
-    members, founds, seen = held.members, held.founds, held.seen
+    members, founds, seen = held.effects, held.findings, held.measured
     twisted = _compliances(told, seen)
     # Where nothing else is left, a name that unseen data refuted shows at least where something is unexplained.
-    spoiling = held.spoiling or (() if members or twisted else held.refuted)
+    spoiling = held.rejected_discrepancies or (() if members or twisted else held.refuted)
     verdict = judgement.verdict
     if len(members) > len(founds) or spoiling:
         verdict = "unexplained"
@@ -117,7 +120,7 @@ def assemble(robot: Robot, told: DiagnosisInputs) -> Diagnosis:
             no_part(word_finding(robot, problem, member, fit, i, p_value, None, gain))
             for i, (member, p_value, gain) in enumerate(spoiling, start=len(members))
         )
-    unseen, apart = seen.unseen, findings[len(members) :]
+    unseen, apart = seen.errors, findings[len(members) :]
     if twisted and not members and not spoiling:
         verdict = "named"
     findings += tuple(windup.finding for windup in twisted)
@@ -151,7 +154,7 @@ def assemble(robot: Robot, told: DiagnosisInputs) -> Diagnosis:
             *faster_joints(problem, seen),
             *farther_joints(problem, seen, findings),
             *held.notes,
-            *beside_larger(told.selection.slight, members),
+            *beside_larger(told.selection.strongest_unaccepted, members),
             *lost,
         ),
         trace=_trace(unseen, [seen.coordinates[i] for i in order], twisted),
@@ -169,11 +172,11 @@ def _is_beyond(told: DiagnosisInputs, effect: Effect) -> bool:
 
     Where it is not known when they were recorded, they say nothing of what comes with time.
     """
-    if any(f.member.hypothesis.effect is effect and f.member.group.by_reversals for f in told.selection.found):
+    if any(f.effect.hypothesis.effect is effect and f.effect.group.by_reversals for f in told.selection.found):
         return True
     if not told.held_out:
         return False
-    return effect.passing or (not told.dated and effect.depends_on == "time")
+    return effect.transient or (not told.dated and effect.depends_on == "time")
 
 
 def _unnamed(
@@ -187,7 +190,9 @@ def _unnamed(
     return strongest_pattern(told.problem, entries, beside, told.false_alarm, rng)
 
 
-_LOST = "Simulated forward, the fitted robot ran away from the position loop: its fit suits no simulation."
+_LOST = (
+    "The forward simulation of the extended model was unstable under the position loop. Do not use it for simulation."
+)
 
 
 def _compliances(told: DiagnosisInputs, seen: HeldOutResult) -> tuple[MeasuredCompliance, ...]:
@@ -196,7 +201,7 @@ def _compliances(told: DiagnosisInputs, seen: HeldOutResult) -> tuple[MeasuredCo
         return ()
     now, unseen = told.problem.situation, None
     if any(log.qlink is not None for log in told.held_out):
-        other = cut_recording(seen.whole, slice(seen.first, len(seen.whole)))
+        other = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
         there = build_situation(other, now.model, told.problem.parameters_without_payload)
         unseen = (there, other, told.held_out)
     return measure_gear_compliance(now, told.problem.recording, told.logs, false_alarm=told.false_alarm, unseen=unseen)
@@ -205,9 +210,9 @@ def _compliances(told: DiagnosisInputs, seen: HeldOutResult) -> tuple[MeasuredCo
 def _next(problem: Problem, founds: Sequence[SelectedEffect]) -> NextExperiment | None:
     """Plans the experiment that tells the causes that are left apart."""
     for found in founds:
-        close = [rival for rival, worse in found.rivals if worse < CLOSE]
+        close = [rival for rival, worse in found.rivals if worse < CLOSE_RIVAL_BIC]
         if close:
-            return plan_next(problem, [found.member, *close])
+            return plan_next(problem, [found.effect, *close])
     return None
 
 
@@ -233,7 +238,7 @@ def _provenance(told: DiagnosisInputs) -> dict[str, object]:
         "velocity_scales": [float(v) for v in problem.situation.velocity_scale],
         "seed": told.seed,
         "false_alarm": told.false_alarm,
-        "residual_rms": np.sqrt(np.mean(problem.remainder**2, axis=0)).tolist(),
+        "residual_rms": np.sqrt(np.mean(problem.base_residual**2, axis=0)).tolist(),
         "torque_rms": torque.tolist(),
         "gravities": [list(gravity) for gravity in problem.baseline.base.gravities],
     }

@@ -1,8 +1,9 @@
-"""What a diagnosis found: the verdict, the causes, what mending them brings, and what could not have been seen."""
+"""Result of a diagnosis: verdict, findings, gain of the extended model, and detection limits."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -103,9 +104,9 @@ class Diagnosis:
         return all_row_errors(self.model)
 
     def summary(self) -> str:
-        """Says what was found, what it brings, and what stays open."""
+        """States the findings, their gain on held-out data, and what is still unknown."""
         robot = self.model.robot
-        lines = [f"{robot.name}: {_VERDICTS[self.verdict]}"]
+        lines = [f"{robot.name}: {_headline(self.verdict, self.findings)}"]
         if self.verdict == "none" and (seen := summarise_limits(self.limits)):
             lines.append(f"  {seen[0].lower()}{seen[1:]}")
         for finding in self.findings:
@@ -113,37 +114,40 @@ class Diagnosis:
             gain = finding.gain
             lines.append(f"  {finding.effect} ({where}), p {_p(finding.p_value)}: {finding.sentence}")
             of = "wind-up" if finding.measured_by else "torque"
-            before, after = (f"{100 * value:.2f} %" for value in (gain.nrmse_before, gain.nrmse_after))
-            fall = " to ".join(f"{100 * value:.2f}" for value in gain.ci95)
-            # Its own gain is what the model loses without it alone.
-            beside = ", beside the other findings" if len(self.findings) > 1 and not finding.measured_by else ""
-            lines.append(f"    unseen error{finding.elsewhere} {before} -> {after} of the {of}{beside} (fall {fall} %)")
-            # Coefficients of a free function mean nothing each.
+            before, after = (f"{100 * value:.3g}" for value in (gain.nrmse_before, gain.nrmse_after))
+            decrease = " to ".join(f"{100 * value:.3g}" for value in gain.ci95)
+            # The gain of one effect compares the whole model with the model that lacks this effect alone.
+            others = ", other findings included" if len(self.findings) > 1 and not finding.measured_by else ""
+            lines.append(
+                f"    held-out error{finding.elsewhere} {before} -> {after} % of the {of}{others} "
+                f"(95 % interval of the decrease: {decrease} %)"
+            )
+            # The single coefficients of a free function have no meaning.
             parameters = finding.parameters if finding.effect != "unexplained" else ()
-            if known := [parameter.told for parameter in parameters if parameter.determined]:
+            if known := [parameter.text for parameter in parameters if parameter.determined]:
                 lines.append(f"    95 % intervals: {list_parameters(known)}")
-            if open_ := [parameter.told for parameter in parameters if not parameter.determined]:
+            if open_ := [parameter.text for parameter in parameters if not parameter.determined]:
                 lines.append(f"    not well determined by these logs: {list_parameters(open_)}")
             close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]
             if close:
-                lines.append(f"    not told apart from: {', '.join(close)}")
+                lines.append(f"    cannot be distinguished from (BIC difference): {', '.join(close)}")
         before, after, every = (
             " ".join(f"{100 * value:.2f}" if np.isfinite(value) else "-" for value in errors)
             for errors in (self.baseline, self.extended, self.every_row)
         )
-        told = {"unseen error per joint [% of torque RMS]": before}
+        rows = {"held-out error per joint [% of torque RMS]": before}
         if self.findings:
-            told["with the extension"] = after
+            rows["with the extended model"] = after
         if np.isfinite(self.every_row).any():
-            told[f"every row counted, as in `oed predict{' --before' if self.model.keeps_heat else ''}`"] = every
-        width = 2 + max(map(len, told))
-        lines += [f"{name:>{width}}: {errors}" for name, errors in told.items()]
+            rows[f"all rows, as in `oed predict{' --before' if self.model.keeps_heat else ''}`"] = every
+        width = 2 + max(map(len, rows))
+        lines += [f"{name:>{width}}: {errors}" for name, errors in rows.items()]
         lines.append(f"  measured on {self.how_unseen}")
         if self.simulation is not None:
             lengths = [length_unit(robot, j) for j in range(robot.n)]
             lines.append(f"  {self.simulation.summary(lengths)}")
         if self.next_experiment is not None:
-            lines.append(f"  next: {self.next_experiment.why}")
+            lines.append(f"  next experiment: {self.next_experiment.why}")
         lines += [f"  {note}" for note in self.notes]
         return "\n".join(lines)
 
@@ -189,7 +193,7 @@ class Diagnosis:
         }
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws the unseen error of each joint, before and after."""
+        """Draws the held-out error of each joint, for the base and the extended model."""
         from matplotlib.figure import Figure
 
         axes = ax if ax is not None else Figure(figsize=(6, 4)).subplots()
@@ -197,7 +201,7 @@ class Diagnosis:
         axes.bar(joints - 0.2, 100 * self.baseline, 0.4, label="base model")
         axes.bar(joints + 0.2, 100 * self.extended, 0.4, label="extended model")
         axes.set_xlabel("joint")
-        axes.set_ylabel("unseen error / torque RMS [%]")
+        axes.set_ylabel("held-out error / torque RMS [%]")
         axes.legend()
         return axes
 
@@ -224,11 +228,11 @@ class Diagnosis:
             model = load_model(Path(folder) / MODEL)
             return _from_dict(data, model)
         except FileNotFoundError:
-            raise InputError("no such file", file=file, remedy="give the folder that `oed diagnose` wrote") from None
+            raise InputError("no such file", file=file, remedy="give the folder written by `oed diagnose`") from None
         except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
             raise InputError(f"cannot be read as JSON: {error}", file=file) from error
         except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"is damaged: {type(error).__name__} {error}", file=file) from error
+            raise InputError(f"is no valid diagnosis: {type(error).__name__} {error}", file=file) from error
 
 
 def _from_dict(data: dict[str, Any], model: Model) -> Diagnosis:
@@ -280,11 +284,30 @@ def _next(item: dict[str, Any]) -> NextExperiment:
     )
 
 
+def _headline(verdict: str, findings: Sequence[Finding]) -> str:
+    """States the verdict in one line, with the causes that have a name."""
+    joints: dict[str, list[int]] = {}
+    for finding in findings:
+        if finding.effect != "unexplained":
+            joints.setdefault(finding.effect, []).extend([finding.joint] if finding.joint else [])
+    known = ", ".join(name + _at_joints(sorted(places)) for name, places in sorted(joints.items()))
+    count = f"{len(joints)} known cause{'s' if len(joints) > 1 else ''} found: {known}" if known else ""
+    if verdict == "named" and known:
+        return count
+    return _VERDICTS[verdict] + (f"; {count}" if known else "")
+
+
+def _at_joints(joints: Sequence[int]) -> str:
+    if not joints:
+        return " (whole robot)"
+    return f" (joint{'s' if len(joints) > 1 else ''} {', '.join(map(str, joints))})"
+
+
 _VERDICTS = {
-    "none": "nothing found beyond the base model and its noise",
-    "named": "the model lacks a cause that has a name",
-    "ambiguous": "the model lacks a cause, and more than one fits",
-    "unexplained": "the model lacks something that no effect of the catalogue explains",
+    "none": "no significant effect found; base model and noise explain the residual",
+    "named": "a known cause was found",
+    "ambiguous": "several known causes explain the residual about equally well",
+    "unexplained": "part of the residual is significant, and no effect of the catalogue explains it",
 }
 
 

@@ -14,6 +14,7 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.recordings.recording import cut_recording
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
+from robots.terms.base import force_unit
 from robots.terms.effects import EFFECTS
 from robots.terms.effects.current_clipping import CERTAIN, CurrentClipping
 
@@ -34,8 +35,8 @@ CLIPPING = CurrentClipping()
 
 
 _AT_LIMIT = (
-    "The torque of joint {} is at its largest, {:.4g}, in samples in a row, several times: its drive is at its limit "
-    "there. What that cuts off is too little to show."
+    "Joint {}: the torque stays at its maximum, {:.3g} {}, for several consecutive samples, repeatedly. The drive "
+    "probably saturates there; the effect on the model is too small to detect."
 )
 
 
@@ -57,24 +58,22 @@ def notes_of(
         after: error of that model over torque RMS on unseen data (n,).
         timed: effects that reversals tell whose rows do not count.
     """
-    recording = problem.recording
+    recording, robot = problem.recording, problem.situation.robot
     notes = []
     still = [j + 1 for j in range(recording.n) if np.ptp(recording.q[:, j]) < STILL]
     if still:
         names = ", ".join(map(str, still))
         whose = f"Joints {names} hardly moved: their" if len(still) > 1 else f"Joint {names} hardly moved: its"
-        notes.append(
-            f"{whose} friction, gears and rotors cannot be judged; what gravity and the other joints ask of them can."
-        )
+        notes.append(f"{whose} friction, gear and rotor effects cannot be detected. Gravity and coupling torques can.")
     told_of = {finding.joint for finding in findings if finding.effect == CLIPPING.name}
     for j in sorted({*range(1, recording.n + 1)} - told_of):
-        if CLIPPING.chance(problem.sees(CLIPPING), j, recording.tau) < CERTAIN:
-            notes.append(_AT_LIMIT.format(j, float(np.abs(recording.tau[:, j - 1]).max())))
+        if CLIPPING.chance(problem.state_for(CLIPPING), j, recording.tau) < CERTAIN:
+            notes.append(_AT_LIMIT.format(j, float(np.abs(recording.tau[:, j - 1]).max()), force_unit(robot, j - 1)))
     strange = _strange(problem, after)
     notes += strange.values()
     notes += [
-        f"Joint {j + 1}: {100 * after[j]:.0f} % of the torque that no fit has seen is left. What cannot be told from "
-        "noise counts as noise, and an effect has to stand out of it: look at the logs one by one."
+        f"Joint {j + 1}: the residual on held-out data is {100 * after[j]:.0f} % of the torque. A residual this large "
+        "raises the noise estimate, and effects may be missed. Diagnose each log separately."
         for j in np.flatnonzero(after > ODD)
         if j not in strange
     ]
@@ -84,8 +83,8 @@ def notes_of(
         lost = [p for p in finding.parameters if not p.determined and p.unit == "s" and np.isnan(p.standard_error)]
         for parameter in (p for p in lost if (p.name, p.value) not in assumed):
             notes.append(
-                f"{parameter.name} of {finding.effect} is not determined by {recording.duration:.0f} s of logs: the "
-                f"value {parameter.value:.3g} s is one of many that fit."
+                f"{finding.effect}: {recording.duration:.0f} s of logs do not determine {parameter.name}. The value "
+                f"{parameter.value:.3g} s is one of many that fit."
             )
         # What is no part of the model says so itself.
         if finding.effect in timed:
@@ -97,9 +96,9 @@ def notes_of(
     if open_:
         names = ", ".join(map(str, open_))
         notes.append(
-            f"No effect of the catalogue explains what stands out of the noise on joint{'s' if len(open_) > 1 else ''} "
-            f"{names}: a free function of the inputs named above was fitted there instead. It predicts where the robot "
-            "has been, and says nothing elsewhere."
+            f"Joint{'s' if len(open_) > 1 else ''} {names}: no effect of the catalogue explains the residual. "
+            "The model contains a free function of the inputs named above instead. It is valid only where these "
+            "logs have data."
         )
     sprung = {finding.joint for finding in findings if finding.effect == "spring"}
     notes += [text for joint, text in undetectable_springs(problem, false_alarm) if joint not in sprung]
@@ -107,24 +106,21 @@ def notes_of(
 
 
 _TIMED = (
-    "What tells {} are impulses at reversals, whose rows count neither in the fit nor on unseen data: encoders tell "
-    "too little of when the joints turn round. Its gain there says nothing of it."
+    "{} was identified from impulses at velocity reversals. Those rows are excluded from the fit and from the held-out "
+    "error, because the time of a reversal is uncertain. Its held-out gain is not meaningful."
 )
-_UNSURE = "The gain of {} on unseen data is not sure: its interval begins below zero."
-_VAGUE = (
-    " Nor do these logs determine any of its parameters: they tell that something acts there, and the name is no more "
-    "than the likeliest for it."
-)
+_UNSURE = "The held-out gain of {} is not significant: its interval includes zero."
+_VAGUE = " These logs determine none of its parameters either, so the effect is reported as the most likely cause only."
 _AGAINST = (
-    "With {} the model predicts the unseen data worse: what is in the logs of the fit is not so there, has another "
-    "cause, or moves base parameters that those logs hardly tell."
+    "With {} the model predicts the held-out data worse. The effect may be absent there or have another cause, or the "
+    "fit may have moved poorly determined base parameters."
 )
 
 
 def unsure_gain(finding: Finding) -> str:
     """Says that the interval of a gain begins below zero, and what else is open of a name."""
     named = finding.effect != "unexplained"
-    what = finding.effect if named else "what is unexplained"
+    what = finding.effect if named else "the unexplained residual"
     where = f"{what} of joint {finding.joint}" if finding.joint else what
     vague = named and finding.parameters and not any(parameter.determined for parameter in finding.parameters)
     return (_UNSURE if finding.gain.ci95[1] >= 0 else _AGAINST).format(where) + (_VAGUE if vague else "")
@@ -132,17 +128,17 @@ def unsure_gain(finding: Finding) -> str:
 
 def _strange(problem: Problem, after: Array) -> dict[int, str]:
     """Says where the model predicts logs far worse than it fits them: there is more in them than was found."""
-    counts = ~problem.recording.unsure
+    counts = ~problem.recording.sign_unknown
     number = np.maximum(counts.sum(axis=0), 1)
     torque = np.sqrt((problem.recording.tau**2 * counts).sum(axis=0) / number)
-    fitted = np.sqrt((problem.remainder**2 * counts).sum(axis=0) / number) / np.maximum(torque, 1e-12)
+    fitted = np.sqrt((problem.base_residual**2 * counts).sum(axis=0) / number) / np.maximum(torque, 1e-12)
     far = np.flatnonzero(after > np.maximum(STRANGE * fitted, FAR))
     return {int(j): _STRANGE.format(j + 1, 100 * after[j], 100 * fitted[j]) for j in far}
 
 
 _STRANGE = (
-    "Joint {}: {:.3g} % of the torque that no fit has seen is left, where the base model leaves {:.2g} % of what it "
-    "was fitted to. The logs differ in something that was not found, or some of them do not tell its parameters."
+    "Joint {}: the residual is {:.3g} % of the torque on held-out data, but {:.2g} % in the fit of the base model. The "
+    "logs differ in something that was not found, or some of them do not determine the joint's parameters."
 )
 
 
@@ -154,8 +150,8 @@ def worse_joints(before: Array, after: Array) -> list[str]:
     worse = np.flatnonzero(after > np.maximum(WORSE * before, before + LITTLE))
     if not len(worse):
         return []
-    told = ", ".join(f"{j + 1} ({100 * before[j]:.3g} -> {100 * after[j]:.3g} %)" for j in worse)
-    return [f"The extended model errs more than the base model on joint{'s' if len(worse) > 1 else ''} {told}."]
+    errors = ", ".join(f"{j + 1} ({100 * before[j]:.3g} -> {100 * after[j]:.3g} %)" for j in worse)
+    return [f"The extended model has a larger held-out error on joint{'s' if len(worse) > 1 else ''} {errors}."]
 
 
 def turning_joints(every: Array, after: Array, counts: NDArray[np.bool_]) -> list[str]:
@@ -176,8 +172,8 @@ def turning_joints(every: Array, after: Array, counts: NDArray[np.bool_]) -> lis
 
 
 _TURNING = (
-    "Joint{} {}: in {} % of the unseen rows the joint rests or turns round. Friction may hold against either side "
-    "there, and no model of motion knows which: the error with every row counted has those rows besides."
+    "Joint{} {}: in {} % of the held-out rows the joint rests or reverses. The sign of its friction is unknown there, "
+    "so these rows count only in the error of all rows."
 )
 
 
@@ -185,7 +181,7 @@ def faster_joints(problem: Problem, seen: HeldOutResult) -> list[str]:
     """Says which joints are faster on unseen data than their friction's polynomial was fitted for."""
     if seen.whole is problem.recording or not any(column.symbol == "f4" for column in problem.baseline.base.columns):
         return []
-    unseen = cut_recording(seen.whole, slice(seen.first, len(seen.whole)))
+    unseen = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
     known, there = (np.abs(recording.dq).max(axis=0) for recording in (problem.recording, unseen))
     ratio = there / np.maximum(known, 1e-9)
     fast = np.flatnonzero(ratio > FASTER)
@@ -197,7 +193,7 @@ def farther_joints(problem: Problem, seen: HeldOutResult, findings: Sequence[Fin
     """Says where unseen data go beyond the positions by which a function of a joint's position was fitted."""
     if seen.whole is problem.recording:
         return []
-    unseen = cut_recording(seen.whole, slice(seen.first, len(seen.whole)))
+    unseen = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
     notes = []
     placed = {f.joint for f in findings if f.effect in PLACED and f.coordinate.startswith("position of joint")}
     for joint in sorted(joint for joint in placed if joint):
@@ -211,12 +207,12 @@ def farther_joints(problem: Problem, seen: HeldOutResult, findings: Sequence[Fin
 
 
 _FARTHER = (
-    "Joint {}: for {:.0f} % of the time the unseen data are beyond the positions in the logs of the fit ({:.1f} times "
-    "their range). What was found to depend on its position is not known there: error and gain may be far off."
+    "Joint {}: {:.0f} % of the held-out data lie outside the positions of the fitted logs (their range is {:.1f} times "
+    "as large). Position-dependent findings are extrapolated there, so error and gain may be wrong."
 )
 _FASTER = (
-    "Joint{} {}: up to {:.1f} times as fast on the unseen data as in the logs of the fit. What a polynomial fitted to "
-    "slower motion says of friction there may be far off, and with it error and gain; coulomb-viscous errs less."
+    "Joint{} {}: up to {:.1f} times as fast in the held-out data as in the fitted logs. The friction polynomial is "
+    "extrapolated there, so error and gain may be wrong. Try `coulomb-viscous` friction."
 )
 
 
@@ -228,7 +224,7 @@ def beside_larger(slight: FittedEffect | None, members: Sequence[FittedEffect]) 
     if not told:
         return ()
     share, member, j = min(told, key=lambda each: each[0])
-    if slight.hypothesis.effect.alike:
+    if slight.hypothesis.effect.shared_coefficient:
         return (_NOT_ALIKE.format(slight.hypothesis.label, member.hypothesis.label),)
     if share >= 1.0:
         return ()
@@ -240,10 +236,10 @@ def _acts(member: FittedEffect, joint: int) -> bool:
 
 
 _SLIGHT = (
-    "{0} stands out of the noise, too, but explains {2:.1f} % of what {1} does on joint {3}, as much as the formula of "
-    "that may leave: it is not told as a finding. A log in which {1} acts less would show whether it is one."
+    "{0} is significant too, but not reported as a finding. It explains only {2:.1f} % of what {1} explains on joint "
+    "{3}, which the formula error of that can produce. A log in which {1} acts less would decide."
 )
 _NOT_ALIKE = (
-    "{0} stands out of the noise, too, but not beyond what {1} may leave, or make drives answer, on the joints that "
-    "tell it: it is not told as a finding."
+    "{0} is significant too, but not reported as a finding. The formula error of {1}, or the drives' response to it, "
+    "can produce the same residual on these joints."
 )

@@ -56,8 +56,8 @@ def word_finding(
         units = {"force": force_unit(robot, joint - 1), "length": length_unit(robot, joint - 1)}
     parameters = _parameters(robot, member, fitted, i, known)
     sentence = _when(hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units), parameters)
-    if hypothesis.effect.vague and not known[: len(extension.coefficients)].any():
-        sentence = hypothesis.effect.vague.format(joint=joint)
+    if hypothesis.effect.undetermined_text and not known[: len(extension.coefficients)].any():
+        sentence = hypothesis.effect.undetermined_text.format(joint=joint)
     pattern = hypothesis.name if hypothesis.name.startswith(PREFIX) else ""
     rivals = [] if found is None else [(rival.hypothesis, worse) for rival, worse in found.rivals]
     return Finding(
@@ -65,7 +65,7 @@ def word_finding(
         joint=joint,
         parameters=parameters,
         p_value=p_value,
-        delta_bic=member.worth(problem.rows),
+        delta_bic=member.local_bic_gain(problem.rows),
         gain=gain,
         rivals=tuple(
             (h.name if h.joint in (joint, None) else f"{h.name} of joint {h.joint}", float(worse))
@@ -73,7 +73,7 @@ def word_finding(
         ),
         sentence=sentence,
         visible=member.visible,
-        coordinate=hypothesis.effect.coordinate(problem.sees(hypothesis.effect), joint, member.shape)[0],
+        coordinate=hypothesis.effect.coordinate(problem.state_for(hypothesis.effect), joint, member.shape)[0],
         pattern=pattern,
     )
 
@@ -87,25 +87,23 @@ def _when(sentence: str, parameters: Sequence[Parameter]) -> str:
     spell = {own.name: own for own in parameters if own.name in ("start", "duration")}
     if len(spell) == 2 and not all(np.isfinite(own.ci95).all() for own in spell.values()):
         start, duration = (spell[name].value for name in ("start", "duration"))
-        least = f"from t = {start:.1f} to {start + duration:.1f} s at least"
+        least = f"at least from t = {start:.1f} to {start + duration:.1f} s"
         sentence = sentence.replace(f"from t = {start:.2f} s for {duration:.2g} s", least)
     return sentence
 
 
 def no_part(finding: Finding) -> Finding:
-    """Words what shows that something is unexplained, but is no part of the extended model."""
+    """Rewords a finding that the held-out data rejected: it is unexplained, and not part of the extended model."""
     if finding.pattern:
-        return replace(finding, sentence=f"{finding.sentence} {_ERRS}")
-    told = _DENIED.format(EFFECTS[finding.effect].title)
-    return replace(finding, effect="unexplained", parameters=(), rivals=(), sentence=told)
+        return replace(finding, sentence=f"{finding.sentence} {_NOT_IN_MODEL}")
+    sentence = _REJECTED.format(EFFECTS[finding.effect].title)
+    return replace(finding, effect="unexplained", parameters=(), rivals=(), sentence=sentence)
 
 
-_ERRS = (
-    "Unseen data do not bear that function out: it shows where something is unexplained, and is no part of the model."
-)
-_DENIED = (
-    "Something stands out of the noise that looks like {}, but unseen data speak against that: what it is, is not "
-    "known. The model has no part of it."
+_NOT_IN_MODEL = "This correction did not improve the held-out prediction, so the model does not contain it."
+_REJECTED = (
+    "A significant residual resembles {}, but the held-out data contradict this cause. The true cause is unknown, and "
+    "the model does not contain it."
 )
 
 

@@ -72,10 +72,10 @@ class ReversalTiming:
     def beside(self, recording: Recording) -> ReversalTiming | None:
         """Keeps what is not told by rows at reversals that count, or far better than by those; None for nothing."""
         errors = self.errors.copy()
-        for j in np.flatnonzero(recording.counting):
-            assert recording.late is not None
+        for j in np.flatnonzero(recording.counted_rows):
+            assert recording.reversal_time_error is not None
             turns = recording.dq[1:, j] * recording.dq[:-1, j] < 0
-            late = np.sqrt(np.mean(recording.late[:-1, j][turns] ** 2)) if turns.any() else 0.0
+            late = np.sqrt(np.mean(recording.reversal_time_error[:-1, j][turns] ** 2)) if turns.any() else 0.0
             if errors[j] > BETTER * late:
                 errors[j] = np.inf
         return replace(self, errors=errors) if np.isfinite(errors).any() else None
@@ -104,13 +104,13 @@ def measure_reversal_timing(
         The timing; None where no joint tells any.
     """
     base = baseline.base
-    if recording.finer is not None:
-        own = recording.finer
+    if recording.full_rate is not None:
+        own = recording.full_rate
         residual = own.tau - base_torque(base, own, values)
         if extra is not None:
             residual -= np.column_stack([np.interp(own.t, recording.t, column) for column in extra.T])
         recording = own
-    if recording.rest is None or recording.cutoffs is None:
+    if recording.position_residual is None or recording.cutoffs is None:
         return None
     lags, errors, kicks = np.zeros(recording.n), np.full(recording.n, np.inf), np.zeros(recording.n)
     coulomb = {column.joint - 1: i for i, column in enumerate(base.columns) if column.symbol == "f1"}
@@ -184,9 +184,9 @@ def _fit_impulse(recording: Recording, j: int, turns: Reversals, force: Array) -
 
     A low-pass leaves nothing of it in the motion that stands out of the encoder's noise at any one reversal.
     """
-    assert recording.rest is not None
+    assert recording.position_residual is not None
     assert recording.cutoffs is not None
-    rest, step, cutoffs = recording.rest[:, j], recording.step, recording.cutoffs[:, j]
+    rest, step, cutoffs = recording.position_residual[:, j], recording.step, recording.cutoffs[:, j]
     loud, noise = _level(rest), _level(force)
     if min(loud, noise, float(cutoffs.min())) <= 0:
         return None

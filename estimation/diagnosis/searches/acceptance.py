@@ -24,7 +24,11 @@ SURE = 0.2
 
 def passes_bic(problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]) -> bool:
     """Whether a candidate is worth its parameters beside members; the first one may have another size in each log."""
-    worth = candidate.bic(problem.rows) - candidate.doubt if members else candidate.worth(problem.rows)
+    worth = (
+        candidate.bic_gain(problem.rows) - candidate.motion_error_chi2
+        if members
+        else candidate.local_bic_gain(problem.rows)
+    )
     if worth <= MIN_BIC_GAIN and not members and len(problem.recording.runs) > 1:
         worth += profile_gain(problem, candidate) - candidate.gain
     return worth > MIN_BIC_GAIN
@@ -43,12 +47,12 @@ def is_certain(
     """Whether an effect on joints where no other acts is far from chance, and worth its parameters at all."""
     joints = set(candidate.group.joints)
     apart = not any(joints.intersection(other.group.joints) for other in others)
-    return apart and p_value < SURE * false_alarm and candidate.bic(problem.rows) - candidate.doubt > 0
+    return apart and p_value < SURE * false_alarm and candidate.bic_gain(problem.rows) - candidate.motion_error_chi2 > 0
 
 
 def exceeds_single_shock(problem: Problem, candidate: FittedEffect, accepted: Accepted) -> bool:
     """Whether what acts for a moment is more than one shock of the noise."""
-    return gain_beside_shock(problem, candidate, accepted).worth(problem.rows) > MIN_BIC_GAIN
+    return gain_beside_shock(problem, candidate, accepted).local_bic_gain(problem.rows) > MIN_BIC_GAIN
 
 
 def exceeds_leakage(problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]) -> bool:
@@ -61,7 +65,7 @@ def exceeds_leakage(problem: Problem, candidate: FittedEffect, members: Sequence
     flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
     if flags is not None and flags.any():
         return True
-    if hypothesis.effect.alike:
+    if hypothesis.effect.shared_coefficient:
         return not members or _joints_agree(problem, candidate, members)
     robot = problem.situation.robot
     able = [
@@ -70,14 +74,14 @@ def exceeds_leakage(problem: Problem, candidate: FittedEffect, members: Sequence
         if candidate.gain_on([j])
         >= max(
             (
-                m.hypothesis.effect.leaves(robot, j, m.shape) * m.gain_on([j]) * candidate.share_beside(m, j)
+                m.hypothesis.effect.leakage(robot, j, m.shape) * m.gain_on([j]) * candidate.share_beside(m, j)
                 for m in members
             ),
             default=0.0,
         )
     ]
     lost = candidate.gain - candidate.gain_on(able)
-    return not members or candidate.bic(problem.rows) - lost > MIN_BIC_GAIN
+    return not members or candidate.bic_gain(problem.rows) - lost > MIN_BIC_GAIN
 
 
 def delay_supported_away_from_impacts(
@@ -88,8 +92,8 @@ def delay_supported_away_from_impacts(
     A link that lands throws its motor back, which the log has for motion of motor and link alike: the torque, which
     answers to it, then seems to be ahead of that, on all joints that feel it.
     """
-    kicks = [member for member in members if member.hypothesis.effect.kicks]
-    if not kicks or not candidate.hypothesis.effect.alike:
+    kicks = [member for member in members if member.hypothesis.effect.acceleration_driven]
+    if not kicks or not candidate.hypothesis.effect.shared_coefficient:
         return True
     reach = round(ANSWERS / (problem.recording.step * problem.whitening.stride))
     beside = np.zeros(problem.rows, dtype=bool)
@@ -126,7 +130,7 @@ def _joints_agree(problem: Problem, candidate: FittedEffect, members: Sequence[F
         max((m.gain_on([j]) for m in members if m.hypothesis.joint == j + 1), default=0.0)
         for j in candidate.group.joints
     ]
-    told = told.some((told.gram > 0) & (told.sure * told.cross**2 >= told.gram * others))
+    told = told.subset((told.gram > 0) & (told.certain_share * told.cross**2 >= told.gram * others))
     if not len(told.gram):
         return False
     return told.gain(surely=True) - candidate.degrees * float(np.log(problem.rows * len(told.gram))) > MIN_BIC_GAIN

@@ -38,7 +38,7 @@ def screen_candidates(
     def reached(outcome: Outcome, times: float = 1.0) -> float:
         """What it is worth with its shape parameters paid for, as when it is refined."""
         effect, joint = outcome.hypothesis.effect, outcome.hypothesis.joint
-        free = sum(high > low for low, high in effect.bounds(problem.sees(effect), joint))
+        free = sum(high > low for low, high in effect.bounds(problem.state_for(effect), joint))
         rows = problem.rows * len(effect.acts_on(problem.situation.robot, joint))
         return float(times * outcome.gain - (outcome.degrees + free) * np.log(rows))
 
@@ -49,4 +49,4 @@ def screen_candidates(
 
 
 def _of_a_moment(effect: Effect) -> bool:
-    return effect.passing or any(shape.moment for shape in effect.shapes)
+    return effect.transient or any(shape.moment for shape in effect.shapes)

@@ -28,7 +28,7 @@ def refine_shapes_jointly(problem: Problem, members: Sequence[FittedEffect]) -> 
     for joint in sorted({m.hypothesis.joint for m in members if m.hypothesis.joint is not None}):
         own = [i for i, m in enumerate(result) if m.hypothesis.joint == joint and m.shape]
         # What acts on all of the torque is measured in sight of the others as they are.
-        if len(own) > 1 and not any(result[i].hypothesis.effect.last for i in own):
+        if len(own) > 1 and not any(result[i].hypothesis.effect.acts_on_total_torque for i in own):
             _along(problem, result, own)
     return result
 
@@ -66,7 +66,7 @@ def _further(problem: Problem, before: FittedEffect, after: FittedEffect, factor
     effect, joint = after.hypothesis.effect, after.hypothesis.joint
     shape = []
     for (low, high), described, a, b in zip(
-        effect.bounds(problem.sees(effect), joint), effect.shapes, before.shape, after.shape, strict=True
+        effect.bounds(problem.state_for(effect), joint), effect.shapes, before.shape, after.shape, strict=True
     ):
         further = b * (b / a) ** factor if described.scale == "log" and a > 0 < b else b + factor * (b - a)
         shape.append(float(np.clip(further, low, high)))

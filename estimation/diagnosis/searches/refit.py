@@ -44,33 +44,33 @@ class RefitResult:
         values: base parameters (b,).
         extra: torque of the effects (N, n) [N m or N]; None without any.
         degrees: parameters of the effects.
-        followed: torque (N, n) of those that others among them make late; None without such others.
-        late: torque (N, n) by which all of it is late; None where it is not.
-        laden: what of the effects the gears bear.
+        delayed: torque (N, n) of those that others among them make late; None without such others.
+        delay_torque: torque (N, n) by which all of it is late; None where it is not.
+        gear_load: what of the effects the gears bear.
     """
 
     residual: Array
     values: Array
     extra: Array | None = None
     degrees: int = 0
-    followed: Array | None = None
-    late: Array | None = None
-    laden: GearLoad = NO_GEAR_LOAD
+    delayed: Array | None = None
+    delay_torque: Array | None = None
+    gear_load: GearLoad = NO_GEAR_LOAD
 
-    def but_late(self) -> tuple[Array, Array | None]:
+    def without_delay(self) -> tuple[Array, Array | None]:
         """What all effects but those leave by which all torque is late, and their torque (N, n); None without any."""
-        if self.extra is None or self.late is None:
+        if self.extra is None or self.delay_torque is None:
             return self.residual, self.extra
-        return self.residual + self.late, self.extra - self.late
+        return self.residual + self.delay_torque, self.extra - self.delay_torque
 
-    def followed_motion(self, recording: Recording, members: Sequence[FittedEffect]) -> Recording:
+    def delayed_motion(self, recording: Recording, members: Sequence[FittedEffect]) -> Recording:
         """What shows how sharply friction turns round: torque without what blurs that, motion as late as all of it is.
 
         What other effects have at low speeds may stand for a sign that was taken to be less sharp than it is.
         """
         late = [m for m in members if m.hypothesis.effect.lags and m.hypothesis.effect.whole_robot]
-        beyond = self.but_late()[1]
-        blurring = 0.0 if beyond is None or self.followed is None else beyond - self.followed
+        beyond = self.without_delay()[1]
+        blurring = 0.0 if beyond is None or self.delayed is None else beyond - self.delayed
         return shift_motion(replace(recording, tau=recording.tau - blurring), sum(m.shape[0] for m in late))
 
 
@@ -89,18 +89,18 @@ def refit(problem: Problem, members: Sequence[FittedEffect]) -> RefitResult:
         members = [_again(problem, members, k) if k in cut else member for k, member in enumerate(members)]
     problem, members = fit_sensor_nonlinearity(problem, members)
     values, left, full = fit_jointly(problem, members)
-    known = len(problem.pull.target)
+    known = len(problem.prior.target)
     effects = [(m.hypothesis.effect, len(m.coefficients)) for m in members]
-    plain = np.concatenate([np.repeat(not effect.blurs, size) for effect, size in effects])
+    plain = np.concatenate([np.repeat(not effect.smooths_friction_sign, size) for effect, size in effects])
     late = np.concatenate([np.repeat(effect.lags and effect.whole_robot, size) for effect, size in effects])
     return RefitResult(
         residual=left,
         values=values[: problem.baseline.base.size],
         extra=full[:, :, known:] @ values[known:],
         degrees=sum(member.degrees for member in members),
-        followed=None if plain.all() else full[:, :, known:] @ (values[known:] * plain),
-        late=full[:, :, known:] @ (values[known:] * late) if late.any() else None,
-        laden=find_gear_load(problem, members, values),
+        delayed=None if plain.all() else full[:, :, known:] @ (values[known:] * plain),
+        delay_torque=full[:, :, known:] @ (values[known:] * late) if late.any() else None,
+        gear_load=find_gear_load(problem, members, values),
     )
 
 
@@ -127,7 +127,7 @@ def base_torque_changed(problem: Problem, values: Array, members: Sequence[Fitte
     if np.max(np.sqrt(np.mean(change**2, axis=0)) / np.maximum(torque, 1e-12)) > MOVED:
         return True
     state = problem.baseline.situation(problem.recording, values[: base.size])
-    now = replace(problem, situation=with_gear_load(state, problem.bearing))
+    now = replace(problem, situation=with_gear_load(state, problem.extra_load))
     for member in members:
         before, after = (dense(p, member.hypothesis, member.shape) @ member.coefficients for p in (problem, now))
         if np.sum((after - before) ** 2) > OTHER**2 * np.sum(before**2):

@@ -44,13 +44,13 @@ class Search:
     """One search through the catalogue with one noise model.
 
     Attributes:
-        posed: what was searched.
+        searched_problem: what was searched.
         problem: that, its state composed with the effects found.
         entries: the catalogue, measured.
         selection: what was found.
     """
 
-    posed: Problem
+    searched_problem: Problem
     problem: Problem
     entries: list[Entry]
     selection: Selection
@@ -78,15 +78,15 @@ def search(
         spared = build_nuisance_projection(recording, baseline, settled.residual)
         whitening = estimate_whitening(recording, settled.residual, fitted, inertia, spared=spared)
         if last is not None:
-            members = [found.member for found in last.selection.found]
-            anew = settled.laden.shows or noise_decreased(last.problem, whitening)
+            members = [found.effect for found in last.selection.found]
+            anew = settled.gear_load.improves_fit or noise_decreased(last.problem, whitening)
             if not (anew or base_torque_changed(last.problem, settled.values, members)):
                 break
             # Its columns are most of what a diagnosis keeps in memory: they go before others come.
             last = None
             give_back()
             if blurred:
-                baseline = build_baseline(base, recording, known=settled.followed_motion(recording, members))
+                baseline = build_baseline(base, recording, known=settled.delayed_motion(recording, members))
         rng = np.random.default_rng(seed)
         posed = build_problem(
             recording,
@@ -95,15 +95,15 @@ def search(
             draws=DRAWS,
             rng=rng,
             extra=settled.extra,
-            followed=settled.followed,
-            bearing=settled.laden.bearing,
+            followed=settled.delayed,
+            bearing=settled.gear_load.extra_load,
         )
-        if any(effect.fast for effect in effects):
+        if any(effect.independent_of_acceleration for effect in effects):
             wide = estimate_whitening(recording, settled.residual, fitted, inertia, WIDER, spared)
             # What is left by the base model as it is fitted alone: beside effects it may be far from that.
-            upper = build_high_band(recording, baseline, posed.remainder, settled.residual, whitening.bands, wide)
-            posed = replace(posed, upper=upper)
-        timing = measure_reversal_timing(recording, baseline, settled.values, *settled.but_late())
+            upper = build_high_band(recording, baseline, posed.base_residual, settled.residual, whitening.bands, wide)
+            posed = replace(posed, high_band=upper)
+        timing = measure_reversal_timing(recording, baseline, settled.values, *settled.without_delay())
         if timing is not None:
             posed = replace(posed, timing=timing.beside(recording))
         give_back()
@@ -118,27 +118,27 @@ def search(
         )
         if not last.selection.found or attempt == SEARCHES - 1:
             break
-        known = {found.member.hypothesis: found.member.shape for found in last.selection.found}
-        settled = refit(last.problem, [found.member for found in last.selection.found])
+        known = {found.effect.hypothesis: found.effect.shape for found in last.selection.found}
+        settled = refit(last.problem, [found.effect for found in last.selection.found])
         # A delay made the sign of friction look less sharp than it is.
-        blurred = any(found.member.hypothesis.effect.blurs for found in last.selection.found)
+        blurred = any(found.effect.hypothesis.effect.smooths_friction_sign for found in last.selection.found)
     assert last is not None
-    told = with_rivals(last.posed, last.entries, last.selection, np.random.default_rng(seed))
+    told = with_rivals(last.searched_problem, last.entries, last.selection, np.random.default_rng(seed))
     return replace(last, selection=told)
 
 
 def _trust_reversal_rows(base: BaseParameters, recording: Recording) -> Recording:
     """Lets rows at reversals count where neither direction nor acceleration is in doubt: a model tells the second."""
-    if not recording.clear.any():
+    if not recording.sign_known_from_velocity.any():
         return recording
     baseline, settled = fit_plain(base, recording)
     inertia = inertia_matrix(baseline, recording, settled.values)
     trusted = quiet_joints(recording, settled.residual, inertia)
     timing = measure_reversal_timing(recording, baseline, settled.values, settled.residual)
-    if timing is not None and recording.late is not None:
+    if timing is not None and recording.reversal_time_error is not None:
         # Positions alone bound what a kick may hide; beside torque they may tell that it is more.
-        trusted &= timing.kicks <= np.max(recording.late * np.abs(recording.ddq), axis=0)
-    return recording.trusting(trusted)
+        trusted &= timing.kicks <= np.max(recording.reversal_time_error * np.abs(recording.ddq), axis=0)
+    return recording.with_trusted(trusted)
 
 
 def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, RefitResult]:
@@ -149,7 +149,7 @@ def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Ref
     joints that the base model describes well must not bend what it says of the others.
     """
     baseline, tau = build_baseline(base, recording), recording.tau
-    counts, size = ~recording.unsure, tau.std(axis=0) + 1e-12
+    counts, size = ~recording.sign_unknown, tau.std(axis=0) + 1e-12
     pull, (grams, crosses) = (
         base_model_prior(baseline, recording),
         normal_equations(baseline, counts.astype(float), tau),
@@ -182,7 +182,7 @@ def _searched(
     give_back()
     advance = _note_progress(bar, share + 0.25)
     selection = select(problem, entries, false_alarm=false_alarm, rng=rng, advance=advance, known=known)
-    members = [found.member for found in selection.found]
+    members = [found.effect for found in selection.found]
     return Search(problem, with_total_torque(problem, members, hypotheses), entries, selection)
 
 

@@ -37,13 +37,13 @@ class SelectedEffect:
     """One effect that was selected, and what else could have been.
 
     Attributes:
-        member: the effect, its shape, measured beside the other effects found.
+        effect: the effect, its shape, measured beside the other effects found.
         p_value: family-wise, of the step that found it.
         rivals: other hypotheses in its place, the closest first, with how much worse their BIC is; none before they
             are asked for (`with_rivals`).
     """
 
-    member: FittedEffect
+    effect: FittedEffect
     p_value: float
     rivals: tuple[tuple[FittedEffect, float], ...] = ()
 
@@ -54,19 +54,20 @@ class Selection:
 
     Attributes:
         found: the effects, strongest first.
-        seen: what the torque as logged shows by itself, whatever explains it.
+        visible_in_torque: what the torque as logged shows by itself, whatever explains it.
         first: the scan before any was found.
         last: the scan beside all that were found.
         accepted: all found, joined.
-        slight: what stood out of the noise next, but no more than formulas of what was found may leave; None for none.
+        strongest_unaccepted: what stood out of the noise next, but no more than formulas of what was found may leave;
+            None for none.
     """
 
     found: tuple[SelectedEffect, ...]
-    seen: frozenset[Hypothesis]
+    visible_in_torque: frozenset[Hypothesis]
     first: Scan
     last: Scan
     accepted: Accepted
-    slight: FittedEffect | None = None
+    strongest_unaccepted: FittedEffect | None = None
 
 
 def select(
@@ -105,7 +106,7 @@ def select(
         chance = {member.hypothesis: chances.get(member.hypothesis, 1.0) for member in refined}
         able = [m for m in refined if chance[m.hypothesis] <= false_alarm and m.hypothesis not in spurned]
         told = [m for m in able if is_accepted(problem, m, chance[m.hypothesis], members, false_alarm)]
-        told = [m for m in told if not m.hypothesis.effect.passing or exceeds_single_shock(problem, m, accepted)]
+        told = [m for m in told if not m.hypothesis.effect.transient or exceeds_single_shock(problem, m, accepted)]
         if not told:
             break
         # What is sure is on joints where no other acts, and so none leaves anything.
@@ -149,12 +150,12 @@ def select(
     kept = [
         f
         for i, f in enumerate(found)
-        if f.member.hypothesis in seen
-        or is_accepted(problem, f.member, f.p_value, [*members[:i], *members[i + 1 :]], false_alarm)
+        if f.effect.hypothesis in seen
+        or is_accepted(problem, f.effect, f.p_value, [*members[:i], *members[i + 1 :]], false_alarm)
     ]
-    order = sorted(kept, key=lambda f: -f.member.gain)
+    order = sorted(kept, key=lambda f: -f.effect.gain)
     last = result if members else first
-    joined = accept(problem, tuple(f.member.group for f in order))
+    joined = accept(problem, tuple(f.effect.group for f in order))
     return Selection(tuple(order), frozenset(seen), first, last, joined, slight)
 
 
@@ -165,21 +166,21 @@ def with_rivals(
 
     What was seen in the torque as logged has no rivals, whatever else explains as little of it.
     """
-    members = [found.member for found in selection.found]
+    members = [found.effect for found in selection.found]
     told = []
     for i, found in enumerate(selection.found):
         rivals: list[tuple[FittedEffect, float]] = []
-        if found.member.hypothesis not in selection.seen:
+        if found.effect.hypothesis not in selection.visible_in_torque:
             # It was found by what it is worth: a moment's cause has not all rows to pay for, in sight of others either.
-            beside, own = accept_all_but(problem, members, i), found.member
-            reference = max(own.bic(problem.rows), own.worth(problem.rows))
+            beside, own = accept_all_but(problem, members, i), found.effect
+            reference = max(own.bic_gain(problem.rows), own.local_bic_gain(problem.rows))
             result = scan(problem, entries, beside, rng, nulls=False)
             near = screen_candidates(problem, result, [*members[:i], *members[i + 1 :]], reference)
-            rest = [o for o in near if o.hypothesis != found.member.hypothesis]
+            rest = [o for o in near if o.hypothesis != found.effect.hypothesis]
             able = [
-                rival for rival in refine_candidates(problem, rest, beside) if rival.gain >= NEAR * found.member.gain
+                rival for rival in refine_candidates(problem, rest, beside) if rival.gain >= NEAR * found.effect.gain
             ]
-            rivals = [(rival, reference - rival.bic(problem.rows)) for rival in able]
+            rivals = [(rival, reference - rival.bic_gain(problem.rows)) for rival in able]
         told.append(replace(found, rivals=tuple(rivals)))
     return replace(selection, found=tuple(told))
 
@@ -200,7 +201,7 @@ def _visible_in_torque(
     taken = {member.hypothesis for member in members}
     now = with_total_torque(problem, members, [entry.hypothesis for entry in entries])
     for hypothesis in (entry.hypothesis for entry in entries if entry.hypothesis not in taken):
-        state = now.sees(hypothesis.effect)
+        state = now.state_for(hypothesis.effect)
         chance = hypothesis.effect.chance(state, hypothesis.joint, problem.recording.tau) * len(entries)
         if chance < SURE * false_alarm:
             beside = accept(problem, tuple(member.group for member in (*members, *found)))

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.hypothesis_tests.refinement import RARE, FittedEffect
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
+from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations.free_functions import excess_chi2, set_bic_gain
 
 # Named effects that explain less than this share of what stands out of the noise, or of what free functions do in their
@@ -47,3 +49,8 @@ def has_better_bic(
     gain -= accept(problem, tuple(m.group for m in others)).gain
     price = float(np.log(problem.rows))
     return not free or gain - sum(member.degrees for member in names) * price > set_bic_gain(problem, free) + margin
+
+
+def has_close_rivals(found: SelectedEffect) -> bool:
+    """Whether an effect has rivals that fit about as well; one that robots seldom have must do so by the data alone."""
+    return any(worse < (RARE if rival.hypothesis.effect.rare else CLOSE_RIVAL_BIC) for rival, worse in found.rivals)

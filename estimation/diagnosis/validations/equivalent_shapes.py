@@ -41,14 +41,14 @@ def complete_effects(problem: Problem, founds: Sequence[SelectedEffect]) -> tupl
     A search pays for each coefficient, and goes without those that are hardly told; values without them are told as
     surer than they are, and off by what those would have been.
     """
-    members = [found.member for found in founds]
+    members = [found.effect for found in founds]
     whole = []
     for i, found in enumerate(founds):
-        own = found.member
+        own = found.effect
         shape = own.hypothesis.effect.complete(problem.situation, own.hypothesis.joint, own.shape)
         if shape != own.shape:
             form = refine(problem, own.hypothesis, shape, accept_all_but(problem, members, i))
-            found = replace(found, member=form) if form.worth(problem.rows) > MIN_BIC_GAIN else found
+            found = replace(found, effect=form) if form.local_bic_gain(problem.rows) > MIN_BIC_GAIN else found
         whole.append(found)
     return tuple(whole)
 

@@ -42,8 +42,8 @@ class FittedRobot:
         values: their values (b,).
         members: effects beside it; none of the base model alone.
         coefficients: of each effect.
-        felt: base parameters (b,) by which effects reckon load and friction; None for `values`.
-        bearing: what of the effects the gears bear; None for nothing.
+        base_values_for_effects: base parameters (b,) by which effects reckon load and friction; None for `values`.
+        extra_load: what of the effects the gears bear; None for nothing.
         since: moment from which phases count [s]; None for the first of a motion.
     """
 
@@ -52,8 +52,8 @@ class FittedRobot:
     values: Array
     members: Sequence[FittedEffect] = ()
     coefficients: Sequence[Array] = ()
-    felt: Array | None = None
-    bearing: ExtraGearLoad | None = None
+    base_values_for_effects: Array | None = None
+    extra_load: ExtraGearLoad | None = None
     since: float | None = None
 
     def at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
@@ -62,8 +62,10 @@ class FittedRobot:
 
     def felt_at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
         """Gives what effects depend on there."""
-        now = self._by(self.values if self.felt is None else self.felt, part, motion)
-        return with_gear_load(now, self.bearing)
+        now = self._by(
+            self.values if self.base_values_for_effects is None else self.base_values_for_effects, part, motion
+        )
+        return with_gear_load(now, self.extra_load)
 
     def _by(self, values: Array, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
         q, dq, ddq = motion
@@ -73,9 +75,9 @@ class FittedRobot:
     def base(self, part: Recording, motion: tuple[Array, Array, Array]) -> Array:
         """Evaluates the base model's torque (N, n) along a motion of one log, with its gravity and payload."""
         own = self.model.under(part.gravities[0]).torque(*motion, self.values, columns=self.columns)
-        return own + self.carried(part, motion)
+        return own + self.payload_torque(part, motion)
 
-    def carried(self, part: Recording, motion: tuple[Array, Array, Array]) -> Array:
+    def payload_torque(self, part: Recording, motion: tuple[Array, Array, Array]) -> Array:
         """Evaluates the torque (N, n) of the payload that one log carries."""
         body = with_body(self.model, np.zeros(self.model.size), part.bodies[0])
         columns = np.flatnonzero(body).tolist()
@@ -93,7 +95,7 @@ class FittedRobot:
                 total[:, j] += X @ self.coefficients[i]
         return total
 
-    def unread(self, now: Situation, reading: Array) -> tuple[FittedRobot, Array]:
+    def unmeasured_torque(self, now: Situation, reading: Array) -> tuple[FittedRobot, Array]:
         """Gives the plant without effects that only distort the reading, and the torque (N, n) that was read so."""
         wrong = [i for i, member in enumerate(self.members) if member.hypothesis.effect.distorts]
         plain = [i for i in range(len(self.members)) if i not in wrong]
@@ -128,18 +130,21 @@ def simulate_both(
     part = cut_recording(whole, rows)
     inertia = _loop_inertia(before, part)
     # The recording's torque is the arm's own; what drives it carries the log's payload besides.
-    driving = part.tau + before.carried(part, (part.q, part.dq, part.ddq))
+    driving = part.tau + before.payload_torque(part, (part.q, part.dq, part.ddq))
     reference = Reference(step=part.step, q=part.q, dq=part.dq, ddq=part.ddq, torque=driving)
     driven = [_driven(plant, whole, rows, reference, inertia, loop) for plant in (before, after)]
     if not all(np.isfinite(run.change) for run, _ in driven):
         return None
     notes = []
     if any(run.filled.any() for run, _ in driven):
-        notes.append("The fitted inertia is not positive in all directions: the loop feeds back acceleration besides.")
+        notes.append("The fitted inertia matrix is not positive definite, so the loop also feeds back acceleration.")
     if not driven[1][1]:
-        notes.append("What was found is taken along the measured motion: along the simulated one it did not settle.")
+        notes.append(
+            "The torque of the findings was computed along the measured motion, because the simulated motion did not "
+            "converge with it."
+        )
     if not all(run.converged for run, _ in driven):
-        notes.append("The simulated motion did not settle to a hundredth.")
+        notes.append("The simulated motion did not converge to 1 %.")
     level = np.maximum(np.sqrt(np.mean(part.tau**2, axis=0)), 1e-300)
     shares, motions = [], []
     for run, _ in driven:
@@ -168,7 +173,7 @@ def _driven(
     """Follows one robot; says too whether its effects were evaluated along the simulated motion."""
     part = cut_recording(whole, rows)
     measured = plant.at(part, (part.q, part.dq, part.ddq))
-    plant, torque = plant.unread(plant.felt_at(part, (part.q, part.dq, part.ddq)), reference.torque)
+    plant, torque = plant.unmeasured_torque(plant.felt_at(part, (part.q, part.dq, part.ddq)), reference.torque)
     reference = replace(reference, torque=torque)
     width, coulomb, tangent = measured.velocity_scale, _coulomb(measured), _tangent(measured)
     effects = _Effects(plant, whole, rows, SEEN * loop.bandwidth)

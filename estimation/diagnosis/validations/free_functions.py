@@ -47,11 +47,11 @@ def free_functions(
         if not p <= false_alarm:
             break
         near = [refine(problem, o.hypothesis, o.shape, accepted) for o in result.outcomes[:CONTENDERS] if o.degrees]
-        member = max(near, key=lambda m: m.bic(problem.rows))
+        member = max(near, key=lambda m: m.bic_gain(problem.rows))
         before = (*named, *members)
         if excess_chi2(member) < BEYOND * sum(m.gain_on(member.group.joints) for m in before):
             break
-        if member.bic(problem.rows) < LEAST and (before or not alone or p > SURE):
+        if member.bic_gain(problem.rows) < LEAST and (before or not alone or p > SURE):
             break
         members.append(member)
         p_values.append(p)

@@ -57,7 +57,7 @@ class HeldOutErrors:
         """Residual RMS over torque RMS (n,) of one of the models."""
         return self._shares(self.errors[model])
 
-    def kept(self, model: int, joints: Sequence[int]) -> float:
+    def retained_share(self, model: int, joints: Sequence[int]) -> float:
         """Share of the fall in NRMSE by a model's lacking effect, mean over joints, that is left on unseen data.
 
         One where nothing is known of fits that have seen the rows, or where they hardly differ.
@@ -71,14 +71,14 @@ class HeldOutErrors:
         )
         return 1.0 if before - after <= WORTH * before else (unseen[0] - unseen[1]) / (before - after)
 
-    def growing(self) -> Array:
+    def support_growth(self) -> Array:
         """By how much the extended model errs more on unseen rows (n,) than where it has seen them; never by less."""
         if self.fitted is None:
             return np.ones(self.measured.shape[1])
         unseen, seen = (self._rms(errors[-1]) for errors in (self.errors, self.fitted))
         return np.maximum(np.divide(unseen, seen, out=np.ones_like(unseen), where=seen > 0), 1.0)
 
-    def astray(self, joint: int) -> bool:
+    def is_unreliable(self, joint: int) -> bool:
         """Whether the extended model errs on unseen rows of a joint, from 0, far more than where it has seen them."""
         if self.fitted is None:
             return False
@@ -151,7 +151,7 @@ def cross_validation_errors(problem: Problem, effects: Sequence[Array], pull: Ga
             "so that the gain on another motion may differ"
         )
     base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
-    counts = ~recording.unsure
+    counts = ~recording.sign_unknown
     weights = counts / problem.whitening.scales(len(recording))
     full = np.concatenate([base, *effects], axis=2)
     weighted = full * weights[:, :, None]
@@ -197,7 +197,7 @@ def held_out_errors(
     """
     recording = problem.recording
     base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
-    weights = ~recording.unsure / problem.whitening.scales(len(recording))
+    weights = ~recording.sign_unknown / problem.whitening.scales(len(recording))
     full = np.concatenate([base, *effects], axis=2)
     gram, cross = _moments(full * weights[:, :, None], recording.tau * weights)
     other = np.concatenate([unseen_base, *unseen_effects], axis=2)
@@ -209,12 +209,14 @@ def held_out_errors(
     logs = len({name.rpartition(" from ")[0] or name for name in unseen.names})
     how = f"{logs} log{'s' if logs > 1 else ''} that the fit has not seen"
     how += f", in {len(unseen.runs)} stretches" if len(unseen.runs) > logs else ""
-    weights = ~unseen.unsure / problem.whitening.scale
+    weights = ~unseen.sign_unknown / problem.whitening.scale
     target = unseen.tau * weights
     more, square = _moments(other * weights[:, :, None], target), float(np.sum(target**2))
     chosen_by = model_columns(base.shape[2], effects)
-    growth = _growth(problem, (gram, cross), more, square, ~unseen.unsure, pull, chosen_by)
-    return HeldOutErrors(how, unseen.t, unseen.step, unseen.tau, tuple(errors), ~unseen.unsure, growth=tuple(growth))
+    growth = _growth(problem, (gram, cross), more, square, ~unseen.sign_unknown, pull, chosen_by)
+    return HeldOutErrors(
+        how, unseen.t, unseen.step, unseen.tau, tuple(errors), ~unseen.sign_unknown, growth=tuple(growth)
+    )
 
 
 def _growth(

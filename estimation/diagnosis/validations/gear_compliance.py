@@ -56,7 +56,7 @@ class _Signals:
     """
 
     t: Array
-    windup: Array
+    deflection: Array
     rest: Array
     load: Array
     rival: Array
@@ -97,7 +97,7 @@ def measure_gear_compliance(
         delay = 0.0
         for _ in range(ALIGNED):
             signals = _signals(now, gear_deflection(recording, logs, joint, delay), joint, delay)
-            delay += float(_solve(np.column_stack([signals.rest, signals.load]), signals.windup)[1])
+            delay += float(_solve(np.column_stack([signals.rest, signals.load]), signals.deflection)[1])
         signals = _signals(now, gear_deflection(recording, logs, joint, delay), joint, delay)
         other = None
         if unseen is not None:
@@ -128,7 +128,7 @@ def gear_deflection(recording: Recording, logs: Sequence[Log], joint: int, delay
             # Straight lines between samples would cut the corners of an accelerated motion.
             own, link = (CubicSpline(log.t, signal[:, joint - 1]) for signal in (log.q, log.qlink))
             result[run] = own(t) - link(np.clip(t + delay, log.t[0], log.t[-1]))
-    result[recording.unsure[:, joint - 1]] = np.nan
+    result[recording.sign_unknown[:, joint - 1]] = np.nan
     return result
 
 
@@ -142,7 +142,7 @@ def _signals(now: Situation, measured: Array, joint: int, delay: float) -> _Sign
     twice = (np.sin(2 * x), np.cos(2 * x)) if turns else (x**3, x**4)
     return _Signals(
         t=now.t[rows],
-        windup=measured[rows],
+        deflection=measured[rows],
         rest=np.column_stack([np.ones_like(q), dq, sign, *once]),
         load=now.load[:, joint - 1][rows],
         rival=np.column_stack(twice),
@@ -154,7 +154,7 @@ def _test_joint(
     now: Situation, own: _Signals, other: _Signals | None, joint: int, tests: int, false_alarm: float
 ) -> MeasuredCompliance | None:
     """Judges one joint: an elastic gear against a rigid one, and against an encoder that is out of true."""
-    w = own.windup
+    w = own.deflection
     alone, whole = own.rest, np.column_stack([own.rest, own.load])
     hidden = own.load - alone @ _solve(alone, own.load)
     if not hidden @ hidden > VISIBLE * np.sum((own.load - own.load.mean()) ** 2):
@@ -176,7 +176,7 @@ def _test_joint(
         level = w
     else:
         one, two = _solve(alone, w), values
-        level, both = other.windup, np.column_stack([other.rest, other.load])
+        level, both = other.deflection, np.column_stack([other.rest, other.load])
         errors = [(level[b] - other.rest[b] @ one, level[b] - both[b] @ two) for b in blocks_of(other.t)]
     gain = gain_by_blocks(errors, level)
     if gain.ci95[1] < 0:
@@ -252,13 +252,13 @@ def _sentence(joint: int, parameters: Sequence[Parameter], force: str, length: s
     low, high = compliance.ci95
     span = f"{1 / high:.3g} to {1 / low:.3g}" if low > 0 else f"above {1 / high:.3g}"
     text = (
-        f"The gear of joint {joint} winds up under load, by its two encoders: a stiffness of "
-        f"{1 / compliance.value:.3g} {force}/{length} (95 % interval {span})"
+        f"The gear of joint {joint} winds up under load, as measured by its two encoders: stiffness "
+        f"{1 / compliance.value:.3g} ({span}) {force}/{length}"
     )
     if motion.determined:
-        text += f", with {abs(motion.value):.2g} {length} of lost motion at reversals"
+        text += f", lost motion {abs(motion.value):.2g} {length} at reversals"
     text += "."
     if delay.determined:
         which = "later" if delay.value > 0 else "earlier"
-        text += f" The encoder behind the gear is logged {1e3 * abs(delay.value):.2f} ms {which} than the motor's."
+        text += f" The link encoder is logged {1e3 * abs(delay.value):.2g} ms {which} than the motor encoder."
     return text

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.payload_and_gravity import base_regressor, subtract_known_payload
-from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
@@ -19,15 +18,12 @@ from estimation.diagnosis.joint_fits.shrinkage import effects_prior
 from estimation.diagnosis.joint_fits.total_torque import effect_columns
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording, join_recordings
-from estimation.diagnosis.validations.forward_simulation import FittedRobot, simulate_both
 from estimation.diagnosis.validations.gain_intervals import (
     PARTS,
     HeldOutErrors,
     cross_validation_errors,
     held_out_errors,
-    model_columns,
 )
-from estimation.diagnosis.validations.simulation_result import Simulation
 from estimation.regressions.parameter_priors import GaussianPrior
 from robots.robot import Robot
 from robots.signals import Log
@@ -36,9 +32,6 @@ from robots.terms.effects import Situation
 Array = NDArray[np.float64]
 
 SHORTEST_UNSEEN = 1.0  # [s] of held-out logs
-# Of this many seconds of unseen data the motion is simulated, by a fit to at most so many rows.
-STRETCH = 5.0
-ENOUGH_ROWS = 12_000
 # A joint tells an effect of another, or of its own, by this share of the gain and more.
 TELLING = 0.1
 # An effect lives in one log that holds more than this share of its energy.
@@ -50,34 +43,34 @@ class HeldOutResult:
     """Errors on unseen data.
 
     Attributes:
-        unseen: of all models.
+        errors: of all models.
         gains: what each member brings there.
-        rises: by what factor each member changes the error of all joints that it acts on.
-        worse: whether unseen rows speak against each member.
-        kept: share of what each member does to the error of the fit that is left there.
-        speaks: share of each member's gain by which unseen rows speak for it (`Unseen.growth`).
+        rmse_ratio: by what factor each member changes the error of all joints that it acts on.
+        contradicts: whether unseen rows speak against each member.
+        cv_retained_gain: share of what each member does to the error of the fit that is left there.
+        support: share of each member's gain by which unseen rows speak for it (`Unseen.growth`).
         coordinates: on which each member shows there (M,).
         whole: the unseen data, after the logs of the fit where heat may last from them.
-        first: row of `whole` at which the unseen data begin.
+        first_held_out_row: row of `whole` at which the unseen data begin.
         effects: columns (N, n, k) of each member on the data of the fit.
         torque: of all members together on the unseen data (M, n).
-        pull: on base model, nuisance and members, of all fits.
-        gone: members that came with a change, and that the unseen data are taken to be without.
+        prior: on base model, nuisance and members, of all fits.
+        absent: members that came with a change, and that the unseen data are taken to be without.
     """
 
-    unseen: HeldOutErrors
+    errors: HeldOutErrors
     gains: tuple[Gain, ...]
-    rises: tuple[float, ...]
-    worse: tuple[bool, ...]
-    kept: tuple[float, ...]
-    speaks: tuple[float, ...]
+    rmse_ratio: tuple[float, ...]
+    contradicts: tuple[bool, ...]
+    cv_retained_gain: tuple[float, ...]
+    support: tuple[float, ...]
     coordinates: tuple[Array, ...]
     whole: Recording
-    first: int
+    first_held_out_row: int
     effects: tuple[Array, ...]
     torque: Array
-    pull: GaussianPrior
-    gone: frozenset[int] = frozenset()
+    prior: GaussianPrior
+    absent: frozenset[int] = frozenset()
 
 
 def measure_held_out(
@@ -105,142 +98,65 @@ def measure_held_out(
         unseen, states, whole, first, columns = _on_logs(robot, problem, members, effects, held_out, pull, gone)
     else:
         unseen = _left_out(problem, effects, pull)
-        states = [problem.sees(member.hypothesis.effect) for member in members]
+        states = [problem.state_for(member.hypothesis.effect) for member in members]
         whole, first, columns = problem.recording, 0, list(effects)
     there = slice(first, None)
     torque = np.zeros_like(whole.tau[there])
     for X, member in zip(columns, members, strict=True):
         torque += X @ member.coefficients
     return HeldOutResult(
-        unseen=unseen,
+        errors=unseen,
         gains=tuple(_gain(unseen, i, member, rng) for i, member in enumerate(members)),
-        rises=tuple(_rise(unseen, i, member) for i, member in enumerate(members)),
-        worse=tuple(unseen.surely_worse(i + 1) for i in range(len(members))),
-        kept=tuple(unseen.kept(i + 1, _joints(member)) for i, member in enumerate(members)),
-        speaks=tuple(unseen.growth[i + 1] / max(member.gain, 1e-300) for i, member in enumerate(members)),
+        rmse_ratio=tuple(_rise(unseen, i, member) for i, member in enumerate(members)),
+        contradicts=tuple(unseen.surely_worse(i + 1) for i in range(len(members))),
+        cv_retained_gain=tuple(unseen.retained_share(i + 1, _joints(member)) for i, member in enumerate(members)),
+        support=tuple(unseen.growth[i + 1] / max(member.gain, 1e-300) for i, member in enumerate(members)),
         coordinates=tuple(
             m.hypothesis.effect.coordinate(state, m.hypothesis.joint, m.shape)[1][there]
             for m, state in zip(members, states, strict=True)
         ),
         whole=whole,
-        first=first,
+        first_held_out_row=first,
         effects=effects,
         torque=torque,
-        pull=pull,
-        gone=gone,
+        prior=pull,
+        absent=gone,
     )
 
 
 def _left_out(problem: Problem, effects: Sequence[Array], pull: GaussianPrior) -> HeldOutErrors:
     """Leaves out logs in turn; parts of logs where an effect lives in one log alone, which no other log could tell."""
     recording = problem.recording
-    why = _only_once(recording, effects)
+    why = found_in_one_log_only(recording, effects)
     if len(recording.runs) == 1 or not why:
         return cross_validation_errors(problem, effects, pull)
-    apart = replace(recording, starts=tuple(part.start for part in _parts(recording)))
+    apart = replace(recording, starts=tuple(part.start for part in split_runs(recording)))
     unseen = cross_validation_errors(replace(problem, recording=apart), effects, pull)
     return replace(unseen, how=_WITHIN.format(PARTS, len(recording.runs), why))
 
 
 _WITHIN = (
-    "each of {} stretches of each of {} logs, predicted from all other stretches: {}, and no other log could tell it"
+    "each of {} stretches of each of {} logs, predicted from all other stretches ({}, so whole logs are not left out)"
 )
 
 
-def _only_once(recording: Recording, effects: Sequence[Array]) -> str:
+def found_in_one_log_only(recording: Recording, effects: Sequence[Array]) -> str:
     """Says what is told by one of several logs alone; nothing where all is told by others too."""
     for X in effects:
         energies = np.array([float(np.sum(X[run] ** 2)) for run in recording.runs])
         if energies.max() > ALONE * energies.sum():
-            return "something that was found acts in one log only"
-    moves = np.array([~recording.unsure[run].all(axis=0) for run in recording.runs])
+            return "one finding acts in one log only"
+    moves = np.array([~recording.sign_unknown[run].all(axis=0) for run in recording.runs])
     return "a joint moves in one log only" if (moves.sum(axis=0) == 1).any() else ""
 
 
-def _parts(recording: Recording) -> list[slice]:
+def split_runs(recording: Recording) -> list[slice]:
     """Cuts every log into stretches of about as many rows."""
     parts = []
     for run in recording.runs:
         edges = np.linspace(run.start, run.stop, PARTS + 1).astype(int)
         parts += [slice(int(a), int(b)) for a, b in pairwise(edges) if b > a]
     return parts
-
-
-def simulate_held_out(
-    problem: Problem, members: Sequence[FittedEffect], measured: HeldOutResult, held_out: bool
-) -> Simulation | None:
-    """Simulates the stretch of unseen data in which the extension acts most, without and with it.
-
-    Args:
-        problem: the data of the fit.
-        members: what was found, at least one.
-        measured: of these members.
-        held_out: whether logs were kept apart; else the fit leaves out the part in which the stretch lies.
-
-    Returns:
-        The simulation; None where the fitted robot runs away from the loop.
-    """
-    whole, first = measured.whole, measured.first
-    parts = [slice(max(run.start, first), run.stop) for run in whole.runs if run.stop > first]
-    if not held_out and (len(parts) == 1 or _only_once(whole, measured.effects)):
-        parts = _parts(whole)
-    strength = np.sum((measured.torque / problem.whitening.scale) ** 2, axis=1)
-    part, rows = _strongest(parts, np.concatenate([np.zeros(first), strength]), round(STRETCH / whole.step))
-    base, extended = _fits(problem, measured, None if held_out else part)
-    known = problem.baseline.base
-    b = known.size
-    before = FittedRobot(model=known.model, columns=known.independent, values=base[:b])
-    edges = np.cumsum([b + problem.baseline.nuisance.shape[2], *(X.shape[2] for X in measured.effects)])
-    there = [i for i in range(len(members)) if i not in measured.gone]
-    after = replace(
-        before,
-        values=extended[:b],
-        felt=problem.parameters_without_payload[list(known.independent)],
-        bearing=problem.bearing,
-        since=problem.situation.origin,
-        members=tuple(members[i] for i in there),
-        coefficients=tuple(extended[edges[i] : edges[i + 1]] for i in there),
-    )
-    return simulate_both(before, after, whole, rows)
-
-
-def _strongest(parts: Sequence[slice], strength: Array, length: int) -> tuple[slice, slice]:
-    """Finds the window of some rows in which a signal (N,) is strongest, and the part in which it lies."""
-    sums = np.concatenate([[0.0], np.cumsum(strength)])
-    best, chosen = -1.0, (parts[0], parts[0])
-    for part in parts:
-        size = min(length, part.stop - part.start)
-        for start in range(part.start, part.stop - size + 1, max(1, size // 4)):
-            mean = float(sums[start + size] - sums[start]) / size
-            # A longer window goes before a short one that is hardly stronger by chance.
-            value = mean * min(1.0, size / length)
-            if value > best:
-                best, chosen = value, (part, slice(start, start + size))
-    return chosen
-
-
-def _fits(problem: Problem, measured: HeldOutResult, left_out: slice | None) -> tuple[Array, Array]:
-    """Fits base model and nuisance alone, and with the effects, to all rows but those left out."""
-    recording, effects = problem.recording, measured.effects
-    kept = np.ones(len(recording), dtype=bool)
-    if left_out is not None:
-        kept[left_out] = False
-    rows = np.flatnonzero(kept)
-    rows = rows[:: max(1, -(-len(rows) // ENOUGH_ROWS))]
-    full = np.concatenate(
-        [problem.baseline.regressor[rows], problem.baseline.nuisance[rows], *(X[rows] for X in effects)], axis=2
-    )
-    weights = (~recording.unsure / problem.whitening.scales(len(recording)))[rows]
-    flat = (full * weights[:, :, None]).reshape(-1, full.shape[2])
-    gram, cross = flat.T @ flat, flat.T @ (recording.tau[rows] * weights).reshape(-1)
-    # Thinned rows count for all.
-    factor = kept.sum() / max(len(rows), 1)
-    alone, *_, everything = model_columns(full.shape[2] - sum(X.shape[2] for X in effects), effects)
-    first, last = (
-        solve_map(factor * gram[np.ix_(chosen, chosen)], factor * cross[chosen], measured.pull.columns(chosen))
-        for chosen in (alone, everything)
-    )
-    return first, last
 
 
 def _gain(unseen: HeldOutErrors, i: int, member: FittedEffect, rng: np.random.Generator) -> Gain:
@@ -288,7 +204,7 @@ def _on_logs(
     other = subtract_known_payload(
         robot, build_recording(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN, travel=travel)
     )
-    other = other.trusting(recording.trusted)
+    other = other.with_trusted(recording.trusted)
     # One clock: where the unseen logs come later, the heat of the ones before is still there.
     later = bool(other.t[0] > recording.t[-1])
     whole = join_recordings(recording, other) if later else other

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, MIN_BIC_GAIN
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations.free_functions import SURE
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
-from estimation.diagnosis.validations.verdict import CLOSE, Verdict
+from estimation.diagnosis.validations.verdict import Verdict
 from robots.terms.discrepancies.patterns import PREFIX, is_of_time, is_oscillation
 from robots.terms.effects import Effect
 
@@ -43,21 +43,21 @@ class ValidatedFindings:
     """What is left of what was found.
 
     Attributes:
-        founds: names that hold.
-        members: theirs, and free functions after them.
+        findings: names that hold.
+        effects: theirs, and free functions after them.
         p_values: of the members.
-        seen: what the members bring on unseen data.
-        spoiling: free functions that err on unseen data, with p-value and gain.
+        measured: what the members bring on unseen data.
+        rejected_discrepancies: free functions that err on unseen data, with p-value and gain.
         notes: what was left out, in words.
         refuted: names that stood out clearly and that unseen data speak against, with p-value and gain: they are no
             cause, but there is one.
     """
 
-    founds: tuple[SelectedEffect, ...]
-    members: tuple[FittedEffect, ...]
+    findings: tuple[SelectedEffect, ...]
+    effects: tuple[FittedEffect, ...]
     p_values: tuple[float, ...]
-    seen: HeldOutResult
-    spoiling: tuple[tuple[FittedEffect, float, Gain], ...]
+    measured: HeldOutResult
+    rejected_discrepancies: tuple[tuple[FittedEffect, float, Gain], ...]
     notes: tuple[str, ...]
     refuted: tuple[tuple[FittedEffect, float, Gain], ...]
 
@@ -84,8 +84,8 @@ def validate_on_held_out(
             stronger one, whose formula may leave as much, unseen data that do not speak for it are the odds against it.
         unnamed: finds a free function of what a name that is left out was for, beside other members; with its p-value.
     """
-    founds = list(judgement.kept)
-    members = [*(found.member for found in founds), *judgement.patterns]
+    founds = list(judgement.named)
+    members = [*(found.effect for found in founds), *judgement.patterns]
     p_values = [*(found.p_value for found in founds), *judgement.p_values]
     spoiling: list[tuple[FittedEffect, float, Gain]] = []
     notes: list[str] = []
@@ -97,7 +97,7 @@ def validate_on_held_out(
         return measure(members, frozenset(i for i, member in enumerate(members) if member.hypothesis in gone))
 
     seen = look(members)
-    strongest = max((worth(found.member) for found in founds), default=0.0)
+    strongest = max((worth(found.effect) for found in founds), default=0.0)
     while idle := [i for i in range(len(founds)) if _is_insignificant(seen, i, members[i], beyond, worth, strongest)]:
         notes.append(_FAINT.format(members[idle[0]].hypothesis.label))
         for items in (founds, members, p_values):
@@ -124,7 +124,7 @@ def validate_on_held_out(
             continue
         elif instead := _alternative(founds[worst], worst, members, look, beyond, forms):
             founds[worst], seen = instead
-            members[worst] = founds[worst].member
+            members[worst] = founds[worst].effect
             if members[worst].hypothesis.label != label:
                 notes.append(_REPLACED.format(label, members[worst].hypothesis.label))
             continue
@@ -147,17 +147,17 @@ def validate_on_held_out(
     )
 
 
-_FAINT = "A fit of {} hardly stood out, and unseen data do not speak for it: left out."
-_DROPPED = "A fit of {} stood out of the noise, but does not help on unseen data: left out."
-_REPLACED = "A fit of {} stood out of the noise, but does not help on unseen data; {}, which fits about as well, does."
+_FAINT = "{} was rejected: it was barely significant, and the held-out data do not support it."
+_DROPPED = "{} was rejected: it was significant in the fit, but does not improve the held-out prediction."
+_REPLACED = "{0} was replaced by {1}: both fit about equally well, but only {1} improves the held-out prediction."
 _UNDONE = (
-    "The unseen data are without {}: they are as they would be if that had been undone before them, as a payload that "
-    "is put down. Errors are measured so; the model has it from its moment on."
+    "{} seems to be absent from the held-out data, for example because a payload was removed before. The held-out "
+    "errors are computed without it. The model keeps it from the time of the change on."
 )
-_WHOLE = "the robot as a whole"
+_WHOLE = "the whole robot"
 _SPOILING = (
-    "On {} something is unexplained, but unseen data do not bear out the free function that shows it: it is no part of "
-    "the extended model."
+    "Part of the residual of {} is unexplained. The free function fitted to it did not improve the held-out "
+    "prediction, so the extended model does not contain it."
 )
 
 
@@ -170,7 +170,7 @@ def _without_change(
     """Measures unseen data that a change is gone from again, such as a payload; None where that is no better."""
     hypothesis = members[place].hypothesis
     effect = hypothesis.effect
-    comes = effect.depends_on == "time" and not effect.passing and any(shape.moment for shape in effect.shapes)
+    comes = effect.depends_on == "time" and not effect.transient and any(shape.moment for shape in effect.shapes)
     if hypothesis in gone or not comes:
         return None
     gone.add(hypothesis)
@@ -200,7 +200,7 @@ def _alternative(
             harmless.append((SelectedEffect(form, found.p_value, found.rivals), seen))
             if seen.gains[place].ci95[0] > 0:
                 return harmless[-1]
-    close = [(rival, worse) for rival, worse in found.rivals if worse < CLOSE]
+    close = [(rival, worse) for rival, worse in found.rivals if worse < CLOSE_RIVAL_BIC]
     for k, (rival, worse) in enumerate(close):
         seen = measure([*members[:place], rival, *members[place + 1 :]])
         if not _is_harmful(seen, place, rival, beyond) and seen.gains[place].ci95[0] > 0:
@@ -214,7 +214,7 @@ def _harmful_free_functions(seen: HeldOutResult, members: Sequence[FittedEffect]
 
     Each may bring something beside the others, what those first took away.
     """
-    before, after = seen.unseen.nrmse(0), seen.unseen.nrmse(-1)
+    before, after = seen.errors.nrmse(0), seen.errors.nrmse(-1)
     worse = set((np.flatnonzero(after > MAX_FREE_RMSE_RATIO * before) + 1).tolist())
     free = range(named, len(members)) if len(members) > 1 else ()
     return [i for i in free if seen.gains[i].ci95[0] <= 0 and (members[i].hypothesis.joint or 0) in worse]
@@ -246,7 +246,7 @@ def _is_insignificant(
         return False
     slight = (
         worth(member) < min(MINOR_SHARE * strongest, MINOR_BIC_GAIN)
-        and seen.speaks[i] < MIN_RETAINED_GAIN
+        and seen.support[i] < MIN_RETAINED_GAIN
         and gain.ci95[0] <= 0
     )
     return slight or (worth(member) <= MIN_BIC_GAIN and gain.nrmse_after >= gain.nrmse_before)
@@ -262,27 +262,27 @@ def _is_harmful(seen: HeldOutResult, i: int, member: FittedEffect, beyond: Calla
     effect, joint = member.hypothesis.effect, member.hypothesis.joint
     if beyond(effect):
         return False
-    gain, speaks = seen.gains[i], seen.speaks[i]
+    gain, speaks = seen.gains[i], seen.support[i]
     told = (speaks >= MIN_RETAINED_GAIN and gain.ci95[0] > 0) or (
         speaks >= MIN_SUPPORT and speaks * member.gain > MIN_SUPPORT_CHI2
     )
-    if effect.depends_on == "state" and seen.kept[i] < MIN_RETAINED_GAIN and not told:
+    if effect.depends_on == "state" and seen.cv_retained_gain[i] < MIN_RETAINED_GAIN and not told:
         return True
-    if joint is not None and seen.unseen.astray(joint - 1):
+    if joint is not None and seen.errors.is_unreliable(joint - 1):
         return True
     # A free function claims no cause: what it brings elsewhere is all that it is good for.
     least = gain.ci95[1] if len(seen.gains) == 1 or is_of_time(effect) else gain.nrmse_before - gain.nrmse_after
     idle = effect.name.startswith(PREFIX) and least < 0
     # By less of its gain than this a base model that errs there, too, makes them speak against a cause.
-    against = seen.worse[i] and speaks < -CONTRADICTION_SHARE
+    against = seen.contradicts[i] and speaks < -CONTRADICTION_SHARE
     # Base parameters that it moves may err elsewhere by more than it is, whatever those rows say of it.
     risen = (
-        seen.rises[i] > MAX_RMSE_RATIO
+        seen.rmse_ratio[i] > MAX_RMSE_RATIO
         if speaks < MIN_RETAINED_GAIN
-        else seen.rises[i] > REJECT_RMSE_RATIO and gain.ci95[0] <= 0
+        else seen.rmse_ratio[i] > REJECT_RMSE_RATIO and gain.ci95[0] <= 0
     )
     # Heat that was stored before the unseen data, and what a pause left of it, are told by neither.
-    return (against and not effect.keeps) or idle or risen
+    return (against and not effect.has_thermal_memory) or idle or risen
 
 
 def _explained_by_cooling(seen: HeldOutResult, i: int, member: FittedEffect) -> bool:
@@ -291,5 +291,7 @@ def _explained_by_cooling(seen: HeldOutResult, i: int, member: FittedEffect) -> 
     One mass stands for gear and housing: how warm a joint is when it moves again it tells worse than how it warmed.
     """
     joint = member.hypothesis.joint
-    known = seen.kept[i] >= MIN_RETAINED_GAIN and not (joint is not None and seen.unseen.astray(joint - 1))
-    return member.hypothesis.effect.keeps and known and seen.rises[i] <= REJECT_RMSE_RATIO
+    known = seen.cv_retained_gain[i] >= MIN_RETAINED_GAIN and not (
+        joint is not None and seen.errors.is_unreliable(joint - 1)
+    )
+    return member.hypothesis.effect.has_thermal_memory and known and seen.rmse_ratio[i] <= REJECT_RMSE_RATIO

@@ -122,7 +122,7 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
             of them that fits had not seen.
         unseen: the errors on those.
     """
-    growth = np.ones(model.robot.n) if held_out else unseen.growing()
+    growth = np.ones(model.robot.n) if held_out else unseen.support_growth()
     every = [*logs, *held_out]
     errors = [np.abs(_error(_predicted(model, log, _before(model, log, every)))) * growth for log in held_out or logs]
     covered = np.full(model.robot.n, np.nan)

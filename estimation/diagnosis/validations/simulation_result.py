@@ -67,19 +67,19 @@ class Simulation:
         return int(np.argmax(np.abs(np.nan_to_num(self.torque[0] - self.torque[1]))))
 
     def summary(self, lengths: Sequence[str]) -> str:
-        """Says in one sentence what was simulated and what it brought.
+        """States controller correction and position error of the joint that changes most, without and with findings.
 
         Args:
             lengths: the unit of each joint's position (n,).
         """
         joint = self.telling
         (old, new), (far, near) = (tuple(part[joint] for part in pair) for pair in (self.torque, self.motion))
-        worse = ": what was found makes the simulation worse there" if new > WORSE * old else ""
+        worse = " The findings make the simulation of this joint worse." if new > WORSE * old else ""
         return (
-            f"simulated forward from {self.start:.1f} to {self.end:.1f} s, driven by the measured torque under an "
-            f"assumed {self.loop.bandwidth:g} Hz position loop: on joint {joint + 1} the loop adds {100 * old:.2f} -> "
-            f"{100 * new:.2f} % of the torque, the motion is {1e3 * far:.3g} -> {1e3 * near:.3g} m{lengths[joint]} off"
-            f"{worse}{f'. {self.note}' if self.note else ''}"
+            f"Forward simulation, joint {joint + 1}: controller correction {100 * old:.3g} -> {100 * new:.3g} % of "
+            f"torque, position error {1e3 * far:.3g} -> {1e3 * near:.3g} m{lengths[joint]} ({self.start:.1f} to "
+            f"{self.end:.1f} s, measured torque as input, assumed {self.loop.bandwidth:g} Hz position loop)."
+            f"{worse}{f' {self.note}' if self.note else ''}"
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import RARE, FittedEffect, refine
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.searches.selection import SelectedEffect, Selection
@@ -17,6 +17,7 @@ from estimation.diagnosis.validations.comparison import (
     NEARLY,
     STAYS,
     has_better_bic,
+    has_close_rivals,
     is_outperformed,
     retains_gain,
 )
@@ -26,8 +27,6 @@ from robots.terms.discrepancies.patterns import is_of_time, is_plain
 
 # Several names on a joint that explain this share of what as many free functions do are as good as those.
 AS_MUCH = 0.95
-# Rivals within this of the best BIC stay possible.
-CLOSE = 10.0
 # Nor is a name borrowed from free functions of which none does this share of what it does.
 HALF = 0.5
 
@@ -38,14 +37,14 @@ class Verdict:
 
     Attributes:
         verdict: ``none``, ``named``, ``ambiguous`` or ``unexplained``.
-        kept: the effects whose names hold.
+        named: the effects whose names hold.
         patterns: functions of the motion that explain the rest, each measured beside all before.
         p_values: of the patterns.
         explained: share of what stands out of the noise that the effects found explain.
     """
 
     verdict: str
-    kept: tuple[SelectedEffect, ...]
+    named: tuple[SelectedEffect, ...]
     patterns: tuple[FittedEffect, ...]
     p_values: tuple[float, ...]
     explained: float
@@ -63,22 +62,22 @@ def decide_verdict(
     A name holds where it leaves little that a free function explains, and where free functions in its place do not
     explain much more; several names on one joint must fit better than free functions do, all parameters counted.
     """
-    named = [found.member for found in selection.found]
+    named = [found.effect for found in selection.found]
     left, p_values = free_functions(problem, patterns, named, false_alarm, rng, alone=True)
     explained, rest = selection.accepted.gain, sum(map(excess_chi2, left))
     share = explained / (explained + rest) if explained + rest > 0 else 1.0
     able = [_plausible_form(problem, found, named) for found in selection.found]
-    named = [member if found is None else found.member for member, found in zip(named, able, strict=True)]
+    named = [member if found is None else found.effect for member, found in zip(named, able, strict=True)]
     kept = tuple(_plausible_rivals(problem, found) for found in able if found is not None)
     if share < ENOUGH:
-        kept = tuple(found for found in kept if found.member.hypothesis.joint is not None)
+        kept = tuple(found for found in kept if found.effect.hypothesis.joint is not None)
     kept = tuple(
         found for found in kept if _outperforms_free_functions(problem, found, named, patterns, false_alarm, rng)
     )
     if not _better_than_one_cause(problem, named, patterns, false_alarm, rng):
         kept = ()
     lost = set()
-    for j in sorted({found.member.hypothesis.joint for found in kept if found.member.hypothesis.joint is not None}):
+    for j in sorted({found.effect.hypothesis.joint for found in kept if found.effect.hypothesis.joint is not None}):
         if _explains_joint(problem, j, named, patterns, left, false_alarm, rng):
             continue
         if (fewer := _drop_weakest(problem, j, named, patterns, false_alarm, rng)) is None:
@@ -86,35 +85,35 @@ def decide_verdict(
         else:
             named = fewer
             again = {member.hypothesis: member for member in named}
-            kept = tuple(replace(f, member=again[f.member.hypothesis]) for f in kept if f.member.hypothesis in again)
+            kept = tuple(replace(f, effect=again[f.effect.hypothesis]) for f in kept if f.effect.hypothesis in again)
     # What acts on all joints at once goes before names of single joints that explain less than it does.
     whole = max((excess_chi2(m) for m in left if m.hypothesis.joint is None), default=0.0) if share < ENOUGH else 0.0
-    kept = tuple(f for f in kept if f.member.hypothesis.joint not in lost and f.member.gain > whole)
+    kept = tuple(f for f in kept if f.effect.hypothesis.joint not in lost and f.effect.gain > whole)
     members = left if share < ENOUGH else []
     while len(kept) < len(named):
         # Names that do not fit would only distort the patterns: those start anew, beside the names that hold.
-        beside = [found.member for found in kept]
+        beside = [found.effect for found in kept]
         members, p_values = free_functions(problem, patterns, beside, false_alarm, rng, alone=True)
         # What is unexplained reaches other joints: names that explain less than it does are not to be trusted.
-        strong = tuple(found for found in kept if found.member.gain > max(map(excess_chi2, members), default=0.0))
+        strong = tuple(found for found in kept if found.effect.gain > max(map(excess_chi2, members), default=0.0))
         if len(strong) == len(kept):
             break
         kept = strong
     while members:
         # A formula may have been named for what is unexplained on all joints, or on another one that it reaches.
         wide = any(member.hypothesis.joint is None for member in members)
-        spread = [found for found in kept if wide or len(found.member.group.joints) > 1]
+        spread = [found for found in kept if wide or len(found.effect.group.joints) > 1]
         borrowed = [f for f in spread if not _is_robust(problem, f, kept, patterns, false_alarm, rng)]
         # So may one that acts on its own joint alone, if base parameters have taken another's torque for it.
         for found in (found for found in kept if found not in spread):
-            elsewhere = [member for member in members if member.hypothesis.joint != found.member.hypothesis.joint]
-            if not retains_gain(problem, [found.member], [*_others(kept, found), *elsewhere]):
+            elsewhere = [member for member in members if member.hypothesis.joint != found.effect.hypothesis.joint]
+            if not retains_gain(problem, [found.effect], [*_others(kept, found), *elsewhere]):
                 borrowed.append(found)
         if not borrowed:
             return Verdict("unexplained", kept, tuple(members), tuple(p_values), float(share))
-        weakest = min(borrowed, key=lambda found: found.member.gain)
+        weakest = min(borrowed, key=lambda found: found.effect.gain)
         kept = tuple(found for found in kept if found is not weakest)
-        beside = [found.member for found in kept]
+        beside = [found.effect for found in kept]
         members, p_values = free_functions(problem, patterns, beside, false_alarm, rng, alone=True)
     verdict = "none" if not kept else "ambiguous" if any(map(has_close_rivals, kept)) else "named"
     return Verdict(verdict, kept, (), (), float(share))
@@ -131,23 +130,25 @@ def _plausible_form(problem: Problem, found: SelectedEffect, named: Sequence[Fit
 
     A delay beside which another friction acts at reversals, which it delays too, may be told later or sooner by them.
     """
-    own = found.member
+    own = found.effect
     if _is_plausible(problem, own):
         return found
     effect, joint = own.hypothesis.effect, own.hypothesis.joint
     beside = accept(problem, tuple(m.group for m in named if m is not own))
-    for known in effect.likely(problem.sees(effect), joint, own.shape, own.coefficients):
+    for known in effect.likely(problem.state_for(effect), joint, own.shape, own.coefficients):
         shape = tuple(was if value is None else value for value, was in zip(known, own.shape, strict=True))
         member = refine(problem, own.hypothesis, shape, beside, effort=0)
-        if _is_plausible(problem, member) and member.worth(problem.rows) > max(LEAST, STAYS * own.worth(problem.rows)):
-            return replace(found, member=member)
+        if _is_plausible(problem, member) and member.local_bic_gain(problem.rows) > max(
+            LEAST, STAYS * own.local_bic_gain(problem.rows)
+        ):
+            return replace(found, effect=member)
     return None
 
 
 def _is_plausible(problem: Problem, member: FittedEffect) -> bool:
     """Whether a machine may have what was fitted."""
     place, robot = member.hypothesis, problem.situation.robot
-    return place.effect.believable(robot, place.joint, member.coefficients, member.shape)
+    return place.effect.is_plausible(robot, place.joint, member.coefficients, member.shape)
 
 
 def _explains_joint(
@@ -178,7 +179,7 @@ def _explains_joint(
         return False
     if len(own) == 1:
         # Waves over a joint's range are no more than one place of it where that explains nearly as much with less.
-        waves = own[0].hypothesis.effect.waves
+        waves = own[0].hypothesis.effect.oscillates_over_range
         spots = [entry for entry in here if waves and isinstance(entry.hypothesis.effect, LocalFault)]
         free = free_functions(problem, spots, others, false_alarm, rng)[0] if spots else []
         if free and free[0].degrees < degrees and excess_chi2(free[0]) > NEARLY * (gain - degrees):
@@ -192,7 +193,7 @@ def _explains_joint(
             and not has_better_bic(problem, own, others, free[:1])
         ):
             return False
-    if any(member.hypothesis.effect.passing for member in own):
+    if any(member.hypothesis.effect.transient for member in own):
         # What comes and goes follows nearly any torque: functions of the motion that do so with less refute it.
         moving = [entry for entry in here if not is_of_time(entry.hypothesis.effect)]
         free, _ = free_functions(problem, moving, others, false_alarm, rng)
@@ -242,7 +243,7 @@ def _outperforms_free_functions(
     rng: np.random.Generator,
 ) -> bool:
     """Whether a name of the whole robot explains what free functions would in its place."""
-    own = found.member
+    own = found.effect
     if own.hypothesis.joint is not None:
         return True
     others = [member for member in named if member is not own]
@@ -286,7 +287,7 @@ def _is_robust(
     """
     others = _others(kept, found)
     free, _ = free_functions(problem, patterns, others, false_alarm, rng, alone=True)
-    own = found.member
+    own = found.effect
     each = [excess_chi2(member) / max(excess_chi2(own), 1e-300) for member in free]
     if sum(each) < NEARLY and max(each, default=0.0) < HALF and has_better_bic(problem, [own], others, free):
         return True
@@ -294,9 +295,4 @@ def _is_robust(
 
 
 def _others(kept: Sequence[SelectedEffect], found: SelectedEffect) -> list[FittedEffect]:
-    return [other.member for other in kept if other is not found]
-
-
-def has_close_rivals(found: SelectedEffect) -> bool:
-    """Whether an effect has rivals that fit about as well; one that robots seldom have must do so by the data alone."""
-    return any(worse < (RARE if rival.hypothesis.effect.rare else CLOSE) for rival, worse in found.rivals)
+    return [other.effect for other in kept if other is not found]

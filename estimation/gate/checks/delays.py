@@ -1,4 +1,4 @@
-"""By how much the torque lags the position: a delay that a fit would take for damping and friction."""
+"""Delay of the torque behind the position, which a fit would take for damping and friction."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def _refined(rows: Rows, fit: JointFit, joint: int, search: _Search) -> Delay:
 
 
 def delay_findings(delays: list[Delay | None], period: float) -> list[Finding]:
-    """Judges the delays (n,): one finding where the joints agree, else one a joint."""
+    """Judges the delays (n,): one finding where the joints agree, else one per joint."""
     told = {
         joint: delay
         for joint, delay in enumerate(delays, start=1)
@@ -144,7 +144,7 @@ def delay_findings(delays: list[Delay | None], period: float) -> list[Finding]:
         and abs(delay.value) > max(SURE * delay.error, LONG * period)
         and (delay.saved > WORTH if abs(delay.value) <= max(SAMPLES * period, SECONDS) else _shared(delay, delays))
     }
-    # A delay of the whole log shows in all joints alike, and may then be shorter than one joint by itself could tell.
+    # A delay common to all joints can be detected at a shorter value than one of a single joint.
     known = [
         delay
         for delay in delays
@@ -176,7 +176,7 @@ def _finding(value: float, error: float, joint: int | None, period: float, joint
         severity="warning" if abs(value) > period else "info",
         text=f"{who} {verb} the position by {1e3 * abs(value):.3g} ms ({abs(value) / period:.2g} samples, "
         f"standard error {1e3 * error:.2g} ms)",
-        action="friction and damping take it up: log both on one clock, or shift the torque back",
+        action="a delay distorts friction and damping: log position and torque on one clock, or shift the torque",
         value=value,
         unit="s",
         joint=joint,

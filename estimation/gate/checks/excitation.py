@@ -13,10 +13,10 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-# A joint whose left-out torque is predicted hardly better than by a constant says nothing of its parameters.
+# A joint whose held-out torque is predicted hardly better than by a constant is not identified.
 HOPELESS = 0.9
-# A joint of which less than half of the torque's variance follows from the motion, and of whose own parameters none is
-# told apart from zero by so many standard errors, is no better.
+# A joint is badly excited if less than half of its torque variance follows from the motion and none of its parameters
+# differs from zero by this many standard errors.
 WEAK, FAINTLY = 0.7, 10.0
 # An error above this share of the torque's standard deviation is worth a warning by itself.
 POOR = 0.3
@@ -45,12 +45,14 @@ def check_excitation(
             Finding(
                 name="badly_excited",
                 severity="warning" if told.any() else "refuse",
-                text=f"{title} is badly excited: on stretches that a fit has not seen, the error is "
-                f"{100 * error:.3g} % of the torque's standard deviation, and its own inertia and friction are at most "
-                f"{found.information:.2g} standard errors from zero",
-                action="its own parameters are not determined; record faster motions of this joint with larger torques"
+                text=(
+                    f"{title} is badly excited: on held-out data the error is {100 * error:.3g} % of the torque's "
+                    f"standard deviation, and its inertia and friction differ from zero by at most "
+                    f"{found.information:.2g} standard errors"
+                ),
+                action="its parameters are not determined; record faster motions of this joint with larger torques"
                 if told.any()
-                else "check units, signs and order of the joints, and that the log is of this robot",
+                else "check units, signs and order of the joints, and that the log belongs to this robot",
                 value=100 * float(error),
                 unit="%",
                 column=f"{name}{joint}",
@@ -64,9 +66,14 @@ def _poor(robot: Robot, error: float, name: str, joint: int) -> Finding:
     return Finding(
         name="poorly_explained",
         severity="warning",
-        text=f"{robot.joint_names[joint - 1]}: rigid body and friction leave {100 * error:.3g} % of the torque's "
-        "standard deviation unexplained on stretches that the fit has not seen",
-        action="look for what is missing: noise, an effect the model lacks, or a wrong order, sign or zero of a joint",
+        text=(
+            f"{robot.joint_names[joint - 1]}: rigid body and friction leave {100 * error:.3g} % of the torque's "
+            f"standard deviation unexplained on held-out data"
+        ),
+        action=(
+            "possible causes: noise, an effect missing in the model, or a wrong order, sign or zero of a joint; run "
+            "oed diagnose"
+        ),
         value=100 * error,
         unit="%",
         column=f"{name}{joint}",

@@ -1,4 +1,4 @@
-"""Positions that jump: an encoder that was set anew, an angle that wraps, rows that were overwritten."""
+"""Jumps of positions: a reset encoder, an angle that wraps, or overwritten rows."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def check_jumps(
     Args:
         t: time (N,) [s].
         columns: of the log.
-        spikes: rows that stick out, which are left out anyway.
+        spikes: rows with outliers, which are ignored anyway.
         gaps: rows after a gap.
         stands: joints (n,) that stand: they tremble by steps of the encoder, one sample each.
     """

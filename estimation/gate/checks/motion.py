@@ -51,7 +51,7 @@ def check_motion(robot: Robot, columns: Columns) -> list[Finding]:
             name="hardly_moves",
             severity="warning",
             text=f"{robot.joint_names[joint]} moves by {travel[joint]:.3g}, {100 * share[joint]:.2g} % of its range",
-            action="inertia and friction of this joint are not to be had from this log: move it further",
+            action="this log does not determine inertia and friction of this joint: move it further",
             value=float(travel[joint]),
             unit="rad or m",
             column=f"q{joint + 1}",

@@ -15,9 +15,9 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Below this unexplained share of the torque nothing is turned.
+# Below this unexplained fraction of the torque, directions count as right.
 WELL = 0.1
-# How much better (mean log error) the torques must be explained with a joint turned to be told, and to be beyond doubt.
+# Improvement (mean log error) with a joint's sign inverted, for a warning and for a refusal.
 BETTER, CERTAIN = 0.2, 0.5
 # Rows that are enough to see it, and rows and a ridge that rule most joints out: less than half of `BETTER` on those.
 ROWS, FEW, RIDGE = 1500, 500, 1e-5
@@ -68,9 +68,10 @@ def check_orientations(robot: Robot, rows: Rows, spread: Array) -> list[Finding]
         Finding(
             name="position_sign",
             severity="refuse" if better > CERTAIN else "warning",
-            text=f"{robot.joint_names[joint]} seems to turn the other way than the robot's description says: with its "
-            f"position{' and torque' if with_torque else ''} turned, errors are {smaller:.3g} % smaller",
-            action="turn its sign in a mapping (`sign: -1`), or correct the description",
+            text=f"{robot.joint_names[joint]} seems to turn opposite to the robot's description: with opposite sign "
+            f"of its "
+            f"position{' and torque' if with_torque else ''} errors are {smaller:.3g} % smaller",
+            action="set `sign: -1` for it in a mapping (--mapping), or correct the description",
             value=smaller,
             unit="%",
             column=f"q{joint + 1}",

@@ -30,8 +30,8 @@ STRAY, BESIDE = 10.0, 20
 def check_repeats(log: Log, columns: Columns) -> tuple[list[Finding], NDArray[np.intp]]:
     """Counts rows that repeat the row before in every column although the arm moves, and columns that got stuck.
 
-    Where there are many that no encoder's steps explain, the rows are given, too: a logger that asks more often than
-    the controller answers has what is new when it is new, and then old positions and torques at later times.
+    If there are many that the encoder's resolution does not explain, their rows are returned. A logger that polls
+    faster than the controller answers writes old positions and torques with later times.
 
     Args:
         log: the log.
@@ -59,10 +59,9 @@ def check_repeats(log: Log, columns: Columns) -> tuple[list[Finding], NDArray[np
                 name="repeated_rows",
                 severity="warning" if share > REPEATED else "info",
                 text=f"{100 * share:.3g} % of the rows repeat the row before while the arm moves",
-                action="these rows are left out; have the logger write each message once"
+                action="these rows are ignored; make the logger write each message once"
                 if len(copies)
-                else "repeated positions are left out of the smoothing; "
-                "have the logger write each message once if there are many",
+                else "repeated positions are ignored in the smoothing; make the logger write each message once",
                 value=100 * share,
                 unit="%",
                 row=first + 2,
@@ -104,7 +103,7 @@ def _stuck(columns: Columns, moving: NDArray[np.bool_]) -> list[Finding]:
             # With a share p of equal neighbours, N rows hold a run of log(N) / log(1/p) by chance; thrice that is not.
             chance = np.log(len(column)) / np.log(1.0 / max(share, 1.0 / len(column)))
             usual = JUMP * float(np.quantile(steps[:: max(1, len(steps) // 50_000)], 0.99))
-            # What hung may have stood for a part of that: rows in which the arm moves count.
+            # The arm may have rested for a part of that: only rows in which it moves count.
             starts, stops = ends(held)
             passed = np.concatenate([[0], np.cumsum(moving)])
             long = passed[stops] - passed[starts] >= max(3.0 * chance, FEWEST)
@@ -121,8 +120,8 @@ def _stuck(columns: Columns, moving: NDArray[np.bool_]) -> list[Finding]:
                 Finding(
                     name="stuck",
                     severity="warning",
-                    text=f"holds one value for {length + 1} rows while the arm moves, and jumps then",
-                    action="the log is cut there; repair the logger",
+                    text=f"keeps one value for {length + 1} rows while the arm moves, and then jumps",
+                    action="the log is split there; repair the logger",
                     value=float(length + 1),
                     unit="rows",
                     column=f"{prefix}{joint + 1}",

@@ -34,7 +34,7 @@ def lattice_step(values: Array) -> float:
     chosen = values[:: max(1, len(values) // SAMPLES)]
     distinct = np.unique(chosen)
     if len(distinct) < 3 or len(distinct) > 0.9 * len(chosen):
-        # As many values as samples: a lattice, if any, is finer than what can be told.
+        # As many values as samples: a resolution step, if any, is too small to be detected.
         return 0.0
     scale = max(float(np.abs(distinct).max()), 1e-300)
     distances = np.diff(distinct)
@@ -44,7 +44,7 @@ def lattice_step(values: Array) -> float:
     step = float(np.quantile(distances, 0.01))
     multiples = distances / step
     near = np.abs(multiples - np.round(multiples)) < 0.05
-    # Rounding in the file blurs high multiples: only the low ones can tell.
+    # Rounding in the file blurs high multiples: only low ones are used.
     low = multiples < 10.5
     if not low.any() or near[low].mean() < 0.95:
         return 0.0
@@ -67,8 +67,11 @@ def check_resolution(columns: Columns) -> list[Finding]:
                 Finding(
                     name="quantised_position",
                     severity="warning" if travel / step < COARSE_POSITION / 5 else "info",
-                    text=f"steps of {step:.3g}, {travel / step:.0f} of them in its whole range",
-                    action="smoothed before it is differentiated; log positions with more digits",
+                    text=(
+                        f"coarse resolution: steps of {step:.3g}, only {travel / step:.0f} of them over the whole "
+                        f"motion"
+                    ),
+                    action="the position is smoothed before differentiation; log positions with more digits",
                     value=step,
                     unit="rad or m",
                     column=f"q{joint + 1}",
@@ -83,8 +86,10 @@ def check_resolution(columns: Columns) -> list[Finding]:
                 Finding(
                     name="quantised_torque",
                     severity="warning" if step > spread else "info",
-                    text=f"steps of {step:.3g}, {100 * step / spread:.3g} % of its standard deviation",
-                    action="counts as noise; log it with more digits",
+                    text=(
+                        f"coarse resolution: steps of {step:.3g}, {100 * step / spread:.3g} % of its standard deviation"
+                    ),
+                    action="treated as noise; log it with more digits",
                     value=step,
                     unit="A" if name == "i" else "N m or N",
                     column=f"{name}{joint + 1}",
@@ -103,7 +108,7 @@ def check_clipping(columns: Columns) -> list[Finding]:
     Args:
         columns: of the log.
 
-    A joint that rests or is off at exactly zero is told as such.
+    A joint that rests or is off at exactly zero is reported as such.
     """
     findings = []
     name = columns.prefix
@@ -134,11 +139,11 @@ def check_clipping(columns: Columns) -> list[Finding]:
                 Finding(
                     name="zero_torque" if off else "clipped",
                     severity="warning",
-                    text=f"piles up at {' and '.join(f'{value:.6g}' for value in at_limit)}: "
+                    text=f"stays at {' and '.join(f'{value:.6g}' for value in at_limit)}: "
                     f"{100 * share:.3g} % of the rows, up to {run} in a row",
-                    action="leave the rows out in which the drive is off"
+                    action="remove the rows in which the drive is off"
                     if off
-                    else "leave these rows out, or record a slower motion that stays below the limit",
+                    else "the signal is probably saturated: remove these rows, or record a slower motion",
                     value=100 * share,
                     unit="%",
                     column=f"{name}{joint + 1}",

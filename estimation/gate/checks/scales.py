@@ -43,9 +43,9 @@ def check_scales(robot: Robot, moments: Moments, spread: Array) -> list[Finding]
                 Finding(
                     name="unit_of_torque",
                     severity="refuse" if better > 2 * DISAGREE else "warning",
-                    text="the joints do not agree on the links they share: errors would be "
+                    text="the torques of the joints do not fit one robot: errors would be "
                     f"{100 * (1 - np.exp(-better)):.3g} % smaller if the torques were {words}",
-                    action="state the unit of tau in a mapping",
+                    action="set the unit of tau in a mapping (--mapping)",
                     value=better,
                 )
             )
@@ -87,9 +87,9 @@ def check_size(
             continue
         gear = float(abs(robot.gear_ratio[joint - 1]))
         guess = (
-            "the sign is turned"
+            "its sign is inverted"
             if slope < 0
-            else f"it seems to be the motor's (gear ratio {gear:.4g})"
+            else f"it seems to be the motor torque (gear ratio {gear:.4g})"
             if gear > 2 and 0.5 < slope * gear < 2
             else "check its unit (percent of the rated torque, N mm, motor side)"
         )
@@ -97,9 +97,14 @@ def check_size(
             Finding(
                 name="torque_sign" if slope < 0 else "unit_of_torque",
                 severity="warning",
-                text=f"is {slope:.3g} times the torque of the robot's description (correlation {likeness:.2f}): "
-                f"{guess}",
-                action="state unit, gear ratio or sign in a mapping; right as it is if the description is that wrong",
+                text=(
+                    f"is {slope:.3g} times the torque computed from the robot's description (correlation "
+                    f"{likeness:.2f}): {guess}"
+                ),
+                action=(
+                    "set unit, gear ratio or sign in a mapping (--mapping); ignore this if the robot's description is "
+                    "inaccurate"
+                ),
                 value=slope,
                 column=f"{name}{joint}",
                 joint=joint,

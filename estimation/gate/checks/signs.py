@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 # a spring or a balancer that the model lacks can look like it.
 SURE, CLEAR = 5.0, 15.0
 # Power of friction, over that of the joint, below minus this drives; and how much worse (mean log variance) all torques
-# are explained when a torque is turned, for it to be right, or wrong, beyond doubt.
+# are explained when a torque's sign is inverted, for it to be certainly right or wrong.
 DRIVES, TURNED = 0.2, 0.3
 # A torque below this share of the joint's limit is hardly one.
 FAINT = 0.01
@@ -34,7 +34,7 @@ def check_signs(
     gains: Array,
     name: str,
 ) -> list[Finding]:
-    """Finds torques whose inertia is negative, or whose friction drives, with nothing that speaks against it.
+    """Finds torques with a negative inertia or a driving friction, without contrary evidence.
 
     Args:
         robot: with n joints.
@@ -57,7 +57,7 @@ def check_signs(
         heavy, lossy = ratios[joint - 1]
         negative = heavy < -SURE and lossy < SURE / 2
         drives = lossy < -SURE and heavy < SURE / 2 and -found.loss > DRIVES * found.power
-        # The other joints see the same links: a turned torque would fit them better the other way.
+        # The other joints see the same links: a torque of wrong sign would fit them better when inverted.
         others = any(agreed[: joint - 1] + agreed[joint:])
         if lossy < -CLEAR and heavy > SURE and -found.loss > DRIVES * found.power:
             findings.append(_against_time(found, name, joint))
@@ -74,10 +74,11 @@ def check_signs(
             Finding(
                 name="torque_sign",
                 severity="refuse" if sure else "warning",
-                text=f"by this torque the joint has an inertia of {found.inertia:.3g} (standard error "
-                f"{found.inertia_error:.2g}) and its friction takes {found.loss:.3g} W "
-                f"({found.loss_error:.2g}): " + ("its sign is turned" if sure else "it drives where it should brake"),
-                action="turn the sign of the torque, or of the position, of this joint: `sign: -1` in a mapping",
+                text=f"implausible: with this torque the joint's inertia is {found.inertia:.3g} (standard error "
+                f"{found.inertia_error:.2g}) and its friction power is {found.loss:.3g} W "
+                f"({found.loss_error:.2g}): "
+                + ("its sign is inverted" if sure else "it accelerates instead of braking"),
+                action="set `sign: -1` for the torque, or the position, of this joint in a mapping (--mapping)",
                 value=found.loss,
                 unit="W",
                 column=f"{name}{joint}",
@@ -91,9 +92,10 @@ def _against_time(found: JointPhysics, name: str, joint: int) -> Finding:
     return Finding(
         name="negative_friction",
         severity="refuse",
-        text=f"friction gives {-found.loss:.3g} W (standard error {found.loss_error:.2g}) instead of taking power, "
-        "while the inertia is positive: the time runs backward, or the friction was compensated beyond its size",
-        action="check the order of the rows and what the torque column holds",
+        text=f"friction delivers {-found.loss:.3g} W (standard error {found.loss_error:.2g}) instead of consuming "
+        f"power, "
+        "but the inertia is positive: time runs backwards, or friction was overcompensated",
+        action="check the order of the rows and the meaning of the torque column",
         value=found.loss,
         unit="W",
         column=f"{name}{joint}",
@@ -122,9 +124,9 @@ def _external(found: JointPhysics, name: str, joint: int) -> Finding:
     return Finding(
         name="moved_by_others",
         severity="refuse",
-        text=f"this torque holds the joint against gravity but does not accelerate it: it has an inertia of "
-        f"{found.inertia:.3g} by it (standard error {found.inertia_error:.2g})",
-        action="record a motion that the drives make, not one by hand or of another arm",
+        text=f"this torque balances gravity but does not accelerate the joint: the estimated inertia is "
+        f"{found.inertia:.3g} (standard error {found.inertia_error:.2g})",
+        action="record a motion made by the drives, not one guided by hand",
         value=found.inertia,
         unit="kg m2",
         column=f"{name}{joint}",

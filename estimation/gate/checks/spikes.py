@@ -1,4 +1,4 @@
-"""Single rows that stick out of their neighbours: a garbled message, a dropout, a cell somebody mistyped."""
+"""Outliers in single rows: a garbled message, a dropout, a typing error."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from estimation.gate.finding import Finding
 
 Array = NDArray[np.float64]
 
-# A row sticks out when it leaves and comes back by so many times the usual back and forth ...
+# A row is an outlier if it leaves and comes back by this multiple of the usual back and forth ...
 OUT = 25.0
 # ... and by this share of what the column does otherwise: a position cannot come back at once, a torque may.
 SHARE_OF_POSITION, SHARE_OF_SIGNAL = 0.01, 0.1
@@ -19,13 +19,13 @@ SHARE_OF_POSITION, SHARE_OF_SIGNAL = 0.01, 0.1
 FLICKER = 3.0
 # Share of rows above which they are no accident: of a torque they count as noise then, of a position they spoil it.
 MANY = 0.03
-# Rows of torque so close to where any joint turns round are no accident, where most that stick out are there: friction
+# Outliers of torque close to a reversal of any joint are not accidents, if most outliers are there: friction
 # that turns round jerks the arm, and a sharp fall of it makes a peak.
 BESIDE, MOST = 4, 0.5
 
 
 def spike_rows(values: Array, share: float, *, noisy: bool) -> NDArray[np.intp]:
-    """Finds the rows of a column (N,) that stick out: a step away, and the same step back.
+    """Finds the outliers of a column (N,): a step away, and the same step back.
 
     The back and forth of a row is the smaller of its two steps where they have opposite signs. Noise of any usual
     distribution stays within a few times its median; a step, as at a reversal of friction, does not come back.
@@ -66,14 +66,14 @@ def dropouts(values: Array, q: Array) -> NDArray[np.intp]:
         q: the joint's position (N,).
     """
     rows = np.flatnonzero((values[1:] == 0.0) & (q[1:] != q[:-1])) + 1
-    # Of a coarse torque zero is a value like any other, and a drive that is off is no accident.
+    # In a coarse torque, zero is a normal value, and a drive that is off is not an accident.
     if not 2 <= len(rows) <= MANY * len(values) or lattice_step(values) > 0:
         return np.empty(0, dtype=np.intp)
     return rows
 
 
 def stray_rows(columns: Columns) -> dict[tuple[str, int], NDArray[np.intp]]:
-    """Finds the rows that stick out of each column of position and of torque or current.
+    """Finds the outliers in each column of position and of torque or current.
 
     Args:
         columns: of the log.
@@ -112,7 +112,7 @@ def _away(rows: NDArray[np.intp], turning: NDArray[np.bool_]) -> NDArray[np.intp
 
 
 def are_accidents(rows: NDArray[np.intp], samples: int) -> bool:
-    """Tells whether rows that stick out are few enough to be left out of a column of so many."""
+    """Whether outliers are few enough to be ignored in a column of this length."""
     return len(rows) <= MANY * samples
 
 
@@ -123,7 +123,7 @@ def check_spikes(columns: Columns) -> tuple[list[Finding], NDArray[np.intp]]:
         columns: of the log.
 
     Returns:
-        The findings, and the rows in which any column sticks out.
+        The findings, and the rows with an outlier in any column.
     """
     findings: list[Finding] = []
     rows: list[NDArray[np.intp]] = []
@@ -136,11 +136,10 @@ def check_spikes(columns: Columns) -> tuple[list[Finding], NDArray[np.intp]]:
             Finding(
                 name="spikes",
                 severity="refuse" if many and prefix == "q" else "warning",
-                text=f"{len(found)} row{'s stick' if len(found) > 1 else ' sticks'} out of "
-                f"{'their' if len(found) > 1 else 'its'} neighbours, the first with "
-                f"{float(column[found[0]]):.6g} between {float(column[found[0] - 1]):.6g} and "
-                f"{float(column[found[0] + 1]):.6g}",
-                action="repair the logger: too many to leave out" if many else "these rows are left out",
+                text=f"{len(found)} outlier{'s' if len(found) > 1 else ''}, the first with "
+                f"{float(column[found[0]]):.4g} between {float(column[found[0] - 1]):.4g} and "
+                f"{float(column[found[0] + 1]):.4g}",
+                action="too many to ignore: repair the logger" if many else "these rows are ignored",
                 value=float(len(found)),
                 unit="rows",
                 column=f"{prefix}{joint + 1}",

@@ -25,12 +25,12 @@ FILLED = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Stalls:
-    """What a logger that stalled did to a log.
+    """Effects of a stalled logger on a log.
 
     Attributes:
         findings: none where it did not.
-        t: times (N,) [s] at which the rows were measured, as far as that can be told.
-        lost: rows of which it cannot.
+        t: times (N,) [s] at which the rows were measured, as far as they can be reconstructed.
+        lost: rows whose times cannot be reconstructed.
     """
 
     findings: tuple[Finding, ...]
@@ -73,14 +73,14 @@ def check_stalls(log: Log) -> Stalls:
         even, late = log.t, none
     if not len(late) + len(left_out):
         return Stalls((), log.t, none)
-    done = [f"{len(late)} are put back evenly"] if len(late) else []
-    done += [f"{len(left_out)}, with others missing, are left out"] if len(left_out) else []
+    done = [f"{len(late)} are moved to uniform times"] if len(late) else []
+    done += [f"{len(left_out)} are ignored because others are missing"] if len(left_out) else []
     finding = Finding(
         name="late_rows",
         severity="warning" if len(late) + len(left_out) > FEW * len(log) else "info",
-        text=f"the logger stalled {f'{len(begins)} times' if len(begins) > 1 else 'once'}, for up to "
-        f"{steps[begins].max():.3g} s, and then wrote rows faster than they were measured",
-        action=f"of these rows {' and '.join(done)}; have the controller stamp them",
+        text=f"the logger stopped {f'{len(begins)} times' if len(begins) > 1 else 'once'}, for up to "
+        f"{steps[begins].max():.3g} s, and then wrote the delayed rows with late time stamps",
+        action=f"of these rows, {' and '.join(done)}; let the controller write the time stamps",
         value=float(len(late) + len(left_out)),
         unit="rows",
         column="t",
@@ -90,7 +90,7 @@ def check_stalls(log: Log) -> Stalls:
 
 
 def _rounded(log: Log, period: float) -> Stalls | None:
-    """Puts rows at even times where those that are told are no more than these, rounded; None elsewhere."""
+    """Gives uniform times if the logged ones are these, rounded; None otherwise."""
     steps = np.diff(log.t)
     resolution = float(steps.min())
     if np.abs(steps / resolution - np.round(steps / resolution)).max() > WHOLE:
@@ -98,15 +98,15 @@ def _rounded(log: Log, period: float) -> Stalls | None:
     rows = np.arange(len(log))
     even = np.polynomial.Polynomial.fit(rows, log.t, 1)(rows)
     off = float(np.abs(log.t - even).max())
-    # Whole steps are even as they are; and what is rounded to a small part of one is as good as even.
+    # Whole steps are uniform already, and rounding to a small fraction of a step does no harm.
     if not FINE * period < off <= resolution or not _fits(log, even, rows[1::2]):
         return None
     step = float(even[1] - even[0])
     finding = Finding(
         name="rounded_times",
         severity="info",
-        text=f"times are those of rows {1e3 * step:.4g} ms apart, rounded to {1e3 * resolution:.3g} ms",
-        action="rows are put at even times; have more digits written",
+        text=f"times are rounded to {1e3 * resolution:.3g} ms; the sample period is {1e3 * step:.4g} ms",
+        action="rows are moved to uniform times; log the time with more digits",
         value=1e3 * resolution,
         unit="ms",
         column="t",

@@ -64,7 +64,7 @@ def check_timing(log: Log, controller_period: float) -> Timing:
                 severity="info",
                 text=f"time steps vary by {100 * jitter:.3g} % of the median ({1e3 * period:.4g} ms), "
                 f"from {1e3 * even.min():.3g} to {1e3 * even.max():.3g} ms",
-                action="positions are put on an even grid, torques stay where they are",
+                action="positions are resampled to a uniform grid; torques keep their times",
                 value=100 * jitter,
                 unit="%",
                 column="t",
@@ -85,9 +85,13 @@ def _rate(period: float, controller_period: float, log: Log) -> list[Finding]:
         Finding(
             name="unit_of_time" if likely else "rate",
             severity="refuse",
-            text=f"a median step of {period:.4g} s"
-            + (f": the time seems to be in {units[factor]}" if likely else ": too slow for accelerations"),
-            action=f"state the unit of t ({units[factor]}), in the file's head or in a mapping"
+            text=f"the median time step is {period:.4g} s"
+            + (
+                f": the time seems to be in {units[factor]}"
+                if likely
+                else ", which is too slow to compute accelerations"
+            ),
+            action=f"set the unit of t ({units[factor]}) in the file's head or in a mapping (--mapping)"
             if likely
             else "record at 50 Hz or more",
             value=period,
@@ -108,7 +112,7 @@ def _gaps(log: Log, steps: Array, gaps: NDArray[np.intp], parts: tuple[tuple[int
             name="gap",
             severity="refuse" if share > 0.5 else "warning",
             text=f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} in time, the longest of {steps[longest]:.4g} s",
-            action="the log is cut there, and nothing is interpolated across"
+            action="the log is split there"
             + (f"; stretches below {FEWEST} rows are left out ({100 * share:.3g} % of the rows)" if lost else ""),
             value=float(steps[longest]),
             unit="s",

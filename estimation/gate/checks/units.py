@@ -52,7 +52,7 @@ def suspect_position_unit(robot: Robot, columns: Columns) -> Suspicion | None:
     revolute = np.array([joint.kind == "revolute" for joint in robot.chain.joints])
     candidates = {
         "unit_of_position": (np.where(revolute, 180.0 / np.pi, 1000.0), "in degrees (or millimetres)", "unit"),
-        "motor_side_position": (np.abs(np.asarray(robot.gear_ratio)), "the motor's, not the link's", "gear ratios"),
+        "motor_side_position": (np.abs(np.asarray(robot.gear_ratio)), "of the motors, not the links", "gear ratios"),
     }
     for name, (factor, words, what) in candidates.items():
         # All joints come in one unit; those that move little stay inside their limits in any.
@@ -66,9 +66,11 @@ def suspect_position_unit(robot: Robot, columns: Columns) -> Suspicion | None:
             Finding(
                 name=name,
                 severity="refuse",
-                text=f"reaches {extreme:.4g}, and {int(beyond.sum())} of {robot.n} joints leave their range: positions "
-                f"seem to be {words}",
-                action=f"state the {what} in the file's head or in a mapping",
+                text=(
+                    f"reaches {extreme:.4g}, and {int(beyond.sum())} of {robot.n} joints exceed their range: "
+                    f"positions seem to be {words}"
+                ),
+                action=f"set the {what} in the file's head or in a mapping (--mapping)",
                 value=abs(extreme),
                 unit="rad or m",
                 column=f"q{worst + 1}",
@@ -98,7 +100,7 @@ def _left(robot: Robot, extreme: float, joint: int) -> Finding:
         severity="warning",
         text=f"reaches {extreme:.4g}, the robot's description allows {robot.limits.lower[joint]:.4g} to "
         f"{robot.limits.upper[joint]:.4g}",
-        action="check its zero, sign and unit, and that the log is of this robot",
+        action="check its zero, sign and unit, and that the log belongs to this robot",
         value=extreme,
         unit="rad or m",
         column=f"q{joint + 1}",
@@ -139,8 +141,8 @@ def check_speed(robot: Robot, peak: Array) -> list[Finding]:
         Finding(
             name="too_fast",
             severity="warning",
-            text=f"moves at {peak[worst]:.4g} per second, {ratio[worst]:.3g} times what the robot's description allows",
-            action="check the units of t and q, and that the log is of this robot",
+            text=f"reaches a speed of {peak[worst]:.3g}, {ratio[worst]:.3g} times the limit in the robot's description",
+            action="check the units of t and q, and that the log belongs to this robot",
             value=float(peak[worst]),
             unit="rad/s or m/s",
             column=f"q{worst + 1}",

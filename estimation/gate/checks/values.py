@@ -10,21 +10,21 @@ from estimation.gate.finding import Finding
 from estimation.gate.report import FEWEST
 from robots.signals import Log
 
-# Beyond these, whatever the unit, a position or a torque is none.
+# Values beyond these are impossible for a position or a torque in any unit.
 ABSURD_Q, ABSURD_TAU = 1e6, 1e8
 # Parameters of a joint and its link, and rows that each of them deserves.
 PER_JOINT, ROWS_PER_PARAMETER = 14, 10
-# Rows by which most columns are told apart.
+# Number of rows that distinguishes most columns.
 LOOKED_AT = 50
 
 
 def too_little(log: Log, timing: Timing) -> Finding:
-    """Refuses a log of which the smoothing leaves too little."""
+    """Refuses a log that is too short after smoothing."""
     longest = max(stop - first for first, stop in timing.parts)
     return Finding(
         name="short",
         severity="refuse",
-        text=f"{len(log)} rows, {longest} of them without a gap: too few to fit and to test a fit",
+        text=f"{len(log)} rows, {longest} of them without a gap: too few to fit and validate a model",
         action="record a longer log, without gaps",
         value=float(longest),
         unit="rows",
@@ -41,7 +41,7 @@ def few_rows(log: Log) -> list[Finding]:
             name="short",
             severity="warning",
             text=f"{len(log)} rows ({log.duration:.3g} s) for some {parameters} parameters",
-            action="record a longer log: standard errors of so few rows are not to be trusted",
+            action="record a longer log: standard errors from so few rows are unreliable",
             value=float(len(log)),
             unit="rows",
         )
@@ -92,8 +92,8 @@ def same_columns(columns: Columns) -> list[Finding]:
                 Finding(
                     name="same_column",
                     severity="warning",
-                    text=f"has the values of {twin} in every row",
-                    action="one was copied over the other: neither joint's parameters are to be trusted",
+                    text=f"is identical to {twin} in every row",
+                    action="one column was copied; the parameters of both joints are unreliable",
                     value=float(len(column)),
                     unit="rows",
                     column=name,
@@ -112,7 +112,7 @@ def too_short(log: Log) -> list[Finding]:
             name="short",
             severity="refuse",
             text=f"{len(log)} rows",
-            action=f"record a longer log: {FEWEST} rows are the least",
+            action=f"record a longer log: at least {FEWEST} rows are needed",
             value=float(len(log)),
             unit="rows",
         )
@@ -127,8 +127,8 @@ def constant_torques(columns: Columns) -> list[Finding]:
         Finding(
             name="constant_torque",
             severity="warning" if columns.varies.any() else "refuse",
-            text=f"holds {columns.signal[joint, 0]:.4g} throughout",
-            action="record the torque of the moving arm, and check what the column holds",
+            text=f"has the constant value {columns.signal[joint, 0]:.4g}",
+            action="record the torque of the moving arm, and check the meaning of the column",
             value=float(columns.signal[joint, 0]),
             unit="A" if columns.prefix == "i" else "N m or N",
             column=f"{columns.prefix}{joint + 1}",
@@ -139,7 +139,7 @@ def constant_torques(columns: Columns) -> list[Finding]:
 
 
 def notes_of_reader(log: Log) -> list[Finding]:
-    """What the reader did to the file."""
+    """Changes that the reader made."""
     return [
         Finding(
             name=str(note["name"]),

@@ -49,7 +49,7 @@ def check_velocities(robot: Robot, excerpts: tuple[Excerpt, ...]) -> list[Findin
                 name="velocity_column",
                 severity="warning",
                 text=text,
-                action="velocities are taken from the positions, not from the column; check which of the two is right",
+                action="velocities are computed from the positions; check which of the two columns is right",
                 value=float(size[joint]),
                 column=f"dq{joint + 1}",
                 joint=int(joint) + 1,
@@ -62,16 +62,16 @@ def _fault(likeness: float, size: float) -> str | None:
     if np.isnan(likeness):
         return "is zero although the position changes"
     if likeness < -LIKE:
-        return f"runs against the derivative of the position (correlation {likeness:.2f})"
+        return f"has the opposite sign of the position's derivative (correlation {likeness:.2f})"
     if abs(likeness) < LIKE:
-        return f"disagrees with the derivative of the position (correlation {likeness:.2f})"
+        return f"does not match the position's derivative (correlation {likeness:.2f})"
     if abs(size - 1.0) > SIZE:
         return f"is {size:.4g} times the derivative of the position"
     return None
 
 
 def _common_factor(robot: Robot, likeness: Array, size: Array, moves: NDArray[np.bool_]) -> Finding | None:
-    """A factor that all joints share tells which unit is wrong."""
+    """A common factor of all joints identifies the wrong unit."""
     sure = moves & (likeness > LIKE)
     if not sure.any():
         return None
@@ -91,13 +91,13 @@ def _common_factor(robot: Robot, likeness: Array, size: Array, moves: NDArray[np
     if meant(1e-3, sure & ~revolute):
         return _refusal("unit_of_position", size, sure & ~revolute, "positions seem to be in millimetres", "q")
     if meant(1.0 / gears, sure & (gears > 2)):
-        return _refusal("motor_side_position", size, sure & (gears > 2), "positions seem to be the motor's", "q")
+        return _refusal("motor_side_position", size, sure & (gears > 2), "positions seem to be motor positions", "q")
     if meant(degree, turning):
         return Finding(
             name="velocity_column",
             severity="warning",
-            text=f"velocities are {degree:.3g} times the derivative of the positions: in degrees per second",
-            action="velocities are taken from the positions, these columns are not used; state their unit",
+            text=f"velocities are {degree:.3g} times the derivative of the positions: probably in degrees per second",
+            action="velocities are computed from the positions and these columns ignored; set their unit",
             value=float(np.nanmedian(size[turning])),
             column=f"dq{int(np.argmax(turning)) + 1}",
         )
@@ -111,7 +111,7 @@ def _refusal(name: str, size: Array, which: NDArray[np.bool_], text: str, prefix
         name=name,
         severity="refuse",
         text=f"velocities are {ratio:.4g} times the derivative of the positions: {text}",
-        action=f"state the unit of {prefix}, in the file's head or in a mapping",
+        action=f"set the unit of {prefix} in the file's head or in a mapping (--mapping)",
         value=ratio,
         column=prefix if prefix == "t" else f"{prefix}{joint + 1}",
     )

@@ -18,7 +18,7 @@ from robots.robot import Robot
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
-# Of a joint by itself: enough to tell directions apart that the joint alone hardly sees.
+# Ridge of the fit of a single joint, for directions that the joint hardly shows.
 OWN_RIDGE = 1e-6
 # Stretches of time that are left out in turn, and blocks whose residuals count as independent.
 FOLDS, BLOCKS = 6, 60
@@ -68,7 +68,7 @@ class JointFit:
     scores: Array
 
     def combination(self, weights: Array) -> tuple[float, float]:
-        """A sum of parameters: its value and its standard error, which coloured residuals do not fool.
+        """A sum of parameters: its value and its standard error, which allows for correlated residuals.
 
         Args:
             weights: (k,) of the parameters of the unscaled columns.

@@ -1,4 +1,4 @@
-"""What a joint feels, by its quick fit: inertia and friction."""
+"""Inertia and friction power of a joint, by its quick fit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ POSES = 64
 
 @dataclass(frozen=True, eq=False)
 class JointPhysics:
-    """What a joint feels, by its quick fit.
+    """Inertia and friction power of a joint, by its quick fit.
 
     Attributes:
         inertia: mean of the diagonal of the mass matrix over the log's poses, with rotor [kg m2 or kg].
@@ -43,7 +43,7 @@ class JointPhysics:
 
     @property
     def information(self) -> float:
-        """The larger of the two ratios: whether the log tells anything of the joint's own parameters."""
+        """The larger of the two ratios: whether the log determines any of the joint's own parameters."""
         return float(np.abs(self.ratios).max())
 
 

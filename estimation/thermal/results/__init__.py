@@ -1,1 +1,1 @@
-"""What thermal fits found."""
+"""Results of thermal fits."""

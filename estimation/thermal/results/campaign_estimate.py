@@ -1,4 +1,4 @@
-"""What a campaign's fit of rigid body, friction and heat found."""
+"""Result of a campaign's fit of rigid body, friction and thermal models."""
 
 from __future__ import annotations
 
@@ -50,8 +50,11 @@ class CampaignEstimate:
         return all(fit is not None and fit.success for fit in self.thermal)
 
     def summary(self) -> str:
-        """Gives each joint's error with and without heat, and its time constants."""
-        lines = ["  joint   error with heat   without     slow / fast at full power   cold over warm"]
+        """Gives each joint's error with and without thermal model, its time constants, and notes."""
+        lines = [
+            "  joint   torque error RMS  without   time constants slow / fast    cold / warm\n"
+            "          with thermal model          at the largest power          friction"
+        ]
         for j, fit in enumerate(self.thermal):
             head = f"  {j + 1:5} {self.residual_rms[j]:14.4g} {self.residual_without[j]:11.4g}"
             if fit is None:
@@ -59,9 +62,22 @@ class CampaignEstimate:
                 continue
             constants = [q for q in fit.combinations if "time constant" in q.name][: len(fit.model.zones)]
             ratio = next((q.value for q in fit.combinations if q.name.startswith("friction cold")), float("nan"))
-            texts = " / ".join(f"{q.value / 60:.1f} ± {q.standard_error / 60:.1f}" for q in constants)
-            lines.append(f"{head}     {texts} min   {ratio:.2f}")
-        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
+            texts = " / ".join(
+                f"{q.value / 60:.1f} ± {q.standard_error / 60:.1f} min" if q.determined else "not determined"
+                for q in constants
+            )
+            lines.append(f"{head}     {texts}   {ratio:.2f}")
+        return "\n".join([*lines, *(f"  {note}" for note in self.joint_notes)])
+
+    @property
+    def joint_notes(self) -> tuple[str, ...]:
+        """Notes, with the joints they apply to unless they apply to all."""
+        moving = sum(fit is not None for fit in self.thermal)
+        found = []
+        for note in self.notes:
+            joints = [str(j) for j, fit in enumerate(self.thermal, start=1) if fit is not None and note in fit.notes]
+            found.append(f"Joint {', '.join(joints)}: {note}" if 0 < len(joints) < moving else note)
+        return tuple(found)
 
     def to_frame(self) -> pd.DataFrame:
         """Gives a row per joint and thermal quantity."""

@@ -89,7 +89,7 @@ class ThermalChoice:
         """Gives the table of thesis Tables 6 and 7, with held-out errors and criteria."""
         what = "one run after the other" if self.held_out == "runs" else "the last third of each run"
         lines = [
-            f"held out: {what}; the model of choice is {self.best}",
+            f"held out: {what}; chosen model: {self.best}",
             "  model        held out        AIC        BIC   "
             "heating mean / largest / steady   cooling mean / largest / steady",
         ]

@@ -1,4 +1,4 @@
-"""What the data do determine: combinations of the parameters, with standard errors."""
+"""Combinations of parameters that the data determine, with standard errors."""
 
 from __future__ import annotations
 

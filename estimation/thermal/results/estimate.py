@@ -1,4 +1,4 @@
-"""What a thermal fit found, how sure it is, and what it cannot know."""
+"""Result of a thermal fit: parameters, uncertainty, and undetermined quantities."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class ThermalEstimate:
         """Finds a parameter or a combination by its name.
 
         Raises:
-            InputError: there is none of that name.
+            InputError: the name is unknown.
         """
         everything = (*self.parameters, *self.combinations)
         for quantity in everything:
@@ -130,7 +130,7 @@ class ThermalEstimate:
         return float(np.sqrt(np.mean(error**2) / np.mean(np.concatenate([run.measured for run in parts]) ** 2)))
 
     def summary(self) -> str:
-        """Says what is determined and what is not."""
+        """Lists determined and undetermined quantities."""
         head = f"{self.model.name} thermal model from {self.rows} measurements"
         if np.isfinite(self.residual):
             head += f", friction error {100 * self.residual:.2f} % of its RMS"
@@ -232,7 +232,9 @@ def load_thermal_model(path: str | PathLike[str]) -> ThermalModel:
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
         if data["format"] != FORMAT or data["format_version"] != 1:
-            raise InputError("is no thermal model file of this version", file=file, allowed=f'"format": "{FORMAT}"')
+            raise InputError("is not a thermal model file of this version", file=file, allowed=f'"format": "{FORMAT}"')
         return build_thermal_model(data["model"])
     except (UnicodeDecodeError, json.JSONDecodeError, AttributeError, KeyError, TypeError) as error:
-        raise InputError(f"is no thermal model file: {type(error).__name__} {error}", file=file) from error
+        raise InputError(
+            f"is not a thermal model file, or is damaged ({type(error).__name__}: {error})", file=file
+        ) from error

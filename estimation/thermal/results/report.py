@@ -1,4 +1,4 @@
-"""What a finished thermal search says: values, standard errors, combinations and remarks."""
+"""Evaluation of a finished thermal fit: values, standard errors, combinations and notes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def report(search: Search, solution: Solution, warm: tuple[int, ...]) -> Thermal
     scales = _slopes(search, at)
     parameters = _parameters(search, model, np.sqrt(np.maximum(np.diag(covariance), 0.0)) * np.abs(scales))
     bounds, notes = _slow(search, solution, info, combinations, powers)
-    notes = [*search.structure.notes, *notes, *_remarks(search, solution, parameters, warm)]
+    notes = [*search.structure.notes, *notes, *_notes(search, solution, parameters, warm)]
     predicted = search.problem.predict(solution.coordinates, solution.states)
     white = search.weights * (predicted - search.problem.measured)
     likelihood = float(-0.5 * white @ white + np.log(search.weights / np.sqrt(2 * np.pi)).sum())
@@ -99,30 +99,30 @@ def _slow(
     bound = slow_bound(
         search.problem, solution, search.free, search.weights, search.prior, powers[0], slow.value, info.colour
     )
-    why = "The log is too short for" if slow.value > longest / 1.5 else "The data hardly determine"
+    why = "The data are too short for" if slow.value > longest / 1.5 else "The data do not determine"
     text = (
-        f"{why} the {slow.name}: {longest / 60:.3g} min of data, an estimate of {slow.value / 60:.3g} min. It is "
-        f"above {bound / 60:.3g} min (95 %, profile likelihood)."
+        f"{why} the {slow.name}. It is "
+        f"at least {bound / 60:.3g} min (95 %, profile likelihood); the longest run has {longest / 60:.3g} min."
     )
     return {slow.name: bound}, [text]
 
 
-def _remarks(search: Search, solution: Solution, parameters: tuple[Quantity, ...], warm: tuple[int, ...]) -> list[str]:
+def _notes(search: Search, solution: Solution, parameters: tuple[Quantity, ...], warm: tuple[int, ...]) -> list[str]:
     remarks = []
     for r in warm:
         start = ", ".join(f"{value:.1f}" for value in search.layout.start_at(solution.coordinates, r))
-        remarks.append(f"{search.runs[r].name} does not start at the surroundings' temperature but at {start} degC.")
+        remarks.append(f"{search.runs[r].name} does not start at ambient temperature; estimated start: {start} degC.")
     lower, upper = search.layout.bounds()
     for i, parameter in enumerate(search.kind.parameters):
         edge = min(abs(solution.coordinates[i] - lower[i]), abs(solution.coordinates[i] - upper[i]))
         if search.free[i] and edge < 1e-3 and not (parameter.lower == 0.0 and parameter.name != "alpha"):
             value = search.layout.values_at(solution.coordinates)[parameter.name]
-            remarks.append(f"{parameter.name} is at its bound, {value:.4g}.")
+            remarks.append(f"{parameter.name} is at its bound {value:.3g}.")
     lost = [p.name for p in parameters if not p.determined and p.name not in search.structure.conventions]
     if lost and not search.structure.conventions:
         remarks.append(f"Not determined by these runs: {', '.join(lost)}.")
     if not solution.success:
-        remarks.append(f"The solver did not confirm a minimum: {solution.status}.")
+        remarks.append("The fit stopped before it converged; check its plot.")
     return remarks
 
 

@@ -33,7 +33,7 @@ class FrictionSignal:
     Attributes:
         t: times (N,) [s].
         dq: velocities (N, n).
-        friction: measured torque less that of the rigid body, rotor and offset (N, n) [N m or N].
+        friction: measured torque minus that of the rigid body, rotor and offset (N, n) [N m or N].
         cold: friction torque of the model's own polynomial (N, n).
         counts: whether a joint moves fast enough for its friction to have a sign (N, n).
         log: where it came from.
@@ -62,7 +62,7 @@ def friction_signal(model: Model, log: Log) -> FrictionSignal:
     require_plain([log], HEAT)
     own = np.array([column.term == "friction" for column in model.parameters])
     if not own.any():
-        raise InputError("a model without friction", allowed="one whose terms have friction")
+        raise InputError("a model without friction", allowed="a model with a friction term")
     tau = torque_of(model.robot, log)
     motion = smooth(resample(log.t, log.q), float(model.provenance.get("cutoff_hz", 10.0)))
     parts = []

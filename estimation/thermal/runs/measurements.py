@@ -1,4 +1,4 @@
-"""What was measured in each run, kind by kind."""
+"""The measurements of each run, by kind."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 STEADY = 0.02
 # ... for at least so many samples.
 SHORTEST = 10
-# Scaled columns that are this close to dependent are not told apart by the data.
+# Scaled columns this close to linear dependence are not separately determined.
 DEPENDENT = 1e-7
 
 
@@ -68,7 +68,7 @@ def fit_single_axis(
 
     Raises:
         InputError: arrays of other shapes.
-        NotIdentifiableError: a motion that does not tell the effects apart, such as one at a single speed.
+        NotIdentifiableError: a motion that does not determine the effects separately, such as one at a single speed.
     """
     position, v, a, torque = _arrays(q, dq, ddq, tau)
     forward, backward = v > 0.0, v < 0.0
@@ -139,7 +139,9 @@ def sweep_friction(t: ArrayLike, q: ArrayLike, dq: ArrayLike, tau: ArrayLike, *,
     dummies = np.eye(len(stretches))[owner[inside]]
     columns = [np.cos(position[inside]), np.sin(position[inside])] if gravity else []
     Y = np.column_stack([*columns, dummies])
-    values, errors, _ = _least_squares(Y, torque[inside], "longer strokes, or the same range at all speeds both ways")
+    values, errors, _ = _least_squares(
+        Y, torque[inside], "use longer strokes, or the same range at all speeds in both directions"
+    )
     skip = len(columns)
     return Sweep(
         t=np.array([time[stretch].mean() for stretch in stretches]),
@@ -194,12 +196,12 @@ def _least_squares(Y: Array, tau: Array, remedy: str) -> tuple[Array, Array, flo
     scale = np.sqrt(np.sum(Y**2, axis=0))
     if Y.shape[0] <= Y.shape[1] or not np.all(scale > 0.0):
         raise NotIdentifiableError(
-            "the motion is too short, or one of the effects never acts", remedy=f"record {remedy}"
+            "the motion is too short, or gravity, inertia or friction has no influence", remedy=f"record {remedy}"
         )
     left, singular, right = np.linalg.svd(Y / scale, full_matrices=False)
     if singular[-1] < DEPENDENT * singular[0]:
         raise NotIdentifiableError(
-            "the motion does not tell gravity, inertia and friction apart", remedy=f"record {remedy}"
+            "the motion does not determine gravity, inertia and friction separately", remedy=f"record {remedy}"
         )
     values = right.T @ ((left.T @ tau) / singular) / scale
     residual = tau - Y @ values

@@ -1,4 +1,4 @@
-"""What is known of one heating or cooling of one joint, checked once."""
+"""Data of one heating or cooling of one joint, checked once."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class ThermalRun:
         temperatures: readings (N,) [degC] by zone (``T``, ``T1``, ``T2``), or by place: ``motor`` or ``joint`` (where
             heat is produced), ``housing`` (the outermost zone); NaN where the sensor was silent.
         T3: a thermocouple beside the joint (N,) [degC]: an input of the advanced model.
-        ambient: temperature of the surroundings, a number or (N,) [degC]; None where it was not measured.
+        ambient: ambient temperature, a number or (N,) [degC]; None where it was not measured.
         drives: 1 from each time to the next in which the drives were powered, a number or (N,).
         weight: number of samples behind each friction value, a number or (N,).
         name: for messages.
@@ -71,7 +71,7 @@ class ThermalRun:
             known = np.isfinite(friction)
             if np.isinf(friction).any() or not np.all(np.isfinite(cold[known]) & (cold[known] != 0.0)):
                 raise self._error(
-                    "a friction torque has no cold friction to be compared with", "cold_friction", "not zero"
+                    "a friction torque was measured where the cold friction is zero", "cold_friction", "not zero"
                 )
             object.__setattr__(self, "friction", friction)
         if not np.all(np.isfinite(weight) & (weight > 0.0)):
@@ -97,9 +97,9 @@ class ThermalRun:
             object.__setattr__(self, "ambient", around)
             self._check_fahrenheit()
         if not self.has_friction and not any(np.isfinite(values).any() for values in readings.values()):
-            raise self._error("neither friction nor temperatures were measured", "friction", "one of them")
+            raise self._error("the run has neither friction nor temperatures", "friction", "one of them")
         if self.power is None and self.has_friction:
-            raise self._error("friction is known, but not the power that it takes", "power", "watts")
+            raise self._error("the run has friction but no friction power", "power", "watts")
 
     @property
     def has_friction(self) -> bool:

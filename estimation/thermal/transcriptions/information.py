@@ -17,17 +17,17 @@ Array = NDArray[np.float64]
 
 # Directions in which the information is weaker by this much are not determined at all.
 FAINT = 1e-10
-# Standard error of a coordinate in a direction of which nothing is known: a factor of e^100 of a positive parameter.
+# Standard error of a coordinate in an undetermined direction: a factor of e^100 of a positive parameter.
 UNKNOWN = 100.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Information:
-    """What the measurements say.
+    """Information of the measurements.
 
     Attributes:
         covariance: of all coordinates (P, P), zero where one is not free.
-        colour: honest over white-noise standard errors, median.
+        colour: median ratio of the standard errors to those of white noise.
     """
 
     covariance: Array
@@ -76,7 +76,7 @@ def _prior_information(problem: Transcription, prior: Array) -> Array:
 
 
 def _inverse(matrix: Array) -> tuple[Array, Array]:
-    """Inverts the information, but for directions of which nothing is known; gives those as well, as columns."""
+    """Inverts the information except for undetermined directions, which are returned as columns."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     values, vectors = np.linalg.eigh(matrix / scale[:, None] / scale)
     known = values > FAINT * max(float(values[-1]), 1e-300)

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 # First guesses: share of the cold friction, and degrees.
 FRICTION, TEMPERATURE = 0.01, 0.2
-# Residuals below this share of the first guess are exact data, for which no noise can be told.
+# Residuals below this fraction of the first guess mean exact data without noise.
 EXACT = 1e-4
 # Gain of the log likelihood that noise in proportion to the torque must bring before it is believed.
 WORTH = 4.0

@@ -38,7 +38,7 @@ def slow_bound(
         prior: of the surroundings.
         power: at which the time constant holds [W].
         estimate: the fit's time constant [s].
-        colour: honest over white-noise standard errors: coloured noise says less.
+        colour: ratio of the standard errors to those of white noise.
 
     Returns:
         The bound [s].

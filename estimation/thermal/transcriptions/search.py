@@ -67,7 +67,7 @@ class Search:
             self.free[i] = parameter.name not in self.structure.fixed
         for r, run in enumerate(self.runs):
             zones = self.layout.start_slots(r)
-            # A thermometer tells where its zone starts.
+            # A thermometer gives the start temperature of its zone.
             seen = self.start == "auto" and bool(run.readings(self.kind))
             self.free[zones] = self.start == "free" or seen
             self.free[self.layout.ambient_slot(r)] = run.ambient is None
@@ -126,7 +126,10 @@ class Search:
         usable = [solution for solution in found if np.isfinite(solution.cost)]
         best = min(usable, key=lambda solution: solution.cost, default=None)
         if best is None:
-            raise SolverError("thermal model: no start led to a minimum", remedy="check units of power and torque")
+            raise SolverError(
+                "thermal model: the fit converged from none of its starting points",
+                remedy="check the units of power and torque",
+            )
         return best
 
     def reweighted(self, solution: Solution) -> Solution:

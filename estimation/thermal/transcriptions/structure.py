@@ -1,4 +1,4 @@
-"""What a set of runs can determine at all: which parameters are searched, which are conventions, and why."""
+"""Parameters that a set of runs can determine: which are searched, which are conventions, and why."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ RESTED, QUIET = 120.0, 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class Structure:
-    """What is searched and what is not.
+    """Searched and fixed parameters.
 
     Attributes:
         fixed: values of the parameters that are not searched.
         conventions: those among them that stand for what the data do not determine.
         scaled: parameters that mean something only together with a convention.
-        notes: what a reader must know.
+        notes: assumptions and limitations.
     """
 
     fixed: Mapping[str, float]
@@ -59,18 +59,24 @@ def find_structure(
     heat_known = any(run.power is not None for run in runs)
     if any(run.power is None for run in runs) and heat_known:
         raise InputError(
-            "some runs have a power and some have none", column="power", allowed="all or none", remedy="fit them apart"
+            "some runs have a power and some have none",
+            column="power",
+            allowed="all or none",
+            remedy="fit them separately",
         )
     if not any(run.has_friction for run in runs):
-        # Without friction data its slope acts through the heat alone, where nothing tells it from a heat exchange.
+        # Without friction data, its slope acts only through the heat, where it is equivalent to a heat exchange.
         if "alpha" not in known:
             known["alpha"] = 0.0
-            notes.append("No friction was measured: alpha is unknown, and heat is taken not to depend on temperature.")
+            notes.append(
+                "No friction was measured, so alpha is unknown. The friction power is assumed to be independent of "
+                "temperature."
+            )
         if heat_known:
             # Heat, exchanges and capacities scale together: the power is taken at its word.
             known.setdefault("beta", 1.0)
         else:
-            notes.append("The heat is unknown: it is taken for constant, and only ratios to it are determined.")
+            notes.append("The heating power is unknown and assumed constant. Only ratios to it are determined.")
         name = next(p.name for p in kind.parameters if p.name.startswith("C"))
         if not heat_known and name not in known:
             known[name] = next(p.typical for p in kind.parameters if p.name == name)
@@ -79,8 +85,8 @@ def find_structure(
         known["alpha"] = -0.01
         conventions.append("alpha")
         notes.append(
-            "Without a temperature reading alpha scales against heat exchanges and capacities: only their ratios are "
-            "determined. Values hold for alpha = -0.01 1/K by convention."
+            "Without a measured temperature, only the ratios of alpha to heat exchanges and capacities are "
+            "determined. The values hold for an assumed alpha of -0.01 1/K."
         )
     if heat_known and not any(run.heating.any() for run in runs if run.power is not None):
         raise NotIdentifiableError("the joint does not move in any run", remedy="record a run that heats the joint")
@@ -89,7 +95,7 @@ def find_structure(
     names = {p.name for p in kind.parameters}
     if "W_e" in names and "W_e" not in known and not any(np.any(np.asarray(run.drives) > 0) for run in runs):
         known["W_e"] = 0.0
-        notes.append("The drives were never powered: the motor's heat is zero by that.")
+        notes.append("The drives were never powered, so the motor's heat is zero.")
     for name in ("K13", "K23"):
         if name in names and name not in known and not any(run.T3 is not None for run in runs):
             known[name] = 0.0
@@ -146,11 +152,11 @@ def _coverage(runs: Sequence[ThermalRun]) -> list[str]:
         (~run.heating & seen).any() or _cooled(run, seen) for run, seen in zip(runs, measured, strict=True)
     ):
         notes.append(
-            "Heating only: no run was measured while it cooled down. What heat exchanges and what the falling power do "
-            "is told apart by the differences between powers alone."
+            "No cooling phase was measured. Heat exchange is distinguished from the falling friction power only by "
+            "differences between power levels."
         )
     if any(run.ambient is None for run in runs) and runs[0].power is not None:
-        notes.append("The surroundings' temperature was not measured: it is estimated, about that of T0.")
+        notes.append("The ambient temperature was not measured. It is estimated, starting from T0.")
     return notes
 
 

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solution:
-    """Where the solver ended.
+    """Result of the solver.
 
     Attributes:
         coordinates: parameters, then each run's start temperatures and surroundings, as they are searched (P,).

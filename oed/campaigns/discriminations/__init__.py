@@ -1,1 +1,1 @@
-"""Experiments that tell two possible causes apart."""
+"""Experiments that distinguish two possible causes."""

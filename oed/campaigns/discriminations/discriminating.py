@@ -1,4 +1,4 @@
-"""The experiment that tells two possible causes apart, for a robot of which there is no log.
+"""Design of an experiment that distinguishes two possible causes, before any log exists.
 
 Of each kind of experiment, T-optimality asks how much of either cause base model and rival would leave in the noise
 (Atkinson and Fedorov 1975): here of the very motion that is written, the reference included.
@@ -16,10 +16,10 @@ from estimation.diagnosis.experiment_plans.next_experiment import VARIANTS
 from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from oed.campaigns.discriminations.discrimination import Discrimination, Judged
-from oed.campaigns.discriminations.judging import STEP, Judge, require_separable
+from oed.campaigns.discriminations.discrimination import Discrimination, DiscriminationScore
+from oed.campaigns.discriminations.judging import STEP, Discriminator, require_separable
 from oed.campaigns.discriminations.rivals import parse_rivals
-from oed.campaigns.discriminations.separating import Run, Workshop
+from oed.campaigns.discriminations.separating import ExperimentBuilder, Run
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InfeasibleError, InputError, NotIdentifiableError
 from robots.common.progress import SILENT, Progress
@@ -31,7 +31,7 @@ from robots.terms.effects import EFFECTS, EXPERIMENTS
 Array = NDArray[np.float64]
 
 REFERENCES = 6
-"""Reference motions that are drawn at most; the one that tells most is taken."""
+"""Largest number of random reference motions; the most informative one is used."""
 SHARE = 0.02
 """Noise as a share of each joint's torque RMS, where it is not stated."""
 SHARP = 1e-3
@@ -50,10 +50,10 @@ def discriminate(
     seed: int = 0,
     progress: Progress = SILENT,
 ) -> Discrimination:
-    """Finds the experiment that tells two effects apart, before there is any log.
+    """Finds the experiment that distinguishes two effects best, before any log exists.
 
     A reference motion within the robot's limits, the best of several, is followed by each kind of experiment. The kind
-    that tells the smallest effects apart is taken, of those that are sure without a change by hand where there are any,
+    that distinguishes the smallest effects is used. Kinds that need no manual change are preferred if they are sure,
     and the best of its variants.
 
     Args:
@@ -66,7 +66,7 @@ def discriminate(
         home: pose (n,) at both ends of all motions; by default `Limits.home`.
         velocity_fraction: share of the velocity limits to use.
         seed: of the reference motion.
-        progress: is told of each kind.
+        progress: receives the progress of each kind.
 
     Raises:
         InputError: an effect or joint that there is not, values out of range, dynamics that are not known.
@@ -80,42 +80,44 @@ def discriminate(
     if not (np.isfinite(velocity_fraction) and 0.0 < velocity_fraction <= 1.0):
         raise InputError(f"found the velocity fraction {velocity_fraction}", allowed="above 0, up to 1")
     model = default_model(robot, friction=friction, velocity_scale=SHARP)
-    workshop = Workshop(find_base_parameters(model), home=home, velocity_fraction=velocity_fraction, seed=seed)
-    reference = workshop.runs()[0]
-    base = workshop.base.model
+    builder = ExperimentBuilder(find_base_parameters(model), home=home, velocity_fraction=velocity_fraction, seed=seed)
+    reference = builder.runs()[0]
+    base = builder.base.model
     if level is None:
         m, nominal = reference.motion, np.nan_to_num(base.nominal)
         level = SHARE * np.sqrt(np.mean(base.torque(m.q, m.dq, m.ddq, nominal) ** 2, axis=0))
-    problem = _planned(reference, level, workshop)
+    problem = _planned(reference, level, builder)
     pair = _choose(problem, places, reference)
-    judge = Judge(problem, pair, size)
+    judge = Discriminator(problem, pair, size)
     best = judge("reference", (reference,))
     for draw in range(1, REFERENCES):
-        other = Workshop(workshop.base, home=home, velocity_fraction=velocity_fraction, seed=seed + draw)
+        other = ExperimentBuilder(builder.base, home=home, velocity_fraction=velocity_fraction, seed=seed + draw)
         drawn = judge("reference", other.runs())
         if drawn.merit > best.merit:
-            workshop, reference, best = other, other.runs()[0], drawn
+            builder, reference, best = other, other.runs()[0], drawn
     index = next((h.joint - 1 for h in pair if h.joint is not None), int(np.argmax(np.ptp(reference.motion.q, axis=0))))
-    judged: dict[str, Judged] = {}
+    judged: dict[str, DiscriminationScore] = {}
     runs: dict[str, tuple[Run, ...]] = {}
     progress.start("kinds of experiment", len(MAKERS))
     try:
         for number, (kind, make) in enumerate(MAKERS.items(), start=1):
             try:
-                runs[kind] = workshop.runs(make(workshop.room, index, 0), kind)
+                runs[kind] = builder.runs(make(builder.room, index, 0), kind)
                 judged[kind] = judge(kind, runs[kind])
             except InfeasibleError as error:
-                judged[kind] = Judged.impossible(kind, str(error))
+                judged[kind] = DiscriminationScore.impossible(kind, str(error))
             progress.update(number, kind)
     finally:
         progress.finish()
     if not runs:
-        raise InfeasibleError(f"no kind of experiment keeps the limits of {robot.name}: {judged['repeat'].note}")
+        raise InfeasibleError(
+            f"no kind of experiment is possible within the limits of {robot.name}: {judged['repeat'].note}"
+        )
     require_separable(pair, list(judged.values()))
     kind = max(runs, key=lambda name: judged[name].merit)
     for variant in range(1, VARIANTS if kind in VARIED else 1):
         try:
-            varied = workshop.runs(MAKERS[kind](workshop.room, index, variant), kind)
+            varied = builder.runs(MAKERS[kind](builder.room, index, variant), kind)
         except InfeasibleError:
             continue
         better = judge(kind, varied)
@@ -133,7 +135,7 @@ def discriminate(
         size=size,
         settings={
             "friction": friction,
-            "home": workshop.home.tolist(),
+            "home": builder.home.tolist(),
             "velocity_fraction": velocity_fraction,
             "seed": seed,
         },
@@ -153,15 +155,15 @@ def _level(noise: ArrayLike | None, robot: Robot) -> Array | None:
     return level
 
 
-def _planned(reference: Run, level: Array, workshop: Workshop) -> Problem:
+def _planned(reference: Run, level: Array, builder: ExperimentBuilder) -> Problem:
     """Poses the diagnosis of the reference motion at `STEP`, the white part of the noise averaged over each step."""
     part = reference.parts(STEP)[0]
     sensors = Sensors()
-    every = max(round(STEP / workshop.period), 1)
+    every = max(round(STEP / builder.period), 1)
     share = sensors.coloured_share
     kept = (1.0 - share) / every + share
     thinned = Sensors(coloured_share=share / kept, correlation_time=sensors.correlation_time)
-    model = workshop.base.model
+    model = builder.base.model
     return planned_problem(
         model,
         np.asarray(model.nominal),
@@ -172,7 +174,7 @@ def _planned(reference: Run, level: Array, workshop: Workshop) -> Problem:
 
 
 def _choose(problem: Problem, places: list[tuple[str, int | None]], reference: Run) -> tuple[Hypothesis, Hypothesis]:
-    """Puts rivals without a joint where the reference alone tells them least, of the joints where both show."""
+    """Chooses the joint of rivals without one: where both act and the reference alone distinguishes them least."""
     robot = problem.situation.robot
     joints = [EFFECTS[name].joints(robot) if joint is None else (joint,) for name, joint in places]
     common = [joint for joint in joints[0] if joint in joints[1]]
@@ -190,7 +192,7 @@ def _choose(problem: Problem, places: list[tuple[str, int | None]], reference: R
         if len(options) == 1:
             return pair
         try:
-            merit = Judge(problem, pair, SHARE)("reference", (reference,)).energy
+            merit = Discriminator(problem, pair, SHARE)("reference", (reference,)).energy
         except NotIdentifiableError as error:
             failed = error
             continue

@@ -1,4 +1,4 @@
-"""The experiment that tells two causes apart: its motions, its chance, and its files."""
+"""Result: an experiment that distinguishes two causes, its probability of success, and its files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Judged:
+class DiscriminationScore:
     """One kind of experiment, judged.
 
     Attributes:
@@ -49,7 +49,7 @@ class Judged:
     note: str = ""
 
     @classmethod
-    def impossible(cls, kind: str, note: str) -> Judged:
+    def impossible(cls, kind: str, note: str) -> DiscriminationScore:
         """A kind that the limits forbid."""
         return cls(kind=kind, resolves=0.0, energy=-1.0, duration=0.0, runs=0, shares=(0, 0), visible=(0, 0), note=note)
 
@@ -96,7 +96,7 @@ class Discrimination:
     kind: str
     what: str
     runs: tuple[Run, ...]
-    ranking: tuple[Judged, ...]
+    ranking: tuple[DiscriminationScore, ...]
     alone: float
     noise: Array
     size: float
@@ -127,41 +127,44 @@ class Discrimination:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The causes for people."""
+        """The causes in words."""
         return tuple(
             name.replace("_", " ") + ("" if joint is None else f" of joint {joint}") for name, joint in self.rivals
         )
 
     @property
     def why(self) -> str:
-        """One sentence for people."""
+        """The result in two sentences, without the last full stop."""
         first, second = self.labels
         return (
-            f"A {self.kind.replace('_', ' ')} experiment ({self.what}) tells {first} from {second} with a chance of "
-            f"{100 * self.resolves:.0f} %, were either to show {100 * self.size:.2g} % of the torque beyond the base "
-            f"model; the reference motion alone with {100 * self.alone:.0f} %"
+            f"A {self.kind.replace('_', ' ')} experiment ({self.what}) distinguishes {first} from {second} with "
+            f"probability "
+            f"{100 * self.resolves:.0f} %, for an effect size of {100 * self.size:.2g} % of the torque. "
+            f"The reference motion alone reaches {100 * self.alone:.0f} %"
         )
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader must know."""
+        """Conditions and limitations of the experiment."""
         notes = []
         if self.resolves < 0.5:
             notes.append(
-                "None of the experiments is likely to tell them apart at this size and noise: repeat the best one, "
-                "or accept that both stay possible."
+                "No experiment is likely to distinguish them at this effect size and noise. Repeat the best one, or "
+                "accept that both remain possible."
             )
         if any(run.payload for run in self.runs):
             mass = max(run.payload for run in self.runs)
             notes.append(
-                f"Needs a payload of {mass:.3g} kg, of known mass and centre (0.1 m ahead of the flange here), mounted "
-                "before the run that names it."
+                f"A payload of {mass:.3g} kg with known mass and centre (here 0.1 m in front of the flange) must be "
+                f"mounted before the marked run."
             )
         if any(run.gravity is not None for run in self.runs):
-            notes.append("Needs the base tilted by 15 degrees, known, before the run that names its gravity.")
+            notes.append("The base must be tilted by a known angle of 15 degrees before the marked run.")
         lacking = missing_limits(self.robot.limits)
         if lacking:
-            notes.append(f"Cautious limits were assumed where the robot states none: {', '.join(lacking)}.")
+            notes.append(
+                f"Conservative limits were assumed where the robot's description states none: {', '.join(lacking)}."
+            )
         notes.append("Collisions are not checked.")
         return tuple(notes)
 
@@ -213,13 +216,17 @@ class Discrimination:
         write_atomic(target / DESIGN, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n")
 
     def summary(self) -> str:
-        """Says the answer in a few lines."""
-        lines = [self.why, "  kind                chance [%]   95 % from [%]   duration [s]"]
+        """Describes the experiment and its alternatives in a few lines."""
+        lines = [
+            f"{self.why}.",
+            f"  {'kind':18}  {'prob. [%]':>10}   {'size [%]':>13}   {'duration [s]':>12}",
+        ]
         for judged in self.ranking:
             least = judged.smallest(self.size)
             least_text = "-" if least is None else f"{100 * least:.2g}"
             value = judged.note or f"{100 * judged.resolves:10.0f}   {least_text:>13}   {judged.duration:12.0f}"
             lines.append(f"  {judged.kind:18}  {value}")
+        lines.append("  prob.: of the right decision; size: effect with 95 % probability, in % of the torque")
         for file, run in zip(self.files, self.runs, strict=True):
             load = f", payload {run.payload:.3g} kg" if run.payload else ""
             tilt = ", base tilted by 15 degrees" if run.gravity is not None else ""

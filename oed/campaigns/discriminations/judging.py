@@ -1,4 +1,4 @@
-"""How well an experiment tells two effects apart: the chance, and whether any experiment could."""
+"""Probability that an experiment distinguishes two effects, and whether any experiment could."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.power import chance_to_resolve
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.linear_algebra.orthonormal import orthonormal
-from oed.campaigns.discriminations.discrimination import Judged
+from oed.campaigns.discriminations.discrimination import DiscriminationScore
 from oed.campaigns.discriminations.separating import Run
 from robots.common.errors import NotIdentifiableError
 
@@ -42,15 +42,15 @@ class Instance:
     mixtures: Array
 
 
-class Judge:
-    """Says how well an experiment tells two hypotheses apart."""
+class Discriminator:
+    """Quantifies how well an experiment distinguishes two hypotheses."""
 
     def __init__(self, problem: Problem, pair: tuple[Hypothesis, Hypothesis], size: float) -> None:
         self.pair = pair
         self.instances = [item for hypothesis in pair for item in instances(problem, hypothesis, size)]
         self.grams = Grams(problem, self.instances)
 
-    def __call__(self, kind: str, runs: tuple[Run, ...]) -> Judged:
+    def __call__(self, kind: str, runs: tuple[Run, ...]) -> DiscriminationScore:
         """Judges an experiment by the worse of the two truths, each the median over its shapes and mixtures."""
         gram = self.grams.of([part for run in runs for part in run.parts(STEP)])
         energies: list[float] = []
@@ -74,7 +74,7 @@ class Judge:
             shares.append(share)
             alone.append(own)
         energy = min(energies)
-        return Judged(
+        return DiscriminationScore(
             kind=kind,
             resolves=chance_to_resolve(energy),
             energy=energy,
@@ -86,17 +86,17 @@ class Judge:
 
 
 def instances(problem: Problem, hypothesis: Hypothesis, size: float) -> list[Instance]:
-    """Gives an effect the shapes and the mixtures of coefficients in which it has a size in the reference.
+    """Scales an effect's shapes and coefficient mixtures to a given size in the reference motion.
 
     Raises:
-        NotIdentifiableError: it has none.
+        NotIdentifiableError: the effect is not visible in any of them.
     """
     grid = hypothesis.effect.grid(problem.situation, hypothesis.joint)
     kinds = ", ".join(kind.replace("_", " ") for kind in hypothesis.effect.experiments)
     if not grid:
         raise NotIdentifiableError(
-            f"a single motion shows no {hypothesis.label}",
-            remedy=f"what may show it: {kinds}; record several logs, and see oed diagnose",
+            f"a single motion cannot show {hypothesis.label}",
+            remedy=f"suitable experiments: {kinds}; record several logs and run oed diagnose",
         )
     count = min(len(grid), SHAPES)
     chosen = [grid[round((k + 0.5) * len(grid) / count - 0.5)] for k in range(count)]
@@ -114,7 +114,7 @@ def instances(problem: Problem, hypothesis: Hypothesis, size: float) -> list[Ins
         flat = X.reshape(N * problem.n, -1)
         shows = (flat - base @ (base.T @ flat)).reshape(X.shape)
         raw = float(np.square(X).sum(axis=(0, 2)).max())
-        # Where the base model absorbs all of it in the reference, it is the whole torque that has the size.
+        # If the base model absorbs the effect in the reference motion, the size refers to the effect's whole torque.
         torque = shows if np.square(shows).sum(axis=(0, 2)).max() > VISIBLE * raw else X
         grams = np.einsum("njk,njl->jkl", torque, torque) / N
         gram = max(grams, key=lambda g: float(np.trace(g)))
@@ -128,14 +128,14 @@ def instances(problem: Problem, hypothesis: Hypothesis, size: float) -> list[Ins
         found.append(Instance(hypothesis, shape, mixtures[0], mixtures))
     if not found:
         raise NotIdentifiableError(
-            f"{hypothesis.label} changes no torque of {problem.situation.robot.name} as it stands",
-            remedy=f"what may show it: {kinds}, with the payload or the tilt of the base known",
+            f"{hypothesis.label} does not change the torques of {problem.situation.robot.name} in the present set-up",
+            remedy=f"suitable experiments: {kinds}, with a known payload or a known tilt of the base",
         )
     return found
 
 
-def require_separable(pair: tuple[Hypothesis, Hypothesis], judged: Sequence[Judged]) -> None:
-    """Refuses rivals of which, in every experiment, the base model or the other one leaves nothing.
+def require_separable(pair: tuple[Hypothesis, Hypothesis], judged: Sequence[DiscriminationScore]) -> None:
+    """Refuses a pair of effects that no experiment can distinguish from the base model or from each other.
 
     Raises:
         NotIdentifiableError: with the reason.
@@ -143,19 +143,24 @@ def require_separable(pair: tuple[Hypothesis, Hypothesis], judged: Sequence[Judg
     possible = [j for j in judged if not j.note]
     tried = ", ".join(j.kind.replace("_", " ") for j in possible)
     remedy = (
-        f"tried: {tried}; what may help: a known payload with its centre off the last joint's axis, or another "
-        "measurement, such as joint torque beside motor current, temperature, or position behind the gear"
+        f"tried: {tried}. Use a known payload with its centre off the last joint's axis, or an additional "
+        "measurement: joint torque, temperature, or position behind the gear"
     )
     for at, hypothesis in enumerate(pair):
         if max(j.visible[at] for j in possible) < ALIAS:
             raise NotIdentifiableError(
-                f"the base model absorbs {hypothesis.label} whatever the motion: it is a change of its parameters",
+                (
+                    f"{hypothesis.label} cannot be distinguished from a change of the base model's parameters by any "
+                    f"motion"
+                ),
                 remedy=remedy,
             )
     for at, hypothesis in enumerate(pair):
         if max(j.shares[at] for j in possible) < ALIAS:
             raise NotIdentifiableError(
-                f"{pair[1 - at].label}, with other parameters of the base model, does whatever "
-                f"{hypothesis.label} does: no experiment of the catalogue tells them apart",
+                (
+                    f"no experiment of the catalogue distinguishes {hypothesis.label} from {pair[1 - at].label} with "
+                    f"other base-model parameters"
+                ),
                 remedy=remedy,
             )

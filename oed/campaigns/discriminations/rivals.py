@@ -20,7 +20,8 @@ def parse_rivals(rivals: str | Sequence[str], robot: Robot) -> list[tuple[str, i
     texts = [part.strip() for part in (rivals.split(",") if isinstance(rivals, str) else rivals)]
     if len(texts) != 2 or not all(texts):
         raise InputError(
-            f"found {len([t for t in texts if t])} effects to tell apart", allowed="two, such as stribeck:2,backlash:2"
+            f"--discriminate needs two effects, found {len([t for t in texts if t])}",
+            allowed="such as stribeck:2,backlash:2",
         )
     places = [_place(text, robot) for text in texts]
     if places[0][1] is None or places[1][1] is None:
@@ -29,7 +30,10 @@ def parse_rivals(rivals: str | Sequence[str], robot: Robot) -> list[tuple[str, i
             (name, known if joint is None and known in EFFECTS[name].joints(robot) else joint) for name, joint in places
         ]
     if places[0] == places[1]:
-        raise InputError(f"{texts[0]} and {texts[1]} are one and the same", allowed="two effects, or two joints")
+        raise InputError(
+            f"{texts[0]} and {texts[1]} are the same effect on the same joint",
+            allowed="two different effects, or two different joints",
+        )
     return places
 
 
@@ -43,10 +47,10 @@ def _place(text: str, robot: Robot) -> tuple[str, int | None]:
         return name, None
     joints = effect.joints(robot)
     if effect.whole_robot:
-        raise InputError(f"{name} acts on the whole robot, not on joint {place}", remedy=f"write {name}")
+        raise InputError(f"{name} acts on the whole robot, not on joint {place} alone", remedy=f"write {name}")
     if not re.fullmatch(r"[0-9]+", place) or int(place) not in joints:
         raise InputError(
-            f"{name} cannot act there on {robot.name}",
+            f"{name} cannot act on this joint of {robot.name}",
             joint=place or "(none)",
             allowed=", ".join(str(joint) for joint in joints) or "no joint of this robot",
         )

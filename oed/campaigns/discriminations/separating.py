@@ -44,7 +44,7 @@ SLOWER, TRIES = 1.15, 12
 """A stage that passes a limit of torque is made slower by this factor, so often at most."""
 LONG = 10.0
 """A rest of more seconds is not counted as data: nothing but heat changes in it."""
-CARRIED = 0.05
+PAYLOAD_SHARE = 0.05
 """Payload as a share of the arm's mass, where its rating is not known."""
 
 
@@ -92,7 +92,7 @@ class Run:
         return tuple(parts)
 
 
-class Workshop:
+class ExperimentBuilder:
     """Makes runs for one robot."""
 
     def __init__(
@@ -269,8 +269,8 @@ class Workshop:
             scale = scale / SLOWER
             middle = self.home + (middle - self.home) / SLOWER
         raise InfeasibleError(
-            "no reference motion about the home pose keeps the torque limits by the nominal dynamics",
-            remedy="another --home, or correct limits or dynamics",
+            "no reference motion around the home pose respects the torque limits of the nominal dynamics",
+            remedy="choose another home pose (--home), or correct the robot's torque limits or dynamics",
         )
 
     def _divides(self, step: float) -> bool:
@@ -288,4 +288,4 @@ class Workshop:
         """The mass of a payload that the robot carries well [kg], as the diagnosis chooses it."""
         if self.robot.payload:
             return 0.8 * self.robot.payload
-        return max(CARRIED * float(np.nansum(self.robot.inertia[:, 0])), 0.1)
+        return max(PAYLOAD_SHARE * float(np.nansum(self.robot.inertia[:, 0])), 0.1)

@@ -1,4 +1,4 @@
-"""``oed campaign``: excitation, friction and warm-up stages, repeated."""
+"""``oed campaign``: repeated excitation, friction and warm-up stages."""
 
 from __future__ import annotations
 
@@ -28,29 +28,39 @@ from oed.cli.options import (
 
 def campaign(
     robot: RobotOption,
-    cycles: Annotated[int, typer.Option(help="Heating cycles of each run: excitation, friction, warm-up.")] = 24,
-    cycle_time: Annotated[float, typer.Option(help="Duration of every cycle [s].")] = 300.0,
-    warm_up: Annotated[float, typer.Option(help="Warm-up in a heating cycle [s].")] = 180.0,
-    warm_up_range: Annotated[float, typer.Option(help="Part of each joint's range that the warm-up drives.")] = 0.8,
+    cycles: Annotated[
+        int, typer.Option(help="Heating cycles per run; each one is excitation, friction and warm-up.")
+    ] = 24,
+    cycle_time: Annotated[float, typer.Option(help="Duration of each cycle [s].")] = 300.0,
+    warm_up: Annotated[float, typer.Option(help="Duration of the warm-up in a heating cycle [s].")] = 180.0,
+    warm_up_range: Annotated[float, typer.Option(help="Fraction of each joint's range that the warm-up uses.")] = 0.8,
     duty: Annotated[
-        str, typer.Option(help="Duty cycle of the warm-up [%]; several, such as 20,40,60,100, make a run each.")
+        str,
+        typer.Option(help="Duty cycle of the warm-up [%]. A list such as 20,40,60,100 plans one run for each value."),
     ] = "100",
     cooling: Annotated[
-        int, typer.Option(help="After each run, friction stages with rest between, one every cycle time.")
+        int, typer.Option(help="Number of friction stages with rest in between after each run, one per cycle time.")
     ] = 0,
-    power_on: Annotated[float, typer.Option(help="Motors on without motion before the first run [s].")] = 0.0,
+    power_on: Annotated[
+        float, typer.Option(help="Time with motors on and without motion before the first run [s].")
+    ] = 0.0,
     design: Annotated[
         Path | None,
-        typer.Option("--design", help="Folder of an oed design; a quick one is made by default.", show_default=False),
+        typer.Option(
+            "--design",
+            help="Folder of an `oed design` result. Default: a quick design is made now.",
+            show_default=False,
+        ),
     ] = None,
     velocity_fraction: VelocityFractionOption = 1.0,
     torque_margin: TorqueMarginOption = 0.1,
-    collision: Annotated[
-        bool, typer.Option(help="Keep stages clear of the arm itself and of the obstacles in its file.")
-    ] = True,
-    ambient: Annotated[float, typer.Option(help="Temperature of the surroundings [degC].")] = 20.0,
+    collision: Annotated[bool, typer.Option(help="Avoid self-collisions and the obstacles in the robot file.")] = True,
+    ambient: Annotated[float, typer.Option(help="Ambient temperature [degC].")] = 20.0,
     cold_friction: Annotated[
-        float, typer.Option(help="Friction of the cold robot over that of its description, for the temperatures.")
+        float,
+        typer.Option(
+            help="Friction of the cold robot divided by that of its description, for the temperature forecast."
+        ),
     ] = 1.0,
     seed: SeedOption = 0,
     workers: WorkersOption = None,
@@ -63,7 +73,10 @@ def campaign(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Plans a campaign: campaign.json, one CSV a stage and report.html."""
+    """Plans a measurement campaign that warms the robot up.
+
+    Writes campaign.json, one CSV file for each stage, and report.html.
+    """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         from oed.campaigns import Programme

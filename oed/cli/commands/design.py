@@ -36,58 +36,92 @@ from oed.cli.options import (
 def design(
     context: typer.Context,
     robot: RobotOption,
-    criterion: Annotated[str, typer.Option(help="cond, d (log det), a, e, i (with --task), or cond-d.")] = "cond",
+    criterion: Annotated[
+        str,
+        typer.Option(
+            help=(
+                "Design criterion: cond (condition number), d (log determinant), a (trace of the inverse), e (smallest "
+                "singular value), i (prediction variance, needs --task), or cond-d (cond and d)."
+            )
+        ),
+    ] = "cond",
     friction: FrictionOption = "polynomial",
-    offset: Annotated[bool, typer.Option("--offset", help="With a torque offset on each joint.")] = False,
+    offset: Annotated[
+        bool, typer.Option("--offset", help="Include a constant torque offset per joint in the model.")
+    ] = False,
     family: FamilyOption = "fourier",
     harmonics: HarmonicsOption = 5,
     base_frequency: BaseFrequencyOption = 0.1,
     periods: Annotated[int, typer.Option(help="Repetitions of the optimised part.")] = 3,
-    strokes: Annotated[bool, typer.Option(help="One stroke a joint to its velocity bound, both ways.")] = True,
+    strokes: Annotated[
+        bool, typer.Option(help="Add one velocity stroke per joint: to the velocity limit, forwards and backwards.")
+    ] = True,
     home: Annotated[
-        str | None, typer.Option(help="Pose at both ends [rad or m], separated by commas.", show_default=False)
+        str | None, typer.Option(help="Pose at start and end [rad or m], comma-separated.", show_default=False)
     ] = None,
     velocity_fraction: VelocityFractionOption = 1.0,
-    torque: Annotated[bool, typer.Option(help="Keep the torque limits, by the robot's nominal dynamics.")] = True,
+    torque: Annotated[
+        bool, typer.Option(help="Respect the torque limits, computed with the robot's nominal dynamics.")
+    ] = True,
     torque_margin: TorqueMarginOption = 0.1,
     collision: CollisionOption = False,
-    clearance: Annotated[float, typer.Option(help="Clearance to keep [m].")] = 0.01,
+    clearance: Annotated[float, typer.Option(help="Minimum clearance for --collision [m].")] = 0.01,
     tool_box: Annotated[
         str | None,
         typer.Option(
-            help="Where the flange stays in the base frame: x from, to, y from, to, z from, to [m]; inf for no bound.",
+            help="Box for the flange in the base frame: xmin,xmax,ymin,ymax,zmin,zmax [m]; inf means no bound.",
             show_default=False,
         ),
     ] = None,
     singularity: Annotated[
         float | None,
-        typer.Option(help="Smallest singular value of the flange's scaled Jacobian to keep.", show_default=False),
+        typer.Option(
+            help="Lower bound for the smallest singular value of the flange's scaled Jacobian.", show_default=False
+        ),
     ] = None,
     essential: Annotated[
-        float, typer.Option(help="Leave out parameters whose torque stays below this share of each joint's.")
+        float, typer.Option(help="Leave out parameters that contribute less than this fraction of each joint's torque.")
     ] = 0.0,
-    scaling: Annotated[str, typer.Option(help="Columns the criterion judges: none, nominal or unit.")] = "none",
+    scaling: Annotated[
+        str, typer.Option(help="Column scaling of the regressor in the criterion: none, nominal or unit.")
+    ] = "none",
     noise: Annotated[
-        str | None, typer.Option(help="Torque noise of each joint [N m], separated by commas.", show_default=False)
+        str | None,
+        typer.Option(
+            help="Standard deviation of the torque noise of each joint [N m], comma-separated.", show_default=False
+        ),
     ] = None,
     after: Annotated[
         Path | None,
         typer.Option(
-            help="A model.json: add what it does not know yet; extensions count in torque limits.", show_default=False
+            help=(
+                "An identified model.json. The design adds information to it; its extensions count in the torque "
+                "limits."
+            ),
+            show_default=False,
         ),
     ] = None,
     task: Annotated[
-        Path | None, typer.Option(help="A trajectory.csv whose torques are to be predicted.", show_default=False)
+        Path | None,
+        typer.Option(
+            help="A trajectory.csv whose torques the identified model shall predict (criterion i).",
+            show_default=False,
+        ),
     ] = None,
     discriminate: Annotated[
         str | None,
         typer.Option(
-            help="Instead: tell two effects apart, such as stribeck:2,load_dependent_friction:2.", show_default=False
+            help=(
+                "Design an experiment that distinguishes two effects, such as stribeck:2,load_dependent_friction:2 "
+                "(effect:joint)."
+            ),
+            show_default=False,
         ),
     ] = None,
-    effort: Annotated[str, typer.Option(help="How long to search: quick, standard or thorough.")] = "standard",
+    effort: Annotated[str, typer.Option(help="Search effort: quick, standard or thorough.")] = "standard",
     time_limit: Annotated[
-        float | None, typer.Option(help="Stop searching after so many seconds and keep the best.", show_default=False)
+        float | None,
+        typer.Option(help="Stop the search after this time [s] and keep the best design.", show_default=False),
     ] = None,
     seed: SeedOption = 0,
     workers: WorkersOption = None,
@@ -100,14 +134,17 @@ def design(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Designs an excitation experiment: trajectory.csv, design.json and report.html."""
+    """Designs an excitation experiment for a robot.
+
+    Writes trajectory.csv, design.json and report.html.
+    """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         if discriminate is not None:
-            from oed.cli.discriminating import discriminating, refuse_others
+            from oed.cli.discriminating import design_discriminating, refuse_others
 
             refuse_others(context)
-            summary, data = discriminating(
+            summary, data = design_discriminating(
                 robot_from(robot, tip, joints, lock),
                 discriminate,
                 noise=numbers("--noise", noise),
@@ -175,5 +212,5 @@ def design(
         data.pop(long, None)
     console.result(f"{result.summary()}\nwritten to {out.resolve()}", data)
     if result.interrupted:
-        print("oed: interrupted; the best design so far was written", file=sys.stderr)
+        print("oed: interrupted; the best design found so far was written", file=sys.stderr)
         raise SystemExit(130)

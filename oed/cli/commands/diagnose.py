@@ -1,4 +1,4 @@
-"""``oed diagnose``: what the model gets wrong, why, and what mending it brings."""
+"""``oed diagnose``: the model's errors, their causes, and the gain of an extended model."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from oed.cli.options import (
     TipOption,
     robot_from,
 )
-from oed.cli.set_up import GravityOption, PayloadOption, told
+from oed.cli.set_up import GravityOption, PayloadOption, with_known_setup
 from robots.common.progress import Progress
 
 if TYPE_CHECKING:
@@ -33,12 +33,17 @@ def diagnose(
     robot: RobotOption,
     log: Annotated[
         list[Path] | None,
-        typer.Option("--log", help="A log, or a folder of logs; may be given again.", show_default=False),
+        typer.Option("--log", help="A log, or a folder of logs. Repeatable.", show_default=False),
     ] = None,
     held_out: Annotated[
         list[Path] | None,
         typer.Option(
-            "--held-out", help="A log to measure the gain on; by default whole runs are kept.", show_default=False
+            "--held-out",
+            help=(
+                "A log for validation only; it is not used in the fit. Default: some of the --log runs are held out. "
+                "Repeatable."
+            ),
+            show_default=False,
         ),
     ] = None,
     payload: PayloadOption = None,
@@ -46,27 +51,37 @@ def diagnose(
     own_clocks: Annotated[
         bool,
         typer.Option(
-            "--own-clocks", help="Each log began its clock anew: they count one after the other, a minute apart."
+            "--own-clocks",
+            help="Each log's time starts at its own zero. Logs are put one after the other, one minute apart.",
         ),
     ] = False,
-    friction: Annotated[str, typer.Option(help="Of the base model: polynomial or coulomb-viscous.")] = "polynomial",
+    friction: Annotated[
+        str, typer.Option(help="Friction of the base model: polynomial or coulomb-viscous.")
+    ] = "polynomial",
     limits: Annotated[
-        bool, typer.Option("--limits", help="Before any experiment: say what --trajectory could show.")
+        bool,
+        typer.Option(
+            "--limits",
+            help=(
+                "Before an experiment: compute which effects the planned --trajectory could show, and from which size "
+                "on."
+            ),
+        ),
     ] = False,
     trajectory: Annotated[
         list[Path] | None,
-        typer.Option("--trajectory", help="With --limits: a trajectory.csv; may be given again.", show_default=False),
+        typer.Option("--trajectory", help="With --limits: a planned trajectory.csv. Repeatable.", show_default=False),
     ] = None,
     model: Annotated[
         Path | None,
         typer.Option(
             "--model",
-            help="With --limits: a model.json; by default the robot's nominal dynamics.",
+            help="With --limits: an identified model.json. Default: the robot's nominal dynamics.",
             show_default=False,
         ),
     ] = None,
     noise: Annotated[
-        float, typer.Option(min=0.0, help="With --limits: torque noise expected, as a share of the torque RMS.")
+        float, typer.Option(min=0.0, help="With --limits: expected torque noise as a fraction of the torque RMS.")
     ] = 0.02,
     seed: SeedOption = 0,
     out: OutOption = Path("diagnosed"),
@@ -78,13 +93,19 @@ def diagnose(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Names what the simulation gets wrong, extends the model and measures the gain."""
+    """Finds the causes of a model's errors and extends the model.
+
+    Writes diagnosis.json, the extended model.json, report.html and, if useful, motions for the next experiment.
+    """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         described = robot_from(robot, tip, joints, lock)
         if limits:
             if log or held_out or payload or gravity or not trajectory:
-                raise typer.BadParameter("--limits takes --trajectory, and no logs", ctx=context)
+                raise typer.BadParameter(
+                    "--limits needs --trajectory; --log, --held-out, --payload and --gravity do not apply",
+                    ctx=context,
+                )
             summary, data = _limits(described, trajectory, model, noise, out, force, progress)
         else:
             if not log or trajectory or model:
@@ -105,7 +126,7 @@ def _limits(
     force: bool,
     progress: Progress,
 ) -> tuple[str, dict[str, Any]]:
-    """Says what planned motions could show: limits.json and report.html."""
+    """Computes which effects planned motions could show; writes limits.json and report.html."""
     import json as codec
 
     import numpy as np
@@ -121,7 +142,7 @@ def _limits(
     from robots.signals import Motion
 
     with ResultFolder(out, force, names=["limits.json", "report.html"]) as folder:
-        # As a diagnosis fits it by default.
+        # The model that a diagnosis fits by default.
         torque_model = default_model(robot, friction="polynomial", velocity_scale=1e-3)
         parameters = np.asarray(torque_model.nominal)
         beyond: list[str] = []
@@ -155,9 +176,11 @@ def _limits(
     hidden = sum(not np.isfinite(limit.detectable) for limit in found)
     named = sum(limit.attributable <= 0.02 for limit in found)
     summary = [
-        f"{len(found)} effects and places: {named} would be seen and named at 2 % of the joint's torque, "
-        f"{hidden} are hidden in this motion",
-        "  effect                       joint   found [%]   at worst   named [%]   toughest rival",
+        f"{len(found)} pairs of effect and joint: {named} would be found and named at 2 % of the joint's torque RMS, "
+        f"{hidden} cannot be found with this motion at any size",
+        "  found: smallest effect, in % of the joint's torque RMS, that is found with 95 % probability",
+        "  worst case: the same for the least visible shape; named: also distinguished from other effects",
+        f"  {'effect':28} {'joint':>5} {'found [%]':>11} {'worst case':>10} {'named [%]':>11}   closest rival",
     ]
     summary += [
         f"  {limit.effect:28} {limit.joint or 'all':>5} {_percent(limit.detectable):>11} "
@@ -166,13 +189,13 @@ def _limits(
     ]
     summary += [f"  {note}" for note in notes]
     if beyond:
-        summary.append(f"  limits beside the base model; the model's extensions are not counted: {', '.join(beyond)}")
+        summary.append(f"  these limits refer to the base model without its extensions: {', '.join(beyond)}")
     return "\n".join(summary), data
 
 
 _SMOOTH = (
-    "The description says nothing of the friction of joints {}: shares are of a torque without it, and limits may be "
-    "far too small. Give the model of an identified robot (--model)."
+    "The robot's description states no friction for joints {}. The limits refer to a torque without it and may be "
+    "far too small. Use --model with an identified model."
 )
 
 
@@ -204,8 +227,8 @@ def _diagnosis(
     with ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]) as folder:
         read = list(read_logs(logs, n=robot.n))
         other = list(read_logs(held_out, n=robot.n)) if held_out else []
-        # Held-out logs count on after the others.
-        both = told([*read, *other], *known)
+        # Held-out logs are numbered after the others.
+        both = with_known_setup([*read, *other], *known)
         if own_clocks:
             both = on_one_clock(both)
         read, other = both[: len(read)], both[len(read) :]

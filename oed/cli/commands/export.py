@@ -1,4 +1,4 @@
-"""``oed export``: a trajectory in the form that a controller reads."""
+"""``oed export``: a trajectory in a controller's format."""
 
 from __future__ import annotations
 
@@ -13,18 +13,20 @@ from oed.cli.options import ForceOption, JsonOption, QuietOption
 
 def export(
     trajectory: Annotated[Path, typer.Argument(help="A trajectory.csv.", show_default=False)],
-    to: Annotated[str, typer.Option("--to", help="The form: csv.")] = "csv",
+    to: Annotated[str, typer.Option("--to", help="Format: csv.")] = "csv",
     out: Annotated[
-        Path | None, typer.Option("--out", help="The file; by default beside the trajectory.", show_default=False)
+        Path | None, typer.Option("--out", help="File to write. Default: next to the trajectory.", show_default=False)
     ] = None,
-    degrees: Annotated[bool, typer.Option("--degrees", help="Angles in degrees.")] = False,
-    positions_only: Annotated[bool, typer.Option("--positions-only", help="Only t and q1..qn.")] = False,
-    bare: Annotated[bool, typer.Option("--bare", help="Only a header line before the numbers.")] = False,
+    degrees: Annotated[bool, typer.Option("--degrees", help="Write angles in degrees.")] = False,
+    positions_only: Annotated[bool, typer.Option("--positions-only", help="Write only t and q1..qn.")] = False,
+    bare: Annotated[
+        bool, typer.Option("--bare", help="Write the column names without the comment block above them.")
+    ] = False,
     force: ForceOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Writes a trajectory for a controller."""
+    """Writes a trajectory file for a robot controller."""
     console = Console(json=json, quiet=quiet)
     with console.working():
         from oed.exports import FORMS, read_trajectory, write_trajectory

@@ -1,4 +1,4 @@
-"""``oed identify``: a robot's parameters from its logs."""
+"""``oed identify``: a robot's dynamic parameters from its logs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from oed.cli.options import (
     TipOption,
     robot_from,
 )
-from oed.cli.set_up import GravityOption, PayloadOption, told
+from oed.cli.set_up import GravityOption, PayloadOption, with_known_setup
 
 
 def identify(
@@ -33,17 +33,17 @@ def identify(
     mapping: MappingOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
-    method: Annotated[str, typer.Option(help="An estimator, or all to compare them.")] = "wls",
-    friction: Annotated[str, typer.Option(help="polynomial or coulomb-viscous.")] = "polynomial",
-    rotor: Annotated[bool, typer.Option(help="With rotor inertias.")] = True,
-    offset: Annotated[bool, typer.Option(help="With a torque offset on each joint.")] = True,
+    method: Annotated[str, typer.Option(help="Estimator, or `all` to compare them.")] = "wls",
+    friction: Annotated[str, typer.Option(help="Friction model: polynomial or coulomb-viscous.")] = "polynomial",
+    rotor: Annotated[bool, typer.Option(help="Include rotor inertias in the model.")] = True,
+    offset: Annotated[bool, typer.Option(help="Include a constant torque offset per joint in the model.")] = True,
     seed: SeedOption = 0,
     out: OutOption = Path("identified"),
     urdf: Annotated[
-        Path | None, typer.Option("--urdf", help="Also write a URDF with the identified bodies.", show_default=False)
+        Path | None, typer.Option("--urdf", help="Also write a URDF with the identified links.", show_default=False)
     ] = None,
     c_code: Annotated[
-        Path | None, typer.Option("--c-code", help="Also write torque and gravity as C.", show_default=False)
+        Path | None, typer.Option("--c-code", help="Also write C code for torque and gravity.", show_default=False)
     ] = None,
     tip: TipOption = None,
     joints: JointsOption = None,
@@ -53,7 +53,10 @@ def identify(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Identifies parameters with uncertainties: model.json and report.html."""
+    """Identifies a robot's dynamic parameters with their uncertainty.
+
+    Writes model.json and report.html.
+    """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         from estimation import identify as run
@@ -66,10 +69,12 @@ def identify(
 
         with ExitStack() as files:
             folder = files.enter_context(ResultFolder(out, force, names=["model.json", "report.html"]))
-            # Opened before the work, so that a file in the way ends it early and an error leaves none of them.
+            # Opened before the work: an existing file ends the command early, and an error leaves no file behind.
             streams = {path: files.enter_context(open_atomic(path, force=force)) for path in (urdf, c_code) if path}
             described = robot_from(robot, tip, joints, lock)
-            logs = told(read_logs(log, n=described.n, mapping=mapping, joints=described.joint_names), payload, gravity)
+            logs = with_known_setup(
+                read_logs(log, n=described.n, mapping=mapping, joints=described.joint_names), payload, gravity
+            )
             options: dict[str, Any] = {
                 "friction": friction,
                 "rotor": rotor,

@@ -1,4 +1,4 @@
-"""``oed pareto``: designs between the extremes of several criteria."""
+"""``oed pareto``: designs that trade several criteria off."""
 
 from __future__ import annotations
 
@@ -28,15 +28,17 @@ from oed.cli.options import (
 
 def pareto(
     robot: RobotOption,
-    criteria: Annotated[str, typer.Option(help="Two or three of cond, d, a, e, separated by commas.")] = "cond,d",
-    points: Annotated[int, typer.Option(help="Designs from one criterion to another, both ends included.")] = 5,
+    criteria: Annotated[str, typer.Option(help="Two or three of cond, d, a, e, comma-separated.")] = "cond,d",
+    points: Annotated[int, typer.Option(help="Number of designs between two criteria, both ends included.")] = 5,
     friction: FrictionOption = "polynomial",
     family: FamilyOption = "fourier",
     harmonics: HarmonicsOption = 5,
     base_frequency: BaseFrequencyOption = 0.1,
     collision: CollisionOption = False,
-    scaling: Annotated[str, typer.Option(help="Columns the criteria judge: none, nominal or unit.")] = "none",
-    effort: Annotated[str, typer.Option(help="How long to search for each: quick, standard or thorough.")] = "quick",
+    scaling: Annotated[
+        str, typer.Option(help="Column scaling of the regressor in the criteria: none, nominal or unit.")
+    ] = "none",
+    effort: Annotated[str, typer.Option(help="Search effort for each design: quick, standard or thorough.")] = "quick",
     seed: SeedOption = 0,
     workers: WorkersOption = None,
     out: OutOption = Path("pareto"),
@@ -45,7 +47,10 @@ def pareto(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Designs for several criteria at once: pareto.json, report.html and a folder for each design."""
+    """Designs experiments on the Pareto front of several criteria.
+
+    Writes pareto.json, report.html and one folder for each design.
+    """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         from oed.experiments import LimitOptions, ModelOptions, SearchOptions, TrajectoryOptions, WeightOptions

@@ -1,4 +1,4 @@
-"""``oed predict``: the torques of a motion by an identified model."""
+"""``oed predict``: joint torques of a motion, by an identified model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 
 from oed.cli.console import Console
 from oed.cli.options import ForceOption, JsonOption, MappingOption, QuietOption
-from oed.cli.set_up import GravityOption, PayloadOption, told
+from oed.cli.set_up import GravityOption, PayloadOption, with_known_setup
 
 if TYPE_CHECKING:
     from estimation.models.model import Model
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def predict(
     model: Annotated[Path, typer.Option("--model", help="A model.json, or its folder.", show_default=False)],
-    log: Annotated[Path, typer.Option("--log", help="A log of the motion.", show_default=False)],
+    log: Annotated[Path, typer.Option("--log", help="A log with the motion.", show_default=False)],
     mapping: MappingOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
@@ -27,36 +27,43 @@ def predict(
         list[Path] | None,
         typer.Option(
             "--before",
-            help="Of a model with heat: a log of what warmed the robot before, or a folder; may be given again.",
+            help="Thermal model: a log, or a folder of logs, of the robot's motion before this log. Repeatable.",
             show_default=False,
         ),
     ] = None,
     ambient: Annotated[
         float | None,
         typer.Option(
-            help="Of a model with heat: temperature of the surroundings, where logs do not state it [degC].",
+            help="Thermal model: ambient temperature of logs that do not state it [degC].",
             show_default=False,
         ),
     ] = None,
-    out: Annotated[Path, typer.Option("--out", help="The table to write: t, tau1..taun.")] = Path("predicted.csv"),
-    band: Annotated[bool, typer.Option("--band", help="Also write band1..bandn, half-widths of 95 %.")] = False,
+    out: Annotated[Path, typer.Option("--out", help="CSV file to write, with t and tau1..taun.")] = Path(
+        "predicted.csv"
+    ),
+    band: Annotated[
+        bool, typer.Option("--band", help="Also write band1..bandn, the half-widths of the 95 % prediction interval.")
+    ] = False,
     force: ForceOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Predicts the torques of a log's motion, and their error where the log has torque."""
+    """Predicts the joint torques of a logged motion.
+
+    If the log has torques, the prediction errors are printed.
+    """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         from estimation import load_model, read_log
         from estimation import predict as run
-        from estimation.predictions.prediction import clock_of
+        from estimation.predictions.prediction import clock_shift
 
         identified = load_model(model)
         robot = identified.robot
         read = read_log(log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names)
-        (recorded,) = told([read], payload, gravity)
+        (recorded,) = with_known_setup([read], payload, gravity)
         progress.start("predicting", None)
-        later, clock = clock_of(identified, recorded)
+        later, clock = clock_shift(identified, recorded)
         heat = _heat(model, identified, recorded, before or [], ambient, mapping, later)
         result = run(identified, recorded, later=later, **heat.options)
         result.save(out, band=band, force=force)
@@ -67,7 +74,7 @@ def predict(
 
 @dataclass(frozen=True, kw_only=True)
 class _Heat:
-    """What a model with heat is told, and what that assumes."""
+    """Thermal inputs of a prediction, and a sentence on the assumed initial state."""
 
     options: dict[str, Any] = field(default_factory=dict)
     assumed: str = ""
@@ -94,7 +101,9 @@ def _heat(
     earlier = read_logs(before, n=model.robot.n, mapping=mapping, joints=model.robot.joint_names) if before else []
     if thermal is None:
         if ambient is not None:
-            raise InputError("the model has no temperatures", file=file, remedy="leave out --ambient")
+            raise InputError(
+                "the model has no thermal part", file=file, remedy="remove --ambient, or use a model of `oed thermal`"
+            )
         placed, assumed = warmed(model, earlier, log, later)
         return _Heat(options={"before": placed}, assumed=assumed)
     if ambient is not None and not -30.0 <= ambient <= 60.0:
@@ -102,7 +111,12 @@ def _heat(
     start = None
     if before:
         start = start_temperatures(thermal, earlier, float(log.t[0]), ambient=ambient)
-        assumed = f"friction with heat: warmed by {len(earlier)} logs before, the first of which began cold"
+        assumed = (
+            f"thermal friction: initial temperatures computed from {len(earlier)} earlier logs; the first is assumed "
+            f"to start cold"
+        )
     else:
-        assumed = "friction with heat: the motion is taken to begin cold; --before says what warmed the robot"
+        assumed = (
+            "thermal friction: the robot is assumed cold at the start; give earlier logs with --before if it was warm"
+        )
     return _Heat(options={"thermal": thermal, "start": start, "ambient": ambient}, assumed=assumed)

@@ -1,4 +1,4 @@
-"""``oed retime``: the same path with another timing."""
+"""``oed retime``: the same path with a new timing."""
 
 from __future__ import annotations
 
@@ -22,21 +22,40 @@ from oed.cli.options import (
 
 def retime(
     trajectory: Annotated[Path, typer.Argument(help="A trajectory.csv.", show_default=False)],
-    method: Annotated[str, typer.Option(help="toppra follows the path; ruckig stops at its vertices.")] = "toppra",
+    method: Annotated[
+        str,
+        typer.Option(
+            help=(
+                "Method: toppra follows the path exactly; ruckig replaces it by straight lines and stops at their "
+                "corners."
+            )
+        ),
+    ] = "toppra",
     robot: Annotated[
         str | None,
-        typer.Option("--robot", help=f"{ROBOT}; by default the one that the file names.", show_default=False),
+        typer.Option(
+            "--robot",
+            help=f"The robot: {ROBOT}. Default: the robot named in the trajectory file.",
+            show_default=False,
+        ),
     ] = None,
-    criterion: Annotated[str, typer.Option(help="The criterion to compare: cond, d, a, e or cond-d.")] = "cond",
+    criterion: Annotated[
+        str, typer.Option(help="Criterion to report before and after: cond, d, a, e or cond-d.")
+    ] = "cond",
     friction: FrictionOption = "polynomial",
-    tolerance: Annotated[float, typer.Option(help="How far ruckig's polyline may leave the path [rad].")] = 0.01,
+    tolerance: Annotated[
+        float, typer.Option(help="Largest allowed deviation of ruckig's straight lines from the path [rad].")
+    ] = 0.01,
     out: OutOption = Path("retimed"),
     png: PngOption = False,
     force: ForceOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Retimes a path within the robot's limits: trajectory.csv, design.json and report.html."""
+    """Retimes a trajectory within the robot's limits.
+
+    Writes trajectory.csv, design.json and report.html.
+    """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         from oed.experiments import retime as run
@@ -49,7 +68,7 @@ def retime(
             motion, metadata = read_trajectory(trajectory)
             named = robot or metadata.get("robot")
             if not named:
-                raise InputError("the file names no robot", file=trajectory, remedy="give --robot")
+                raise InputError("the file does not name its robot", file=trajectory, remedy="give --robot")
             progress.start(f"retiming by {method}", None)
             result = run(
                 robot_from(str(named)),

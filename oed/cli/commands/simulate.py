@@ -1,4 +1,4 @@
-"""``oed simulate``: a virtual experiment."""
+"""``oed simulate``: an experiment on a virtual robot."""
 
 from __future__ import annotations
 
@@ -26,25 +26,31 @@ def simulate(
     robot: Annotated[
         str | None,
         typer.Option(
-            "--robot", help=f"The robot: {ROBOT}; by default the one that the file names.", show_default=False
+            "--robot", help=f"The robot: {ROBOT}. Default: the robot named in the trajectory file.", show_default=False
         ),
     ] = None,
     trajectory: Annotated[
-        Path | None, typer.Option("--trajectory", help="A trajectory.csv.", show_default=False)
+        Path | None, typer.Option("--trajectory", help="The trajectory.csv to play.", show_default=False)
     ] = None,
     campaign: Annotated[
         Path | None,
-        typer.Option("--campaign", help="Instead of a trajectory: the folder of an oed campaign.", show_default=False),
+        typer.Option(
+            "--campaign", help="Folder of an `oed campaign` to play instead of a trajectory.", show_default=False
+        ),
     ] = None,
     plant: Annotated[
         Path | None,
-        typer.Option("--plant", help="A plant YAML; by default the robot's nominal dynamics.", show_default=False),
+        typer.Option(
+            "--plant",
+            help="YAML file with the virtual robot's true behaviour. Default: the robot's nominal dynamics.",
+            show_default=False,
+        ),
     ] = None,
     model: Annotated[
         Path | None,
         typer.Option(
             "--model",
-            help="Instead of a plant: a model.json that the robot obeys, extensions included.",
+            help="A model.json to simulate instead of a plant, extensions included.",
             show_default=False,
         ),
     ] = None,
@@ -52,7 +58,7 @@ def simulate(
         Path | None,
         typer.Option(
             "--out",
-            help="The log to write, .csv or .parquet (log.csv); of a campaign the folder of its logs (logs).",
+            help="Log file to write, .csv or .parquet (log.csv); for a campaign, the folder of the logs (logs).",
             show_default=False,
         ),
     ] = None,
@@ -64,7 +70,10 @@ def simulate(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Plays a trajectory, or a whole campaign, on a virtual robot and logs t, q and tau."""
+    """Plays a trajectory or a campaign on a virtual robot.
+
+    Writes logs with t, q and tau.
+    """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         from estimation.logs import write_log
@@ -77,7 +86,7 @@ def simulate(
         if (trajectory is None) == (campaign is None):
             raise typer.BadParameter("give either --trajectory or --campaign", ctx=context)
         if model is not None and (plant or campaign):
-            raise typer.BadParameter("--model takes the place of --plant, and plays a --trajectory", ctx=context)
+            raise typer.BadParameter("--model takes the place of --plant and needs a --trajectory", ctx=context)
         given = robot_from(robot, tip, joints, lock) if robot else None
         if campaign is not None:
             planned = Campaign.load(campaign, given)
@@ -91,7 +100,7 @@ def simulate(
                 "duration": planned.duration,
                 "robot": planned.robot.name,
             }
-            told = f"{len(files)} logs, {planned.samples} samples, {planned.duration / 60:.1f} min"
+            size = f"{len(files)} logs, {planned.samples} samples, {planned.duration / 60:.1f} min"
             target = folder
         else:
             assert trajectory is not None
@@ -109,9 +118,9 @@ def simulate(
             elif described is not None:
                 virtual = load_plant(plant, described) if plant else nominal_plant(described)
             else:
-                raise InputError("the file names no robot", file=trajectory, remedy="give --robot")
+                raise InputError("the file does not name its robot", file=trajectory, remedy="give --robot")
             log = run(virtual, motion, seed=seed)
             write_log(target, log, force=force)
             data = {"file": str(target), "samples": len(log), "duration": log.duration, "robot": described.name}
-            told = f"{len(log)} samples, {log.duration:.1f} s"
-    console.result(f"{told}, of a virtual {data['robot']} written to {target}", data)
+            size = f"{len(log)} samples, {log.duration:.1f} s"
+    console.result(f"{size} of a virtual {data['robot']} written to {target}", data)

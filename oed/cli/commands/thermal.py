@@ -1,4 +1,4 @@
-"""``oed thermal``: rigid body, friction, and what heat does to the friction."""
+"""``oed thermal``: rigid body, friction, and the change of friction with temperature."""
 
 from __future__ import annotations
 
@@ -34,24 +34,29 @@ def thermal(
     robot: RobotOption,
     log: LogOption,
     mapping: MappingOption = None,
-    order: Annotated[str, typer.Option(help="1, 2, advanced, fractional, or auto to compare them.")] = "2",
+    order: Annotated[
+        str, typer.Option(help="Thermal model: 1, 2, advanced, fractional, or auto to compare them.")
+    ] = "2",
     joint: Annotated[
         int | None,
         typer.Option(
             min=1,
-            help="The joint whose friction chooses the model and is shown by duty cycle; by default the hottest.",
+            help=(
+                "Joint for the model comparison and the duty-cycle figure. Default: the joint with the largest "
+                "friction power."
+            ),
             show_default=False,
         ),
     ] = None,
     alpha: Annotated[
         float | None,
-        typer.Option(help="Relative change of friction per degree, where it is known [1/K].", show_default=False),
+        typer.Option(help="Known relative change of friction with temperature [1/K], negative.", show_default=False),
     ] = None,
     ambient: Annotated[
         float | None,
-        typer.Option(help="Temperature of the surroundings of logs that do not state it [degC].", show_default=False),
+        typer.Option(help="Ambient temperature of logs that do not state it [degC].", show_default=False),
     ] = None,
-    friction: Annotated[str, typer.Option(help="polynomial or coulomb-viscous.")] = "polynomial",
+    friction: Annotated[str, typer.Option(help="Friction model: polynomial or coulomb-viscous.")] = "polynomial",
     seed: SeedOption = 0,
     out: OutOption = Path("thermal"),
     tip: TipOption = None,
@@ -62,7 +67,10 @@ def thermal(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Identifies parameters and how friction falls as the joints warm up: model.json and report.html."""
+    """Identifies parameters and the effect of temperature on friction.
+
+    Writes model.json and report.html.
+    """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         import json as codec
@@ -78,7 +86,9 @@ def thermal(
 
         wanted = "second" if order == "auto" else thermal_model_class(order).name
         if alpha is not None and not (np.isfinite(alpha) and alpha < 0.0):
-            raise InputError(f"--alpha {alpha}", allowed="a negative number: friction falls as a joint warms up")
+            raise InputError(
+                f"--alpha {alpha}", allowed="a negative number, because friction falls as a joint warms up"
+            )
         with ResultFolder(out, force, names=["model.json", "report.html"]) as folder:
             described = robot_from(robot, tip, joints, lock)
             if joint is not None and joint > described.n:
@@ -89,7 +99,7 @@ def thermal(
             result = fit_campaign(described, logs, order=wanted, model=identified.model, **options)
             shown = joint or _hottest(result)
             if result.thermal[shown - 1] is None:
-                raise InputError(f"--joint {shown}", allowed="one that moves in the logs")
+                raise InputError(f"--joint {shown}", allowed="a joint that moves in the logs")
             choice = None
             if order == "auto":
                 choice = choose_thermal(thermal_runs(result.model, logs, shown), **options)
@@ -107,7 +117,7 @@ def thermal(
 
 
 def _surrounded(logs: Sequence[Log], ambient: float | None) -> tuple[Log, ...]:
-    """Gives logs that do not state the temperature of their surroundings the one that the user does."""
+    """Sets the ambient temperature of logs that do not state it."""
     from dataclasses import replace
 
     import numpy as np

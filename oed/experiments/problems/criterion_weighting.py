@@ -37,7 +37,10 @@ def choose_weighting(
     if scaling not in SCALINGS:
         raise InputError(f"scaling {scaling!r}", allowed=", ".join(SCALINGS))
     if (criterion.name == "i") != (task is not None):
-        raise InputError("criterion i and a task belong together", remedy="give both, or neither")
+        raise InputError(
+            "criterion i needs a task, and a task needs criterion i",
+            remedy="give both (--criterion i --task FILE), or neither",
+        )
     joints = base.model.robot.n
     levels = after.noise if noise is None and after is not None else noise
     rows = None

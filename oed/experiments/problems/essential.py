@@ -32,7 +32,7 @@ def essential_part(problem: FourierProblem, share: float) -> BaseParameters:
         InputError: a share out of range, a description that lacks nominal parameters, or no parameter left.
     """
     if not 0 <= share < 1:
-        raise InputError(f"a share of essential parameters of {share}", allowed="0 to below 1")
+        raise InputError(f"the threshold of essential parameters is {share}", allowed="0 to below 1")
     base = problem.base
     nominal = base.model.nominal
     if not np.isfinite(nominal).all():
@@ -42,7 +42,7 @@ def essential_part(problem: FourierProblem, share: float) -> BaseParameters:
     q, dq, ddq = (np.concatenate(part) for part in zip(*map(problem.limit_states, drawn), strict=True))
     kept = base.essential(q, dq, ddq, base.from_standard(nominal), share)
     if not kept:
-        raise InputError(f"no parameter has a share of {share}", remedy="state a smaller share")
+        raise InputError(f"no parameter reaches the threshold {share}", remedy="use a smaller threshold")
     return restricted(base, kept)
 
 

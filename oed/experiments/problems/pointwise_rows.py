@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from oed.experiments.problems.problem import FourierProblem
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+States = tuple[Array, Array, Array]
 
 # Kept from each bound, in its own scale, for what happens between the samples.
 BETWEEN = 0.005
@@ -33,7 +35,7 @@ class PointwiseRows:
         return int(self._chosen.sum()) + self._averaged
 
     def add_peaks(self, z: Array, tolerance: float) -> bool:
-        """Adds the sample of each near peak; tells whether one passed its bound by more than the tolerance."""
+        """Adds the sample of each near peak; returns whether one exceeded its bound by more than the tolerance."""
         if not self._problem.pointwise:
             return False
         excess = self._problem.pointwise_excess(z)
@@ -65,22 +67,39 @@ class PointwiseRows:
 
     def jacobian(self, z: Array) -> Array:
         """Evaluates the derivatives (rows, n K) of the chosen rows by z."""
-        problem = self._problem
-        states = problem.limit_states(z)
-        bases = np.stack(problem.limit_bases[:3], axis=1)  # (M, 3, K)
-        whole = []
-        for limit in problem.averaged:
-            each = limit.jacobian(*states).reshape(len(limit.labels), len(bases), 3, problem.joints)
-            summed = np.einsum("rmdj,mdk->rjk", each, bases, optimize=True) * problem.scale
-            whole.append(summed.reshape(len(limit.labels), -1))
-        samples = np.flatnonzero(self._chosen.any(axis=1))
-        if not len(samples):
-            return np.concatenate([np.zeros((0, problem.size)), *whole])
-        by_state = np.concatenate(
-            [limit.jacobian(*(state[samples] for state in states)) for limit in problem.pointwise], axis=1
+        states = self._problem.limit_states(z)
+        samples, rows = np.nonzero(self._chosen)
+        return np.concatenate(
+            [row_gradients(self._problem, states, samples, rows), mean_gradients(self._problem, states)]
         )
-        chosen = self._chosen[samples]
-        slopes = by_state[chosen].reshape(-1, 3, problem.joints)  # per row: by q, dq, ddq of each joint
-        at = samples[np.nonzero(chosen)[0]]
-        gradient = np.einsum("rdj,rdk->rjk", slopes, bases[at]) * problem.scale
-        return np.concatenate([gradient.reshape(len(at), -1), *whole])
+
+
+def row_gradients(problem: FourierProblem, states: States, samples: Indices, rows: Indices) -> Array:
+    """Evaluates the derivatives (m, n K) of single rows of the pointwise limits by z.
+
+    Args:
+        problem: the design problem.
+        states: position, velocity and acceleration at all limit samples, as `FourierProblem.limit_states` gives them.
+        samples: which limit sample each of them is at (m,).
+        rows: which row of all pointwise limits it is (m,).
+    """
+    if not len(samples):
+        return np.zeros((0, problem.size))
+    used, where = np.unique(samples, return_inverse=True)
+    at = [state[used] for state in states]
+    by_state = np.concatenate([limit.jacobian(*at) for limit in problem.pointwise], axis=1)
+    slopes = by_state[where, rows].reshape(-1, 3, problem.joints)  # per row: by q, dq, ddq of each joint
+    bases = np.stack(problem.limit_bases[:3], axis=1)[samples]  # (m, 3, K)
+    gradient = np.einsum("rdj,rdk->rjk", slopes, bases) * problem.scale
+    return np.asarray(gradient.reshape(len(samples), -1), dtype=np.float64)
+
+
+def mean_gradients(problem: FourierProblem, states: States) -> Array:
+    """Evaluates the derivatives (A, n K) of all averaged limits by z."""
+    bases = np.stack(problem.limit_bases[:3], axis=1)  # (M, 3, K)
+    whole = [np.zeros((0, problem.size))]
+    for limit in problem.averaged:
+        each = limit.jacobian(*states).reshape(len(limit.labels), len(bases), 3, problem.joints)
+        summed = np.einsum("rmdj,mdk->rjk", each, bases, optimize=True) * problem.scale
+        whole.append(summed.reshape(len(limit.labels), -1))
+    return np.concatenate(whole)

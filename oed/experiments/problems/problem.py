@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -54,11 +54,19 @@ class FourierProblem:
     weighting: Weighting = field(default_factory=Weighting)
 
     def __getstate__(self) -> dict[str, object]:
-        # What is derived, compiled code above all, is rebuilt in the process that needs it.
+        # Derived data, such as compiled code, are rebuilt in the process that needs them.
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
+
+    def resampled(self, samples: int) -> FourierProblem:
+        """Gives the same problem with another number of regressor samples; compiled functions and limits are shared."""
+        other = replace(self, samples=samples)
+        known = {name: value for name, value in self.__dict__.items() if name not in ("samples", "_sampled")}
+        # Two problems must not write into each other's regressor.
+        other.__dict__.update(known, information=self.information.unshared())
+        return other
 
     @property
     def joints(self) -> int:
@@ -106,8 +114,11 @@ class FourierProblem:
             labels += [label for limit in self.averaged for label in limit.labels]
             broken = [labels[row] for row in np.flatnonzero(np.concatenate(excess) >= -ROOM)]
         raise InfeasibleError(
-            f"at rest in the home pose and in the middle of the ranges: {', '.join(broken[:3])} passes its limit",
-            remedy="state another home pose or other limits",
+            (
+                f"even at rest, in the home pose and in the middle of the ranges, {', '.join(broken[:3])} exceeds its "
+                f"limit"
+            ),
+            remedy="choose another home pose, or correct the limits",
         )
 
     @property
@@ -168,38 +179,39 @@ class FourierProblem:
         q, dq, ddq = self.limit_states(z)
         return np.concatenate([limit.excess(q, dq, ddq) for limit in self.pointwise], axis=1)
 
-    def inside(self, z: Array) -> bool:
-        """Whether all limits that are not linear hold, with some room."""
-        states = self.limit_states(z)
+    def inside(self, z: Array, stride: int = 1) -> bool:
+        """Whether all limits that are not linear hold, with some room, at every `stride`-th limit sample."""
+        states = self.limit_states(z, stride)
         if any(limit.excess(*states).max() > -ROOM for limit in self.pointwise):
             return False
         return all(limit.values(*states).max() <= 1 - ROOM for limit in self.averaged)
 
-    def limit_states(self, z: Array) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration (M, n) at the limit samples."""
+    def limit_states(self, z: Array, stride: int = 1) -> tuple[Array, Array, Array]:
+        """Position, velocity and acceleration (M, n) at every `stride`-th limit sample."""
         free = self.free(z).T
-        q, dq, ddq = (np.ascontiguousarray(basis @ free) for basis in self.limit_bases[:3])
+        q, dq, ddq = (np.ascontiguousarray(basis[::stride] @ free) for basis in self.limit_bases[:3])
         return q, dq, ddq
 
-    def shrunk(self, z: Array, fraction: float = 1.0, halvings: int = 12) -> Array:
+    def shrunk(self, z: Array, fraction: float = 1.0, halvings: int = 12, stride: int = 1) -> Array:
         """Pulls each joint's motion towards the pose of z = 0 until it keeps the limits.
 
         Args:
             z: any point (n K,).
             fraction: of the way to the limits that it may go.
             halvings: of the interval in which the way to the pointwise limits is sought.
+            stride: of the limit samples at which those are checked; more than 1 is faster and may miss a peak.
         """
         still = self.free(np.zeros(self.size))
         room = self.rows.room(still, self.free(z) - still)
         kept = (z.reshape(self.joints, -1) * np.minimum(1.0, fraction * room)[:, None]).reshape(-1)
-        return self._inside(kept, halvings) if self.curved else kept
+        return self._inside(kept, halvings, stride) if self.curved else kept
 
-    def _inside(self, z: Array, halvings: int) -> Array:
+    def _inside(self, z: Array, halvings: int, stride: int) -> Array:
         """Shrinks all joints alike until the pointwise limits hold; z = 0 does."""
         low, high = 0.0, 1.0
-        if self.inside(z):
+        if self.inside(z, stride):
             return z
         for _ in range(halvings):
             middle = (low + high) / 2
-            low, high = (middle, high) if self.inside(middle * z) else (low, middle)
+            low, high = (middle, high) if self.inside(middle * z, stride) else (low, middle)
         return low * z

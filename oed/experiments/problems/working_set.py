@@ -32,7 +32,7 @@ class WorkingSet:
         self._offset = (problem.centre[:, None] * rows.matrix[:, 0] - centre) / self._half  # z = 0 is at the centre
 
     def add_peaks(self, z: Array, tolerance: float) -> bool:
-        """Adds the rows around each passed peak; tells whether there was any."""
+        """Adds the rows around each peak that exceeds its bound; returns whether there was any."""
         excess = self._problem.rows.excess(self._problem.free(z))
         blocks = excess.reshape(excess.shape[0], -1, self._problem.limit_samples)
         peak = (blocks >= np.roll(blocks, 1, 2)) & (blocks > np.roll(blocks, -1, 2)) & (blocks > tolerance)

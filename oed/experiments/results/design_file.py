@@ -73,4 +73,4 @@ def read_design(
             "strokes_left_out": tuple(data["strokes_left_out"]),
         }
     except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
-        raise InputError(f"is no design file: {type(error).__name__} {error}", file=file) from error
+        raise InputError(f"is not a design file, or is damaged ({type(error).__name__}: {error})", file=file) from error

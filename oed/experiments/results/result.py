@@ -86,7 +86,7 @@ class Design:
 
     @property
     def effects(self) -> tuple[PlantEffect, ...]:
-        """What the robot was said to have beyond its description."""
+        """The effects beyond the robot's description that the design assumed."""
         return tuple(
             PlantEffect(
                 effect=e["effect"], joint=e["joint"], coefficients=tuple(e["coefficients"]), shape=tuple(e["shape"])
@@ -125,34 +125,35 @@ class Design:
         return Motion(t=t[inside], q=motion.q[inside], dq=motion.dq[inside], ddq=motion.ddq[inside])
 
     def check(self) -> tuple[Margin, ...]:
-        """Measures all margins anew from the samples of the motion, whatever the solver said."""
+        """Computes all margins from the samples of the motion, independently of the solver."""
         return measured_margins(self.robot, self.motion, self.base, [e for e in self.effects if e.static])
 
     def summary(self) -> str:
-        """Says in a few lines what the experiment is and what it is good for."""
+        """Describes the experiment, its quality and its margins in a few lines."""
         lines = [
-            f"{self.robot.name}: {self.motion.duration:.1f} s, {len(self.motion)} samples at "
-            f"{1e3 * self.robot.period:g} ms, {self.base.size} parameters",
+            f"{self.robot.name}: experiment of {self.motion.duration:.1f} s for {self.base.size} parameters, "
+            f"{len(self.motion)} samples at {1e3 * self.robot.period:g} ms",
         ]
         for quality in self.qualities:
             values = quality.to_dict()
             if values["cond_Y"] is None:
-                lines.append(f"  {quality.part:8} does not determine all parameters")
+                usual = " (normal)" if quality.part == "sinusoid" else ""
+                lines.append(f"  {quality.label:16} alone: not all parameters are determined{usual}")
             else:
                 lines.append(
-                    f"  {quality.part:8} cond(Y) {values['cond_Y']:.2f}, log det(Y'Y) {values['log_det_YtY']:.1f}, "
+                    f"  {quality.label:16} cond(Y) {values['cond_Y']:.3g}, log det(Y'Y) {values['log_det_YtY']:.1f}, "
                     f"smallest singular value {values['smallest_singular_value_Y']:.3g}"
                 )
         finals = ", ".join(f"{island.initial:.4g} -> {island.final:.4g} ({island.status})" for island in self.islands)
         searches = "1 search" if len(self.islands) == 1 else f"{len(self.islands)} searches"
-        lines.append(f"  {self.criterion.name} of one period, in {searches}: {finals}")
+        lines.append(f"  optimisation of {self.criterion.name} over one period, {searches}: {finals}")
         tightest = min((m for m in self.margins if np.isfinite(m.limit)), key=lambda m: m.slack_fraction, default=None)
         if tightest is not None:
             lines.append(
                 f"  tightest limit: {tightest.quantity} of joint {tightest.joint}, "
                 f"{100 * tightest.slack_fraction:.2f} % left at {tightest.time:.3f} s"
             )
-        lines += self._told_effects()
+        lines += self._effect_lines()
         if self.freedom is not None:
             lines.append(
                 f"  closest bodies: {self.freedom['pair']}, {1e3 * self.freedom['clearance']:.0f} mm at "
@@ -163,26 +164,27 @@ class Design:
             lines.append(f"  {near.limit}: {near.value:.4g}{unit} left at {near.time:.2f} s")
         if self.home_moved:
             pose = ", ".join(f"{x:.3f}" for x in self.home)
-            lines.append(f"  begins and ends at {pose}: the usual home pose breaks a limit in space")
+            lines.append(f"  starts and ends at {pose}, because the usual home pose violates a workspace limit")
         if self.strokes_left_out:
-            why = "the arm would collide or leave its space"
-            lines.append(f"  no stroke for joints {self.strokes_left_out}: {why}")
+            why = "the arm would collide or leave its workspace"
+            lines.append(f"  no velocity stroke for joints {self.strokes_left_out}: {why}")
         for margin in self.violated:
             lines.append(
-                f"  PASSED: {margin.quantity} of joint {margin.joint}: {margin.value:.4g} of {margin.limit:.4g} "
+                f"  LIMIT EXCEEDED: {margin.quantity} of joint {margin.joint}: {margin.value:.4g} of "
+                f"{margin.limit:.4g} "
                 f"at {margin.time:.3f} s"
             )
         return "\n".join(lines)
 
-    def _told_effects(self) -> list[str]:
-        """Says of which effects beyond the description the torque counted, and of which it could not."""
+    def _effect_lines(self) -> list[str]:
+        """Lists effects beyond the description that the torque limits include, and those they cannot."""
         limited = any(margin.quantity.startswith("torque") for margin in self.margins)
         counted = [effect.label for effect in self.effects if effect.static and limited]
-        lines = [f"  counted within the torque limits: {', '.join(counted)}"] if counted else []
+        lines = [f"  included in the torque limits: {', '.join(counted)}"] if counted else []
         lost = [effect.label for effect in self.effects if not (effect.static and limited)]
         if lost:
-            why = "it depends on time or on the past" if limited else "torque limits or dynamics are not described"
-            lines.append(f"  NOT counted within the torque limits, for {why}: {', '.join(lost)}")
+            why = "they depend on time or history" if limited else "torque limits or dynamics are not described"
+            lines.append(f"  NOT included in the torque limits, because {why}: {', '.join(lost)}")
         return lines
 
     def to_frame(self) -> pd.DataFrame:
@@ -265,7 +267,7 @@ class Design:
         return cls(**read_design(folder, robot, criterion))
 
     def metadata(self) -> dict[str, Any]:
-        """What the trajectory file says of itself."""
+        """Metadata of the trajectory file."""
         return {
             "robot": self.robot.origin or self.robot.name,
             "period": self.robot.period,

@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TorqueUse:
-    """What a timing asks of the motors, by the nominal model with friction.
+    """Motor torques of a timing, by the nominal model with friction.
 
     Attributes:
         peak: largest magnitude of each joint, (n,) [N m, or N of a prismatic joint].
@@ -59,7 +59,7 @@ class TorqueUse:
 
 @dataclass(frozen=True, kw_only=True)
 class RetimedExperiment:
-    """A path with a new timing, and what both timings tell of the parameters.
+    """A path with a new timing, and the information of both timings on the parameters.
 
     Attributes:
         robot: what it is for.
@@ -96,7 +96,7 @@ class RetimedExperiment:
         return not any(margin.violated for margin in self.margins)
 
     def summary(self) -> str:
-        """Says what changed."""
+        """Compares the experiment before and after retiming."""
         label = CRITERIA[self.criterion]().label
         before, after = (_value(quality, self.criterion) for quality in (self.before, self.after))
         lines = [self.retimed.summary(), f"  {label}: {before} before, {after} after"]
@@ -107,13 +107,14 @@ class RetimedExperiment:
         for margin in self.margins:
             if margin.violated:
                 lines.append(
-                    f"  PASSED: {margin.quantity} of joint {margin.joint}: {margin.value:.4g} of {margin.limit:.4g} "
+                    f"  LIMIT EXCEEDED: {margin.quantity} of joint {margin.joint}: {margin.value:.4g} of "
+                    f"{margin.limit:.4g} "
                     f"at {margin.time:.3f} s"
                 )
         return "\n".join(lines)
 
     def check(self) -> tuple[Margin, ...]:
-        """Measures all margins anew from the samples of the motion."""
+        """Computes all margins from the samples of the motion."""
         return measured_margins(self.robot, self.motion, self.base)
 
     def to_frame(self) -> pd.DataFrame:
@@ -226,7 +227,9 @@ class RetimedExperiment:
                 settings=data["settings"],
             )
         except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
-            raise InputError(f"is no retimed experiment: {type(error).__name__} {error}", file=file) from error
+            raise InputError(
+                f"is not a file of a retimed experiment, or is damaged ({type(error).__name__}: {error})", file=file
+            ) from error
 
 
 def torque_use(base: BaseParameters, motion: Motion) -> TorqueUse | None:

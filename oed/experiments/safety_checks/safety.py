@@ -28,13 +28,13 @@ Array = NDArray[np.float64]
 SLOWER = (1.0, 0.85, 0.7, 0.5, 0.35, 0.2)
 # From each bound in space [m], of a home pose that had to be moved.
 HOME_ROOM = 0.008
-# The share of a limit on root mean squares that the optimised part may use: moves to and from it need some, too.
+# Fraction of an RMS limit that the optimised part may use; the moves to and from it need the rest.
 MOVES = 0.98
 
 
 @dataclass(frozen=True, kw_only=True)
 class Safety:
-    """What an experiment must keep besides position, velocity, acceleration and jerk.
+    """Limits of an experiment besides position, velocity, acceleration and jerk.
 
     Attributes:
         torque: the torque limit, where it is known.
@@ -103,8 +103,8 @@ class Safety:
             if self._strong_enough(motion):
                 return sequence, report, left_out
         raise InfeasibleError(
-            "the moves pass a limit of torque or motion however slow they are",
-            remedy="state another home pose, or leave out the strokes",
+            "the moves between the segments exceed a limit of torque or motion, even at low speed",
+            remedy="choose another home pose (--home), or leave out the strokes (--no-strokes)",
         )
 
     def _strong_enough(self, motion: Motion) -> bool:
@@ -113,7 +113,7 @@ class Safety:
         return max(peaks, default=0.0) <= 0 and (self.torque_rms is None or self.torque_rms.values(*states).max() <= 1)
 
     def _broken(self, motion: Motion, report: CollisionReport | None) -> tuple[float, str] | None:
-        """When a motion breaks a limit in space most, and which; None where it keeps all."""
+        """The time and the kind of the largest workspace violation; None without any."""
         if report is not None and report.collides:
             worst = report.worst
             assert worst is not None
@@ -134,7 +134,7 @@ def collision_data(report: CollisionReport) -> dict[str, object]:
 
 
 def _culprit(sequence: Experiment, time: float, what: str) -> int:
-    """The joint in whose stroke, or the move to or from it, that happens."""
+    """The joint whose stroke, or the move before or after it, causes the violation."""
     table = sequence.table()
     here = next(i for i, s in enumerate(table) if time <= float(s["end"]) + 1e-9)  # type: ignore[arg-type]
     for neighbour in (here, here + 1, here - 1):
@@ -142,7 +142,7 @@ def _culprit(sequence: Experiment, time: float, what: str) -> int:
             return int(table[neighbour]["joint"])  # type: ignore[call-overload]
     raise InfeasibleError(
         f"the move at {time:.2f} s {what}",
-        remedy="state another home pose",
+        remedy="choose another home pose (--home)",
     )
 
 
@@ -153,8 +153,8 @@ def choose_safety(robot: Robot, base: BaseParameters, home: Array, limits: Limit
         robot: the robot.
         base: whose model gives the torques.
         home: pose (n,) at both ends.
-        limits: what is to be kept.
-        movable: whether another home pose may be taken where this one is in collision.
+        limits: the limits to keep.
+        movable: whether another home pose may be used if this one is in collision.
 
     Raises:
         InfeasibleError: a home pose that cannot be held, is in collision or breaks another limit; a tool box that the

@@ -1,4 +1,4 @@
-"""How searches in other processes tell how far they are: one small file each, in a folder that goes away."""
+"""Progress of searches in other processes: one small file each, in a temporary folder."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class Board:
 
     folder: Path
 
-    def teller(self, number: int) -> Callable[[int, float], None]:
-        """Gives the function that one search tells its steps and best value."""
+    def reporter(self, number: int) -> Callable[[int, float], None]:
+        """Gives the function by which one search reports its steps and best value."""
 
         def tell(done: int, best: float) -> None:
             fresh = self.folder / f"{number}.new"
@@ -65,12 +65,12 @@ class Board:
     @staticmethod
     @contextmanager
     def watched(searches: int, steps: int, progress: Progress, task: str, sign: float = 1.0) -> Iterator[Board]:
-        """Opens a board and passes on what it says until the work is over.
+        """Opens a board and reports its progress until the work is over.
 
         Args:
-            searches: how many will tell.
+            searches: number of searches.
             steps: of each.
-            progress: is told the sum of the steps, and the best value.
+            progress: receives the sum of the steps, and the best value.
             task: what the work is called.
             sign: -1 where the smaller value, which is the better, stands for a criterion that is to be large.
         """

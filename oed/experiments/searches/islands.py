@@ -40,7 +40,7 @@ def search_islands(
         keep_on_interrupt: on Ctrl-C end them with the best so far.
         workers: processes; as many as cores by default.
         executor: runs them instead of processes of its own.
-        progress: is told the steps done and the best value.
+        progress: receives the steps done and the best value.
     """
     sign = -1.0 if problem.criterion.larger_is_better else 1.0
     work_name = f"designing for {problem.base.model.robot.name}"
@@ -94,7 +94,7 @@ def _search(task: _Task) -> Found:
         task.solver,
         task.seed,
         task.number,
-        tell=task.board.teller(task.number),
+        tell=task.board.reporter(task.number),
         deadline=task.deadline,
         halted=lambda: task.board.stopped,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ THROWS = (0.15, 0.3, 0.6)
 
 # Per period, by which designs are compared.
 FINE_SAMPLES = 1000
+
+# Screening checks only every fifth limit sample. The start that it chooses is then pulled within the limits at all.
+SCREENING_STRIDE = 5
 INTERRUPTED = "interrupted"
 
 
@@ -104,7 +107,7 @@ class Island:
         settings: the local solver and its settings.
         seed: of the whole design.
         number: of this island.
-        tell: told after each local solution how many are done, and the best value so far.
+        tell: called after each local solution with the number done and the best value so far.
         deadline: as `time.time` counts, for islands of one design may run one after the other or on several machines;
             after it the best design so far is kept.
         halted: asked again and again whether to end early with the best design so far.
@@ -123,7 +126,7 @@ class Island:
         halted: Callable[[], bool] = lambda: False,
     ) -> None:
         self._problem, self._effort, self._settings = problem, effort, settings
-        self._fine = replace(problem, samples=FINE_SAMPLES)
+        self._fine = problem.resampled(FINE_SAMPLES)
         self._rng = np.random.default_rng([seed, number])
         self._number, self._tell, self._deadline, self._halted = number, tell, deadline, halted
         self._starts: list[tuple[float, float]] = []
@@ -181,7 +184,8 @@ class Island:
     def _screen(self) -> Array:
         problem = self._problem
         drawn = (self._rng.normal(size=problem.size) for _ in range(self._effort.screened))
-        return min((problem.shrunk(z, 0.95, halvings=6) for z in drawn), key=problem.cost)
+        rough = (problem.shrunk(z, 0.95, halvings=6, stride=SCREENING_STRIDE) for z in drawn)
+        return problem.shrunk(min(rough, key=problem.cost))
 
     def _thrown(self, pool: list[tuple[float, Array]], hop: int) -> Array:
         """Throws one or two joints' coefficients of the best design, or now and then of one of the next best."""
@@ -212,7 +216,7 @@ class Island:
 
     def _finish(self, z: Array) -> Array:
         """Sharpens the stand-in on a finer grid until it is the criterion, keeping each stage that brings something."""
-        problem = replace(self._problem, samples=self._effort.finish_samples)
+        problem = self._problem.resampled(self._effort.finish_samples)
         best, best_cost, barrier = z, dense(problem, z)[0], self._settings.barriers[2]
         for sharpness in problem.criterion.finish or problem.criterion.stages:
             if not self._in_time():

@@ -58,7 +58,6 @@ class Solver(ABC):
         max_iter: iterations per stage of the criterion in the search.
         finish_iter: iterations per stage of the finish.
         tolerance: at which a stage ends.
-        rounds: how often rows that a solution passes are added and the stage is solved again.
     """
 
     name: ClassVar[str]
@@ -68,7 +67,6 @@ class Solver(ABC):
     max_iter: int = 60
     finish_iter: int = 150
     tolerance: float = 1e-4
-    rounds: int = 2
 
     @abstractmethod
     def minimise(

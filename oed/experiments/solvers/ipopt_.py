@@ -30,12 +30,14 @@ class Ipopt(Solver):
 
     Attributes:
         history: of the limited-memory Hessian.
+        rounds: how often rows that a solution passes are added and the stage is solved again.
     """
 
     name: ClassVar[str] = "ipopt"
     barriers: ClassVar[tuple[float, float, float]] = (1e-2, 1e-3, 1e-4)
 
     history: int = 10
+    rounds: int = 2
 
     def minimise(
         self,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.experiments.problems.pointwise_rows import BETWEEN, PointwiseRows
 from oed.experiments.problems.problem import FourierProblem
+from oed.experiments.solvers.curved_slacks import CurvedSlacks
 
 Array = NDArray[np.float64]
 
@@ -64,61 +64,46 @@ class LinearSlacks:
 
 
 class Slacks:
-    """Those of the linear rows, then those of the chosen pointwise rows, which bend.
+    """Those of the linear rows, then those of the curved ones.
 
     Args:
         linear: slacks of the kinematic rows.
-        curved: the pointwise rows chosen at the moment.
-        start: z (n K,), strictly within all of them.
+        curved: those of all other limits.
     """
 
-    def __init__(self, linear: LinearSlacks, curved: PointwiseRows, start: Array) -> None:
+    def __init__(self, linear: LinearSlacks, curved: CurvedSlacks) -> None:
         self._linear, self._curved = linear, curved
-        self.bent = curved.size > 0
-        if self.bent:
-            lower, upper = curved.bounds()
-            self._has_lower, self._has_upper = np.isfinite(lower), np.isfinite(upper)
-            self._lower, self._upper = lower[self._has_lower], upper[self._has_upper]
-            # A start may be nearer to a bound than what is kept from it; it may go a tenth of the way there.
-            room = self._from_bounds(curved.values(start))
-            self._relaxed = np.maximum(0.0, (room + BETWEEN) / 10 - room)
-        self._slopes = np.zeros((0, len(start)))
 
-    def _from_bounds(self, values: Array) -> Array:
-        return np.concatenate([values[self._has_lower] - self._lower, self._upper - values[self._has_upper]])
-
-    def values(self, z: Array) -> Array:
-        """Evaluates all slacks (m,)."""
+    def values(self, z: Array) -> tuple[Array, bool]:
+        """Evaluates the rows' slacks (m,), and tells whether all limits that are no rows hold."""
         linear = self._linear.values(z)
-        if not self.bent:
-            return linear
-        return np.concatenate([linear, self._from_bounds(self._curved.values(z)) + self._relaxed])
+        curved, others = self._curved.values(z)
+        return np.concatenate([linear, curved]), others
+
+    def choose(self, z: Array) -> bool:
+        """Makes rows of limits passed at z; see `CurvedSlacks.choose`."""
+        return self._curved.choose(z)
 
     def linearise(self, z: Array) -> None:
-        """Takes the derivatives of the pointwise rows at z."""
-        if self.bent:
-            slopes = self._curved.jacobian(z)
-            self._slopes = np.concatenate([slopes[self._has_lower], -slopes[self._has_upper]])
+        """Takes the derivatives at z."""
+        self._curved.linearise(z)
 
     def change(self, p: Array) -> Array:
         """Their change along a direction, to first order (m,)."""
-        linear = self._linear.change(p)
-        return np.concatenate([linear, self._slopes @ p]) if self.bent else linear
+        return np.concatenate([self._linear.change(p), self._curved.change(p)])
 
     def pullback(self, weights: Array) -> Array:
         """The gradient (n K,) of the slacks' weighted sum."""
-        linear = self._linear.pullback(weights[: self._linear.size])
-        return linear + self.bend(weights) if self.bent else linear
+        return self._linear.pullback(weights[: self._linear.size]) + self.bend(weights)
 
     def bend(self, weights: Array) -> Array:
-        """That of the pointwise rows alone."""
-        return np.asarray(weights[self._linear.size :] @ self._slopes, dtype=np.float64)
+        """That of the curved rows alone."""
+        return self._curved.pullback(weights[self._linear.size :])
 
     def add_normal(self, matrix: Array, weights: Array) -> None:
         """Adds sum_i w_i (ds_i/dz)(ds_i/dz)' to a matrix (n K, n K)."""
         self._linear.add_normal(matrix, weights[: self._linear.size])
-        if self.bent:
-            matrix += (self._slopes * weights[self._linear.size :, None]).T @ self._slopes
+        self._curved.add_normal(matrix, weights[self._linear.size :])
 
 
 def implied(problem: FourierProblem) -> NDArray[np.bool_]:

@@ -22,23 +22,25 @@ def campaign_page(campaign: Campaign) -> Page:
     """Builds the page: what runs when, how each stage moves, and how hot the robot is expected to get."""
     robot = campaign.robot
     verdict = (
-        f"{campaign.cycles} cycles in {campaign.duration / 60:.1f} min, {len(campaign.stages)} files to play; every "
-        "stage keeps all limits and is at rest at home at both ends."
+        f"{campaign.cycles} cycles in {campaign.duration / 60:.1f} min, {len(campaign.stages)} files to play. Every "
+        f"stage respects all limits and starts and ends at rest in the home pose."
     )
     temperature = _temperature_sections(campaign)
     return Page(
         title="Campaign",
         subtitle=robot.title or robot.name,
-        verdict=verdict if campaign.success else "A stage passes a limit.",
+        verdict=verdict if campaign.success else "At least one stage exceeds a limit; see the table of margins.",
         status="good" if campaign.success else "bad",
         facts=_facts(campaign),
         warnings=(*campaign.notes, *_assumed(campaign)),
         sections=(
             Section(
-                title="What runs when",
+                title="Schedule",
                 paragraphs=(
-                    "Play each file from its first row to its last, one row every controller period; the next one may "
-                    "follow at once. Rest means: leave the motors on at home and play nothing.",
+                    (
+                        "Play each file completely, one row per controller period. The next file may follow "
+                        "immediately. Rest means: motors on in the home pose, no motion."
+                    ),
                 ),
                 pictures=(velocity_picture(campaign),),
                 tables=(_phases(campaign), _cycle_table(campaign)),
@@ -66,7 +68,7 @@ def _facts(campaign: Campaign) -> tuple[Fact, ...]:
             Fact(
                 label="Highest expected temperature",
                 value=f"{peak.max():.0f} °C",
-                note=f"joint {int(peak.argmax()) + 1}, surroundings {campaign.ambient:g} °C",
+                note=f"joint {int(peak.argmax()) + 1}, ambient {campaign.ambient:g} °C",
             )
         )
     return tuple(facts)
@@ -75,7 +77,7 @@ def _facts(campaign: Campaign) -> tuple[Fact, ...]:
 def _assumed(campaign: Campaign) -> tuple[str, ...]:
     if not campaign.robot.assumed:
         return ()
-    return (f"Assumed, with no source behind them: {', '.join(campaign.robot.assumed)}.",)
+    return (f"Assumed values without a source: {', '.join(campaign.robot.assumed)}.",)
 
 
 def _phases(campaign: Campaign) -> Table:
@@ -121,7 +123,9 @@ def _cycle_table(campaign: Campaign) -> Table:
             for slot in slots
         ]
     headings = ("cycle", "stage", "start [s]", "end [s]", "duration [s]")
-    return Table(headings=headings, rows=tuple(rows), caption="One cycle of each kind; times from its start.")
+    return Table(
+        headings=headings, rows=tuple(rows), caption="One cycle of each kind. Times count from the start of the cycle."
+    )
 
 
 def _timetable(slots: tuple[Slot, ...]) -> Table:
@@ -135,7 +139,11 @@ def _timetable(slots: tuple[Slot, ...]) -> Table:
         )
         for slot in slots
     )
-    return Table(headings=("start [s]", "end [s]", "cycle", "phase", "file"), rows=rows, caption="On one clock.")
+    return Table(
+        headings=("start [s]", "end [s]", "cycle", "phase", "file"),
+        rows=rows,
+        caption="All times count from the start of the campaign.",
+    )
 
 
 def _heat_table(campaign: Campaign) -> Table:
@@ -158,7 +166,7 @@ def _heat_table(campaign: Campaign) -> Table:
     return Table(
         headings=("", *names, "all"),
         rows=tuple(rows),
-        caption="Friction torque times speed, by the friction of the robot's description at all temperatures.",
+        caption="Friction torque times velocity. The friction of the robot's description is used at all temperatures.",
     )
 
 
@@ -172,7 +180,7 @@ def _limit_table(stages: tuple[Stage, ...]) -> Table:
                 (stage.name, quantity, worst.joint, worst.value, worst.limit, 100 * worst.slack_fraction, worst.time)
             )
     headings = ("stage", "limit", "joint", "value", "bound", "left [%]", "at [s]")
-    return Table(headings=headings, rows=tuple(rows), caption="The closest approaches, by the samples of the files.")
+    return Table(headings=headings, rows=tuple(rows), caption="Smallest distances at the samples of the files.")
 
 
 def _friction_sections(campaign: Campaign) -> tuple[Section, ...]:
@@ -190,10 +198,7 @@ def _friction_sections(campaign: Campaign) -> tuple[Section, ...]:
     return (
         Section(
             title="Friction stage",
-            paragraphs=(
-                "Each joint moves alone. At an angle of 0° gravity does no work on it: a revolute axis stands "
-                "vertical.",
-            ),
+            paragraphs=("Each joint moves alone. At 0° gravity does no work on it (a revolute axis is vertical).",),
             tables=(table,),
         ),
     )
@@ -224,12 +229,12 @@ def _temperature_sections(campaign: Campaign) -> tuple[Section, ...]:
     table = Table(
         headings=("joint", "W [W]", "slow [min]", "fast [min]", "highest [°C]", "parameters"),
         rows=tuple(rows),
-        caption="Mean power of the hottest cycle at the surroundings' temperature; time constants at that power.",
+        caption="Mean power of the hottest cycle at ambient temperature, and the time constants at that power.",
     )
     ratio = "" if campaign.cold_friction == 1.0 else f", times {campaign.cold_friction:g} for the cold robot"
     text = (
-        "By the second-order thermal model (thesis eq. 116), from the surroundings' temperature. Its power is that of "
-        f"the described friction{ratio}; friction falls as the joint warms up."
+        "Second-order thermal model (thesis eq. 116), starting at ambient temperature. Power: friction of the robot's "
+        f"description{ratio}, which falls as the joint warms up."
     )
     return (
         Section(

@@ -28,11 +28,11 @@ def design_page(design: Design) -> Page:
     robot, motion = design.robot, design.motion
     label, value = design.criterion.label, design.optimised.value(design.criterion)
     verdict = (
-        f"The optimised part reaches {label} = {significant(value)} over {design.base.size} parameters, and the whole "
+        f"The optimised motion reaches {label} = {significant(value)} over {design.base.size} parameters. The whole "
         f"experiment takes {motion.duration:.0f} s."
     )
     if design.violated:
-        verdict += f" It passes a limit: {_name(design.violated[0])}."
+        verdict += f" It exceeds a limit: {_name(design.violated[0])}."
     return Page(
         title="Excitation experiment",
         subtitle=robot.title or robot.name,
@@ -44,8 +44,11 @@ def design_page(design: Design) -> Page:
             Section(
                 title="Motion",
                 paragraphs=(
-                    "Each joint within its limits. The shaded parts are the segments: the optimised Fourier series, "
-                    "one stroke a joint to its velocity bound both ways, and jerk-limited moves in between.",
+                    (
+                        "Motion of each joint with its limits. The shaded parts are the segments: the optimised "
+                        "Fourier series, one velocity stroke per joint in both directions, and jerk-limited moves in "
+                        "between."
+                    ),
                 ),
                 pictures=(
                     trajectory_picture(
@@ -71,13 +74,13 @@ def design_page(design: Design) -> Page:
 
 
 def quality_section(qualities: tuple[Quality, ...]) -> Section:
-    """Shows what each part tells of the parameters."""
+    """Shows the information of each part on the parameters."""
     rows = []
     for quality in qualities:
         data = quality.to_dict()
         rows.append(
             (
-                quality.part,
+                quality.label,
                 quality.samples,
                 data["cond_Y"],
                 None if data["cond_Y"] is None else data["cond_Y"] ** 2,
@@ -88,16 +91,20 @@ def quality_section(qualities: tuple[Quality, ...]) -> Section:
     table = Table(
         headings=("part", "samples", "cond(Y)", "cond(Y'Y)", "log det(Y'Y)", "smallest singular value of Y"),
         rows=tuple(rows),
-        caption="Of the unscaled regressor in SI units; a dash where a part alone does not excite all parameters.",
+        caption=(
+            "Values of the unscaled regressor Y in SI units. A dash: this part alone does not determine all parameters."
+        ),
     )
     return Section(
-        title="What it tells",
+        title="Information in the data",
         paragraphs=(
-            "Condition numbers depend on the columns' units and do not compare across robots or models. The smallest "
-            "singular value says how well the worst-determined direction is seen: its standard error is the torque "
-            "noise over it.",
+            (
+                "Condition numbers depend on the units of the columns; do not compare them across robots or models. "
+                "The standard error in the worst-determined direction is the torque noise divided by the smallest "
+                "singular value."
+            ),
         ),
-        pictures=(spectrum_picture({quality.part: _shown(quality) for quality in qualities}),),
+        pictures=(spectrum_picture({quality.label: _shown(quality) for quality in qualities}),),
         tables=(table,),
     )
 
@@ -118,7 +125,7 @@ def margins_section(margins: tuple[Margin, ...], joint_names: tuple[str, ...]) -
     table = Table(
         headings=("limit", "joint", "value", "bound", "left [%]", "at [s]"),
         rows=rows[:12],
-        caption="The twelve closest approaches, by the samples of the file.",
+        caption="The twelve smallest distances at the samples of the file.",
     )
     return Section(title="Limits", pictures=(margins_picture(margins, joint_names=joint_names),), tables=(table,))
 
@@ -128,7 +135,7 @@ def parameters_section(names: tuple[str, ...], formulas: tuple[str, ...]) -> Sec
     rows: tuple[tuple[Cell, ...], ...] = tuple(zip(names, formulas, strict=True))
     return Section(
         title="Base parameters",
-        paragraphs=("Only these sums of the links' parameters show in the torques.",),
+        paragraphs=("The torques depend only on these combinations of link parameters (base parameters).",),
         tables=(Table(headings=("parameter", "stands for"), rows=rows),),
         folded=True,
     )
@@ -138,7 +145,7 @@ def _facts(design: Design) -> tuple[Fact, ...]:
     fourier, whole = design.optimised.to_dict(), design.whole.to_dict()
     tightest = min((m for m in design.margins if np.isfinite(m.limit)), key=lambda m: m.slack_fraction, default=None)
     facts = [
-        Fact(label="cond(Y), optimised part", value=fourier["cond_Y"]),
+        Fact(label="cond(Y), optimised motion", value=fourier["cond_Y"]),
         Fact(label="cond(Y), whole experiment", value=whole["cond_Y"]),
         Fact(label="Parameters", value=design.base.size),
         Fact(label="Duration", value=f"{design.motion.duration:.1f} s"),
@@ -156,24 +163,26 @@ def _facts(design: Design) -> tuple[Fact, ...]:
 
 
 def _warnings(design: Design) -> tuple[str, ...]:
-    warnings = [f"The motion passes the limit of {_name(margin)}." for margin in design.violated]
+    warnings = [f"The motion exceeds the limit of {_name(margin)}." for margin in design.violated]
     if design.robot.assumed:
-        warnings.append(f"Assumed, with no source behind them: {', '.join(design.robot.assumed)}.")
+        warnings.append(f"Assumed values without a source: {', '.join(design.robot.assumed)}.")
     substitutes = {"acceleration": "4/s times the velocity limit", "jerk": "20/s times the acceleration limit"}
     for name, joints in missing_limits(design.robot.limits).items():
         warnings.append(
-            f"The robot's description lacks the {name} limit of joint {', '.join(map(str, joints))}; cautiously "
-            f"assumed: {substitutes[name]}."
+            f"The robot's description states no {name} limit for joint {', '.join(map(str, joints))}; assumed: "
+            f"{substitutes[name]}."
         )
     if not any(margin.quantity == "torque" for margin in design.margins):
-        warnings.append("Torque was not checked: the robot's description lacks nominal dynamics or torque limits.")
+        warnings.append(
+            "Torque limits were not checked: the robot's description lacks nominal dynamics or torque limits."
+        )
     if design.freedom is None:
-        warnings.append("Collisions were not checked.")
+        warnings.append("Collisions were not checked. Use --collision with a robot that has collision bodies.")
     elif not design.freedom["certified"]:
-        warnings.append("Freedom of collisions is not proved at all times.")
+        warnings.append("Absence of collisions was checked at the samples only; between samples it is not proved.")
     if design.strokes_left_out:
         left_out = ", ".join(str(joint) for joint in design.strokes_left_out)
-        warnings.append(f"No stroke for joints {left_out}: on it the arm would collide.")
+        warnings.append(f"No velocity stroke for joints {left_out}: the arm would collide.")
     return tuple(warnings)
 
 
@@ -194,7 +203,7 @@ def _search_text(design: Design) -> str:
         f"{searches} from seed {settings['seed']}, {'' if count == 1 else 'each '}with "
         f"{settings['effort']['starts']} screened starts and {settings['effort']['hops']} hops, solved by "
         f"{'IPOPT' if settings['solver']['name'] == 'ipopt' else 'a feasible interior-point method'} with exact "
-        "gradients. The limits were imposed so that they hold between the samples, too."
+        "gradients. The limits also hold between the samples."
     )
 
 
@@ -204,4 +213,4 @@ def _islands(design: Design) -> Table:
     )
     name = design.criterion.name
     headings = ("search", f"first {name}", f"final {name}", "iterations", "evaluations", "end")
-    return Table(headings=headings, rows=rows, caption="The criterion of one period at the controller's samples.")
+    return Table(headings=headings, rows=rows, caption="Criterion of one period, at the controller's sample times.")

@@ -1,4 +1,4 @@
-"""What a log or a planned experiment could show: a table of effects by joints, and the page of a plan."""
+"""Detection limits of a log or a planned experiment: a table of effects by joints, and the page of a plan."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from robots.terms.effects import EFFECTS
 CLEAR = 0.02
 """Share of the torque below which a limit counts as small: what robot models commonly leave."""
 ALL = 1.0
-"""Share of the torque from which a size is none."""
+"""Fraction of the torque from which an effect size counts as impossible."""
 MUCH = 2.0
-"""Times a limit from which the one of the kind that shows least is told beside it."""
+"""If the worst-case limit exceeds the usual one by this factor, it is shown as well."""
 
 
 def save_limits_report(limits: Sequence[Limit], robot: str, folder: ResultFolder) -> None:
-    """Writes the page of what a planned experiment could show."""
+    """Writes the report on the effects that a planned experiment could show."""
     save_page(limits_page(limits, robot), folder)
 
 
@@ -31,18 +31,19 @@ def limits_page(limits: Sequence[Limit], robot: str) -> Page:
     clear = [limit for limit in testable if limit.attributable <= CLEAR]
     hidden = sorted({EFFECTS[limit.effect].title for limit in limits if not np.isfinite(limit.detectable)})
     return Page(
-        title="What this experiment could show",
+        title="Detectable effects of this experiment",
         subtitle=robot,
         verdict=(
-            f"Of {len(limits)} effects and places, {len(clear)} would be seen and named at {100 * CLEAR:g} % of the "
-            f"joint's torque, and {len(testable)} at some size."
+            f"Of {len(limits)} pairs of effect and joint, {len(clear)} would be found and named at {100 * CLEAR:g} % "
+            f"of the "
+            f"joint's torque RMS. {len(testable)} would be found at some size."
         ),
         status="good" if len(clear) > len(limits) / 2 else "warning",
         facts=(
-            Fact(label="Seen and named at 2 %", value=f"{len(clear)} of {len(limits)}"),
-            Fact(label="Hidden in this motion", value=len(limits) - len(testable)),
+            Fact(label="Found and named at 2 % of torque RMS", value=f"{len(clear)} of {len(limits)}"),
+            Fact(label="Not detectable with this motion", value=len(limits) - len(testable)),
         ),
-        warnings=(f"No size of these shows on some joint: {'; '.join(hidden)}.",) if hidden else (),
+        warnings=(f"Not detectable on at least one joint, at any size: {'; '.join(hidden)}.",) if hidden else (),
         sections=(limits_section(limits),),
         footer=footer(),
     )
@@ -61,27 +62,27 @@ def limits_section(limits: Sequence[Limit], *, folded: bool = False) -> Section:
         Table(
             headings=("effect", *(f"joint {joint}" for joint in joints)),
             rows=tuple(rows),
-            caption="Smallest size that would be found with 95 % chance / that would also be told from its rivals, in "
-            "per cent of the joint's torque RMS, of an effect of usual shape: half of the speeds, time constants or "
-            "travels that are tried show sooner. In brackets, where it is much more: from what size on it would be "
-            "found whatever those are. A dash: cannot act there; hidden: no size shows in this motion.",
+            caption=(
+                "Found / named: smallest effect size, in per cent of the joint's torque RMS, that is found with 95 % "
+                "probability / also distinguished from other effects. Values hold for the median over the shape "
+                "parameters (speeds, time constants, travels). In brackets: the worst case, where it is much larger. "
+                "A dash: cannot act on this joint. Hidden: not detectable with this motion."
+            ),
             align=("left", *("right" for _ in joints)),
         )
     ]
     if whole:
         tables.append(
             Table(
-                headings=("effect on the whole robot", "found / named [%]", "toughest rival"),
+                headings=("effect on the whole robot", "found / named [%]", "closest rival"),
                 rows=tuple(
                     (EFFECTS[w.effect].title, _cell(w), EFFECTS[w.toughest].title if w.toughest else None)
                     for w in whole
                 ),
-                caption="Sizes on the joint where the effect shows most.",
+                caption="Sizes refer to the joint with the clearest signal.",
             )
         )
-    text = (
-        "What could have been seen, and what not: an effect smaller than this may be there although nothing was found."
-    )
+    text = "Detection limits of these data: smaller effects may exist and stay undetected."
     return Section(
         title="Limits",
         paragraphs=(text, *_notes(limits)),
@@ -91,14 +92,14 @@ def limits_section(limits: Sequence[Limit], *, folded: bool = False) -> Section:
 
 
 def _notes(limits: Sequence[Limit]) -> list[str]:
-    """Tells each note once, with the places that it is of."""
+    """Writes each note once, with the joints it applies to."""
     places: dict[str, list[Limit]] = {}
     for limit in limits:
         if limit.note:
             places.setdefault(limit.note, []).append(limit)
     result = []
     for note, those in places.items():
-        # Effects of the same joints are told together: a list of effects beside one of joints would be their product.
+        # Effects on the same joints share one entry; a list of effects with a list of joints would mean their product.
         joints: dict[str, list[int]] = {}
         for limit in those:
             joints.setdefault(EFFECTS[limit.effect].title, []).extend([limit.joint] if limit.joint else [])
@@ -123,7 +124,7 @@ def _cell(limit: Limit | None) -> Cell:
 
 
 def _worst(limit: Limit) -> str:
-    """Says from what size on the kind of it that shows least would be found, where that is much more."""
+    """Writes the worst-case limit where it is much larger."""
     if limit.at_worst <= MUCH * limit.detectable:
         return ""
     return f" ({100 * limit.at_worst:.2g})" if limit.at_worst < ALL else " (never)"

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
 from estimation.diagnosis.experiment_plans.detection_limits import summarise_limits
 from estimation.diagnosis.results.diagnosis import Diagnosis
-from estimation.diagnosis.validations.verdict import CLOSE
 from oed.reports.pages.diagnosis_limits import limits_section
 from oed.reports.pages.diagnosis_simulation import simulation_section
 from oed.reports.pages.diagnosis_view import DiagnosisView, view_of
@@ -25,7 +25,7 @@ from robots.common.files import ResultFolder
 Array = NDArray[np.float64]
 
 SMALL = 1e-12
-"""Probability below which no number is told: the noise's distribution is not known that far out."""
+"""Smallest probability that is written: the tail of the noise distribution is unknown beyond it."""
 
 
 def save_diagnosis_report(diagnosis: Diagnosis, folder: ResultFolder, *, png: bool = False) -> None:
@@ -34,13 +34,13 @@ def save_diagnosis_report(diagnosis: Diagnosis, folder: ResultFolder, *, png: bo
 
 
 def diagnosis_page(view: DiagnosisView) -> Page:
-    """Builds the page: what is wrong, how it shows, what mending it brings, what could not be seen, what to do next."""
+    """Builds the page: findings with their evidence, gain of the extended model, detection limits, next step."""
     sections = [_torque(view)]
     sections += [_finding(view, index) for index in range(len(view.findings))]
     if view.simulation is not None:
         sections.append(simulation_section(view.simulation, view.joint_names, view.kinds))
     if view.unexplained:
-        sections.append(Section(title="What is left", paragraphs=view.unexplained))
+        sections.append(Section(title="Unexplained residual", paragraphs=view.unexplained))
     sections.append(_next(view))
     sections.append(limits_section(view.limits, folded=bool(view.findings)))
     status: dict[str, Status] = {"none": "good", "named": "good"}
@@ -59,23 +59,23 @@ def diagnosis_page(view: DiagnosisView) -> Page:
 def _verdict(view: DiagnosisView) -> str:
     if view.verdict == "none":
         seen = summarise_limits(view.limits)
-        return f"Nothing that the model leaves out was found.{f' {seen}.' if seen else ''}"
+        return f"No missing effect was found.{f' {seen}.' if seen else ''}"
     if not view.findings:
-        return "The model leaves something out that no effect of the catalogue explains."
+        return "The residual is not noise, but no effect of the catalogue explains it."
     first = view.findings[0].sentence
     others = len(view.findings) - 1
-    more = f" And {others} more: see below." if others else ""
+    more = f" {others} more below." if others else ""
     if view.verdict == "ambiguous":
-        return f"Something is found, but not which of several causes. The likeliest: {first}{more}"
+        return f"An effect is found, but several causes fit. The most likely: {first}{more}"
     if view.verdict == "unexplained":
-        # A free function names no cause, however much it brings.
+        # A free function does not name a cause, whatever its gain.
         helps = any(finding.interval[0] > 0 and finding.named for finding in view.findings)
-        part = "A part of the error is explained, another is not." if helps else _STANDS_OUT
+        part = "The error is explained in part." if helps else _NO_KNOWN_CAUSE
         return f"{part} {first}{more}"
     return f"{first}{more}"
 
 
-_STANDS_OUT = "Something stands out of the noise that no effect of the catalogue explains."
+_NO_KNOWN_CAUSE = "The residual is not noise, but no effect of the catalogue explains it."
 
 
 def _facts(view: DiagnosisView) -> tuple[Fact, ...]:
@@ -84,34 +84,34 @@ def _facts(view: DiagnosisView) -> tuple[Fact, ...]:
         change = np.nan_to_num(view.nrmse_before - view.nrmse_after)
         own = {finding.joint for finding in view.findings}
         if own and None not in own:
-            # Of what is told: other joints differ by what the base model makes of it.
+            # Only joints with a finding: on other joints the change comes from the base model.
             change[[j for j in range(len(change)) if j + 1 not in own]] = -np.inf
         worst = int(np.argmax(change))
         facts.append(
             Fact(
-                label=f"Error of joint {worst + 1}, unseen data",
+                label=f"Error of joint {worst + 1}, held-out data",
                 value=f"{100 * view.nrmse_before[worst]:.2g} → {100 * view.nrmse_after[worst]:.2g} %",
-                note="of its torque RMS, without and with what was found",
+                note="of its torque RMS, base model → extended model",
                 status="good" if view.nrmse_after[worst] < view.nrmse_before[worst] else "neutral",
             )
         )
         facts.append(
             Fact(
-                label="Error of all joints, unseen data",
+                label="Error of all joints, held-out data",
                 value=f"{100 * _pooled(view.nrmse_before):.2g} → {100 * _pooled(view.nrmse_after):.2g} %",
-                note="root mean square over the joints",
+                note="root mean square over joints",
             )
         )
     if view.findings:
         chance = max(finding.p_value for finding in view.findings)
         facts.append(
-            Fact(label="Chance of a false alarm", value=_chance(chance, 100.0) + " %", note="the weakest finding")
+            Fact(label="False-alarm probability", value=_chance(chance, 100.0) + " %", note="of the weakest finding")
         )
     return tuple(facts)
 
 
 def _chance(p: float, times: float = 1.0) -> str:
-    """Writes a probability; of one that no sample could tell from zero, that it is smaller than any that matters."""
+    """Writes a probability; below `SMALL`, writes that it is smaller than that."""
     return f"{times * p:.2g}" if p >= SMALL else f"< {times * SMALL:.0g}"
 
 
@@ -138,17 +138,17 @@ def _torque(view: DiagnosisView) -> Section:
         gain = None if old is None or new is None or not old else 100 * (1 - new / old)
         rows.append((title, old, new, gain, every))
     table = Table(
-        headings=("joint", "base model [%]", "extended model [%]", "less error [%]", "every row [%]"),
+        headings=("joint", "base model [%]", "extended model [%]", "reduction [%]", "all rows [%]"),
         rows=tuple(rows),
-        caption="Error of the simulated torque over the torque's RMS, on data that the fit has not seen. Rows in which "
-        "a joint stands or turns round do not count for it: its friction may have any value there. The last column is "
-        "the extended model's error with every row counted, as `oed predict` has it.",
+        caption=(
+            "RMS error of the simulated torque divided by the torque RMS, on held-out data. Rows at standstill or "
+            "velocity reversal do not count for a joint, because its friction is not determined there. The last "
+            "column counts all rows, as `oed predict` does."
+        ),
     )
     return Section(
         title="Measured and simulated torque",
-        paragraphs=(
-            f"The robot's torque as it was measured, and as the extended model simulates it, on {view.unseen}.",
-        ),
+        paragraphs=(f"Measured torque, and torque of the extended model, on {view.unseen}.",),
         pictures=tuple(pictures),
         tables=(table,) if known else (),
     )
@@ -164,7 +164,7 @@ def _finding(view: DiagnosisView, index: int) -> Section:
         if not np.isfinite(error):
             interval = "not determined by these logs"
         elif error <= 0:
-            interval = "one of a few that machines have"
+            interval = "chosen from a list of usual values"
         else:
             interval = f"{significant(lower, error)} to {significant(upper, error)}"
         values.append((name.replace("_", " "), significant(value, error), unit_of, interval))
@@ -176,27 +176,27 @@ def _finding(view: DiagnosisView, index: int) -> Section:
         )
     ]
     evidence: list[tuple[Cell, ...]] = [
-        ("chance that noise alone looks like this", _chance(finding.p_value)),
-        ("better than without it, in BIC", significant(finding.delta_bic, digits=3)),
+        ("probability of this pattern under noise alone (p-value)", _chance(finding.p_value)),
+        ("BIC gain over the model without it", significant(finding.delta_bic, digits=3)),
     ]
     if np.isfinite(finding.before):
         evidence.append(
             (
-                f"error{finding.elsewhere} on unseen data",
+                f"error{finding.elsewhere} on held-out data",
                 f"{100 * finding.before:.3g} → {100 * finding.after:.3g} % of the {finding.of} RMS",
             )
         )
     if np.isfinite(finding.interval).all():
         low, high = finding.interval
-        evidence.append(("gain, 95 % interval", f"{100 * low:.2g} to {100 * high:.2g} percentage points"))
+        evidence.append(("error reduction, 95 % interval", f"{100 * low:.2g} to {100 * high:.2g} percentage points"))
     tables.append(Table(headings=("evidence", "value"), rows=tuple(evidence)))
     if finding.rivals:
         tables.append(
             Table(
-                headings=("instead of it", "worse by, in BIC"),
+                headings=("alternative effect", "BIC difference"),
                 rows=tuple((title, round(margin, 1)) for title, margin in finding.rivals),
-                caption=f"Below {CLOSE:g} a rival remains possible"
-                f"{'' if finding.rivals[0][1] < CLOSE else ': none does'}.",
+                caption=f"Below {CLOSE_RIVAL_BIC:g} an alternative remains possible"
+                f"{'' if finding.rivals[0][1] < CLOSE_RIVAL_BIC else ': none does'}.",
             )
         )
     picture = cause_picture(
@@ -204,7 +204,7 @@ def _finding(view: DiagnosisView, index: int) -> Section:
         finding.coordinate,
         finding.residual_before,
         finding.residual_after,
-        title=f"What the model leaves of the {finding.of} of joint {finding.shown_on}",
+        title=f"Residual {finding.of} of joint {finding.shown_on}",
         unit=unit,
         name=f"cause-{index + 1}",
     )
@@ -217,32 +217,34 @@ def _finding(view: DiagnosisView, index: int) -> Section:
 
 
 _UNLESS = (
-    "No further experiment is needed to name the cause, unless the robot may have what few have and what fits about "
-    "as well: {}. That is then to be ruled out by itself."
+    "No further experiment is needed to name the cause. One exception: a rare effect fits about as well: {}. If your "
+    "robot may have it, check it separately."
 )
 _NO_EXPERIMENT = {
-    "none": "Nothing is left to tell apart.",
+    "none": "No further experiment is needed.",
     "named": "No further experiment is needed to name the cause.",
-    "ambiguous": "No experiment that was thought of would tell the causes apart.",
-    "unexplained": "Part of the error has no name, and no experiment of the catalogue gives it one. Look at its joint: "
-    "move it alone, slowly and fast, through the same range at several loads, and see whether the residual stays with "
-    "the position, the speed or the time that the findings above name.",
+    "ambiguous": "None of the known kinds of experiment would distinguish the remaining causes.",
+    "unexplained": (
+        "Part of the error has no known cause, and no experiment of the catalogue can identify it. Move the joint "
+        "alone, slowly and fast, through the same range and with several loads. Check whether the residual depends on "
+        "position, velocity or time as the findings above state."
+    ),
 }
 
 
 def _next(view: DiagnosisView) -> Section:
     if not view.next_kind:
-        rare = [title for finding in view.findings for title, worse in finding.rivals if worse < CLOSE]
+        rare = [title for finding in view.findings for title, worse in finding.rivals if worse < CLOSE_RIVAL_BIC]
         text = _UNLESS.format(", ".join(rare)) if view.verdict == "named" and rare else _NO_EXPERIMENT[view.verdict]
         return Section(title="Next step", paragraphs=(f"{text}{_rough(view)}",))
-    paragraphs = [f"Make {view.next_kind}: {view.next_why}." if view.next_why else f"Make {view.next_kind}."]
+    paragraphs = [f"Record {view.next_kind}: {view.next_why}." if view.next_why else f"Record {view.next_kind}."]
     rows: Sequence[tuple[Cell, ...]] = tuple(
         (kind, round(100 * chance), round(duration)) for kind, chance, duration in view.next_ranking
     )
     tables = (
         (
             Table(
-                headings=("experiment", "chance to name one cause [%]", "takes [s]"),
+                headings=("experiment", "probability to name one cause [%]", "duration [s]"),
                 rows=tuple(rows),
                 align=("left", "right", "right"),
             ),
@@ -252,14 +254,14 @@ def _next(view: DiagnosisView) -> Section:
     )
     if view.next_logged:
         paragraphs.append(
-            f"The motion is that of {view.next_logged}. Where it begins or ends in motion, let the program of that log "
-            "run instead."
+            f"The motion is that of {view.next_logged}. If that log starts or ends in motion, run its original "
+            f"program instead."
         )
     return Section(title="Next step", paragraphs=tuple(paragraphs), tables=(*tables, *_runs(view)))
 
 
 def _rough(view: DiagnosisView) -> str:
-    """Says which values of what is named a longer log could tell."""
+    """Names parameters that longer logs would determine better."""
     rough = [
         f"{', '.join(name.replace('_', ' ') for name in finding.rough)} of {finding.title}"
         for finding in view.findings
@@ -267,11 +269,11 @@ def _rough(view: DiagnosisView) -> str:
     ]
     if view.verdict != "named" or not rough:
         return ""
-    return f" Not well determined yet: {'; '.join(rough)}. More of such logs would tell them better."
+    return f" Not well determined: {'; '.join(rough)}. More logs of this kind would improve them."
 
 
 def _runs(view: DiagnosisView) -> tuple[Table, ...]:
-    """What to play, one after the other."""
+    """The motions to play, in order."""
     if not view.next_runs:
         return ()
     rows: list[tuple[Cell, ...]] = [
@@ -279,13 +281,13 @@ def _runs(view: DiagnosisView) -> tuple[Table, ...]:
             f"next_experiment_{run['motion']}.csv",
             run["pause_s"],
             run["payload_kg"] or None,
-            "as it stands" if run["gravity"] is None else ", ".join(f"{g:.4g}" for g in run["gravity"]),
+            "unchanged" if run["gravity"] is None else ", ".join(f"{g:.4g}" for g in run["gravity"]),
         )
         for run in view.next_runs
     ]
     return (
         Table(
-            headings=("play", "after a rest of [s]", "payload [kg]", "base: gravity in its frame [m/s2]"),
+            headings=("play", "rest before it [s]", "payload [kg]", "gravity in the base frame [m/s2]"),
             rows=tuple(rows),
             align=("left", "right", "right", "left"),
         ),

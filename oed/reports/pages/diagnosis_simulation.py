@@ -26,17 +26,23 @@ def simulation_section(simulation: Simulation, names: Sequence[str], kinds: Sequ
         motion = (f"{1e3 * float(part[j]):.3g}" for part in simulation.motion)
         rows.append((title, *torque, *motion, f"m{units[j].position}"))
     paragraphs = [
-        f"From {simulation.start:.1f} to {simulation.end:.1f} s, the part of the unseen data in which what was found "
-        "acts most, the robot was simulated forward in time. The measured torque drives it, and a position loop holds "
-        f"it to the measured motion. The loop is assumed: proportional and derivative, {loop.bandwidth:g} Hz, damping "
-        f"{loop.damping:g}. A robot simulated as it is would need nothing of the loop.",
+        (
+            f"Forward simulation from {simulation.start:.1f} to {simulation.end:.1f} s, the part of the held-out data "
+            f"in which the found effects act most. Inputs are the measured torque and the correction of a position "
+            f"controller that follows the measured motion. The controller is assumed: proportional and derivative, "
+            f"bandwidth {loop.bandwidth:g} Hz, damping ratio {loop.damping:g}. With a perfect model the correction is "
+            f"zero."
+        ),
     ]
     if simulation.note:
         paragraphs.append(simulation.note)
     table = Table(
-        headings=("joint", "loop adds, base [%]", "extended [%]", "motion off, base", "extended", "unit"),
+        headings=("joint", "correction, base [%]", "extended [%]", "position error, base", "extended", "unit"),
         rows=tuple(rows),
-        caption="RMS of the torque that the loop adds, over the torque's, and RMS deviation of the simulated motion.",
+        caption=(
+            "Correction: RMS of the controller's torque divided by the torque RMS. Position error: RMS of simulated "
+            "minus measured position."
+        ),
         align=("left", "right", "right", "right", "right", "left"),
     )
     return Section(
@@ -50,7 +56,7 @@ def simulation_section(simulation: Simulation, names: Sequence[str], kinds: Sequ
 def simulation_picture(
     simulation: Simulation, names: Sequence[str], kinds: Sequence[str], *, name: str = "simulation"
 ) -> Picture:
-    """Shows, of the joint that changes most, torque and deviation of the motion without and with what was found.
+    """Shows torque and position error of the base and the extended model, for the joint that changes most.
 
     Args:
         simulation: with its curves.
@@ -66,7 +72,7 @@ def simulation_picture(
         raise ValueError("a simulation that was loaded from a file has no curves")
     j = simulation.telling
     unit, title = joint_units(kinds, len(names))[j], joint_titles(names, len(names))[j]
-    roles = (("base model", "residual"), ("with what was found", "good"))
+    roles = (("base model", "residual"), ("extended model", "good"))
     torque = [Series(x=curves.t, y=curves.measured[:, j], name="measured", role="measured")]
     torque += [
         Series(x=curves.t, y=part[:, j], name=label, role=role)
@@ -77,17 +83,17 @@ def simulation_picture(
         for (label, role), part in zip(roles, curves.deviation, strict=True)
     ]
     return Picture(
-        title=f"{title}, simulated forward under a position loop",
+        title=f"{title}, forward simulation with a position controller",
         name=name,
         panels=(
             Panel(title="Torque", x_label="time [s]", y_label=f"[{unit.torque}]", series=tuple(torque)),
             Panel(
-                title="Simulated less measured position",
+                title="Simulated minus measured position",
                 x_label="time [s]",
                 y_label=f"[m{unit.position}]",
                 series=tuple(motion),
                 lines=(Line(value=0.0, role="neutral", dash="solid"),),
             ),
         ),
-        caption="Of all joints, the one whose loop changes most.",
+        caption="Shown is the joint whose controller correction changes most.",
     )

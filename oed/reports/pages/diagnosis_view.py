@@ -1,4 +1,4 @@
-"""A diagnosis as its page tells it: words, tables and curves, free of the objects that they come from."""
+"""The content of a diagnosis report: words, tables and curves, independent of the objects they come from."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FindingView:
-    """One finding as the page tells it.
+    """One finding as the report shows it.
 
     Attributes:
         title: what it is, in words.
         sentence: what its values mean.
         joint: counted from 1; None for the whole robot.
         parameters: name, value, unit, lower and upper end of the 95 % interval (not finite where not determined).
-        p_value: chance that noise alone has an effect this strong.
+        p_value: probability of an effect this strong under noise alone.
         delta_bic: how much better the model is with it.
-        before: error over torque RMS without it, on unseen data.
+        before: error divided by torque RMS without it, on held-out data.
         after: with it.
         interval: 95 % interval of the difference.
         rivals: title and how much worse in BIC, the closest first.
@@ -38,7 +38,7 @@ class FindingView:
         residual_before: of that joint without the finding (N,).
         residual_after: with all findings (N,).
         of: what before and after are the error of.
-        unit: of the residuals where they are no torques.
+        unit: of the residuals if they are not torques.
         elsewhere: joints on which before and after are, where those are not its own; begins with a space, or is empty.
         named: whether it is an effect of the catalogue.
         rough: names of the parameters that are not well determined.
@@ -68,27 +68,27 @@ class FindingView:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DiagnosisView:
-    """A diagnosis as the page tells it.
+    """A diagnosis as the report shows it.
 
     Attributes:
-        robot: its name for people.
+        robot: its name in reports.
         verdict: none, named, ambiguous or unexplained.
         findings: strongest first.
         joint_names: names (n,).
         kinds: revolute or prismatic (n,).
-        t: time [s] of the unseen data (N,).
+        t: time [s] of the held-out data (N,).
         measured: torque (N, n).
         base: the base model's (N, n).
         extended: the extended model's (N, n).
-        nrmse_before: error over torque RMS per joint on unseen data (n,).
+        nrmse_before: error divided by torque RMS per joint on held-out data (n,).
         nrmse_after: with what was found (n,).
         nrmse_every: the same with every row counted (n,); NaN where it is not known.
-        unseen: what the unseen data are.
-        limits: what could have been seen.
+        unseen: which data are held out.
+        limits: detection limits of the data.
         next_kind: the next experiment's kind in words; empty for none.
         next_why: why.
-        next_resolves: its chance.
-        next_ranking: kind in words, chance and duration [s], the best first.
+        next_resolves: its probability to name one cause.
+        next_ranking: kind in words, probability and duration [s], the best first.
         next_logged: which motion of the logs it repeats, in words; empty for a new one.
         next_runs: what to play, as `NextExperiment.runs` has it.
         unexplained: what is left, in words.
@@ -122,7 +122,7 @@ class DiagnosisView:
 
 
 def view_of(diagnosis: Diagnosis) -> DiagnosisView:
-    """Tells a diagnosis that has just been made: one that was loaded has no curves.
+    """Collects what the report shows of a new diagnosis; a loaded one has no curves.
 
     Raises:
         ValueError: a diagnosis without curves.
@@ -162,11 +162,11 @@ def view_of(diagnosis: Diagnosis) -> DiagnosisView:
 
 def _experiment(kind: str, times: int) -> str:
     """Describes a kind of experiment, and how often its motions are made."""
-    return EXPERIMENTS.get(kind, kind.replace("_", " ")) + (f", {times} times over" if times > 1 else "")
+    return EXPERIMENTS.get(kind, kind.replace("_", " ")) + (f", repeated {times} times" if times > 1 else "")
 
 
 def _findings(diagnosis: Diagnosis, trace: Trace) -> tuple[FindingView, ...]:
-    """Tells findings in the torque, those that are no part of the model, and those by encoders, with their curves."""
+    """Collects the findings with their curves: in the torque, outside the model, and from joint encoders."""
     count, last = len(trace.coordinate), len(diagnosis.findings) - len(trace.windups)
     told = [_finding(f, trace, x) for f, x in zip(diagnosis.findings[:count], trace.coordinate, strict=True)]
     told += [_finding(f, trace, trace.t) for f in diagnosis.findings[count:last]]
@@ -193,7 +193,7 @@ def _finding(finding: Finding, trace: Trace, coordinate: Array) -> FindingView:
     title = effect.title if effect is not None else "a pattern without a known cause"
     joint = finding.joint if finding.joint is not None else _most(trace)
     if finding.elsewhere and joint not in finding.gain.joints:
-        # What is wrong with one joint is shown where it shows.
+        # Shown on the joint whose error falls most.
         joint = max(finding.gain.joints, key=lambda k: _fall(trace)[k - 1])
     known = bool(np.isfinite(coordinate).any())
     return FindingView(
@@ -219,18 +219,18 @@ def _finding(finding: Finding, trace: Trace, coordinate: Array) -> FindingView:
 
 
 def _most(trace: Trace) -> int:
-    """The joint, from 1, whose error falls most."""
+    """The joint, counted from 1, whose error falls most."""
     return 1 + int(np.argmax(_fall(trace)))
 
 
 def _fall(trace: Trace) -> Array:
-    """By what share of the torque each joint's error falls (n,)."""
+    """Fall of each joint's error as a fraction of its torque RMS (n,)."""
     before, after, size = (_rms(part) for part in (trace.before, trace.after, trace.measured))
     return np.asarray((before - after) / np.maximum(size, 1e-12))
 
 
 def _rms(values: Array) -> Array:
-    """Root mean square of what is known of each column (n,); 0 where nothing is."""
+    """Root mean square of each column's finite values (n,); 0 without any."""
     known = np.isfinite(values)
     sums = np.where(known, values, 0.0) ** 2
     return np.asarray(np.sqrt(sums.sum(axis=0) / np.maximum(known.sum(axis=0), 1)))

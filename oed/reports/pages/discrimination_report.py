@@ -1,4 +1,4 @@
-"""The page of an experiment that tells two possible causes apart."""
+"""The report of an experiment that distinguishes two possible causes."""
 
 from __future__ import annotations
 
@@ -44,20 +44,20 @@ def discrimination_page(result: Discrimination) -> Page:
         for judged in result.ranking
     )
     return Page(
-        title="The experiment that tells two causes apart",
+        title="Experiment to distinguish two causes",
         subtitle=robot.title or robot.name,
         verdict=f"{result.why}.",
         status="good" if result.resolves >= SURE else "warning",
         facts=(
-            Fact(label="Chance to tell them apart", value=f"{100 * result.resolves:.0f} %"),
-            Fact(label="By the reference motion alone", value=f"{100 * result.alone:.0f} %"),
+            Fact(label="Probability of the right decision", value=f"{100 * result.resolves:.0f} %"),
+            Fact(label="With the reference motion alone", value=f"{100 * result.alone:.0f} %"),
             Fact(label="Kind", value=result.kind.replace("_", " "), note=result.what),
             Fact(label="Duration", value=f"{sum(run.motion.duration for run in result.runs):.0f} s"),
         ),
         warnings=result.warnings,
         sections=(
             Section(
-                title="What to play",
+                title="Motions to play",
                 paragraphs=tuple(
                     f"{label.capitalize()}: {EFFECTS[name].title}."
                     for label, (name, _) in zip(result.labels, result.rivals, strict=True)
@@ -66,7 +66,7 @@ def discrimination_page(result: Discrimination) -> Page:
                     Table(
                         headings=("run", "file", "duration [s]", "payload [kg]", "gravity in the base frame [m/s2]"),
                         rows=plays,
-                        caption="In this order, a minute or more between runs. A dash: as the robot stands.",
+                        caption="Play in this order, with at least one minute between runs. A dash: unchanged.",
                     ),
                 ),
             ),
@@ -74,10 +74,20 @@ def discrimination_page(result: Discrimination) -> Page:
                 title="All kinds of experiment",
                 tables=(
                     Table(
-                        headings=("kind", "what the robot does", "chance [%]", "95 % from [%]", "duration [s]", "note"),
+                        headings=(
+                            "kind",
+                            "what the robot does",
+                            "probability [%]",
+                            "size for 95 % [%]",
+                            "duration [s]",
+                            "note",
+                        ),
                         rows=kinds,
-                        caption="Each after the same reference; 95 % from: the size, as a share of the torque, from "
-                        "which it is sure. Those that are sure without a change by hand come first.",
+                        caption=(
+                            "Each kind follows the same reference motion. Size for 95 %: smallest effect size, in per "
+                            "cent of the torque, with 95 % probability of the right decision. Sorted: sufficient "
+                            "without manual change first."
+                        ),
                     ),
                 ),
             ),

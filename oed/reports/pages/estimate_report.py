@@ -30,19 +30,19 @@ def save_estimate_report(
 
 
 def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Page:
-    """Builds the page: how well the torques are explained, by which parameters, known how well.
+    """Builds the page: torque errors, parameters and their uncertainty.
 
     Args:
         estimate: the identification.
-        methods: estimators that were compared on unseen data.
+        methods: estimators compared on held-out data.
     """
     model, joints = estimate.model, estimate.joints
     robot = model.robot
     known = int(model.determined.sum())
     lost = [joint for joint in joints if not joint.identified]
     verdict = (
-        f"{known} of {len(model.names)} parameters are determined; torque left out of the fit is predicted to "
-        f"{100 * np.median([joint.nrmse for joint in joints]):.1f} % of its RMS on the median joint."
+        f"{known} of {len(model.names)} parameters are determined. The prediction error on held-out data is "
+        f"{100 * np.median([joint.nrmse for joint in joints]):.1f} % of the torque RMS (median joint)."
     )
     if lost:
         verdict += f" Not identified: joint {', '.join(str(joint.joint) for joint in lost)}."
@@ -53,9 +53,11 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
         Section(
             title="Torque",
             paragraphs=(
-                "Measured and predicted torque on the fitted rows, and what is left. The table says what the model "
-                "achieves on blocks of the logs that were left out of the fit, beside a constant and the robot's own "
-                "description.",
+                (
+                    "Measured and predicted torque, and the residual, on the fitted rows. The table compares the "
+                    "model's error on held-out blocks of the logs with that of a constant and of the robot's "
+                    "description."
+                ),
             ),
             pictures=(
                 _errors(estimate),
@@ -80,13 +82,15 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
             pictures=(residual_picture(residual, estimate.dq, period=period, joint_names=names, kinds=kinds),),
         ),
         Section(
-            title="How it was made",
+            title="Method",
             paragraphs=(
-                f"Method {model.provenance['method']}; positions: {estimate.choice.smoother.text}, without phase "
-                f"lag; {_regularisation(estimate)}; both chosen by predicting contiguous blocks of the logs from the "
-                "rest. Standard errors come from a sandwich with an autoregressive model of the residual, joints "
-                "correlated. The 95 % band holds the errors of left-out blocks; its coverage is counted on each block "
-                "with the band of the others.",
+                f"Estimator: {model.provenance['method']}. Positions: {estimate.choice.smoother.text}, without phase "
+                f"lag. Regularisation: {_regularisation(estimate)}. Both were chosen by cross-validation on "
+                f"contiguous blocks of the logs. "
+                "Standard errors: sandwich estimator with an autoregressive model of the residuals, correlated across "
+                "joints. "
+                "The 95 % band is computed from the errors on held-out blocks. Its coverage is counted on each block "
+                "with the band of the other blocks.",
             ),
             tables=(_logs(estimate),),
             folded=True,
@@ -103,12 +107,12 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
         status="good" if estimate.success else "warning",
         facts=(
             Fact(label="Parameters determined", value=f"{known} of {len(model.names)}"),
-            Fact(label="Worst joint, left out", value=f"{100 * max(joint.nrmse for joint in joints):.1f} %"),
+            Fact(label="Worst joint, held-out data", value=f"{100 * max(joint.nrmse for joint in joints):.1f} %"),
             Fact(label="Samples", value=len(estimate.t)),
             Fact(
-                label="Colour of the residual",
+                label="Residual correlation factor",
                 value=f"{estimate.colour:.1f}",
-                note="white-noise standard errors would be too small by this factor",
+                note="the standard errors are this many times those of white noise",
             ),
         ),
         warnings=estimate.warnings,
@@ -122,7 +126,7 @@ def _errors(estimate: Estimate) -> Picture:
         pairs = [(getattr(joint, name), joint.torque_rms) for joint in estimate.joints]
         return np.array([error / scale if scale else np.nan for error, scale in pairs])
 
-    errors = {"fitted": shares("residual_rms"), "left out": shares("held_out_rms"), "constant": shares("torque_spread")}
+    errors = {"fitted": shares("residual_rms"), "held out": shares("held_out_rms"), "constant": shares("torque_spread")}
     errors["noise floor"] = shares("noise_floor")
     nominal = shares("nominal_rms")
     if np.isfinite(nominal).any():
@@ -157,18 +161,21 @@ def _joints(estimate: Estimate) -> Table:
         "name",
         "torque RMS",
         "fitted [%]",
-        "left out [%]",
+        "held out [%]",
         "constant [%]",
         "description [%]",
         "noise floor [%]",
         "95 % band ± [%]",
-        "band holds [%]",
+        "band coverage [%]",
         "identified",
     )
     return Table(
         headings=headings,
         rows=tuple(rows),
-        caption="Shares of each joint's torque RMS; fitted and left out where the joint is not almost at rest.",
+        caption=(
+            "RMS errors in per cent of the joint's torque RMS. Fitted and held-out errors count only rows in which "
+            "the joint moves."
+        ),
     )
 
 
@@ -185,9 +192,9 @@ def _parameters(estimate: Estimate) -> Table:
         else:
             rows.append((column.name, "not determined", "–", "–", column.unit, formula))
     return Table(
-        headings=("parameter", "value", "standard error", "percent", "unit", "stands for"),
+        headings=("parameter", "value", "standard error", "percent", "unit", "meaning"),
         rows=tuple(rows),
-        caption="Values rounded to two digits of their standard errors.",
+        caption="Values are rounded to two digits of the standard error.",
         align=("left", "right", "right", "right", "left", "left"),
     )
 
@@ -195,12 +202,12 @@ def _parameters(estimate: Estimate) -> Table:
 def _regularisation(estimate: Estimate) -> str:
     choice = estimate.choice
     if choice.pull is not None:
-        return f"a pull of {choice.ridge:g} towards the robot's description"
-    return f"ridge {choice.ridge:g} on the Gram matrix with unit columns"
+        return f"prior on the robot's description, weight {choice.ridge:g}"
+    return f"ridge, weight {choice.ridge:g}, on the Gram matrix with unit columns"
 
 
 def _correlations(estimate: Estimate) -> tuple[Table, ...]:
-    """Pairs of determined parameters whose errors go together: the data tell their sum better than each."""
+    """Pairs of determined parameters with strongly correlated errors."""
     model = estimate.model
     known = np.flatnonzero(model.determined)
     errors = np.sqrt(np.maximum(np.diag(model.covariance), np.finfo(float).tiny))
@@ -212,7 +219,10 @@ def _correlations(estimate: Estimate) -> tuple[Table, ...]:
         return ()
     names = [model.names[i] for i in known]
     rows = tuple((names[first[k]], names[second[k]], f"{values[k]:+.3f}") for k in order)
-    caption = f"Determined parameters with the most correlated errors, from {CORRELATED:g} on."
+    caption = (
+        f"Pairs of determined parameters with error correlations of {CORRELATED:g} or more. Do not interpret them "
+        f"separately."
+    )
     return (Table(headings=("parameter", "parameter", "correlation"), rows=rows, caption=caption),)
 
 
@@ -226,13 +236,16 @@ def _methods(methods: MethodTable) -> Table:
     return Table(
         headings=("estimator", *joints, "mean [%]", "determined [%]", "time [s]", "problem"),
         rows=tuple(rows),
-        caption="Error over torque, standard deviations, on data that none has seen. The best one made this page.",
+        caption=(
+            "Standard deviation of the error divided by that of the torque, on held-out data. This report shows the "
+            "best estimator."
+        ),
     )
 
 
 def _findings(estimate: Estimate) -> Table:
     rows = tuple((gate.log, finding.severity, str(finding)) for gate in estimate.gates for finding in gate.findings)
-    caption = "What the gate found before the fit, and what was done about it."
+    caption = "Result of the data checks before the fit, and the action taken."
     return Table(headings=("log", "severity", "finding"), rows=rows, caption=caption)
 
 

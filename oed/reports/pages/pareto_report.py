@@ -28,30 +28,32 @@ def pareto_page(front: ParetoFront) -> Page:
     efficient = int(front.efficient.sum())
     names = [criterion.name for criterion in front.criteria]
     rows = tuple(
-        (point, *weights.tolist(), *values.tolist(), "yes" if good else "beaten by another")
+        (point, *weights.tolist(), *values.tolist(), "yes" if good else "dominated")
         for point, (weights, values, good) in enumerate(
             zip(front.weights, front.values, front.efficient, strict=True), start=1
         )
     )
-    headings = ("point", *(f"weight of {name}" for name in names), *names, "efficient")
+    headings = ("point", *(f"weight of {name}" for name in names), *names, "Pareto-optimal")
     return Page(
-        title="Several criteria at once",
+        title="Designs for several criteria",
         subtitle=robot.title or robot.name,
         verdict=(
-            f"{efficient} of {len(front.designs)} designs are efficient: no other one is better in every criterion. "
-            f"{_cost(front)}"
+            f"{efficient} of {len(front.designs)} designs are Pareto-optimal: no other design is better in every "
+            f"criterion. {_cost(front)}"
         ),
         status="good" if front.success else "bad",
         facts=tuple(Fact(label=f"Best {c.label}", value=_best(front, k)) for k, c in enumerate(front.criteria)),
         sections=(
             Section(
-                title="The front",
+                title="Pareto front",
                 paragraphs=(
-                    "Each point is a design of its own that keeps all limits; its trajectory lies in the folder of its "
-                    "number. Towards the lower left both are better; where a larger value is better, the axis says so.",
+                    (
+                        "Each point is a design that respects all limits; its trajectory is in the folder with its "
+                        "number. The axes name criteria for which larger is better."
+                    ),
                 ),
                 pictures=(_picture(front),),
-                tables=(Table(headings=headings, rows=rows, caption="Criteria of the optimised part."),),
+                tables=(Table(headings=headings, rows=rows, caption="Criteria of the optimised motion."),),
             ),
         ),
         footer=footer(),
@@ -64,7 +66,7 @@ def _best(front: ParetoFront, k: int) -> float:
 
 
 def _cost(front: ParetoFront) -> str:
-    """Says what the extremes give up."""
+    """Compares the designs for a single criterion with the best of each criterion."""
     said = []
     for k, criterion in enumerate(front.criteria):
         (own,) = np.flatnonzero(front.weights[:, k] == 1.0)
@@ -82,7 +84,7 @@ def _picture(front: ParetoFront) -> Picture:
     panels = []
     for i, j in combinations(range(len(front.criteria)), 2):
         series = []
-        for good, role, name in ((True, "main", "efficient"), (False, "neutral", "beaten by another")):
+        for good, role, name in ((True, "main", "Pareto-optimal"), (False, "neutral", "dominated")):
             chosen = np.flatnonzero(front.efficient == good)
             if chosen.size:
                 texts = tuple(f"point {point + 1}" for point in chosen)

@@ -21,7 +21,7 @@ def save_retime_report(result: RetimedExperiment, given: Motion, folder: ResultF
 
 
 def retime_page(result: RetimedExperiment, given: Motion) -> Page:
-    """Builds the page: what the new timing gained and what it cost."""
+    """Builds the page: gain and cost of the new timing."""
     robot, retimed = result.robot, result.retimed
     before, after = result.before.to_dict()["cond_Y"], result.after.to_dict()["cond_Y"]
     name, joint, share = retimed.peak
@@ -38,11 +38,11 @@ def retime_page(result: RetimedExperiment, given: Motion) -> Page:
         )
         for stem, motion in (("after", result.motion), ("before", given))
     )
-    warnings = [] if result.success else ["The new timing passes a limit."]
+    warnings = [] if result.success else ["The new timing exceeds a limit."]
     if retimed.slower:
         warnings.append(retimed.verdict())
     if robot.assumed:
-        warnings.append(f"Assumed, with no source behind them: {', '.join(robot.assumed)}.")
+        warnings.append(f"Assumed values without a source: {', '.join(robot.assumed)}.")
     return Page(
         title="Retimed path",
         subtitle=robot.title or robot.name,
@@ -61,8 +61,8 @@ def retime_page(result: RetimedExperiment, given: Motion) -> Page:
                 value=f"{retimed.duration_after:.3f} s",
                 status="bad" if retimed.slower and retimed.given_keeps_limits else "neutral",
             ),
-            Fact(label="Stops on the way", value=retimed.stops),
-            Fact(label="Path kept to", value=f"{retimed.deviation:.2g}", note="rad or m, in any joint"),
+            Fact(label="Intermediate stops", value=retimed.stops),
+            Fact(label="Path deviation", value=f"{retimed.deviation:.2g}", note="rad or m, largest of all joints"),
         ),
         warnings=tuple(warnings),
         sections=(
@@ -96,6 +96,6 @@ def _torque_sections(result: RetimedExperiment) -> tuple[Section, ...]:
     table = Table(
         headings=("joint", "peak before", "peak after", "peak allowed", "RMS before", "RMS after"),
         rows=rows,
-        caption="In N m (N of a prismatic joint), by the nominal model with friction.",
+        caption="In N m (prismatic joints: N), by the nominal model with friction.",
     )
     return (Section(title="Torque", tables=(table,)),)

@@ -41,7 +41,7 @@ def save_thermal_report(
 def thermal_page(
     estimate: CampaignEstimate, logs: Sequence[Log], *, joint: int, choice: ThermalChoice | None = None
 ) -> Page:
-    """Builds the page: how friction falls with heat, how fast, how sure, and what the logs cannot say.
+    """Builds the page: change of friction with temperature, time constants, uncertainty, undetermined parameters.
 
     Args:
         estimate: of rigid body, friction and heat.
@@ -55,18 +55,18 @@ def thermal_page(
     moving = [fit for fit in fits if fit is not None]
     open_ = sorted({q.name for fit in moving for q in fit.parameters if not q.determined})
     verdict = (
-        f"With heat, the torque error of the median joint is {100 * np.median(gain):.0f} % smaller than with one "
-        f"friction for cold and warm. {_open_text(open_)}"
+        f"The thermal model reduces the torque error of the median joint by {100 * np.median(gain):.0f} %, compared "
+        f"with temperature-independent friction. {_open_text(open_)}"
     )
     coefficients = _coefficients(estimate)
     fit = fits[joint - 1]
     duty = None if fit is None else duty_picture(fit, duty_runs(logs), title=f"joint {joint}")
     first: list[Picture] = [friction_time_picture(fits, joint_names=names), *([duty] if duty else [])]
     sections = [
-        Section(title="Friction against time", pictures=tuple(first), tables=(_joints(estimate),)),
+        Section(title="Friction over time", pictures=tuple(first), tables=(_joints(estimate),)),
         Section(
             title="Time constants",
-            paragraphs=("Time constants fall as the power rises: friction that falls with heat holds itself back.",),
+            paragraphs=("Time constants fall as the power rises: warm friction is smaller and produces less heat.",),
             pictures=(time_constant_picture(fits, joint_names=names),),
         ),
         Section(
@@ -78,19 +78,21 @@ def thermal_page(
         Section(
             title="Parameters",
             paragraphs=(
-                "Without a thermometer in the joint only ratios of alpha to exchanges and capacities are determined: a "
-                "joint that gets twice as warm and whose friction falls half as much per degree makes the same "
-                "torques. Predictions of friction need none of what is marked as not determined.",
+                (
+                    "Without a temperature sensor in the joint, only the ratios of alpha to heat exchanges and "
+                    "capacities are determined. Twice the temperature rise with half the friction change per kelvin "
+                    "gives the same torques. Friction predictions do not need the undetermined values."
+                ),
             ),
             tables=tuple(_parameters(item, j) for j, item in enumerate(fits, start=1) if item is not None),
             folded=True,
         ),
     ]
     if choice is not None:
-        sections.insert(1, Section(title="Models beside each other", tables=(_models(choice, joint),)))
+        sections.insert(1, Section(title="Model comparison", tables=(_models(choice, joint),)))
     worst = int(np.argmin(np.where([item is not None for item in fits], gain, np.inf)))
     return Page(
-        title="Friction and heat",
+        title="Friction and temperature",
         subtitle=robot.title or robot.name,
         verdict=verdict,
         status="good" if estimate.success else "warning",
@@ -98,9 +100,9 @@ def thermal_page(
             Fact(label="Model", value=moving[0].model.name if moving else "–"),
             Fact(label="Largest gain", value=f"{100 * gain.max():.0f} %", note=f"joint {int(gain.argmax()) + 1}"),
             Fact(label="Smallest gain", value=f"{100 * gain[worst]:.0f} %", note=f"joint {worst + 1}"),
-            Fact(label="Turns of the two fits", value=estimate.rounds),
+            Fact(label="Iterations (dynamics, thermal model)", value=estimate.rounds),
         ),
-        warnings=(*_notes(estimate), *_still(fits)),
+        warnings=(*estimate.joint_notes, *_still(fits)),
         sections=tuple(sections),
         footer=footer(),
     )
@@ -109,23 +111,12 @@ def thermal_page(
 def _open_text(names: Sequence[str]) -> str:
     if not names:
         return "All thermal parameters are determined."
-    return f"Not determined by these logs: {', '.join(names)}; time constants and friction ratios are."
-
-
-def _notes(estimate: CampaignEstimate) -> tuple[str, ...]:
-    """Remarks, with the joints that they are about where they are not about all."""
-    fits = estimate.thermal
-    moving = sum(fit is not None for fit in fits)
-    found = []
-    for note in estimate.notes:
-        joints = [str(j) for j, fit in enumerate(fits, start=1) if fit is not None and note in fit.notes]
-        found.append(f"Joint {', '.join(joints)}: {note}" if 0 < len(joints) < moving else note)
-    return tuple(found)
+    return f"These logs determine time constants and friction ratios, but not {', '.join(names)}."
 
 
 def _still(fits: Sequence[ThermalEstimate | None]) -> tuple[str, ...]:
     still = [str(j) for j, fit in enumerate(fits, start=1) if fit is None]
-    return (f"No heat of joint {', '.join(still)}: it does not move.",) if still else ()
+    return (f"No thermal model for joint {', '.join(still)}: it does not move in the logs.",) if still else ()
 
 
 def _joints(estimate: CampaignEstimate) -> Table:
@@ -154,16 +145,16 @@ def _joints(estimate: CampaignEstimate) -> Table:
     headings = (
         "joint",
         "name",
-        "error without heat",
-        "with heat",
+        "error without thermal model",
+        "with thermal model",
         "slow [min]",
         "fast [min]",
-        "cold over warm",
+        "cold / warm friction",
         "bounds (95 %)",
     )
     caption = (
-        "RMS of the torque's error [N m or N]; time constants at the largest power, with standard errors; friction at "
-        "T0 over that at the steady state of that power."
+        "RMS torque error [N m or N]. Time constants at the largest power, with standard errors. Cold / warm: "
+        "friction at T0 divided by that in the steady state at this power."
     )
     return Table(headings=headings, rows=tuple(rows), caption=caption)
 
@@ -206,7 +197,7 @@ def _models(choice: ThermalChoice, joint: int) -> Table:
         ),
         rows=tuple(rows),
         caption=(
-            f"Errors of joint {joint}'s friction as in thesis Tables 6 and 7, two minutes averaged; held out: "
+            f"Friction errors of joint {joint}, averaged over two minutes (as in thesis Tables 6 and 7). Held out: "
             f"{'one run after the other' if choice.held_out == 'runs' else 'the last third of each run'}."
         ),
     )

@@ -63,7 +63,7 @@ def velocity_picture(campaign: Campaign, *, name: str = "velocities") -> Picture
         panels=tuple(panels),
         shared_x=True,
         panel_height=140,
-        caption="Shading marks the stages, dashed lines the velocity limits.",
+        caption="Shaded areas are the stages, dashed lines the velocity limits.",
     )
 
 
@@ -89,7 +89,7 @@ def temperature_picture(campaign: Campaign, *, name: str = "temperatures") -> Pi
             ),
             spans=phase_spans(campaign.slots),
         )
-        for title, values in (("where heat is produced (T1)", expected.T1), ("around it (T2)", expected.T2))
+        for title, values in (("heat source (T1)", expected.T1), ("surrounding structure (T2)", expected.T2))
     )
     return Picture(
         title="Expected temperature of each joint over the campaign",
@@ -97,7 +97,9 @@ def temperature_picture(campaign: Campaign, *, name: str = "temperatures") -> Pi
         panels=panels,
         shared_x=True,
         panel_height=280,
-        caption="By the second-order thermal model and the described friction; nothing here was measured.",
+        caption=(
+            "Forecast by the second-order thermal model with the friction of the robot's description; not measured."
+        ),
     )
 
 

@@ -32,7 +32,7 @@ def cause_picture(
     unit: str = "N m",
     name: str = "cause",
 ) -> Picture:
-    """Shows what the model left before and what it leaves with the cause, against the coordinate that shows it best.
+    """Shows the residual without and with an effect over the coordinate that shows it best.
 
     Args:
         label: the coordinate with its unit.
@@ -60,17 +60,17 @@ def cause_picture(
     some = np.linspace(0, len(x) - 1, min(CLOUD, len(x))).astype(int) if len(x) else np.zeros(0, dtype=int)
     panels = []
     for heading, values, (middle, mean, error), role in zip(
-        ("without the cause", "with the cause"), (old, new), curves, ("residual", "good"), strict=True
+        ("without this effect", "with this effect"), (old, new), curves, ("residual", "good"), strict=True
     ):
         rms = float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
         panels.append(
             Panel(
                 title=f"{heading}: {rms:.3g} {unit} RMS",
                 x_label=label,
-                y_label=f"measured less simulated [{unit}]",
+                y_label=f"measured minus simulated [{unit}]",
                 series=(
                     Series(x=x[some], y=values[some], kind="markers", role="neutral", opacity=0.25, name="samples"),
-                    Series(x=middle, y=mean, error=error, role=role, name="mean with its 95 % interval"),
+                    Series(x=middle, y=mean, error=error, role=role, name="mean with 95 % interval"),
                 ),
                 lines=(Line(value=0.0, role="neutral", dash="solid"),),
                 y_range=(-top, top),
@@ -82,8 +82,10 @@ def cause_picture(
         panels=tuple(panels),
         columns=2,
         panel_height=300,
-        caption="Each dot is a sample of the logs. If the cause is the right one, the mean that bends on the left is "
-        "flat on the right.",
+        caption=(
+            "Each dot is a sample of the logs. For a correct cause, the mean is curved on the left and flat on the "
+            "right."
+        ),
     )
 
 
@@ -114,10 +116,10 @@ def binned(x: Array, values: Array) -> tuple[Array, Array, Array]:
 def gain_picture(
     before: ArrayLike, after: ArrayLike, *, joint_names: Sequence[str] | None = None, name: str = "gain"
 ) -> Picture:
-    """Shows the error on unseen data per joint, without and with what was found.
+    """Shows the error on held-out data per joint, base and extended model.
 
     Args:
-        before: error over torque RMS of the base model (n,).
+        before: error divided by torque RMS of the base model (n,).
         after: of the extended model (n,).
         joint_names: names (n,).
         name: the stem of the file name.
@@ -130,14 +132,14 @@ def gain_picture(
         raise InputError(f"shapes {old.shape} and {new.shape}", allowed="(n,), both")
     places = np.arange(len(old), dtype=np.float64)
     return Picture(
-        title="Error of the simulated torque on data that the fit has not seen",
+        title="Error of the simulated torque on held-out data",
         name=name,
         panels=(
             Panel(
                 y_label="error / torque RMS [%]",
                 series=(
                     Series(x=places, y=100 * old, name="base model", kind="bars", role="residual"),
-                    Series(x=places, y=100 * new, name="with what was found", kind="bars", role="good"),
+                    Series(x=places, y=100 * new, name="extended model", kind="bars", role="good"),
                 ),
                 categories=joint_titles(joint_names, len(old)),
             ),

@@ -54,7 +54,7 @@ def parameter_picture(
             x=place,
             y=estimates[chosen],
             error=np.nan_to_num(NORMAL_95 * errors[chosen]),
-            name="estimate with its 95 % interval",
+            name="estimate with 95 % interval",
             kind="bars",
             texts=texts,
         )
@@ -74,7 +74,7 @@ def parameter_picture(
         name=name,
         panels=tuple(panels),
         panel_height=190,
-        caption="One panel per unit. An interval that holds zero means that the data do not show the parameter.",
+        caption="One panel per unit. If an interval contains zero, the parameter is not significant.",
     )
 
 
@@ -138,7 +138,7 @@ def friction_picture(
         panels=tuple(panels),
         columns=min(3, count),
         panel_height=210,
-        caption="The ribbon is the 95 % interval of the curve." if spread is not None else "",
+        caption="The shaded band is the 95 % interval of the curve." if spread is not None else "",
     )
 
 
@@ -181,7 +181,7 @@ def error_bars_picture(
         name=name,
         panels=(panel,),
         panel_height=280,
-        caption="Residual RMS over torque RMS of each joint.",
+        caption="RMS error divided by torque RMS, for each joint.",
     )
 
 

@@ -70,12 +70,15 @@ def friction_time_picture(fits: Fits, *, joint_names: Sequence[str] | None = Non
             )
         )
     return Picture(
-        title="Friction over that at T0, against time",
+        title="Friction relative to T0 over time",
         name="friction_time",
         panels=tuple(panels),
         shared_x=True,
         panel_height=150,
-        caption="Points are averages of ten seconds, 1 is the friction at T0; across a rest the line joins them.",
+        caption=(
+            "Points are averages over ten seconds. 1 is the friction at the initial temperature T0. Lines connect "
+            "points across rests."
+        ),
     )
 
 
@@ -100,7 +103,7 @@ def duty_picture(fit: ThermalEstimate, runs: Sequence[DutyRun], *, title: str) -
         name="friction_duty",
         panels=(panel,),
         panel_height=320,
-        caption="Points are measured, lines predicted; the percentage is the duty cycle of the warm-up.",
+        caption="Points are measured, lines are predicted. The percentage is the duty cycle of the warm-up.",
     )
 
 
@@ -130,7 +133,10 @@ def time_constant_picture(fits: Fits, *, joint_names: Sequence[str] | None = Non
         panels=tuple(panels),
         columns=min(3, len(panels)),
         panel_height=220,
-        caption="W is the mean power that friction would take at T0. Points: powers of the data, with 95 % intervals.",
+        caption=(
+            "W is the mean friction power at the initial temperature T0. Points mark the powers in the data, with 95 "
+            "% intervals."
+        ),
     )
 
 
@@ -188,7 +194,10 @@ def friction_curves_picture(
         panels=tuple(panels),
         columns=min(3, len(panels)),
         panel_height=220,
-        caption="From the coldest to the warmest moment of the logs, in equal steps; the whole curve scales (eq. 100).",
+        caption=(
+            "From the coldest to the warmest state in the logs, in equal steps. Temperature scales the whole curve "
+            "(thesis eq. 100)."
+        ),
     )
 
 

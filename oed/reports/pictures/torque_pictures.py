@@ -1,4 +1,4 @@
-"""Pictures of what a model explains of the torque, and of what it leaves."""
+"""Figures of measured and predicted torque, and of the residual."""
 
 from __future__ import annotations
 
@@ -93,8 +93,8 @@ def torque_picture(
         columns=2,
         shared_x=True,
         panel_height=150,
-        caption="Left: both torques. Right: measured less predicted, on a scale of its own."
-        + ("" if widths is None else " The band held 95 % of the errors on data left out of the fit."),
+        caption="Left: measured and predicted torque. Right: measured minus predicted, on its own scale."
+        + ("" if widths is None else " The band contains 95 % of the errors on held-out data."),
     )
 
 
@@ -107,10 +107,10 @@ def residual_picture(
     kinds: Sequence[str] | None = None,
     name: str = "residual",
 ) -> Picture:
-    """Shows how the residual of each joint is spread, how long it remembers, and how it depends on velocity.
+    """Shows distribution, autocorrelation and velocity dependence of each joint's residual.
 
     Args:
-        residual: measured less predicted torque, (N, n), uniform in time; NaN where there is none.
+        residual: measured minus predicted torque, (N, n), uniform in time; NaN where there is none.
         velocity: joint velocities [rad/s or m/s], (N, n).
         period: sample period [s].
         joint_names: names, (n,).
@@ -139,13 +139,15 @@ def residual_picture(
             ),
         ]
     return Picture(
-        title="What the model leaves",
+        title="Residuals",
         name=name,
         panels=tuple(panels),
         columns=3,
         panel_height=150,
-        caption="Pure noise gives a bell, no memory beyond lag 0 (the band holds 95 % of white noise), and a level "
-        "line over velocity (means of bins with their spread).",
+        caption=(
+            "For white noise the histogram is bell-shaped, the autocorrelation stays within the 95 % band beyond lag "
+            "0, and the mean over velocity is flat (bin means with standard deviation)."
+        ),
     )
 
 

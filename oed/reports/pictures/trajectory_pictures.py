@@ -1,4 +1,4 @@
-"""Pictures of a designed motion: what the joints do, how much it tells, and how close it comes to the limits."""
+"""Figures of a designed motion: motion of the joints, information content, and margins to the limits."""
 
 from __future__ import annotations
 
@@ -95,8 +95,8 @@ def trajectory_picture(
         columns=3,
         shared_x=True,
         panel_height=130,
-        caption="Dashed lines are limits; a limit far outside is named in the corner instead."
-        + (" Shading marks the segments of the experiment." if spans else ""),
+        caption="Dashed lines are limits. Limits far outside the range are written in the corner."
+        + (" Shaded areas are the segments of the experiment." if spans else ""),
     )
 
 
@@ -119,7 +119,7 @@ def segment_spans(segments: Sequence[Mapping[str, Any]]) -> tuple[Span, ...]:
 
 
 def spectrum_picture(parts: Mapping[str, ArrayLike], *, name: str = "spectrum") -> Picture:
-    """Shows the singular values of the regressor: what the motion tells about each direction of the parameters.
+    """Shows the singular values of the regressor: the excitation of each direction of the parameters.
 
     Args:
         parts: singular values of each part of an experiment, and of the whole, each (m,), in any order.
@@ -146,11 +146,13 @@ def spectrum_picture(parts: Mapping[str, ArrayLike], *, name: str = "spectrum") 
         y_log=True,
     )
     return Picture(
-        title="How well each direction of the parameters is excited",
+        title="Excitation of the parameter directions",
         name=name,
         panels=(panel,),
         panel_height=300,
-        caption="The flatter a curve, the better conditioned the experiment; the last point is the one known least.",
+        caption=(
+            "A flatter curve means a better conditioned experiment. The last point is the worst-determined direction."
+        ),
     )
 
 
@@ -178,7 +180,7 @@ def margins_picture(
     }
     for margin in margins:
         quantity = "position" if _is_position(margin) else margin.quantity
-        # Of a range with two ends, the middle is as far from a limit as the joint can be.
+        # In a range with two ends, the middle is the farthest from both limits.
         scale = 2.0 if quantity == "position" and ranges[margin.joint] == 2 else 1.0
         use = 100.0 * (1.0 - scale * margin.slack_fraction) if np.isfinite(margin.limit) else np.nan
         row = used.setdefault(quantity, np.full(count, np.nan))
@@ -207,11 +209,11 @@ def margins_picture(
         y_range=(0.0, 1.12 * largest),
     )
     return Picture(
-        title="How much of each limit the motion uses",
+        title="Use of the limits",
         name=name,
         panels=(panel,),
         panel_height=280,
-        caption="100 % is on the limit. Of a position, 0 % is the middle of its range.",
+        caption="100 % is on the limit. For positions, 0 % is the middle of the range.",
     )
 
 

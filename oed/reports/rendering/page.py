@@ -33,7 +33,7 @@ class Fact:
         label: what it is.
         value: the number with its unit, as text or as a number that is rounded to four digits.
         note: what to compare it with, or where it comes from.
-        status: whether it is as it should be.
+        status: good, neutral, warning or bad.
     """
 
     label: str
@@ -126,7 +126,7 @@ class Page:
         subtitle: robot, file or experiment.
         status: whether the verdict is good news.
         facts: the numbers that support it, for the first screen.
-        warnings: what a reader must know before using the result.
+        warnings: limitations of the result.
         sections: the rest.
         footer: where the page comes from.
 

@@ -1,4 +1,4 @@
-"""The colours of every picture: by role, told apart by colour-blind readers, on light and dark pages."""
+"""The colours of all figures, by role; distinguishable for colour-blind readers, on light and dark pages."""
 
 from __future__ import annotations
 

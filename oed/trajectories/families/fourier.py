@@ -75,7 +75,8 @@ class Fourier(Family):
 
     def regressor_times(self, samples: int) -> Array:
         """Times (M,) [s], half a step off the start."""
-        return (np.arange(samples) + 0.5) / (samples * self.base_frequency)
+        times: Array = (np.arange(samples) + 0.5) / (samples * self.base_frequency)
+        return times
 
     def limit_times(self, samples: int) -> Array:
         """Times (M,) over one period without its end, which repeats the start."""

@@ -61,7 +61,7 @@ def find_dialect(header: str, rows: str, path: Path, first_row: int) -> Dialect:
             f"decimal commas (line {comma}) and decimal points (line {point})",
             file=path,
             row=max(comma, point),
-            allowed="one of the two throughout",
+            allowed="one of the two in the whole file",
             remedy="export the file again",
         )
     return Dialect(delimiter, "." if comma is None else ",")

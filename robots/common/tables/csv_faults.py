@@ -48,11 +48,11 @@ def check_names(names: Sequence[str], line: str, path: Path, row: int) -> None:
     """
     if len(names) == 1 and " " in line.strip():
         raise InputError(
-            "columns are separated by spaces",
+            "the columns are separated by spaces",
             file=path,
             row=row,
             allowed="commas, semicolons or tabs",
-            remedy="export the file with commas",
+            remedy="export the file with commas as separators",
         )
     if all(is_number(name) for name in names):
         raise InputError(

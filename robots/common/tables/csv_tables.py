@@ -32,7 +32,7 @@ def read_csv(path: Path, wanted: Callable[[str], bool]) -> Table:
 
     Args:
         path: the file, UTF-8 with or without byte order mark.
-        wanted: tells by name which columns to read; those must be all numbers or all text.
+        wanted: selects by name which columns to read; those must be all numbers or all text.
 
     Raises:
         InputError: whatever is wrong with the file, with its column and line.

@@ -21,7 +21,7 @@ _YAML_ERRORS = (yaml.YAMLError, ValueError)
 
 @dataclass(frozen=True, kw_only=True)
 class Header:
-    """What a ``#`` block says.
+    """The content of a ``#`` block.
 
     Args:
         metadata: everything that is not about single columns.

@@ -32,7 +32,7 @@ def read_table(path: str | PathLike[str], *, wanted: Callable[[str], bool] | Non
 
     Args:
         path: the file.
-        wanted: tells by name which columns to read, all by default; the others are named in ``Table.skipped`` and may
+        wanted: selects by name which columns to read, all by default; the others are named in ``Table.skipped`` and may
             hold anything.
 
     Returns:
@@ -99,7 +99,7 @@ def _checked_columns(columns: Mapping[str, ArrayLike], path: Path) -> dict[str, 
     arrays: dict[str, Column] = {}
     first = next(iter(columns))
     for name, values in columns.items():
-        # What the reader would take for something else must not be written.
+        # Text that the reader would interpret differently must not be written.
         if not name or name != name.strip() or set(name) & set(',;"#\r\n\t\0'):
             raise InputError(f"{name!r} cannot name a column", file=path, allowed='text without , ; " # or line ends')
         array = np.asarray(values)

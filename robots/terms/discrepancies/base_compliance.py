@@ -23,7 +23,7 @@ class BaseCompliance(Effect):
     """
 
     name: ClassVar[str] = "pattern:leaning:0:even"
-    title: ClassVar[str] = "a base that leans to where the robot reaches"
+    title: ClassVar[str] = "base compliance"
     whole_robot: ClassVar[bool] = True
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
@@ -62,13 +62,13 @@ class BaseCompliance(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         if coefficients[int(np.argmax(np.abs(coefficients[:2])))] < 0:
             return (
-                "The residual torque of all joints changes with the moment of the robot's weight about its base, but "
-                "not as that of a base that gives way does: it has the other sign."
+                "The residual torque of all joints changes with the moment of the robot's weight about its base. The "
+                "sign is opposite to that of a compliant base."
             )
         return (
-            "The residual torque of all joints looks like that of a base that leans to where the robot reaches: by "
-            f"up to {np.degrees(np.abs(coefficients[:3]).max()) * 1e3:.2g} deg per 1000 N m of its weight's moment."
+            "The residual torque of all joints matches a compliant base that tilts under the robot's weight: by "
+            f"up to {np.degrees(np.abs(coefficients[:3]).max()) * 1e3:.2g} deg per 1000 N m of weight moment."
         )

@@ -26,7 +26,7 @@ class ClockDrift(OverTime):
     """
 
     name: ClassVar[str] = "pattern:parting:0:even"
-    title: ClassVar[str] = "torque that is logged later than position by more or less as time goes on"
+    title: ClassVar[str] = "drift between the clocks of torque and position"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the delays of the half waves."""
@@ -46,9 +46,9 @@ class ClockDrift(OverTime):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         late = half_waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients
         return (
-            "The torque of all joints is logged later after the positions, or less late, as time goes on: by about "
-            f"{1000 * float(np.ptp(late)):.2g} ms over the logs. Two clocks that do not run alike do that."
+            "The delay between logged torque and position changes with time, on all joints: by about "
+            f"{1000 * float(np.ptp(late)):.2g} ms over the logs. Likely cause: two clocks with different rates."
         )

@@ -24,7 +24,7 @@ RANGE = (0.02, 0.98)
 class EndStop(Placed):
     """tau = (k + d dq) x beyond a place c, x = (q - c) there; or short of it, x = (c - q).
 
-    What is met gives way in proportion (k), and takes energy by how deep it is (d), as a buffer of rubber does.
+    The stop has a stiffness k and a damping d that grows with the depth, as a rubber buffer has.
 
     Attributes:
         below: whether it is met at positions short of the place.
@@ -41,8 +41,8 @@ class EndStop(Placed):
 
     @property
     def title(self) -> str:  # type: ignore[override]
-        """Its name for people."""
-        return f"something that is met {'short of' if self.below else 'beyond'} a place of the joint's range"
+        """The effect's title."""
+        return f"contact {'below' if self.below else 'above'} a position of the joint"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the torque per depth, and per depth and velocity."""
@@ -76,7 +76,7 @@ class EndStop(Placed):
     ) -> str:
         """Says where it begins and how stiff it is."""
         return (
-            f"The residual torque of joint {joint} begins {'short of' if self.below else 'beyond'} {shape[0]:.3g} "
-            f"{length} and changes by {coefficients[0]:.3g} {force}/{length} from there: as if a buffer, a stop, or a "
-            f"hose that goes taut were met."
+            f"The residual torque of joint {joint} starts {'below' if self.below else 'above'} {shape[0]:.3g} "
+            f"{length} and changes by {coefficients[0]:.3g} {force}/{length} from there. Likely cause: a buffer, an "
+            f"end stop, or a tight hose."
         )

@@ -1,4 +1,4 @@
-"""Families of free functions: what torque may depend on where no cause of the catalogue says how."""
+"""Families of free functions for torque errors without a known cause."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from robots.terms.effects import Situation
 Array = NDArray[np.float64]
 
 HARMONICS = (1, 2, 3, 4)
-# Of what remembers velocity, of a sensor that creeps, and of a supply that sags [s].
+# Time constants of velocity memory, of a creeping sensor, and of a sagging supply [s].
 MEMORIES, CREEPS, SUPPLIES = (0.1, 0.3, 1.0, 3.0), (1.0, 3.0, 10.0, 30.0), (0.03, 0.15, 0.7)
-# Of grease that thins as it is worked [s].
+# time constants of grease that thins as it is worked [s].
 WORKED = (0.5, 2.0, 8.0)
 KNOTS, AGEING = 8, 3
 WHIRLING = 6  # joints at most beside the two
@@ -39,7 +39,7 @@ class Family:
     Attributes:
         columns: evaluates them (N, k), of what is seen, the joint (from 1), another one's number and the shape.
         count: k.
-        words: what the residual torque does, with room for the other joint's name and the shape.
+        words: the dependence of the residual torque, with placeholders for the other joint and the shape.
         of: the joint's input (N,) that the shape's value is the largest size of, in the logs that it was found in: the
             functions are the same ones in any other log.
         unit: of that.
@@ -168,9 +168,9 @@ def _supply(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> A
 
 
 def _followers(s: Situation, source: Array, memories: tuple[float, ...]) -> Array:
-    """What follows a source (N,) with some time constants [s], (N, k), each log anew, from its mean there.
+    """First-order filters of a source (N,) with several time constants [s], (N, k). Each log starts at its mean.
 
-    From zero it would settle for as long, as a drift does that begins with the log.
+    A start from zero would cause a transient that resembles a drift at the log's start.
     """
     columns = np.zeros((len(s), len(memories)))
     for k, memory in enumerate(memories):
@@ -232,7 +232,7 @@ def _sway(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Arr
 def _turns(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     q, v, a = (x[:, joint - 1] for x in (s.q, s.dq, s.ddq))
     waves = (np.cos(shape[0] * q), np.sin(shape[0] * q))
-    # What an error of the position of so many waves does through stiffness, friction and inertia.
+    # Effect of a periodic position error through stiffness, friction and inertia.
     return np.column_stack([wave * factor for factor in (np.ones(len(s)), v, v**2, a) for wave in waves])
 
 
@@ -241,33 +241,31 @@ FAMILIES: dict[str, Family] = {
     "angles": Family(_angles, 16, "depends on its own position and that of {who} together"),
     "motion": Family(_motion, 5, "depends on the velocity of {who}"),
     "push": Family(_push, 3, "depends on the acceleration of {who}"),
-    "whirl": Family(_whirl, WHIRLING, "depends on the velocity of {who} times those of further joints"),
+    "whirl": Family(_whirl, WHIRLING, "depends on products of the velocity of {who} and those of other joints"),
     "drag": Family(_drag, 8, "depends on its own position and the velocity of {who} together"),
     "posture": Family(_posture, 8, "depends on its own velocity and the position of {who} together"),
     "speed": Family(_speed, 6, "depends on the speed of the joint", _speed_of, "rad/s or m/s"),
     "load": Family(_load, 5, "depends on the load of the joint", _load_of, "N m or N"),
-    "torque": Family(_torque, 6, "depends on the torque of the joint, not in proportion", _torque_of, "N m or N"),
+    "torque": Family(_torque, 6, "depends nonlinearly on the torque of the joint", _torque_of, "N m or N"),
     "acceleration": Family(
         _acceleration,
         3,
-        "depends on the acceleration of the joint, not in proportion",
+        "depends nonlinearly on the acceleration of the joint",
         _acceleration_of,
         "rad/s2 or m/s2",
     ),
-    "memory": Family(_memory, 4, "remembers the velocity of the joint for a while"),
-    "worked": Family(
-        _worked, 2 * len(WORKED), "depends on how fast the joint has moved before", _speed_of, "rad/s or m/s"
-    ),
-    "creep": Family(_creep, 4, "remembers the torque of the joint for a while"),
+    "memory": Family(_memory, 4, "depends on the recent velocity of the joint"),
+    "worked": Family(_worked, 2 * len(WORKED), "depends on the joint's earlier speed", _speed_of, "rad/s or m/s"),
+    "creep": Family(_creep, 4, "depends on the recent torque of the joint"),
     "hysteresis": Family(
-        _hysteresis, len(STRAINS), "differs as its torque grows and as it falls", _torque_of, "N m or N"
+        _hysteresis, len(STRAINS), "differs between rising and falling torque (hysteresis)", _torque_of, "N m or N"
     ),
-    "supply": Family(_supply, 6, "depends on its own torque and the power that all joints draw together"),
+    "supply": Family(_supply, 6, "depends on the joint's torque and the power of all joints together"),
     "time": Family(_time, KNOTS, "changes slowly with time"),
-    "ageing": Family(_ageing, 2 * AGEING, "depends on its own position, and changes slowly with time"),
-    "start": Family(_start, len(SINCE) - 1, "is another for a while after the joint has stood"),
-    "ringing": Family(_ringing, 4, "rings at {point} Hz after the motion"),
-    "vibration": Family(_vibration, 8, "vibrates at {point} Hz whatever the motion"),
-    "sway": Family(_sway, 2, "swings to and fro at {point} Hz whatever the motion"),
+    "ageing": Family(_ageing, 2 * AGEING, "depends on the joint's position and changes slowly with time"),
+    "start": Family(_start, len(SINCE) - 1, "differs for some time after a standstill of the joint"),
+    "ringing": Family(_ringing, 4, "rings at {point} Hz, excited by the motion"),
+    "vibration": Family(_vibration, 8, "vibrates at {point} Hz, independent of the motion"),
+    "sway": Family(_sway, 2, "oscillates at {point} Hz, independent of the motion"),
     "turns": Family(_turns, 8, "repeats {point} times a turn of the joint and grows with its speed"),
 }

@@ -1,4 +1,4 @@
-"""What swings at the flange after its motion and pulls all joints at once, as liquid in a tank or a hose does."""
+"""A load that swings at the flange, such as liquid in a tank or a hose, and acts on all joints."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class FlangeOscillator(Effect):
     """
 
     name: ClassVar[str] = "pattern:swinging:0:even"
-    title: ClassVar[str] = "something that swings at the flange"
+    title: ClassVar[str] = "swinging load at the flange"
     whole_robot: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("frequency", "Hz", 0.3, 6.0, "log", FREQUENCIES),)
 
@@ -53,10 +53,10 @@ class FlangeOscillator(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         return (
-            "The residual torque of all joints looks like that of something at the flange that swings at "
-            f"{shape[0]:.3g} Hz after its motion, of some {np.abs(coefficients).max():.2g} kg."
+            "The residual torque of all joints matches a load at the flange that swings at "
+            f"{shape[0]:.3g} Hz, with a mass of about {np.abs(coefficients).max():.2g} kg."
         )
 
 

@@ -1,4 +1,4 @@
-"""What pulls at the flange by where that is, as a hose, a cable or a balancer between it and the ceiling does."""
+"""An elastic force on the flange that depends on its position: a hose, a cable or a balancer."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ _WAYS = ("x", "y", "z")
 class FlangeSpring(Effect):
     """-J(q)' f(p), f a force on the flange that is linear in the flange's place p: f = f0 + S p.
 
-    A steady pull downwards is a payload, which the base model has.
+    A constant downward force is a payload, which the base model contains.
     """
 
     name: ClassVar[str] = "pattern:pulling:0:even"
-    title: ClassVar[str] = "something that pulls at the flange by where it is"
+    title: ClassVar[str] = "elastic force on the flange (hose or cable)"
     whole_robot: ClassVar[bool] = True
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
@@ -45,8 +45,8 @@ class FlangeSpring(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         return (
-            "The residual torque of all joints looks like that of something that pulls at the flange by where it "
-            f"is, as a hose or a cable does: by up to {np.abs(coefficients[3:]).max():.2g} N/m."
+            f"The residual torque of all joints matches an elastic force on the flange that depends on its position, "
+            f"such as a hose or cable: up to {np.abs(coefficients[3:]).max():.2g} N/m."
         )

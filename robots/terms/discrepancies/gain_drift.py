@@ -17,7 +17,7 @@ FEWEST = 3  # joints
 
 
 class OverTime(Effect):
-    """What all joints share and changes slowly with time."""
+    """Base class of slow changes over time that all joints share."""
 
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
@@ -30,11 +30,11 @@ class OverTime(Effect):
 class GainDrift(OverTime):
     """tau_j g(t) on every joint j, g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
 
-    What heat makes of a motor's constant differs from joint to joint, and is `torque_constant_heat`.
+    The temperature dependence of a torque constant differs between joints; see `torque_constant_heat`.
     """
 
     name: ClassVar[str] = "pattern:fading:0:even"
-    title: ClassVar[str] = "torque of all joints that changes by the same share with time"
+    title: ClassVar[str] = "common gain drift of all torque signals"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the shares of the half waves."""
@@ -53,11 +53,12 @@ class GainDrift(OverTime):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         share = half_waves(np.linspace(0.0, 1.0, 201)) @ coefficients
         return (
-            "The torque of all joints changes slowly with time, by the same share of each: over the logs it differs by "
-            f"{100 * float(np.ptp(share)):.2g} %. A supply, or what all amplifiers are measured by, does that."
+            "The torque signals of all joints change slowly with time by the same factor; the total change over the "
+            "logs is "
+            f"{100 * float(np.ptp(share)):.2g} %. Likely cause: the supply, or a common reference of the amplifiers."
         )
 
 

@@ -20,11 +20,11 @@ MOST = 0.5
 class GainStep(Sudden, JointEffect):
     """tau = e tau_j from the time t_c on.
 
-    What heat makes of a motor's constant comes little by little, and is `torque_constant_heat`.
+    The temperature dependence of a torque constant is gradual; see `torque_constant_heat`.
     """
 
     name: ClassVar[str] = "pattern:switch:0:even"
-    title: ClassVar[str] = "torque of a joint that changes by a share of itself at one moment"
+    title: ClassVar[str] = "sudden gain change of a torque signal"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the share by which the torque changes."""
@@ -43,9 +43,9 @@ class GainStep(Sudden, JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         change = f"{100 * abs(coefficients[0]):.2g} % {'more' if coefficients[0] > 0 else 'less'}"
         return (
-            f"The residual torque of joint {joint} looks like that of a torque logged {change} from t = "
-            f"{shape[0]:.2f} s on than before, as where another amplifier, sensor or range of it is used."
+            f"The residual torque of joint {joint} matches a torque signal logged {change} from t = {shape[0]:.2f} s "
+            f"on than before. Likely cause: another amplifier, sensor or measuring range."
         )

@@ -1,4 +1,4 @@
-"""What comes and goes whatever the robot does: a brake that drags for a while, a machine that pushes in its cycle."""
+"""Intermittent torques, independent of the motion: a brake that drags for some time, a machine with a cycle."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class IntermittentTorque(JointEffect):
     """tau = c sign(dq) p(t), p a pulse: friction that is there for a while."""
 
     name: ClassVar[str] = "pattern:spell:0:odd"
-    title: ClassVar[str] = "friction of a joint that is there for a while"
+    title: ClassVar[str] = "temporary additional friction of a joint"
     depends_on: ClassVar[Literal["state", "time"]] = "time"
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.03),
@@ -88,21 +88,22 @@ class IntermittentTorque(JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         return (
-            f"The residual torque of joint {joint} looks like that of {coefficients[0]:.2g} {force} of friction from "
-            f"t = {shape[0]:.1f} s for {shape[1]:.2g} s, and not before or after: a brake that drags does that."
+            f"The residual torque of joint {joint} matches {coefficients[0]:.2g} {force} of additional "
+            f"friction from t = {shape[0]:.1f} s for {shape[1]:.2g} s, and not before or after. Likely cause: a "
+            f"dragging brake."
         )
 
 
 class PeriodicTorque(OverTime):
     """J(q)' f p(t - k T - t_0) for all k: a force on the flange, constant in the base frame, that comes every T s.
 
-    It is told from the motion by its period: one with which the motion repeats as well is none.
+    Its period distinguishes it from the motion; a period of the motion itself is excluded.
     """
 
     name: ClassVar[str] = "pattern:recurring:0:even"
-    title: ClassVar[str] = "a force on the flange that comes again and again"
+    title: ClassVar[str] = "periodic force on the flange"
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("period", "s", 0.5, np.inf, "log", inexact=0.01),
         Shape("moment", "s", -np.inf, np.inf, "linear", inexact=0.03),
@@ -123,7 +124,7 @@ class PeriodicTorque(OverTime):
         )
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
-        """Keeps the period and what a push lasts what they are."""
+        """Bounds the period and the duration of a push."""
         first, last = float(situation.t[0]), float(situation.t[-1])
         longest = max((last - first) / (TIMES - 1.0), 2 * SHORTEST)
         return (0.5 * SHORTEST, longest), (first, last), (0.5 * BRIEFEST, 0.6 * longest)
@@ -131,7 +132,7 @@ class PeriodicTorque(OverTime):
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks all of the grid by sums of what the residual says of a force, folded over each period."""
+        """Ranks the grid by the force that the residual shows, folded over each period."""
         force = np.einsum("tin,tn->ti", situation.sensitivity("jacobian")[:, :3], residual)
         bins = ((situation.t - situation.t[0]) / BIN).astype(int)
         sums = np.column_stack([np.bincount(bins, weights=column) for column in force.T])
@@ -160,7 +161,7 @@ class PeriodicTorque(OverTime):
             if has_long_pauses(situation):
                 return ()
             shortest, longest = max(SHORTEST, BRIEFEST / share), duration / TIMES
-            # From one to the next the last push moves by as much as it lasts.
+            # Between neighbouring periods, the last push moves by its own duration.
             rates = np.arange(1.0 / longest, 1.0 / shortest, share / duration) if longest > shortest else np.zeros(0)
             return tuple(float(1.0 / rate) for rate in rates if not _with_motion(situation, rate))
 
@@ -182,11 +183,11 @@ class PeriodicTorque(OverTime):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         return (
-            f"The residual torque of all joints looks like that of a force of {np.linalg.norm(coefficients):.2g} N "
-            f"on the flange that comes every {shape[0]:.3g} s for {shape[2]:.2g} s, whatever the motion, as another "
-            "machine's would."
+            f"The residual torque of all joints matches a force of {np.linalg.norm(coefficients):.2g} N "
+            f"on the flange that comes every {shape[0]:.3g} s for {shape[2]:.2g} s, independent of the motion. Likely "
+            f"cause: another machine."
         )
 
 

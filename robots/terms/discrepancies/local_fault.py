@@ -18,13 +18,13 @@ WIDTHS = (0.015, 0.03, 0.06, 0.12)
 APART = 1.5
 """Distance of a scan's spots, in widths."""
 NARROWEST, WIDEST = 0.004, 0.2
-"""Shares of the joint's range between which a spot is as wide as it is."""
+"""Smallest and largest width of a spot, as fractions of the joint's range."""
 BINS = 1000
-"""Of the joint's range, by which all spots are ranked at once."""
+"""Number of bins of the joint's range, by which all positions are ranked at once."""
 
 
 class Placed(JointEffect):
-    """What is at a place of a joint's range."""
+    """Base class of effects at a position of a joint's range."""
 
     def coordinate(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the position."""
@@ -62,8 +62,8 @@ class LocalFault(Placed):
 
     @property
     def title(self) -> str:  # type: ignore[override]
-        """Its name for people."""
-        return f"a spot of the joint's range where something {'rubs' if self.odd else 'pushes'}"
+        """The effect's title."""
+        return f"local {'friction' if self.odd else 'torque'} at one position of the joint"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the torque at the spot."""
@@ -104,7 +104,7 @@ class LocalFault(Placed):
         middles = (np.arange(BINS) + 0.5) / BINS * reach + low
         centres, widths = np.array(grid).T
         spots = np.exp(-0.5 * ((middles - centres[:, None]) / widths[:, None]) ** 2)
-        # A joint that stays at a level has it in its offset: what a spot is beside that is what it shows.
+        # A constant level is part of the joint's offset; a spot shows only by its difference from it.
         seen = spots - (spots @ rows / max(rows.sum(), 1.0))[:, None]
         size = np.sqrt(np.maximum(seen**2 @ rows, 1e-12))
         return tuple(grid[i] for i in np.argsort(-np.abs(seen @ told) / size)[:count])
@@ -127,6 +127,6 @@ class LocalFault(Placed):
         """Says where the spot is, how wide and how strong."""
         what = "friction" if self.odd else "torque"
         return (
-            f"The residual torque of joint {joint} looks like that of a spot at {shape[0]:.3g} {length}, "
+            f"The residual torque of joint {joint} matches a local disturbance at {shape[0]:.3g} {length}, "
             f"{2 * shape[1]:.2g} {length} wide, with {coefficients[0]:.2g} {force} of {what}."
         )

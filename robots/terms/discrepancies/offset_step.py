@@ -1,4 +1,4 @@
-"""What moves once and for all while the logs go on: a base that slips on its mount, a joint's zero that jumps."""
+"""Lasting steps during the logs: a base that slips on its mount, a joint zero that jumps."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ Array = NDArray[np.float64]
 CHANGES = 64
 """Times through the data; of so many only the likeliest are scanned, for what acts on all joints takes much memory."""
 APART = 2
-"""Of those times as many beside one that is scanned are not: it is refined."""
+"""Number of neighbours of a scanned time that are skipped, because the time is refined."""
 LEAST = 0.02
 """Share of its torque's energy below which a change is taken to have that much."""
 
 
 class Step(Sudden):
-    """What acts on all joints from a time t_c on, and did not before."""
+    """Base class of effects on all joints from a time t_c on."""
 
     moments: ClassVar[int] = CHANGES
 
@@ -42,7 +42,7 @@ class Step(Sudden):
         products = np.einsum("tjk,tj->tk", X, residual)
         told, size = (np.cumsum(x[::-1], axis=0)[::-1] for x in (products, np.einsum("tjk,tjk->tk", seen, seen)))
         rows = np.searchsorted(situation.t, np.ravel(grid))
-        # Of the last moments so little is seen that anything fits.
+        # The data after the last candidate times are too short for a fit.
         scores = np.sum(told[rows] ** 2 / np.maximum(size[rows], LEAST * size[:1] + 1e-300), axis=1)
         return tuple(grid[i] for i in best_apart(scores, count, APART))
 
@@ -56,7 +56,7 @@ class BaseStep(Step):
     """(d rigid/dg) (g x e_k) a_k from t_c on, e_1 and e_2 level: `base_tilt` that begins while the robot moves."""
 
     name: ClassVar[str] = "pattern:base_shift:0:even"
-    title: ClassVar[str] = "a base that tilts at one moment"
+    title: ClassVar[str] = "sudden tilt of the base"
     whole_robot: ClassVar[bool] = True
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
@@ -80,11 +80,11 @@ class BaseStep(Step):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         angle = np.degrees(np.hypot(*coefficients))
         return (
-            f"The residual torque of all joints looks like that of a base that tilts by {angle:.2g} deg at t = "
-            f"{shape[0]:.2f} s and stays so, as where its mount gives way."
+            f"The residual torque of all joints matches a sudden tilt of the base by {angle:.2g} deg at t = "
+            f"{shape[0]:.2f} s, which remains. Likely cause: a loose mount."
         )
 
 
@@ -92,7 +92,7 @@ class ZeroStep(Step):
     """(d rigid/dq_j) o from t_c on: `encoder_offset` that begins while the robot moves."""
 
     name: ClassVar[str] = "pattern:zero_shift:0:even"
-    title: ClassVar[str] = "a joint zero that jumps at one moment"
+    title: ClassVar[str] = "sudden change of a joint zero"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the offset."""
@@ -113,9 +113,9 @@ class ZeroStep(Step):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         return (
-            f"The residual torque looks like that of a joint {joint} that stands {coefficients[0]:.2g} {length} "
-            f"further than its encoder says, from t = {shape[0]:.2f} s on, as where a coupling slips or a reference is "
-            "set anew."
+            f"The residual torque matches a joint {joint} that stands {coefficients[0]:.2g} {length} "
+            f"further than its encoder says, from t = {shape[0]:.2f} s on. Likely cause: a slipping coupling or a new "
+            f"encoder reference."
         )

@@ -1,4 +1,4 @@
-"""What a model error looks like when no cause of the catalogue explains it: which joint, of which inputs, how."""
+"""Description of a model error without a known cause: its joint, its inputs and its shape."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ PREFIX = "pattern:"
 RINGING = tuple(float(f) for f in np.geomspace(0.5, 8.0, 13))
 TURNS = tuple(float(h) for h in (*range(5, 33), 40, 48, 64))
 SLOWEST, RUBBING = 0.6, 2.0
-# Swings of a torque that goes to and fro by itself: fewer than so many in the data are a drift.
+# Swings of a torque that goes back and forth by itself: fewer than so many in the data are a drift.
 SWINGS = 5.0
 SWAYING = ("vibration", "sway")
-# What acts on all joints at once.
+# Effects on all joints at once.
 WHOLE: tuple[Effect, ...] = (
     FlangeOscillator(),
     FlangeSpring(),
@@ -45,7 +45,7 @@ WHOLE: tuple[Effect, ...] = (
     PeriodicTorque(),
     SessionFriction(),
 )
-# What is at a place of a joint's range, or comes at a moment.
+# Effects at a position of a joint, or at a time.
 SINGLE: tuple[Effect, ...] = (
     LocalFault(),
     LocalFault(odd=True),
@@ -78,16 +78,16 @@ class Pattern(JointEffect):
 
     @property
     def title(self) -> str:  # type: ignore[override]
-        """Its name for people."""
+        """The effect's title."""
         return self.sentence(None)
 
     @property
-    def fast(self) -> bool:  # type: ignore[override]
+    def independent_of_acceleration(self) -> bool:  # type: ignore[override]
         """Whether it is looked for above the bands too: what vibrates owes nothing to accelerations."""
         return self.kind == "vibration"
 
     @property
-    def unmoved(self) -> bool:  # type: ignore[override]
+    def exogenous(self) -> bool:  # type: ignore[override]
         """Whether the arm's motion answers to it, and not it to the motion."""
         return self.kind == "vibration"
 
@@ -108,7 +108,7 @@ class Pattern(JointEffect):
         return tuple(Coefficient(f"function_{i + 1}", "") for i in range(FAMILIES[self.kind].count))
 
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
-        """Lists the frequencies of what goes to and fro half a resolution apart; else the family's own points.
+        """Lists the frequencies of what goes back and forth half a resolution apart; else the family's own points.
 
         An input is measured by its largest size here.
         """
@@ -125,7 +125,7 @@ class Pattern(JointEffect):
         return tuple((float(f),) for f in np.arange(bottom, top, 0.5 / duration))
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
-        """Keeps a vibration below what the samples resolve, a swing where it is one, and what measures an input."""
+        """Bounds a vibration to frequencies that the samples resolve, a swing to its range, and fixes input scales."""
         if FAMILIES[self.kind].of:
             ((largest,),) = self.grid(situation, joint)
             return ((largest, largest),)
@@ -138,7 +138,7 @@ class Pattern(JointEffect):
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks the frequencies of what goes to and fro by the residual's spectrum over that of its surroundings."""
+        """Ranks frequencies by the ratio of the residual's spectrum to its local level."""
         grid = self.grid(situation, joint)
         if self.kind not in SWAYING or len(grid) <= count:
             return grid
@@ -152,7 +152,7 @@ class Pattern(JointEffect):
         level = np.convolve(np.pad(power, width // 2, mode="reflect"), np.ones(width) / width, mode="valid")
         points = np.array(grid)[:, 0]
         contrast = np.interp(points, f, power / np.maximum(level, 1e-300))
-        # Of a line that lasts, a search from beside its top would leave as much as it takes.
+        # A search that starts beside the top of a narrow spectral line would not reach it.
         return tuple((_top(np.asarray(f), power, float(points[i])),) for i in np.argsort(-contrast)[:count])
 
     @property
@@ -174,7 +174,7 @@ class Pattern(JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the residual depends on."""
+        """Describes the dependence of the residual."""
         text = self.sentence(joint, shape)
         if self.kind != "turns" or length == "rad":
             return text
@@ -183,12 +183,12 @@ class Pattern(JointEffect):
         )
 
     def sentence(self, joint: int | None, shape: tuple[float, ...] = ()) -> str:
-        """Says in words which joint's residual depends on what."""
+        """Describes in words the dependence of a joint's residual."""
         where = f"of joint {joint}" if joint else "of the joint"
         who = f"joint {self.other}" if self.other and self.other != joint else "its own joint"
         point = f"{shape[0]:.3g}" if shape else ""
         text = FAMILIES[self.kind].words.format(who=who, point=point)
-        turn = ", and turns round with the direction of motion" if self.odd else ""
+        turn = "and changes sign with the direction of motion" if self.odd else ""
         return f"The residual torque {where} {text}{turn}."
 
 
@@ -236,14 +236,14 @@ def is_of_time(effect: object) -> bool:
 
 
 def is_plain(effect: object) -> bool:
-    """Whether a pattern's few functions resemble a cause that is no other: a name that explains less is none."""
+    """Whether a simple pattern resembles one specific cause."""
     return isinstance(effect, (EndStop, GainStep, Step, PayloadDrift)) or (
         isinstance(effect, Pattern) and effect.kind == "ageing"
     )
 
 
 def is_oscillation(effect: object) -> bool:
-    """Whether a pattern goes to and fro in time, not with the motion: where in its swing it is elsewhere is open."""
+    """Whether a pattern oscillates in time, not with the motion: its phase in other logs is unknown."""
     return isinstance(effect, Pattern) and effect.kind in SWAYING
 
 

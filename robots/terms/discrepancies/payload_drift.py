@@ -24,7 +24,7 @@ class PayloadDrift(OverTime):
     """
 
     name: ClassVar[str] = "pattern:draining:0:even"
-    title: ClassVar[str] = "a body at the flange that changes slowly with time"
+    title: ClassVar[str] = "slowly changing payload"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes mass and first moments of each half wave."""
@@ -45,9 +45,9 @@ class PayloadDrift(OverTime):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         mass = half_waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients[:: len(_PARTS)]
         return (
-            "The residual torque of all joints looks like that of a body at the flange that changes slowly with "
-            f"time, as a tank that empties or a coil that unwinds does: by {float(np.ptp(mass)):.2g} kg over the logs."
+            f"The residual torque of all joints matches a payload that changes slowly with time, such as a tank that "
+            f"empties: by {float(np.ptp(mass)):.2g} kg over the logs."
         )

@@ -10,7 +10,7 @@ from robots.terms.effects import Situation
 
 Array = NDArray[np.float64]
 
-# Half the resonance's share of the critical damping is hardly told from twice: both of its phases have a column.
+# The damping ratio is known only to a factor of about two, because both phases have a column.
 DAMPING = 0.05
 
 

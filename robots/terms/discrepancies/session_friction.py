@@ -16,17 +16,17 @@ from robots.terms.effects import Coefficient, Situation
 Array = NDArray[np.float64]
 
 SESSIONS = 6
-"""Sessions that are told apart; more of them are bunched, in order."""
+"""Largest number of separate sessions; more of them are grouped, in order."""
 
 
 class SessionFriction(OverTime):
     """tau_j = s_jk f_j in the session k, f_j the friction of the base model, which is that of the first one.
 
-    What one joint has from one moment on is `friction_step`; here each has its own share, in each session.
+    A change of one joint at one time is `friction_step`; here each joint has its own factor in each session.
     """
 
     name: ClassVar[str] = "pattern:daily:0:odd"
-    title: ClassVar[str] = "friction of all joints that differs from log to log"
+    title: ClassVar[str] = "friction that differs between logs"
 
     def joints(self, robot: Robot) -> tuple[int | None, ...]:
         """Names the whole robot: no joint alone is another."""
@@ -62,21 +62,21 @@ class SessionFriction(OverTime):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what is seen."""
+        """Describes the finding in one sentence."""
         shares = np.asarray(coefficients).reshape(SESSIONS - 1, -1)
         k, j = np.unravel_index(int(np.argmax(np.abs(shares))), shares.shape)
         most, way = shares[k, j], "more" if shares[k, j] > 0 else "less"
         return (
-            "The friction of the joints differs from log to log, most on joint "
-            f"{j + 1} with {100 * abs(most):.2g} % {way} than in the first: they were warmer or colder, or something "
-            "was done to them between."
+            "The friction of the joints differs between the logs, most on joint "
+            f"{j + 1} with {100 * abs(most):.2g} % {way} than in the first log. Likely cause: another temperature, or "
+            f"maintenance between the logs."
         )
 
 
 def _sessions(situation: Situation) -> list[slice]:
     """Gives the rows of each session: logs with a pause between that is shorter than `UNKNOWN_PAUSE` are one.
 
-    Logs whose pauses nobody noted may be of several days.
+    Logs without known pauses may be from several days.
     """
     t, runs, least = situation.t, situation.runs, UNKNOWN_PAUSE - situation.period
     begins = [0, *(b.start for a, b in pairwise(runs) if t[b.start] - t[a.stop - 1] > least)]

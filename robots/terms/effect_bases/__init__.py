@@ -1,1 +1,1 @@
-"""What effects are made of: base classes, parameters, and states that several share."""
+"""Components of effects: base classes, parameters, and shared states."""

@@ -1,4 +1,4 @@
-"""What an effect beyond the base model must say of itself to be played, found, named and added to a model.
+"""Interface of effects beyond the base model.
 
 A term of `robots.terms` belongs to every robot's model. An effect is what a robot may have besides: it acts on one
 joint or on the whole robot, is linear in a few coefficients once its shape is given, and may depend on the past. The
@@ -21,38 +21,40 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 STOPPED = 0.02
-"""Share of its largest size within which a value is stopped by that: beside others it is told a little otherwise."""
+"""Relative distance from a limit within which a value counts as at the limit."""
 
 
 class Effect(ABC):
-    """A physical effect that the base model leaves out: torque = columns @ coefficients.
+    """A physical effect that the base model does not contain: torque = columns @ coefficients.
 
     Attributes:
         name: its name in a diagnosis.
-        title: its name for people.
+        title: its name in reports.
         whole_robot: whether it acts on the robot as a whole; its joint is then None.
-        rare: whether it is to be thought of last: it resembles a common effect, and robots seldom have it.
-        depends_on: ``state`` where one and the same motion always meets it, ``time`` where it comes, goes or builds up.
-        keeps: whether what came before a log acts in it still: heat.
-        passing: whether it belongs to the logs it is found in, and may be gone or different in others.
-        alike: whether it has one coefficient, that all joints share: each joint tells it, and they must agree.
-        lags: whether its one coefficient is a time: reversals tell that no better than their own moments are known.
-        turns: whether it acts where a joint turns round: an error in the moment of that resembles it.
-        kicks: whether it acts by changes of acceleration: they are largest, and least known, where a joint turns round.
-        fast: whether its torque owes nothing to accelerations: it is looked for above the frequencies of those, too.
-        sharp: whether its torque may turn round or pass within some samples, otherwise than by the sign of a velocity:
-            where logs are thinned, it is evaluated before.
-        unmoved: whether the arm's motion answers to it, and not it to the motion: no base model is fitted to that.
-        blurs: whether it lets friction turn round later or over some time: how sharp its sign is shows beside it only.
-        waves: whether it goes up and down over the joint's range, as a spot of it does once.
-        borne: whether the gears bear its torque: what grows with their load feels it.
-        preloads: whether what it pulls with throughout is in the base model's offset.
-        loaded: whether it depends on what the gears bear.
-        last: whether it acts on all of the torque, that of other effects too (`Situation.beyond`).
-        distorts: whether a reading of its joint's torque is wrong by it, as that torque has it: the base model follows
-            such readings, and both are then fitted at once. A `StaticJointEffect`.
-        vague: what is said of it where the logs determine none of its coefficients; nothing by default.
-        shapes: the parameters that the columns are not linear in.
+        rare: whether it is considered last, because it resembles a common effect and is rare on robots.
+        depends_on: ``state`` if the same motion always shows it, ``time`` if it starts, ends or builds up.
+        has_thermal_memory: whether the motion before a log still acts in it, through heat.
+        transient: whether it belongs to the logs in which it was found, and may be absent or different in others.
+        shared_coefficient: whether all joints share one coefficient; the joints' estimates must then agree.
+        lags: whether its coefficient is a time, which reversals determine only as well as their own times are known.
+        acts_at_reversals: whether it acts at velocity reversals; an error in the reversal's time resembles it.
+        acceleration_driven: whether changes of acceleration cause it. These are largest, and known least, at reversals.
+        independent_of_acceleration: whether its torque does not depend on accelerations. It is then searched above
+            their frequency band as well.
+        needs_full_rate: whether its torque may change within a few samples, other than by the sign of a velocity. In
+            thinned logs it is evaluated before the thinning.
+        exogenous: whether it causes the motion instead of depending on it; no base model is fitted to such data.
+        smooths_friction_sign: whether it makes friction change sign later or gradually. The sharpness of the sign is
+            then fitted together with it.
+        oscillates_over_range: whether it rises and falls over the joint's range, as a local fault does once.
+        loads_gear: whether its torque loads the gears, so that load-dependent effects depend on it.
+        preloads: whether its constant part is in the base model's offset.
+        depends_on_gear_load: whether it depends on the load of the gears.
+        acts_on_total_torque: whether it acts on the total torque, including other effects (`Situation.beyond`).
+        distorts: whether it distorts the torque reading of its joint as a function of that torque. The base model
+            follows such readings, so both are fitted together. A `StaticJointEffect`.
+        undetermined_text: the finding's sentence if the logs determine none of its coefficients; empty by default.
+        shapes: the parameters in which the columns are not linear.
         rivals: effects that resemble it, the closest first.
         experiments: kinds of experiment that separate it from them, the best first.
     """
@@ -62,23 +64,23 @@ class Effect(ABC):
     whole_robot: ClassVar[bool] = False
     rare: ClassVar[bool] = False
     depends_on: ClassVar[Literal["state", "time"]] = "state"
-    keeps: ClassVar[bool] = False
-    passing: ClassVar[bool] = False
-    alike: ClassVar[bool] = False
+    has_thermal_memory: ClassVar[bool] = False
+    transient: ClassVar[bool] = False
+    shared_coefficient: ClassVar[bool] = False
     lags: ClassVar[bool] = False
-    turns: ClassVar[bool] = False
-    kicks: ClassVar[bool] = False
-    fast: ClassVar[bool] = False
-    sharp: ClassVar[bool] = False
-    unmoved: ClassVar[bool] = False
-    blurs: ClassVar[bool] = False
-    waves: ClassVar[bool] = False
-    borne: ClassVar[bool] = False
+    acts_at_reversals: ClassVar[bool] = False
+    acceleration_driven: ClassVar[bool] = False
+    independent_of_acceleration: ClassVar[bool] = False
+    needs_full_rate: ClassVar[bool] = False
+    exogenous: ClassVar[bool] = False
+    smooths_friction_sign: ClassVar[bool] = False
+    oscillates_over_range: ClassVar[bool] = False
+    loads_gear: ClassVar[bool] = False
     preloads: ClassVar[bool] = False
-    loaded: ClassVar[bool] = False
-    last: ClassVar[bool] = False
+    depends_on_gear_load: ClassVar[bool] = False
+    acts_on_total_torque: ClassVar[bool] = False
     distorts: ClassVar[bool] = False
-    vague: ClassVar[str] = ""
+    undetermined_text: ClassVar[str] = ""
     shapes: ClassVar[tuple[Shape, ...]] = ()
     rivals: ClassVar[tuple[str, ...]] = ()
     experiments: ClassVar[tuple[str, ...]] = ()
@@ -88,25 +90,25 @@ class Effect(ABC):
         """Describes the k linear coefficients, in the order of the columns."""
 
     def unused(self, shape: tuple[float, ...]) -> frozenset[int]:
-        """Gives which shape parameters mean nothing at these values."""
+        """Gives the shape parameters without influence at these values."""
         return frozenset()
 
     def described(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[Coefficient, ...]:
-        """Describes them at some shape values, where those say what they mean; one of no use there has no name."""
+        """Describes the coefficients at given shape values; an unused one has no name."""
         return self.parameters(robot, joint)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
-        """Gives the range of each coefficient at some shape values: as described, where shapes do not narrow it."""
+        """Gives the range of each coefficient at given shape values; by default as in `parameters`."""
         return tuple((coefficient.lower, coefficient.upper) for coefficient in self.parameters(robot, joint))
 
     def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
-        """Lists coefficients and shapes that are one quantity told twice, and what they may differ by (deviation)."""
+        """Lists coefficients and shapes of the same quantity, with the standard deviation of their difference."""
         return ()
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
-        """Whether a machine may have these values, of a shape where that is given.
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+        """Whether these values are physically plausible, for a shape if it is given.
 
-        One that is stopped by its largest size wants to be more still, and one below its least is none.
+        A value at its limit would be larger without the limit, and one below its least size is not significant.
         """
         described = self.parameters(robot, joint)
         limits = [(c.lower, c.upper) for c in described]
@@ -141,7 +143,7 @@ class Effect(ABC):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says in one plain sentence what the effect with these values means.
+        """Describes the effect with these values in one or two sentences.
 
         Args:
             joint: where it acts.
@@ -156,57 +158,57 @@ class Effect(ABC):
         return (None,) if self.whole_robot else tuple(range(1, robot.n + 1))
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists the shape values to scan; none where this data can show none of them."""
+        """Lists the shape values to scan; empty if these data cannot show the effect."""
         points: list[tuple[float, ...]] = [()]
         for shape in self.shapes:
             points = [(*point, value) for point in points for value in shape.grid]
         return tuple(points)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Gives the range of each shape parameter in which this data allow it to be refined; none of a choice."""
+        """Gives the range in which each shape parameter is refined on these data; a point for a choice."""
         return tuple(shape.choices[:1] * 2 if shape.choices else (shape.lower, shape.upper) for shape in self.shapes)  # type: ignore[misc]
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Lists shapes near a refined one that machines are built with, such as whole numbers of waves a turn.
+        """Lists usual design values near a refined shape, such as whole numbers of waves per turn.
 
-        None of their parameters is counted as fitted; nor is what follows from the coefficients (k,) found there. One
-        that is None stays as it was refined, and counts.
+        Their parameters do not count as fitted, nor those that follow from the coefficients (k,). A parameter given as
+        None keeps its refined value and counts as fitted.
         """
         return ()
 
-    def elsewhere(
+    def other_optima(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Lists other summits than a refined shape's, which a search from there does not reach.
+        """Lists starting shapes for other local optima that a search from the refined shape does not reach.
 
-        Each by shapes on its slopes, from the best of which it is climbed.
+        Each entry holds several starts for one optimum; the search starts from the best of them.
         """
         return ()
 
-    def further(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
-        """Lists what it would be where it may go on beside a refined shape, by a formula that is near to it only.
+    def open_edges(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
+        """Lists shapes in which the effect continues beyond a refined shape whose formula holds only locally.
 
-        Each with the shape parameter that is then not told.
+        Each comes with the index of the shape parameter that is then undetermined.
         """
         return ()
 
-    def lasting(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
-        """Lists shapes of formulas that stay true while it lasts, where a refined one's is near to it only.
+    def sustained_shapes(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+        """Lists shapes whose formula holds for the whole duration, if that of a refined shape holds only locally.
 
-        As if it acted throughout; when it does are the first two of its shape parameters, a start and a duration [s].
+        They assume a permanent effect; start and duration [s] are its first two shape parameters.
         """
         return ()
 
     def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists shapes that a log may not tell apart though other motions do; the likeliest is taken of those."""
+        """Lists shapes that a log may not distinguish; the most likely of them is used."""
         return ()
 
-    def leaves(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
-        """Gives the share of what the effect explains on a joint, from 0, that its formula may leave unexplained there.
+    def leakage(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
+        """Gives the fraction of the effect on a joint (from 0) that its formula may leave unexplained.
 
-        What is left must not be taken for another effect: formulas are true to some per cent of an effect.
+        This remainder must not count as another effect, because formulas hold to some per cent only.
         """
         return 0.08
 
@@ -219,7 +221,7 @@ class Effect(ABC):
     ) -> tuple[tuple[float, ...], ...]:
         """Lists the points of `grid` that are worth scanning on a residual (N, n), the best first.
 
-        It is weighed by what noise makes of it, so that its products with an effect's torque are what that explains per
+        The residual is weighted by the noise, so that its product with an effect's torque is the explained part per
         unit [1/(N m) or 1/N]; zero where a joint rests.
 
         All of them, unless the effect knows a fast way to rank them. The ranking is a search: a false-alarm control
@@ -228,7 +230,7 @@ class Effect(ABC):
         return self.grid(situation, joint)
 
     def complete(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[float, ...]:
-        """Gives where to search a shape with all that the effect has where it is there; it may be told without some."""
+        """Adds the optional shape parameters to a start of the search; the result may be reported without them."""
         return shape
 
     def gate(self, situation: Situation, joint: Place, measured: Array) -> NDArray[np.bool_] | None:
@@ -242,7 +244,7 @@ class Effect(ABC):
         return None
 
     def chance(self, situation: Situation, joint: Place, measured: Array) -> float:
-        """Gives the chance that torque as logged (N, n) shows this effect by itself where it is not; 1 for most."""
+        """Gives the probability that the logged torque (N, n) shows this effect by chance; 1 for most effects."""
         return 1.0
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

@@ -1,4 +1,4 @@
-"""What gears bear besides the robot's own weight and inertia: springs, payloads, pushes, a base that is not level."""
+"""Additional gear load besides the robot's own weight and inertia: springs, payloads, contacts, a tilted base."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from robots.terms.situations.situation import Situation
 Array = NDArray[np.float64]
 
 LoadPath = Literal["effects", "preloads"]
-"""The torque of effects that are `borne` alone, or with the base model's offset on joints of those it `preloads`."""
+"""Torque of effects that load the gear: alone, or with the base model's offset on joints that they preload."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoadSource:
-    """An effect whose torque gears bear.
+    """An effect whose torque loads the gears.
 
     Attributes:
-        effect: one that is `borne`.
+        effect: with `loads_gear`.
         joint: where it acts, counted from 1; None for the whole robot.
         shape: values of its shape parameters.
         coefficients: of its columns (k,).
@@ -37,30 +37,29 @@ class LoadSource:
 
 @dataclass(frozen=True, eq=False)
 class ExtraGearLoad:
-    """What effects add to the load of gears, beside the base parameters that they were fitted with.
+    """Additional load of the gears by effects that were fitted together with the base parameters.
 
-    What of a spring resembles gravity the base model may have taken, and the load with it: both together are what the
-    gear bears, whichever has how much of it.
+    A part of a spring's torque resembles gravity and may be in the base model. Only the sum of both is the gear's load.
 
     Attributes:
-        how: what of them the gears bear.
-        weights: the effects.
+        path: which part of their torque loads the gears.
+        sources: the effects.
     """
 
-    how: LoadPath
-    weights: Sequence[LoadSource]
+    path: LoadPath
+    sources: Sequence[LoadSource]
 
     def on(self, now: Situation) -> Situation:
-        """Gives what effects that grow with the load depend on."""
-        borne = np.zeros_like(now.q)
-        for weight in self.weights:
-            borne += weight.effect.columns(now, weight.joint, weight.shape) @ weight.coefficients
-        if self.how == "preloads":
-            held = sorted({w.joint - 1 for w in self.weights if w.effect.preloads and w.joint is not None})
-            borne[:, held] += (now.torque - now.rigid - now.friction)[:, held]
-        return now.bearing(borne)
+        """Gives the situation with the additional gear load, for load-dependent effects."""
+        load = np.zeros_like(now.q)
+        for weight in self.sources:
+            load += weight.effect.columns(now, weight.joint, weight.shape) @ weight.coefficients
+        if self.path == "preloads":
+            preloaded = sorted({w.joint - 1 for w in self.sources if w.effect.preloads and w.joint is not None})
+            load[:, preloaded] += (now.torque - now.rigid - now.friction)[:, preloaded]
+        return now.bearing(load)
 
 
 def with_gear_load(now: Situation, bearing: ExtraGearLoad | None) -> Situation:
-    """Gives what effects that grow with the load depend on, whether gears bear anything else or not."""
+    """Gives the situation with an additional gear load, if there is any."""
     return now if bearing is None else bearing.on(now)

@@ -1,4 +1,4 @@
-"""What effects of heat share: they build up and go with a time constant that the data must be long enough to show."""
+"""Base class of thermal effects: they rise and decay with a time constant that the data must be long enough to show."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 LEAST = 1.01
-"""Times the shortest time constant: a faster one is wanted below, and that is none of heat."""
+"""Factor to the shortest time constant: a fit that wants a faster one does not describe heat."""
 
 
 class HeatEffect(JointEffect):
     """An effect of one joint whose first shape is the time constant of a heat that is kept."""
 
     depends_on: ClassVar[Literal["state", "time"]] = "time"
-    keeps: ClassVar[bool] = True
+    has_thermal_memory: ClassVar[bool] = True
     falls: ClassVar[bool] = False
     """Whether its coefficients are falls of friction, Coulomb and viscous: what warms up loses some of it.
 
     Where oil gets thinner slow motion may rub more (Bittencourt and Gunnarsson 2012), but not all motion does.
     """
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
-        """Tells what follows its source within seconds from heat, and what grows from what heat makes fall."""
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+        """Distinguishes thermal effects from fast followers of the source, and falling from rising effects."""
         slow = not shape or shape[0] > LEAST * self.shapes[0].lower
         warmer = self.falls and rises(robot, joint, coefficients)
-        return slow and not warmer and super().believable(robot, joint, coefficients)
+        return slow and not warmer and super().is_plausible(robot, joint, coefficients)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists time constants up to three times the data's duration: all slower ones look like the slowest."""

@@ -1,4 +1,4 @@
-"""What the parameters of an effect say of themselves: its coefficients, and what shapes its columns."""
+"""Parameters of an effect: linear coefficients, and shape parameters of its columns."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ STRAIGHT = {
 
 @dataclass(frozen=True)
 class Shape:
-    """A parameter that shapes an effect's columns, and that they are not linear in.
+    """A shape parameter of an effect, in which its columns are not linear.
 
     Attributes:
         name: such as ``stribeck_velocity``.
@@ -36,14 +36,12 @@ class Shape:
         lower: the least value that is physically possible.
         upper: the largest.
         scale: ``log`` where values differ by factors, ``linear`` where by steps.
-        grid: the values that a scan tries where the data give none (see `Effect.grid`).
-        inexact: standard error that the formula itself has, beside that of the data: no change is quite sudden, no push
-            has quite that form. In the parameter's unit; a share of the value on a logarithmic scale.
-        default: what it is where a description does not say; None where it must be said.
-        beside: whether the effect is whole without it: it is sought once the others are found, and is one of its
-            parameters only where it is not the default.
-        choices: the only values that machines have, where these are few: `likely` lists them, and nothing between is
-            searched.
+        grid: the values of a scan, unless the data give them (see `Effect.grid`).
+        inexact: standard error of the formula itself, in addition to that of the data: no change is exactly sudden. In
+            the parameter's unit, or as a fraction of the value on a logarithmic scale.
+        default: the value if a description does not state it; None if it must be stated.
+        beside: whether it is optional: it is searched after the others, and counts only if it is not the default.
+        choices: the only possible values, if they are few: `likely` lists them, and no others are searched.
     """
 
     name: str
@@ -59,11 +57,11 @@ class Shape:
 
     @property
     def moment(self) -> bool:
-        """Whether it is a moment of the logs' clock."""
+        """Whether it is a time on the logs' clock."""
         return self.unit == "s" and self.lower == -np.inf
 
     def is_left(self, value: float) -> bool:
-        """Whether a value says that the effect is whole without it."""
+        """Whether a value means that the optional parameter is unused."""
         return self.beside and value == self.default
 
     def unit_at(self, robot: Robot, joint: Place) -> str:
@@ -74,15 +72,15 @@ class Shape:
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A parameter that an effect's torque is linear in.
+    """A parameter in which an effect's torque is linear.
 
     Attributes:
         name: such as ``stribeck_torque``.
         unit: its unit, in which the column is N m (or N) per one.
         lower: the least value that is physically possible.
         upper: the largest.
-        inexact: standard error that the formula itself has, beside that of the data, as a share of the value.
-        least: size below which it is none: what another effect's formula leaves, or its own cannot tell.
+        inexact: standard error of the formula itself, in addition to that of the data, as a fraction of the value.
+        least: size below which it counts as zero: errors of the formulas are of this size.
     """
 
     name: str

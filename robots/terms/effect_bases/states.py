@@ -1,4 +1,4 @@
-"""What several effects share: heat that relaxes, a bristle that follows the motion, times at which things change."""
+"""Shared states of effects: heat that relaxes, a bristle that follows the motion, times of changes."""
 
 from __future__ import annotations
 

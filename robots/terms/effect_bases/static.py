@@ -25,7 +25,7 @@ NEWTON, LEAST_SLOPE = 20, 0.1
 
 
 class Instant(NamedTuple):
-    """What a static effect depends on, symbolic.
+    """Symbolic inputs of a static effect.
 
     Attributes:
         q: positions (n,) [rad or m].

@@ -1,4 +1,4 @@
-"""What begins at one moment and stays: the moments that are tried, and how well one can be known."""
+"""Base class of lasting changes at one time: candidate times, and the accuracy of such a time."""
 
 from __future__ import annotations
 

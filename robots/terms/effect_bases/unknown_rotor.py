@@ -1,4 +1,4 @@
-"""Of the first joints' inertia no log tells how much is the rotor's, which loads no gear.
+"""Rotor inertia of the first joints, which no log separates from the link inertia, but which does not load the gear.
 
 Where a robot's description does not say it, or says it as datasheets do, what gears do with their load may.
 """
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 KNOWN = 0.0
 """No rotor beside those that are known."""
 ROTOR = Shape("rotor_inertia", "kg m2", -np.inf, np.inf, "linear", (KNOWN,), default=KNOWN)
-"""What a rotor has beside its inertia that the base model knows, as fitted or as described."""
+"""Rotor inertia in addition to the base model's, fitted or described."""
 DATASHEET = 0.3
 """Share of a described rotor by which it may differ: brakes, couplings and gears' own shafts are often left out."""
 LOOKS = 9
@@ -28,7 +28,7 @@ def unknown_rotor(situation: Situation, joint: int) -> float:
 
 
 def rotor_bounds(situation: Situation, joint: int) -> tuple[float, float]:
-    """Gives what a rotor may have beside what is known: nothing where a log tells it, little where it is described."""
+    """Gives the range of the additional rotor inertia: zero if a log determines it, small if it is described."""
     described = float(situation.rotors[1, joint - 1])
     if described:
         within = DATASHEET * described

@@ -19,13 +19,13 @@ Array = NDArray[np.float64]
 
 
 class AsymmetricFriction(StaticJointEffect):
-    """tau = a |dq| + b dq^2: viscous friction that differs with the direction.
+    """tau = a |dq| + b dq^2: viscous direction-dependent friction.
 
-    Coulomb friction that differs is the base model's torque offset, and cannot be told from it.
+    A difference of Coulomb friction is equivalent to the torque offset, which the base model contains.
     """
 
     name: ClassVar[str] = "asymmetric_friction"
-    title: ClassVar[str] = "friction that differs with the direction"
+    title: ClassVar[str] = "direction-dependent friction"
     rivals: ClassVar[tuple[str, ...]] = ("spring", "torque_sensor_drift", "torque_constant_error", "encoder_offset")
     experiments: ClassVar[tuple[str, ...]] = ("mirrored", "sweep")
 
@@ -51,11 +51,12 @@ class AsymmetricFriction(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         way = "forward" if coefficients[0] + coefficients[1] > 0 else "backward"
         return (
-            f"Joint {joint} has more friction {way}: it differs from the mean of both ways by {coefficients[0]:.3g} "
-            f"{force} s/{length} of speed and {coefficients[1]:.3g} {force} s2/{length}2 of squared speed."
+            f"Joint {joint} has more friction {way}. The difference from the mean of both directions is "
+            f"{coefficients[0]:.3g} "
+            f"{force} s/{length} times speed and {coefficients[1]:.3g} {force} s2/{length}2 times squared speed."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

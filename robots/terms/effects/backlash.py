@@ -35,12 +35,12 @@ ASIDE = (-0.03, -0.015, 0.0, 0.015, 0.03)
 FARTHEST = 0.1
 """Largest such share: of a base model whose zero is less sure nothing follows."""
 BRIEFEST, LANDS = 0.012, 0.02
-"""Times [s] in which a flank stops the link: at least, and where nothing tells it. When a blow falls is known to some
-milliseconds, as the load's zero is: one briefer than that would err by more than it is where it is predicted."""
+"""Shortest and default time [s] in which a flank stops the link. The time of an impact is known to some milliseconds:
+the prediction of a shorter impact would be worse than none."""
 REBOUND, SETTLES = 0.2, 2.0
 """Share of its speed with which a link comes back from the flank, and in how many times its landing it loses that."""
 LEAST, MOST = 1 / 8, 8.0
-"""Shares of the gap that the time of its crossing tells: the time, whose cube that is, is true to a factor of two."""
+"""Uncertainty of the gap from its crossing time: the time, whose cube it is, is correct to a factor of two."""
 
 HOVERS = 0.05
 """Share of its root mean square that a load must get beyond zero to have changed sides."""
@@ -48,27 +48,26 @@ HOVERS = 0.05
 INEXACT = 0.2
 """Share by which a play errs besides: links bounce otherwise, and drives give way to the kick, by as much."""
 SMALLEST = 5e-7
-"""Half a play below which there is none [rad or m]: at a radius of a tenth of a metre, what teeth are rough by."""
+"""Half a backlash below which it counts as zero [rad or m]: the roughness of teeth at a radius of 0.1 m."""
 
 
 class Backlash(Effect):
     """The link lags its encoder by (b / 2) side: the side changes from where the load changes sign, in T + L.
 
-    A load that grows by r per second carries the link's inertia M over the gap b in T = (6 b M / r)^(1/3), or in the
-    longest time that the motor, which goes on, leaves it: it flies by s^3, ever faster, and has most of its speed where
-    it lands. The far flank stops it with half a wave of force, over a time L that is that of half a swing of the link
-    on the gear's teeth and on what the drive gives way, and throws it back a little. So the torque lacks the load for
-    long and little, and then is hit for short and much. It follows from the lag as for an elastic gear: bursts at zero
-    crossings of the load, not of the velocity. Their size and their time tell the same gap, each but roughly: nothing
-    flies quite freely from flank to flank, or lands alike each time. Zero is where the base model has the load's, to
-    some per cent: what of a joint's torque is offset and what its load, a log tells less well, and a slow load crosses
-    late.
+    A load that grows by r per second moves the link's inertia M over the gap b in T = (6 b M / r)^(1/3), or in the
+    longest time that the moving motor leaves. The motion in the gap grows with the third power of time, so the link is
+    fastest when it lands. The far flank stops it with a half wave of force over a time L: half a period of the link on
+    the stiffness of teeth and drive. The torque first lacks the load slightly for a long time, then shows a short and
+    large impact. It follows from the lag as for an elastic gear: bursts at zero crossings of the load, not of the
+    velocity. Size and duration of the bursts both determine the gap, each only roughly, because real crossings and
+    landings vary. The zero of the load is known from the base model to some per cent; a log separates offset and load
+    poorly, and a slow load crosses late.
     """
 
     name: ClassVar[str] = "backlash"
-    title: ClassVar[str] = "play in the gear (backlash)"
-    loaded: ClassVar[bool] = True
-    kicks: ClassVar[bool] = True
+    title: ClassVar[str] = "gear backlash"
+    depends_on_gear_load: ClassVar[bool] = True
+    acceleration_driven: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("gap_crossed", "rad", 1e-7, 0.2, "log"),
         Shape("longest", "s", 0.01, SLOWEST, "log", (SLOWEST,), default=SLOWEST),
@@ -77,7 +76,7 @@ class Backlash(Effect):
         Shape("landing", "s", BRIEFEST, 0.1, "log", (LANDS,), default=LANDS),
     )
     rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "presliding_hysteresis", "load_dependent_friction")
-    fast: ClassVar[bool] = True
+    independent_of_acceleration: ClassVar[bool] = True
     experiments: ClassVar[tuple[str, ...]] = ("payload", "micro_reversals")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
@@ -86,7 +85,7 @@ class Backlash(Effect):
         return (Coefficient("half_play", length_unit(robot, joint - 1), 0.0, 0.05, INEXACT, SMALLEST),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
-        """Ties the play that the torque's size tells to the gap that the crossings' time tells."""
+        """Links the backlash from the size of the torque to the gap from the crossing times."""
         ((lower, upper),) = super().ranges(robot, joint, shape)
         return ((max(lower, LEAST * shape[0] / 2), min(upper, MOST * shape[0] / 2)),)
 
@@ -120,7 +119,7 @@ class Backlash(Effect):
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the gap that the size of the torque tells, free flight however long, and the base model's zero."""
+        """Gives the gap from the size of the torque, for free motion, and the base model's zero."""
         gap = float(np.clip(2.0 * coefficients[0], self.shapes[0].lower, self.shapes[0].upper))
         # All but what was refined itself: each as it should be, or not.
         assert joint is not None
@@ -128,10 +127,10 @@ class Backlash(Effect):
         either = ((LANDS, None), rotors, (0.0, None), (SLOWEST, None), (gap, None))
         return tuple((g, s, z, r, lands) for lands, r, z, s, g in product(*either))[:-1]
 
-    def elsewhere(
+    def other_optima(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Gives the gap that the size tells, crossed in as long as now: by the motor's time instead of free flight.
+        """Gives the gap from the size of the torque with the present crossing time, limited by the motor.
 
         Free flight in the time that was seen asks for a smaller gap, and goes astray where loads change more slowly.
         Another rotor, where it is not sure, makes the load change sign at other times: a narrow summit on the right
@@ -180,10 +179,11 @@ class Backlash(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
-            f"The gear of joint {joint} has a play of {2 * coefficients[0]:.3g} {length}: its link changes sides when "
-            f"the load changes sign."
+            f"The gear of joint {joint} has {2 * coefficients[0]:.3g} {length} of backlash; the link moves through it "
+            f"when "
+            "the load changes sign."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
@@ -227,8 +227,8 @@ def _size(situation: Situation, joint: int) -> float:
 def _crossings(situation: Situation, joint: int, at: float, rotor: float) -> tuple[Array, Array, Array]:
     """Finds where the load passes a value: times [s], the new side, and its rate over the link's inertia [rad/s3].
 
-    It must get as far as `HOVERS` beyond before it comes back: a load that hovers about zero, as that of a horizontal
-    axis at even speed, has no sides, and what makes it cross is what is not known of the motion.
+    A crossing counts only if the load gets beyond `HOVERS` before it comes back. A load that stays near zero, as on a
+    horizontal axis at constant speed, would cross only by errors of the motion.
     """
     load = load_beside(situation, joint, rotor) - at
     inertia = np.maximum(link_inertia(situation, joint, rotor)[:, joint - 1], 1e-12)
@@ -238,7 +238,7 @@ def _crossings(situation: Situation, joint: int, at: float, rotor: float) -> tup
         part = load[run]
         sure = np.flatnonzero(np.abs(part) > beyond)
         last = sure[:-1][part[sure[:-1]] * part[sure[1:]] < 0]
-        # Of the rows between two sides the load changes its sign for good in the last that is not yet the new one's.
+        # The load changes sign for good in the last row before the new side.
         changes = np.flatnonzero(part[:-1] * part[1:] <= 0)
         after = sure[np.searchsorted(sure, last, side="right")]
         found.append(run.start + changes[np.searchsorted(changes, after, side="left") - 1])

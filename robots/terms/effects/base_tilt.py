@@ -33,8 +33,8 @@ class BaseTilt(Effect):
     """
 
     name: ClassVar[str] = "base_tilt"
-    title: ClassVar[str] = "a base that is not level"
-    borne: ClassVar[bool] = True
+    title: ClassVar[str] = "tilted base"
+    loads_gear: ClassVar[bool] = True
     whole_robot: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = OWN
     rivals: ClassVar[tuple[str, ...]] = ("spring", "encoder_offset", "torque_constant_error", "payload_change")
@@ -45,7 +45,7 @@ class BaseTilt(Effect):
         return Coefficient("tilt_1", "rad", -0.5, 0.5), Coefficient("tilt_2", "rad", -0.5, 0.5)
 
     def unused(self, shape: tuple[float, ...]) -> frozenset[int]:
-        """Gives moments where there are none."""
+        """Gives the shape without moments."""
         return frozenset() if any(shape) else frozenset((0, 1))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
@@ -57,10 +57,10 @@ class BaseTilt(Effect):
         """Names the whole robot, if there is gravity."""
         return (None,) if np.any(robot.chain.gravity) else ()
 
-    def leaves(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
-        """Gives half of it for an upright first axis whose own moments are too small to be told: they show."""
+    def leakage(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
+        """Gives half of it for an upright first axis whose own moments are too small to be determined."""
         hidden = joint == 0 and upright(robot) and not any(shape)
-        return 0.5 if hidden else super().leaves(robot, joint, shape)
+        return 0.5 if hidden else super().leakage(robot, joint, shape)
 
     def complete(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[float, ...]:
         """Gives the first axis' own moments, if they may be there: angles would take what they are."""
@@ -84,9 +84,9 @@ class BaseTilt(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         angle = np.degrees(np.hypot(*coefficients[:2]))
-        return f"The base is tilted by {angle:.3g} deg: gravity does not pull where the description says."
+        return f"The base is tilted by {angle:.3g} deg relative to the robot's description."
 
 
 def upright(robot: Robot) -> bool:

@@ -27,8 +27,8 @@ class CurrentClipping(JointEffect):
     """
 
     name: ClassVar[str] = "current_clipping"
-    title: ClassVar[str] = "torque cut off at the current limit"
-    last: ClassVar[bool] = True
+    title: ClassVar[str] = "torque limited by the drive current"
+    acts_on_total_torque: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("level", "N m", 1e-3, 1e6, "log", inexact=0.01),)
     rivals: ClassVar[tuple[str, ...]] = ("torque_constant_saturation", "load_dependent_friction")
     experiments: ClassVar[tuple[str, ...]] = ("payload", "static_hold")
@@ -41,7 +41,7 @@ class CurrentClipping(JointEffect):
         """Gives what a limit takes of the torque beyond its level: of less, another bends it."""
         return ((LEAST, 1.0),)
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Gives true for all of the range: a torque that is cut off is all lost."""
         return float(coefficients[0]) > LEAST
 
@@ -69,7 +69,7 @@ class CurrentClipping(JointEffect):
         return float(np.abs(measured[:, joint - 1]).max())
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates what the cut takes away: where noise is cut as well, what it takes on average."""
+        """Evaluates the torque removed by the limit; with noise, its mean."""
         torque, level = situation.whole[:, joint - 1], shape[0]
         lost = np.clip(torque, -level, level) - torque
         if self._flat(situation, joint):
@@ -92,9 +92,9 @@ class CurrentClipping(JointEffect):
         return flagged if certain and size.any() else np.zeros_like(flagged)
 
     def chance(self, situation: Situation, joint: Place, measured: Array) -> float:
-        """Gives the chance of the log's flat tops, if the known torque comes near them.
+        """Gives the probability of the log's flat peaks by chance, if the known torque comes near them.
 
-        One that does not is not known as to its most: the log's limit is none of what is known.
+        If it does not come near them, its largest values are unknown.
         """
         assert joint is not None
         most, known = (float(np.abs(x[:, joint - 1]).max(initial=0.0)) for x in (measured, situation.whole))
@@ -109,8 +109,8 @@ class CurrentClipping(JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
-        return f"The torque of joint {joint} is cut off at {shape[0]:.4g} {force}: the drive's current is at its limit."
+        """Describes the values in one sentence."""
+        return f"The torque of joint {joint} is limited to {shape[0]:.3g} {force}, the drive's current limit."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the torque that is cut."""
@@ -120,7 +120,7 @@ class CurrentClipping(JointEffect):
 
 
 LEAST = 0.5
-"""Share of the torque beyond its level that a limit takes, whatever errors its estimate has; in truth it is one."""
+"""Fraction of the torque beyond the level that a limit removes, with estimation errors; the true value is one."""
 FLAT = 1e-4
 """Relative difference from the largest torque up to which a sample is at it."""
 FLAT_SAMPLES = 30
@@ -139,7 +139,7 @@ def _stretches(situation: Situation, flags: NDArray[np.bool_]) -> list[tuple[int
 
 
 def _spread(values: Array, counted: NDArray[np.bool_]) -> float:
-    """Gives the standard deviation of noise, whatever else is among it."""
+    """Gives a robust standard deviation of the noise."""
     return 1.4826 * float(np.median(np.abs(values[counted]))) if counted.any() else 0.0
 
 
@@ -152,9 +152,9 @@ def _above(excess: Array, noise: float) -> Array:
 
 
 def _accident(situation: Situation, joint: int, measured: Array) -> float:
-    """Gives the chance that the largest torque is logged in so many stretches of three samples and more.
+    """Gives the probability that the largest torque appears in this many runs of three samples or more by chance.
 
-    As often as other samples are in stretches of one torque: where it is told in coarse steps, that says nothing.
+    Reference: runs of equal values elsewhere. With a coarse torque resolution such runs are usual.
     """
 
     def evaluate() -> float:

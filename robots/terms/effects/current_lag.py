@@ -21,7 +21,7 @@ class CurrentLag(Late, JointEffect):
     """tau_j(t - d) - tau_j(t): as a delay, but of one joint: its current's filter."""
 
     name: ClassVar[str] = "current_lag"
-    title: ClassVar[str] = "torque of one joint that is logged late (filter)"
+    title: ClassVar[str] = "delayed (filtered) torque signal of one joint"
     rare: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (replace(SHIFT, lower=0.0, grid=tuple(s for s in SHIFT.grid if s > 0)),)
     rivals: ClassVar[tuple[str, ...]] = ("time_delay", "presliding_hysteresis", "joint_elasticity")
@@ -49,9 +49,9 @@ class CurrentLag(Late, JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         late = 1000 * coefficients[0]
-        return f"The torque of joint {joint} is logged {late:.2f} ms late, as where its drive filters it."
+        return f"The torque of joint {joint} is logged {late:.3g} ms late. Likely cause: a filter in its drive."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the rate of the joint's torque."""

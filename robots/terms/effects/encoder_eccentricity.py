@@ -20,7 +20,7 @@ class EncoderEccentricity(Effect):
     """tau = (d rigid/dq_j) (a cos(q_j) + b sin(q_j)): the joint stands further by an error of one period per turn."""
 
     name: ClassVar[str] = "encoder_eccentricity"
-    title: ClassVar[str] = "an encoder that is out of true"
+    title: ClassVar[str] = "encoder eccentricity"
     rare: ClassVar[bool] = True
     rivals: ClassVar[tuple[str, ...]] = ("encoder_offset", "spring", "torque_ripple")
     experiments: ClassVar[tuple[str, ...]] = ("payload", "static_hold")
@@ -51,9 +51,9 @@ class EncoderEccentricity(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         size = np.hypot(*coefficients)
-        return f"The encoder of joint {joint} is off by {size:.3g} {length} up and down, once a turn."
+        return f"The encoder of joint {joint} has an error with an amplitude of {size:.3g} {length}, once per turn."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the position."""

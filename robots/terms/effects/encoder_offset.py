@@ -1,4 +1,4 @@
-"""An encoder that is mounted a little turned."""
+"""An encoder that is mounted with an offset."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class EncoderOffset(Effect):
     """tau = (d rigid/dq_j) o: joint j stands at q + o when it reports q."""
 
     name: ClassVar[str] = "encoder_offset"
-    title: ClassVar[str] = "a joint zero that is off"
+    title: ClassVar[str] = "wrong joint zero (encoder offset)"
     rivals: ClassVar[tuple[str, ...]] = ("base_tilt", "torque_constant_error", "spring", "encoder_eccentricity")
     experiments: ClassVar[tuple[str, ...]] = ("second_base_pose", "payload")
 
@@ -43,8 +43,8 @@ class EncoderOffset(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
-        return f"Joint {joint} stands {coefficients[0]:.3g} {length} further than its encoder says."
+        """Describes the values in one sentence."""
+        return f"The true position of joint {joint} is {coefficients[0]:.3g} {length} larger than its encoder value."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the position."""

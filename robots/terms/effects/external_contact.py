@@ -25,9 +25,9 @@ HOLD = 0.1  # of one that lasts
 LONGER = (1.0, 2.0, 4.0, 8.0)
 FROM = (0.0, 0.5, 1.0)
 ALONE = 0.05  # share of what a joint feels below which others feel nothing
-NONE = 1e-6  # share of force or moment [N or N m] below which the other is none
+NONE = 1e-6  # ratio of force to moment, or the reverse, below which the smaller one counts as zero
 WRENCH = tuple(f"mean_{what}_{k}" for what in ("force", "moment") for k in "xyz")
-# Of a force F at the place r of a body, the first along the base's axes, the second along the body's.
+# A force F at the place r of a body; F along the base's axes, r along the body's.
 PLACED = tuple(f"place_{i}_force_{k}" for i in "xyz" for k in "xyz")
 
 
@@ -42,11 +42,11 @@ class ExternalContact(Effect):
     """
 
     name: ClassVar[str] = "external_contact"
-    title: ClassVar[str] = "an external contact"
-    borne: ClassVar[bool] = True
+    title: ClassVar[str] = "external contact"
+    loads_gear: ClassVar[bool] = True
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
-    passing: ClassVar[bool] = True
+    transient: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.03),
         Shape("duration", "s", 0.03, 60.0, "log", (0.2, 0.5, 1.25, 3.2), 0.05),
@@ -71,8 +71,8 @@ class ExternalContact(Effect):
             told = [Coefficient(f"peak_on_joint_{j + 1}", force_unit(robot, j)) for j in range(robot.n)]
         return (*told, *(Coefficient("", "") for _ in range(_count(robot.n) - len(told))))
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
-        """Whether joints before the one that feels it most feel it, too.
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+        """Whether joints before the most loaded one are loaded as well.
 
         A force misses the axes of the first two where it acts across the arm, or along an upright first axis; all
         before a further one it misses by chance only. What one of those has alone is its own.
@@ -81,7 +81,7 @@ class ExternalContact(Effect):
         most = int(np.argmax(size))
         told = not on_the_flange(shape) and not on_body(shape)
         alone = told and most >= 2 and bool((size[:most] < ALONE * size[most]).all())
-        return not alone and super().believable(robot, joint, coefficients, shape)
+        return not alone and super().is_plausible(robot, joint, coefficients, shape)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists durations, each starting every half of it."""
@@ -94,10 +94,10 @@ class ExternalContact(Effect):
         hardness = (self.shapes[2].lower, self.shapes[2].upper)
         return (first, last), (self.shapes[1].lower, longest), hardness, (0.0, 0.0), (0.0, 0.0)
 
-    def elsewhere(
+    def other_optima(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Gives pushes on the flange that last, of which this may be the part in which the arm moves least."""
+        """Gives longer pushes on the flange that may contain this one."""
         if on_body(shape):
             return ()
         (first, last), (_, longest), *_ = self.bounds(situation, joint)
@@ -112,13 +112,13 @@ class ExternalContact(Effect):
             ),
         )
 
-    def further(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
+    def open_edges(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
         """Gives pushes as long as this, just before and just after: what pushes an arm that moves is no such pulse."""
         start, duration = shape[:2]
         times = ((0, start - duration), (1, start + duration))
         return tuple((k, (at, duration, HOLD, 0.0, 0.0)) for k, at in times)
 
-    def lasting(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+    def sustained_shapes(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
         """Gives forces at a place of each of the bodies."""
         if on_body(shape):
             return ()
@@ -158,7 +158,7 @@ class ExternalContact(Effect):
         last = np.searchsorted(situation.t, starts + 0.9 * durations)
         energies = (sums[last] - sums[first]) ** 2
         for duration in np.unique(durations):
-            # What slow noise makes of long windows, and fast noise of short ones: the median of a chi-square.
+            # Noise of long and short windows differs; the median of a chi-square normalises both.
             own = energies[durations == duration]
             usual = np.array([np.median(some) / 0.455 if len(some := of[of > 0]) else 0.0 for of in own.T])
             energies[durations == duration] = np.divide(own, usual, out=np.zeros_like(own), where=usual > 0)
@@ -174,30 +174,31 @@ class ExternalContact(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         when = f"from t = {shape[0]:.2f} s for {shape[1]:.2g} s"
         if on_body(shape):
             push = float(np.linalg.norm(coefficients[:3]))
             return (
-                f"Something pushed the arm {when}, as a force of {push:.3g} N at one place of body {shape[4]:.0f} does "
-                "that stays the same (its mean, along the base's axes; the signs are those of the arm's push against "
-                "it)."
+                f"Something pushed the arm {when}, with a constant force of {push:.3g} N at one place of body "
+                f"{shape[4]:.0f} "
+                "(mean values, along the base's axes; the signs are those of the arm's reaction)."
             )
         if on_the_flange(shape):
-            # What no joint feels of them is none, or rounding.
+            # A part that no joint feels is zero, or rounding.
             push, turn = (float(np.linalg.norm(part)) for part in (coefficients[:3], coefficients[3:6]))
             sizes = (("force", push, "N"), ("moment", turn, "N m"))
             least = NONE * max(push, turn)
             told = [f"a {word} of {size:.3g} {unit}" for word, size, unit in sizes if size > least]
             return (
-                f"Something pushed the flange {when}, with {' and '.join(told)} that stayed the same (means, along the "
-                "base's axes; the signs are those of the arm's push against it)."
+                f"Something pushed the flange {when}, with {' and '.join(told)}, constant (mean values, along the "
+                f"base's "
+                "axes; the signs are those of the arm's reaction)."
             )
         size = np.abs(coefficients)
         most, last = int(np.argmax(size)) + 1, int(np.flatnonzero(size > 0.05 * size.max())[-1]) + 1
         return (
-            f"Something pushed the arm {when}: joint {most} felt {size.max():.3g} {force}, and joint {last} is the "
-            "last that felt it."
+            f"Something pushed the arm {when}. The largest torque is {size.max():.3g} {force} on joint {most}; joint "
+            f"{last} is the last that shows it."
         )
 
 

@@ -21,7 +21,7 @@ class FrictionStep(Sudden, JointEffect):
     """tau = (a sign(dq) + b dq) from the time t_c on."""
 
     name: ClassVar[str] = "friction_step"
-    title: ClassVar[str] = "friction that changed at one moment"
+    title: ClassVar[str] = "sudden change of friction"
     rivals: ClassVar[tuple[str, ...]] = ("thermal_friction", "load_heat", "payload_change", "external_contact")
     experiments: ClassVar[tuple[str, ...]] = ("pause", "repeat")
 
@@ -45,7 +45,7 @@ class FrictionStep(Sudden, JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         coulomb, viscous = coefficients[:2]
         change = "changed" if coulomb * viscous < 0 else "rose" if coulomb + viscous > 0 else "fell"
         if change == "fell":

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Of the torque, what is less than this is rounding.
+# Fraction of the torque below which a value is rounding.
 NO_WEIGHT = 1e-9
 # Who moves the arm takes over this share of what its motion needs at least: less is no hand.
 MOST = 0.5
@@ -35,10 +35,10 @@ class HandGuiding(Effect):
     """
 
     name: ClassVar[str] = "hand_guiding"
-    title: ClassVar[str] = "an external force that moved the robot (by hand)"
+    title: ClassVar[str] = "robot guided by hand (external force)"
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
-    passing: ClassVar[bool] = True
+    transient: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.02),
         Shape("end", "s", -np.inf, np.inf, "linear", inexact=0.02),
@@ -112,10 +112,11 @@ class HandGuiding(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
-            f"An external force moved the robot from t = {shape[0]:.2f} s to {shape[1]:.2f} s, as a hand does: the "
-            f"drives carried its weight, not its friction and inertia."
+            f"An external force, such as a hand, moved the robot from t = {shape[0]:.2f} s to {shape[1]:.2f} s. The "
+            f"drives "
+            "carried its weight, but not its friction and inertia."
         )
 
 

@@ -24,13 +24,13 @@ class JointCoupling(StaticEffect):
     """Of joint k and j = k - 1: tau_j = I ddq_k + a dq_k + F s, tau_k = I ddq_j + b dq_j + w F s.
 
     s = sign(dq_j + w dq_k). The rotor of a drive that passes through another (Gautier 1995). Rotors and seals that both
-    motions turn give a = b; each is free, so that drag one way is seen as well. The way w is -1 where the description's
-    axes of both joints turn the seal between them against each other. Counted at the outer joint.
+    motions turn give a = b; each is free, so that coupling in one direction is found as well. The way w is -1 where the
+    description's axes of both joints turn the seal between them against each other. Counted at the outer joint.
     """
 
     name: ClassVar[str] = "joint_coupling"
-    title: ClassVar[str] = "drives that run through each other (coupling)"
-    sharp: ClassVar[bool] = True
+    title: ClassVar[str] = "coupled drives of neighbouring joints"
+    needs_full_rate: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("way", "", -1.0, 1.0, "linear", WAYS, default=1.0, beside=True, choices=WAYS),
     )
@@ -84,12 +84,12 @@ class JointCoupling(StaticEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         assert joint is not None
         return (
-            f"Joints {joint - 1} and {joint} drag each other: the motion of one costs torque of the other "
+            f"Joints {joint - 1} and {joint} are coupled: motion of one needs torque of the other "
             f"({coefficients[1]:.3g} and {coefficients[2]:.3g} {force} s/{length}, {coefficients[3]:.3g} {force} of "
-            f"Coulomb friction of their {'difference' if shape and shape[0] < 0 else 'sum'})."
+            f"Coulomb friction on their {'difference' if shape and shape[0] < 0 else 'sum'})."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

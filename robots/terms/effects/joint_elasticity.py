@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DAMPING = 0.05
-"""Of the resonance, of its critical one."""
+"""Damping ratio of the resonance."""
 INEXACT = 0.05
 """Share by which the stiffness by the dynamics errs besides: it is as right as the inertia and the damping are."""
 OWN = 0.03
@@ -26,7 +26,7 @@ OWN = 0.03
 SCANNED = (3.5, 4.2, 5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 18.0, 30.0, 300.0)
 """Resonances [Hz] of a scan, at the log's mean inertia: dense where a motion may excite them, for they are narrow."""
 LIGHTEST = 0.02
-"""Of a joint's largest inertia, the least that an arm makes it in any pose."""
+"""Smallest inertia of a joint in any pose, as a fraction of its largest."""
 APART = 5.0
 """Times by which the stiffness by the dynamics and that by the compliance differ at most: they are of one gear."""
 LOWEST, HIGHEST = 3.0, 1000.0
@@ -43,9 +43,9 @@ class JointElasticity(Effect):
     """
 
     name: ClassVar[str] = "joint_elasticity"
-    title: ClassVar[str] = "a gear that winds up under load (elasticity)"
-    loaded: ClassVar[bool] = True
-    kicks: ClassVar[bool] = True
+    title: ClassVar[str] = "joint elasticity (compliant gear)"
+    depends_on_gear_load: ClassVar[bool] = True
+    acceleration_driven: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("dynamic_stiffness", "N m/rad", 1e-6, 1e12, "log", inexact=INEXACT),
         ROTOR,
@@ -66,7 +66,7 @@ class JointElasticity(Effect):
         return tuple((_stiffness(situation, joint, f, rotor), rotor) for rotor in rotors for f in SCANNED)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the resonance within what gears have, and the rotor near what is known of it."""
+        """Bounds the resonance to usual gears, and the rotor to values near the known one."""
         assert joint is not None
         rotor = rotor_bounds(situation, joint)
         softest = _stiffness(situation, joint, LOWEST, rotor[1])
@@ -83,10 +83,10 @@ class JointElasticity(Effect):
         stiffness = float(np.clip(1.0 / coefficients[0], *self.bounds(situation, joint)[0]))
         return (stiffness, KNOWN), *plain, *((stiffness, None) for _ in plain)
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Tells a gear from what swings as if on a spring of another stiffness than it winds up by."""
         ratio = float(coefficients[0]) * shape[0] if shape else 1.0
-        return 1.0 / APART < ratio < APART and super().believable(robot, joint, coefficients, shape)
+        return 1.0 / APART < ratio < APART and super().is_plausible(robot, joint, coefficients, shape)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per compliance of one."""
@@ -104,9 +104,9 @@ class JointElasticity(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
-            f"The gear of joint {joint} winds up under load, with a stiffness of "
+            f"The gear of joint {joint} is elastic, with a stiffness of "
             f"{1.0 / max(coefficients[0], 1e-12):.3g} {force}/{length}."
         )
 
@@ -164,7 +164,7 @@ def link_inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Arra
 
 
 def windup(situation: Situation, joint: int, lag: Array, rate: Array, curve: Array, rotor: float = KNOWN) -> Array:
-    """Gives the torque (N, n) by which all joints change when a link lags its encoder, to first order.
+    """Gives the torque change (N, n) of all joints when a link lags its encoder, to first order.
 
     Args:
         situation: what the robot did.

@@ -32,8 +32,8 @@ class LoadDependentFriction(StaticJointEffect):
     """
 
     name: ClassVar[str] = "load_dependent_friction"
-    title: ClassVar[str] = "friction that grows with the load"
-    loaded: ClassVar[bool] = True
+    title: ClassVar[str] = "load-dependent friction"
+    depends_on_gear_load: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("driven_back", "1", 0.0, 1.0, "linear", (ALIKE,), 0.05, default=ALIKE),
         ROTOR,
@@ -85,15 +85,18 @@ class LoadDependentFriction(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         back = (
-            "" if not shape or shape[0] == ALIKE else f" Driven back by its load it loses {shape[0]:.2g} times as much."
+            ""
+            if not shape or shape[0] == ALIKE
+            else f" When the load drives the joint, the friction is {shape[0]:.2g} times as large."
         )
         change, (coulomb, viscous) = "grows", 100 * coefficients[:2]
         if coulomb < 0:
             change, coulomb, viscous = "falls", -coulomb, -viscous
         return (
-            f"The friction of joint {joint} {change} with its load: by {coulomb:.3g} % of it in Coulomb friction, and "
+            f"The friction of joint {joint} {change} with the load: Coulomb friction by {coulomb:.3g} % of the load, "
+            f"viscous friction by "
             f"{viscous:.3g} % per {length}/s.{back}"
         )
 

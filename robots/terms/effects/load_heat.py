@@ -22,7 +22,7 @@ class LoadHeat(HeatEffect):
     """tau = -x (a sign(dq) + b dq), dx/dt = tau^2 - x / T: x is copper heat, at rest as in motion."""
 
     name: ClassVar[str] = "load_heat"
-    title: ClassVar[str] = "friction that falls as the motor's current heats the joint"
+    title: ClassVar[str] = "friction reduced by motor heat"
     rare: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("time_constant", "s", 5.0, 7200.0, "log", (45.0, 400.0, 3600.0)),)
     falls: ClassVar[bool] = True
@@ -50,10 +50,10 @@ class LoadHeat(HeatEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
-            f"Joint {joint} loses friction as its motor's current heats it, also at rest; the heat goes with a time "
-            f"constant of {shape[0]:.0f} s."
+            f"The friction of joint {joint} falls as its motor current heats the joint, also at rest. The thermal time "
+            f"constant is {shape[0]:.0f} s."
         )
 
 

@@ -22,9 +22,9 @@ class LoadStribeck(StaticJointEffect):
     """tau = c |tau_L| exp(-|dq| / v_s) sign(dq) (Bittencourt and Gunnarsson 2012)."""
 
     name: ClassVar[str] = "load_stribeck"
-    title: ClassVar[str] = "break-away friction that grows with the load"
-    loaded: ClassVar[bool] = True
-    sharp: ClassVar[bool] = True
+    title: ClassVar[str] = "load-dependent break-away friction"
+    depends_on_gear_load: ClassVar[bool] = True
+    needs_full_rate: ClassVar[bool] = True
     rare: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("stribeck_velocity", "rad/s", 1e-3, 2.0, "log"),)
     rivals: ClassVar[tuple[str, ...]] = ("stribeck", "load_dependent_friction", "presliding_hysteresis")
@@ -57,11 +57,12 @@ class LoadStribeck(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         than = "more" if coefficients[0] > 0 else "less"
         return (
-            f"Joint {joint} needs {100 * abs(coefficients[0]):.3g} % of its load {than} to break away; that fades as "
-            f"it speeds up past {shape[0]:.3g} {length}/s."
+            f"Joint {joint} needs {100 * abs(coefficients[0]):.3g} % of its load {than} to break away. The difference "
+            f"fades "
+            f"above {shape[0]:.3g} {length}/s."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

@@ -24,8 +24,8 @@ class PayloadChange(Effect):
     """
 
     name: ClassVar[str] = "payload_change"
-    title: ClassVar[str] = "a payload that changed at one moment"
-    borne: ClassVar[bool] = True
+    title: ClassVar[str] = "sudden change of the payload"
+    loads_gear: ClassVar[bool] = True
     whole_robot: ClassVar[bool] = True
     depends_on: ClassVar[Literal["state", "time"]] = "time"
     shapes: ClassVar[tuple[Shape, ...]] = (
@@ -73,10 +73,10 @@ class PayloadChange(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
-        change = "grew" if coefficients[0] > 0 else "fell"
+        """Describes the values in one sentence."""
+        change = "increased" if coefficients[0] > 0 else "decreased"
         return f"The payload {change} by {abs(coefficients[0]):.3g} kg at t = {shape[0]:.2f} s."
 
 
 USED = (0, 1, 2, 3, 4, 7, 9)
-"""Of the ten inertial parameters: all but the products of inertia."""
+"""Used inertial parameters: all but the products of inertia."""

@@ -27,7 +27,7 @@ class PositionDependentFriction(StaticJointEffect):
     """tau = sign(dq) (a cos(h q) + b sin(h q)), h periods per turn; of a linear axis h is a wave number [rad/m]."""
 
     name: ClassVar[str] = "position_dependent_friction"
-    title: ClassVar[str] = "friction that depends on the position"
+    title: ClassVar[str] = "position-dependent friction"
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("order", "periods per turn", 0.5, HIGHEST["m"], "linear", (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)),
     )
@@ -56,7 +56,7 @@ class PositionDependentFriction(StaticJointEffect):
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the nearest whole order, where the joint's range does not tell it from the one found."""
+        """Gives the nearest whole order, if the joint's range does not distinguish it from the fitted one."""
         assert joint is not None
         order = max(float(round(shape[0])), 1.0)
         if length_unit(situation.robot, joint - 1) == "m":
@@ -77,12 +77,12 @@ class PositionDependentFriction(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         size, peak = np.hypot(*coefficients), np.arctan2(coefficients[1], coefficients[0]) / shape[0]
-        often = f"{shape[0]:.3g} times a turn" if length == "rad" else f"every {2000 * np.pi / shape[0]:.4g} mm"
+        often = f"{shape[0]:.3g} times per turn" if length == "rad" else f"every {2000 * np.pi / shape[0]:.4g} mm"
         return (
-            f"The friction of joint {joint} varies by {size:.3g} {force} up and down, {often}, and "
-            f"is highest at {peak:.3g} {length}."
+            f"The friction of joint {joint} varies with an amplitude of {size:.3g} {force}, {often}. "
+            f"It is highest at {peak:.3g} {length}."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

@@ -24,9 +24,9 @@ class PreslidingHysteresis(JointEffect):
     """
 
     name: ClassVar[str] = "presliding_hysteresis"
-    title: ClassVar[str] = "friction that turns round gradually at reversals (presliding)"
-    sharp: ClassVar[bool] = True
-    turns: ClassVar[bool] = True
+    title: ClassVar[str] = "presliding hysteresis"
+    needs_full_rate: ClassVar[bool] = True
+    acts_at_reversals: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("presliding_travel", "rad", 1e-5, 0.2, "log"),)
     rivals: ClassVar[tuple[str, ...]] = ("stribeck", "backlash", "time_delay", "current_lag", "spring")
     experiments: ClassVar[tuple[str, ...]] = ("micro_reversals", "sweep")
@@ -66,10 +66,11 @@ class PreslidingHysteresis(JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
-            f"After each reversal, {coefficients[0]:.3g} {force} of the friction of joint {joint} turn round over a "
-            f"travel of {shape[0]:.3g} {length} instead of at once."
+            f"After each reversal, {coefficients[0]:.3g} {force} of the friction of joint {joint} change sign "
+            f"gradually, "
+            f"over a travel of {shape[0]:.3g} {length}."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

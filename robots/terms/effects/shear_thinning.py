@@ -1,4 +1,4 @@
-"""Grease that thins as it is sheared."""
+"""Friction of shear-thinning grease."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class ShearThinning(StaticJointEffect):
     """tau = F |dq / v_r|^p sign(dq), v_r = 1 rad/s (Waiboer et al. 2005)."""
 
     name: ClassVar[str] = "shear_thinning"
-    title: ClassVar[str] = "viscous friction that grows less than the speed"
-    sharp: ClassVar[bool] = True
+    title: ClassVar[str] = "shear-thinning viscous friction"
+    needs_full_rate: ClassVar[bool] = True
     rare: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("power", "1", 0.2, 0.9, "linear", (0.3, 0.5, 0.7)),)
     rivals: ClassVar[tuple[str, ...]] = ("stribeck", "presliding_hysteresis")
@@ -47,10 +47,10 @@ class ShearThinning(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
-            f"The friction of joint {joint} grows with the power {shape[0]:.2g} of its speed: its grease thins "
-            f"as it is sheared."
+            f"The viscous friction of joint {joint} grows with the power {shape[0]:.2g} of the speed. Likely cause: "
+            "shear-thinning grease."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

@@ -20,9 +20,9 @@ Array = NDArray[np.float64]
 PLAIN = (0.0, 0.0)
 
 
-# Lever ratios and dead centres of the scan; a joint that moves less than this [rad] tells none of them.
+# Lever ratios and dead centres of the scan; a joint that moves less than this [rad] does not determine them.
 RATIOS, CENTRES, TOLD = (0.35,), tuple(float(x) for x in np.arange(-np.pi, np.pi, np.pi / 4)), 1.0
-# A shorter lever (as a share of the other) is none.
+# A shorter lever (as a fraction of the other) is ignored.
 SHORTEST = 0.1
 # Ends of levers so alike would nearly meet where the joint passes their dead centre: no spring is as short.
 MEETING = 0.8
@@ -41,19 +41,19 @@ class Spring(StaticJointEffect):
     """
 
     name: ClassVar[str] = "spring"
-    title: ClassVar[str] = "a spring or cable on the joint"
-    borne: ClassVar[bool] = True
+    title: ClassVar[str] = "spring or cable on the joint"
+    loads_gear: ClassVar[bool] = True
     preloads: ClassVar[bool] = True
-    vague: ClassVar[str] = (
-        "A spring or cable acts on joint {joint}; how stiff it is where, these logs do not tell: gravity resembles "
-        "much of it."
+    undetermined_text: ClassVar[str] = (
+        "A spring or cable acts on joint {joint}. These logs do not determine its stiffness, because gravity has a "
+        "similar effect."
     )
     shapes: ClassVar[tuple[Shape, ...]] = (LEVER, CENTRE)
     rivals: ClassVar[tuple[str, ...]] = ("base_tilt", "torque_ripple", "asymmetric_friction", "encoder_offset")
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "second_base_pose", "payload")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes stiffness, its two next orders, and what pulls where s is zero."""
+        """Describes stiffness, its two next orders, and the force at s = 0."""
         assert joint is not None
         force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
         return (
@@ -64,35 +64,35 @@ class Spring(StaticJointEffect):
         )
 
     def described(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[Coefficient, ...]:
-        """Describes them without what a lever's third order is, and what pulls a plain spring: the model's offset."""
+        """Describes them without a lever's third order and a plain spring's preload (the model's offset)."""
         stiffness, second, third, preload = self.parameters(robot, joint)
         none = Coefficient("", "")
         return (stiffness, second, none, preload) if _has_lever(shape) else (stiffness, second, third, none)
 
     def unused(self, shape: tuple[float, ...]) -> frozenset[int]:
-        """Gives ratio and dead centre of levers that are none."""
+        """Gives ratio and dead centre of a spring without levers."""
         return frozenset() if _has_lever(shape) else frozenset((0, 1))
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Whether its ends stay apart: a catch at one angle resembles a spring whose ends nearly meet there."""
         assert joint is not None
         meets = _has_lever(shape) and shape[0] > MEETING and _passes(robot, joint, shape[1])
-        return not meets and super().believable(robot, joint, coefficients, shape)
+        return not meets and super().is_plausible(robot, joint, coefficients, shape)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists a spring without levers, and levers where a joint turns far enough to tell them."""
+        """Lists a spring without levers, and levers if the joint turns far enough to determine them."""
         assert joint is not None
         return (PLAIN,) if np.ptp(situation.q[:, joint - 1]) < TOLD else self.forms(situation, joint)
 
     def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists a spring without levers, and levers of a joint that turns: a log of few angles tells none of them."""
+        """Lists a spring without levers, and levers of a revolute joint that moves far enough."""
         assert joint is not None
         if situation.robot.chain.joints[joint - 1].kind != "revolute":
             return (PLAIN,)
         return (PLAIN, *((ratio, centre) for ratio in RATIOS for centre in CENTRES))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps a spring plain where no lever could be told."""
+        """Keeps a spring plain if the data do not determine a lever."""
         if len(self.grid(situation, joint)) == 1:
             return ((0.0, 0.0), (0.0, 0.0))
         return super().bounds(situation, joint)
@@ -124,9 +124,9 @@ class Spring(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         if _has_lever(shape):
-            # Ratio and dead centre are told with their intervals: of many pairs all do about as well.
+            # Ratio and dead centre are given with their intervals; many pairs fit about equally well.
             return f"A spring between two levers acts on joint {joint}."
         return (
             f"A spring or cable acts on joint {joint}: {coefficients[0]:.3g} {force}/{length} at the middle of its "

@@ -23,8 +23,8 @@ class Stribeck(StaticJointEffect):
     """tau = F exp(-(|dq| / v_s)^d) sign(dq) (Armstrong-Helouvry et al. 1994)."""
 
     name: ClassVar[str] = "stribeck"
-    title: ClassVar[str] = "more friction at low speed (Stribeck)"
-    sharp: ClassVar[bool] = True
+    title: ClassVar[str] = "Stribeck friction"
+    needs_full_rate: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("stribeck_velocity", "rad/s", 1e-3, 2.0, "log", inexact=0.03),
         Shape("exponent", "1", 0.5, 2.5, "linear", (1.0, 2.0)),
@@ -69,10 +69,11 @@ class Stribeck(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
-            f"Joint {joint} needs {coefficients[0]:.3g} {force} more than its Coulomb friction to break away; that "
-            f"fades as it speeds up past {shape[0]:.3g} {length}/s."
+            f"Joint {joint} needs {coefficients[0]:.3g} {force} more than its Coulomb friction to break away. The "
+            f"difference "
+            f"fades above {shape[0]:.3g} {length}/s."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

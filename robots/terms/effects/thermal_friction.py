@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 SLOWER = 12.0
-"""Times the gear's time constant, with which the housing that it heats goes cold: only a log of hours tells which."""
+"""Time constant of the housing, as a multiple of the gear's; only a log of hours would determine it."""
 MIDDLE = 400.0
 FADES = 5.0
 """Largest fading times the heat kept with a middling time constant: friction is as good as gone there."""
@@ -36,7 +36,7 @@ class ThermalFriction(HeatEffect):
     """
 
     name: ClassVar[str] = "thermal_friction"
-    title: ClassVar[str] = "friction that falls as the joint warms up"
+    title: ClassVar[str] = "temperature-dependent friction"
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("time_constant", "s", 5.0, 7200.0, "log", (15.0, 45.0, 135.0, 400.0, 1200.0, 3600.0), 0.05),
         Shape("housing_weight", "", 0.0, 5.0, "linear", (0.0,), default=0.0, beside=True),
@@ -80,11 +80,11 @@ class ThermalFriction(HeatEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         return (
-            f"Joint {joint} loses friction as it warms up: {coefficients[0]:.3g} {force} of Coulomb and "
-            f"{coefficients[1]:.3g} {force} s/{length} of viscous friction per kJ of its own friction heat; the heat "
-            f"goes with a time constant of {shape[0]:.0f} s{_more(shape)}."
+            f"The friction of joint {joint} falls as it warms up: {coefficients[0]:.3g} {force} Coulomb and "
+            f"{coefficients[1]:.3g} {force} s/{length} viscous friction per kJ of stored friction heat. The thermal "
+            f"time constant is {shape[0]:.0f} s{_more(shape)}."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
@@ -95,8 +95,8 @@ class ThermalFriction(HeatEffect):
 
 def _more(shape: tuple[float, ...]) -> str:
     _, weight, fading = shape
-    slow = f", and {weight:.2g} times as much with one {SLOWER:.0f} times as long" if weight > 0 else ""
-    return slow + (f"; the fall fades as exp(-x {fading:.2g}/kJ)" if fading > 0 else "")
+    slow = f", with a second part, {weight:.2g} times as large and {SLOWER:.0f} times as slow" if weight > 0 else ""
+    return slow + (f"; the effect saturates with exp(-x {fading:.2g}/kJ)" if fading > 0 else "")
 
 
 def _kept(situation: Situation, joint: int, shape: tuple[float, ...]) -> Array:
@@ -116,6 +116,6 @@ def heat(situation: Situation, joint: int, time_constant: float) -> Array:
         power = np.maximum(situation.friction[:, j] * situation.dq[:, j], 0.0)
         return relaxation(situation, power, time_constant) / 1000.0
 
-    # The points of the grid come again and again; those of a search are as many as they are brief.
+    # Grid points are used repeatedly and cached; points of a search are used once.
     known = time_constant in ThermalFriction.shapes[0].grid
     return situation.cached(("heat", joint, time_constant), integrate) if known else integrate()

@@ -18,29 +18,29 @@ Array = NDArray[np.float64]
 
 SMALL = 1e-5  # [s]
 SHORTEST = 1e-4
-"""Delay [s] below which there is none: how friction turns round within a sample is not known that well."""
+"""Delay [s] below which it counts as zero: the sign change of friction within a sample is not known better."""
 APART = 1.6
-# What motion has above the frequencies that are known of it is late, too: a delay is told short by some per cent.
+# Motion above the known frequencies is delayed as well, so a delay is underestimated by some per cent.
 INEXACT = 0.05
 SHIFT = Shape("reversals_late", "s", -0.02, 0.02, "linear", (-0.003, -0.001, -0.0002, 0.0002, 0.001, 0.003, 0.008))
 
 
 class Late(Effect):
-    """Torque that is logged late: reversals, its shape, and all else, its coefficient, tell one delay."""
+    """Delay of the logged torque; the shape follows from reversals, the coefficient from all other data."""
 
     lags: ClassVar[bool] = True
-    blurs: ClassVar[bool] = True
-    sharp: ClassVar[bool] = True
+    smooths_friction_sign: ClassVar[bool] = True
+    needs_full_rate: ClassVar[bool] = True
 
     def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
         """Ties reversals to all else: what `near` allows is 95 %."""
         return ((0, 0, 0.5 * (APART - 1.0 / APART) / 1.96 * float(abs(coefficients[0]))),)
 
-    def believable(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Whether a machine may have these values: it does not stand where its reversals' lets it come no closer."""
         ends = [end for shift in shape for end in near(shift)[0]]
         torn = any(bool(np.isclose(coefficients[0], end, rtol=1e-6, atol=0.0)) for end in ends)
-        return super().believable(robot, joint, coefficients, shape) and not torn
+        return super().is_plausible(robot, joint, coefficients, shape) and not torn
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
@@ -52,15 +52,15 @@ class Late(Effect):
 class TimeDelay(Late):
     """tau(t - d) - tau(t): the logged torque lags the logged position by d, on all joints alike.
 
-    It is d times a difference quotient over d', which the base model's torque and velocities of a moment before say:
-    Coulomb friction turns round within less than a sample, and a joint that sticks breaks loose in one, so that neither
-    follows from rates. d' = d where all is as it should be.
+    It is d times a difference quotient over d', computed from the base model's torque and velocities shortly before.
+    Rates are not sufficient, because Coulomb friction changes sign, and a sticking joint breaks loose, within one
+    sample. With a correct model d' = d.
     """
 
     name: ClassVar[str] = "time_delay"
-    title: ClassVar[str] = "torque that is logged later than position"
+    title: ClassVar[str] = "delay between torque and position"
     whole_robot: ClassVar[bool] = True
-    alike: ClassVar[bool] = True
+    shared_coefficient: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (SHIFT,)
     rivals: ClassVar[tuple[str, ...]] = ("current_lag", "presliding_hysteresis", "joint_elasticity")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "micro_reversals")
@@ -70,7 +70,7 @@ class TimeDelay(Late):
         return (Coefficient("delay", "s", -0.05, 0.05, INEXACT, SHORTEST),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
-        """Keeps the delay near that of the reversals, of which the torque's own is a difference quotient."""
+        """Bounds the delay to values near that of the reversals."""
         return near(shape[0])
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
@@ -86,9 +86,9 @@ class TimeDelay(Late):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         which = "later" if coefficients[0] > 0 else "earlier"
-        return f"Torque is logged {1000 * abs(coefficients[0]):.2f} ms {which} than position, on all joints."
+        return f"Torque is logged {1000 * abs(coefficients[0]):.3g} ms {which} than position, on all joints."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the rate of torque of the joint where it is largest."""
@@ -115,7 +115,7 @@ def lateness(situation: Situation, shift: float) -> Array:
             before[run], dq[run] = torque(past), velocity(past)
         return (before - smooth + situation.friction_at(dq) - situation.friction) / step
 
-    # Joints share the points of the grid; those of a search are as many as they are brief.
+    # Joints share the grid points, which are cached; points of a search are used once.
     own = situation.cached(("lateness", shift), evaluate) if shift in SHIFT.grid else evaluate()
     if situation.beyond is None:
         return own

@@ -24,7 +24,7 @@ class TorqueConstantError(StaticJointEffect):
     """
 
     name: ClassVar[str] = "torque_constant_error"
-    title: ClassVar[str] = "a wrong torque constant"
+    title: ClassVar[str] = "wrong torque constant"
     rivals: ClassVar[tuple[str, ...]] = ("spring", "base_tilt", "encoder_offset", "torque_constant_saturation")
     experiments: ClassVar[tuple[str, ...]] = ("payload",)
 
@@ -45,8 +45,11 @@ class TorqueConstantError(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
-        return f"The torque of joint {joint} is logged {100 * coefficients[0]:+.3g} % wrong: its torque constant."
+        """Describes the values in one sentence."""
+        return (
+            f"The logged torque of joint {joint} is wrong by {100 * coefficients[0]:+.3g} %. Likely cause: a wrong "
+            f"torque constant."
+        )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the base model's torque."""

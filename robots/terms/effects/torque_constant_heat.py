@@ -22,7 +22,7 @@ class TorqueConstantHeat(HeatEffect):
     """tau = c x tau, dx/dt = tau^2 - x / T: magnets weaken as copper heat x builds up."""
 
     name: ClassVar[str] = "torque_constant_heat"
-    title: ClassVar[str] = "a torque constant that falls as the motor warms up"
+    title: ClassVar[str] = "temperature-dependent torque constant"
     rare: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("time_constant", "s", 5.0, 7200.0, "log", (45.0, 400.0, 3600.0)),)
     rivals: ClassVar[tuple[str, ...]] = ("thermal_friction", "torque_sensor_drift", "payload_change")
@@ -46,9 +46,9 @@ class TorqueConstantHeat(HeatEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         than = "less" if coefficients[0] > 0 else "more"
         return (
-            f"The motor of joint {joint} gives {than} torque per current as it warms up, with a time constant of "
+            f"The motor of joint {joint} gives {than} torque per ampere as it warms up, with a time constant of "
             f"{shape[0]:.0f} s."
         )

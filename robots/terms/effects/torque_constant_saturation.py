@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-# The base model's torque, of which the formula is a power, has itself taken some of the error.
+# The formula is a power of the base model's torque, which contains some of the error itself.
 INEXACT = 0.1
 
 
@@ -30,7 +30,7 @@ class TorqueConstantSaturation(StaticJointEffect):
     """
 
     name: ClassVar[str] = "torque_constant_saturation"
-    title: ClassVar[str] = "a torque constant that falls at high torque (saturation)"
+    title: ClassVar[str] = "saturation of the torque constant"
     distorts: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("exponent", "1", 1.0, 8.0, "linear", (1.0, 2.0, 4.0)),
@@ -69,12 +69,12 @@ class TorqueConstantSaturation(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         exponent, torque = shape
         at = f"{torque:.3g} {force}" if torque > 0 else "the torque limit"
         return (
-            f"The torque per current of joint {joint} is not constant: the logged torque is "
-            f"{100 * coefficients[0]:+.3g} % off at {at}, by the power {exponent:.2g} of the torque."
+            f"The torque constant of joint {joint} depends on the torque: the logged torque is wrong by "
+            f"{100 * coefficients[0]:+.3g} % at {at}, with the power {exponent:.2g} of the torque."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:

@@ -19,7 +19,7 @@ class TorqueCrosstalk(JointEffect):
     """tau_j = c tau_{j-1} + d tau_{j+1}: a sensor that also feels its neighbours' torque."""
 
     name: ClassVar[str] = "torque_crosstalk"
-    title: ClassVar[str] = "a torque signal that shows its neighbours'"
+    title: ClassVar[str] = "crosstalk between torque signals"
     rare: ClassVar[bool] = True
     rivals: ClassVar[tuple[str, ...]] = ("joint_coupling", "torque_constant_error", "base_tilt")
     experiments: ClassVar[tuple[str, ...]] = ("single_joint", "payload")
@@ -46,9 +46,9 @@ class TorqueCrosstalk(JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         shares = " and ".join(f"{100 * c:.3g} %" for c in coefficients)
-        return f"The torque signal of joint {joint} shows {shares} of its neighbours' torque."
+        return f"The torque signal of joint {joint} contains {shares} of the torque of its neighbours."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives a neighbour's torque."""

@@ -26,9 +26,9 @@ WAVES = 2.0
 HIGHEST = {"rad": 1000.0, "m": 10_000.0}
 """Highest order per turn, and wave number of a linear axis [rad/m]: four waves a turn of a screw with 3 mm of lead."""
 LARGEST = 1600
-"""Orders on the grid at most: more than a joint tells over a turn and a half."""
+"""Largest number of orders on the grid: more than a joint resolves over one and a half turns."""
 ABOUT = 201
-"""Points of the spectrum, four a resolution, that tell how much is usual about an order."""
+"""Points of the spectrum, four per resolution, for the usual level around an order."""
 APART = 2
 """Orders of the grid, two a resolution, beside one that is scanned: they are the same line."""
 
@@ -47,15 +47,15 @@ class TorqueRipple(StaticJointEffect):
     """
 
     name: ClassVar[str] = "torque_ripple"
-    title: ClassVar[str] = "torque ripple per turn of gear or motor"
+    title: ClassVar[str] = "torque ripple of gear or motor"
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("order", "periods per turn", 2.5, HIGHEST["m"], "linear"),
         Shape("late", "s", -0.01, 0.01, "linear", (0.0,), default=0.0),
         Shape("friction_share", "", 0.0, 1.0, "linear", (0.0,), default=0.0, choices=(0.0, 1.0)),
     )
     rivals: ClassVar[tuple[str, ...]] = ("position_dependent_friction", "spring", "encoder_eccentricity")
-    fast: ClassVar[bool] = True
-    waves: ClassVar[bool] = True
+    independent_of_acceleration: ClassVar[bool] = True
+    oscillates_over_range: ClassVar[bool] = True
     experiments: ClassVar[tuple[str, ...]] = ("sweep",)
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
@@ -104,8 +104,8 @@ class TorqueRipple(StaticJointEffect):
     ) -> tuple[tuple[float | None, ...], ...]:
         """Lists whole orders up to 12 within the resolution of an order, and those of a known gear; none is late.
 
-        Each by the load and by the motor's torque. A motion that repeats, sampled, may not tell a gear's order from
-        others far away: it is the likelier.
+        Each with the load and with the motor torque. A periodic motion may not distinguish a known gear's order from
+        distant ones; the known one is more likely.
         """
         assert joint is not None
         spacing = self._resolution(situation, joint)[0]
@@ -160,11 +160,11 @@ class TorqueRipple(StaticJointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         size, share = np.hypot(*coefficients[:2]), 100 * np.hypot(*coefficients[2:])
-        often = f"{shape[0]:.4g} times a turn" if length == "rad" else f"every {2000 * np.pi / shape[0]:.4g} mm"
+        often = f"{shape[0]:.4g} times per turn" if length == "rad" else f"every {2000 * np.pi / shape[0]:.4g} mm"
         much = f"{size:.3g} {force} and {share:.2g} % of its {'motor torque' if shape[2] else 'load'}"
-        return f"The torque of joint {joint} ripples by {much} up and down, {often}."
+        return f"The torque of joint {joint} ripples with an amplitude of {much}, {often}."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Gives the angle within the ripple's period."""

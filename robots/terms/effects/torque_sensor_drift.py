@@ -20,14 +20,14 @@ class TorqueSensorDrift(JointEffect):
     """tau = sum_k b_k clip((t' - t_0 - k d) / d, 0, 1): a zero that goes by b_k during the k-th stretch of length d.
 
     One stretch as long as the data is a straight line; more of them follow a zero that wanders. It stays where the data
-    end, t' = min(t, t_1): nobody knows where it goes from there. A stretch of which the data have less than half is
-    none: what little they show of it would say anything.
+    end, t' = min(t, t_1), because later drift is unknown. A stretch with less than half of its length in the data is
+    left out, because it is not determined.
     """
 
     name: ClassVar[str] = "torque_sensor_drift"
-    title: ClassVar[str] = "a torque sensor's zero that drifts"
+    title: ClassVar[str] = "zero drift of a torque sensor"
     depends_on: ClassVar[Literal["state", "time"]] = "time"
-    passing: ClassVar[bool] = True
+    transient: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("origin", "s", -np.inf, np.inf, "linear"),
         Shape("stretch", "s", 1e-3, 1e7, "log"),
@@ -70,9 +70,9 @@ class TorqueSensorDrift(JointEffect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says what the values mean."""
+        """Describes the values in one sentence."""
         places = np.concatenate([[0.0], np.cumsum(coefficients)])
-        return f"The torque zero of joint {joint} wanders over {np.ptp(places):.3g} {force}."
+        return f"The torque zero of joint {joint} drifts by {np.ptp(places):.3g} {force}."
 
 
 STRETCHES = 16

@@ -1,1 +1,1 @@
-"""What an effect may depend on: the motion, the base model's torque, and its sensitivities."""
+"""Inputs of effects: the motion, the base model's torque, and its sensitivities."""

@@ -1,4 +1,4 @@
-"""What a base model's parameters say of rotors, and how sharp it takes the sign of velocities."""
+"""Rotor inertias and velocity scale of a base model."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 def rotor_inertias(model: TorqueModel, parameters: Array) -> Array:
     """Gives the rotors' inertias (2, n): as fitted, and as described where the fit holds them within the links'.
 
-    Next to the base a rotor moves as its link does: no log tells the two apart, and one base parameter holds both.
+    Next to the base, a rotor moves with its link: no log separates them, and one base parameter contains both.
 
     Args:
         model: the base model.

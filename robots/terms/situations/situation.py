@@ -1,8 +1,8 @@
-"""What an effect may depend on: the motion, the base model's torque in it, and how that torque would change."""
+"""Inputs of effects: the motion, the base model's torque, and its sensitivities."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -25,7 +25,7 @@ Kept = TypeVar("Kept")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Situation:
-    """What the robot did, all logs one after the other, and what the base model says of it.
+    """The motion of all logs, one after the other, and the base model's torque.
 
     Attributes:
         model: the base model.
@@ -44,8 +44,9 @@ class Situation:
             situations that this one joins; `parameters` are the first's, and each has a model of its own gravity.
         measured: torque as logged (N, n) [N m or N]; None where there is no log, and in models that are evaluated.
         beyond: torque of other effects (N, n) [N m or N], for those that act on all of the torque; None for none.
-        borne: torque of other effects (N, n) that the gears bear besides the robot's own [N m or N]; None for none.
-        finer: the same logs before they were thinned; None where they were not.
+        extra_load: torque of other effects (N, n) that the gears bear besides the robot's own [N m or N]; None for
+            none.
+        full_rate: the same logs before they were thinned; None where they were not.
         since: moment from which the phase of what vibrates counts [s]; None for its own first.
     """
 
@@ -63,8 +64,8 @@ class Situation:
     parts: tuple[Situation, ...] = ()
     measured: Array | None = None
     beyond: Array | None = None
-    borne: Array | None = None
-    finer: Finer | None = None
+    extra_load: Array | None = None
+    full_rate: Finer | None = None
     since: float | None = None
     _cache: dict[object, Any] = field(default_factory=dict, repr=False)
 
@@ -95,7 +96,7 @@ class Situation:
     @property
     def sampled(self) -> float:
         """The median sample period of the logs before they were thinned [s]."""
-        return self.period if self.finer is None else self.finer.situation.period
+        return self.period if self.full_rate is None else self.full_rate.situation.period
 
     @property
     def whole(self) -> Array:
@@ -107,21 +108,21 @@ class Situation:
         return self._with("beyond", torque)
 
     def bearing(self, torque: Array | None) -> Situation:
-        """The same with torque (N, n) [N m or N] that the gears bear besides the robot's own; None for none."""
-        return self._with("borne", torque)
+        """The same with an additional gear load (N, n) [N m or N]; None for none."""
+        return self._with("extra_load", torque)
 
     def _with(self, name: str, torque: Array | None) -> Situation:
         """The same with a torque that is known, at all samples too; what is kept for callers depends on neither."""
         if torque is not None:
             torque = np.broadcast_to(torque, self.q.shape)
-        if self.finer is None or torque is None:
+        if self.full_rate is None or torque is None:
             return replace(self, **{name: torque})  # type: ignore[arg-type]
-        other = self.finer.situation
+        other = self.full_rate.situation
         spread = np.empty_like(other.q)
         for own, run in zip(other.runs, self.runs, strict=True):
             spread[own] = np.column_stack([np.interp(other.t[own], self.t[run], x) for x in torque[run].T])
-        finer = replace(self.finer, situation=other._with(name, spread))
-        return replace(self, **{name: torque}, finer=finer)  # type: ignore[arg-type]
+        finer = replace(self.full_rate, situation=other._with(name, spread))
+        return replace(self, **{name: torque}, full_rate=finer)  # type: ignore[arg-type]
 
     @cached_property
     def gravity(self) -> Array:
@@ -133,8 +134,8 @@ class Situation:
     @cached_property
     def sign(self) -> Array:
         """The sign of the velocities as the base model takes it (N, n), low-passed where logs are thinned."""
-        if self.finer is not None:
-            return self.finer.thinned(self.finer.situation.sign)
+        if self.full_rate is not None:
+            return self.full_rate.thinned(self.full_rate.situation.sign)
         return sign_of(self.dq, self.velocity_scale)
 
     @cached_property
@@ -144,9 +145,9 @@ class Situation:
 
     @cached_property
     def load(self) -> Array:
-        """The torque that passes the gears (N, n) [N m or N]: the rigid body's without rotors, and what they bear."""
+        """The load of the gears (N, n) [N m or N]: the rigid body's torque without rotors, and the additional load."""
         own = self.rigid - self.ddq * self.rotors.sum(axis=0)
-        return own if self.borne is None else own + self.borne
+        return own if self.extra_load is None else own + self.extra_load
 
     def friction_at(self, dq: Array) -> Array:
         """Evaluates the base model's friction (N, n) [N m or N] at other velocities (N, n)."""
@@ -204,7 +205,7 @@ class Situation:
 
 @dataclass(frozen=True, eq=False)
 class Finer:
-    """Logs before they were thinned: what jumps between samples is evaluated there, and goes their torque's way.
+    """Logs before thinning. Effects that change between samples are evaluated there and filtered like the torque.
 
     Attributes:
         situation: what the robot did, at all samples.
@@ -218,7 +219,9 @@ class Finer:
 def with_finer(coarse: Situation, finer: Finer) -> Situation:
     """Gives a situation of thinned logs whose friction is that of all samples, low-passed as their torque."""
     friction = finer.thinned(finer.situation.friction)
-    return replace(coarse, friction=friction, torque=coarse.torque - coarse.friction + friction, finer=finer, _cache={})
+    return replace(
+        coarse, friction=friction, torque=coarse.torque - coarse.friction + friction, full_rate=finer, _cache={}
+    )
 
 
 def situation(
@@ -277,27 +280,4 @@ def situation(
         friction=parts["friction"],
         torque=rigid + parts["friction"] + parts["other"],
         velocity_scale=velocity_scale(model),
-    )
-
-
-def joined(parts: Sequence[Situation], model: TorqueModel | None = None) -> Situation:
-    """Joins situations of one robot on one clock; the parameters are those of the first.
-
-    Args:
-        parts: one or more; their bodies and gravities may differ.
-        model: the base model under the gravity of the robot's description; by default that of the first part.
-    """
-    model = model or parts[0].model
-    if len(parts) == 1 and parts[0].model is model:
-        return parts[0]
-    edges = np.cumsum([0, *(len(part) for part in parts[:-1])])
-    names = ("t", "q", "dq", "ddq", "rigid", "friction", "torque")
-    merged: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    return replace(
-        parts[0],
-        model=model,
-        **merged,
-        starts=tuple(int(edge) + start for edge, part in zip(edges, parts, strict=True) for start in part.starts),
-        parts=tuple(parts),
-        _cache={},
     )

@@ -61,14 +61,14 @@ class Bench:
         ]
         lost = {m.hypothesis.joint - 1 for m, s in zip(members, shown, strict=True) if m.hypothesis.joint and s.astray}
         return SimpleNamespace(
-            unseen=SimpleNamespace(astray=lost.__contains__, nrmse=partial(self._left, members, shown)),
+            errors=SimpleNamespace(is_unreliable=lost.__contains__, nrmse=partial(self._left, members, shown)),
             gains=tuple(
                 Gain(nrmse_before=0.03, nrmse_after=0.03 - (s.low + s.high) / 2, ci95=(s.low, s.high)) for s in shown
             ),
-            rises=tuple(s.rise for s in shown),
-            worse=tuple(s.high < 0 for s in shown),
-            kept=tuple(s.kept for s in shown),
-            speaks=tuple(s.speaks for s in shown),
+            rmse_ratio=tuple(s.rise for s in shown),
+            contradicts=tuple(s.high < 0 for s in shown),
+            cv_retained_gain=tuple(s.kept for s in shown),
+            support=tuple(s.speaks for s in shown),
         )
 
     def _left(self, members: Sequence[FittedEffect], shown: Sequence[Shown], model: int) -> np.ndarray:
@@ -126,7 +126,7 @@ def borne(
     judgement = Verdict("named", founds, tuple(free), tuple(p_values), 1.0)
 
     def beyond(effect: Effect) -> bool:
-        return held_out and effect.passing
+        return held_out and effect.transient
 
     return validate_on_held_out(
         judgement,

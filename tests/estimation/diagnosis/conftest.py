@@ -28,7 +28,7 @@ def pose_arm(arm: Robot) -> Callable[..., Problem]:
     def build(recording: Recording, draws: int = 0, wider: float | None = None) -> Problem:
         baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
         pull = base_model_prior(baseline, recording)
-        values = fit_values(baseline, recording.tau.std(axis=0), recording.unsure, recording.tau, pull)
+        values = fit_values(baseline, recording.tau.std(axis=0), recording.sign_unknown, recording.tau, pull)
         residual = recording.tau - baseline.regressor @ values
         inertia = inertia_matrix(baseline, recording, values)
         spared = build_nuisance_projection(recording, baseline, residual)

@@ -24,9 +24,9 @@ def recording_of(rows: int = 10_000, n: int = 2, unsure: np.ndarray | None = Non
         cycles=(None,),
         cutoff=50.0,
         floor=np.full(n, 1e-20),
-        unsure=np.zeros((rows, n), dtype=bool) if unsure is None else unsure,
-        clear=np.zeros((rows, n), dtype=bool),
-        jolts=np.zeros(n),
+        sign_unknown=np.zeros((rows, n), dtype=bool) if unsure is None else unsure,
+        sign_known_from_velocity=np.zeros((rows, n), dtype=bool),
+        reversal_acceleration_error=np.zeros(n),
         names=("log",),
     )
 

@@ -13,7 +13,7 @@ import pytest
 from estimation import load_model, predict
 from estimation.diagnosis import Diagnosis, diagnose
 from estimation.logs.clocks import UNKNOWN_PAUSE
-from estimation.predictions.prediction import clock_of
+from estimation.predictions.prediction import clock_shift
 from oed.reports.pages.diagnosis_view import view_of
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.plants import simulate
@@ -102,12 +102,12 @@ def test_a_log_that_began_its_clock_anew_is_predicted_as_after_the_change(
     result.save(tmp_path)
     model = load_model(tmp_path)
     anew = replace(unseen, t=unseen.t - unseen.t[0] + 0.5)
-    later, word = clock_of(model, anew)
+    later, word = clock_shift(model, anew)
     assert later == pytest.approx(model.provenance["logs"][0]["duration"] + UNKNOWN_PAUSE - 0.5)
-    assert "counts as recorded 60 s after" in word
+    assert "taken as recorded 60 s after" in word
     np.testing.assert_allclose(predict(model, anew).predicted, predict(model, unseen).predicted, rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(predict(model, anew).motion.t, predict(model, unseen).motion.t - 99.5, atol=1e-6)
-    assert clock_of(model, unseen) == clock_of(replace(model, extensions=()), anew) == (0.0, "")
+    assert clock_shift(model, unseen) == clock_shift(replace(model, extensions=()), anew) == (0.0, "")
 
 
 def test_a_diagnosis_survives_its_file(stepped: tuple[Diagnosis, Log], tmp_path: Path) -> None:
@@ -130,8 +130,8 @@ def test_the_summary_names_cause_joint_and_gain(stepped: tuple[Diagnosis, Log]) 
     text = stepped[0].summary()
     assert "friction_step (joint 2)" in text
     for parameter in stepped[0].findings[0].parameters:
-        assert f"{parameter.name} (" in parameter.told
-        assert parameter.told in text
+        assert f"{parameter.name} (" in parameter.text
+        assert parameter.text in text
     assert "not seen" in text
     assert len(stepped[0].to_frame()) == sum(len(f.parameters) for f in stepped[0].findings)
 
@@ -184,7 +184,7 @@ def test_noise_that_is_a_third_of_the_torque_is_said(arm: Robot, fourier_motion:
     )
     result = diagnose(arm, loud, candidates=("payload_change",), friction=SIMPLE)
     assert result.verdict == "none"
-    (note,) = (note for note in result.notes if "counts as noise" in note)
+    (note,) = (note for note in result.notes if "treated as noise" in note)
     assert note.startswith("Joint 2: ")
 
 

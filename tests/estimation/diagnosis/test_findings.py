@@ -23,7 +23,7 @@ from estimation.diagnosis.findings import MOST_LISTED, Parameter, list_parameter
 def test_both_ends_of_an_interval_are_told_apart(value: float, ci95: tuple, unit: str, told: str) -> None:
     """A narrow one has the digits for that, a choice among a few no interval, what is open none either."""
     parameter = Parameter(name="size", value=value, unit=unit, standard_error=1.0, ci95=ci95, determined=True)
-    assert parameter.told == told
+    assert parameter.text == told
 
 
 def test_a_summary_lists_no_more_parameters_than_a_line_holds() -> None:

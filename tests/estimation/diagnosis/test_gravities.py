@@ -87,11 +87,11 @@ def test_each_log_is_evaluated_as_its_base_stood(upright: Robot, build: Build, p
             dq=light.dq[run],
             ddq=light.ddq[run],
             payloads=(light.bodies[recording.runs.index(run)],),
-            fields=(light.gravities[recording.runs.index(run)],),
+            gravity_fields=(light.gravities[recording.runs.index(run)],),
         )
         states = (part.q, part.dq, part.ddq)
         # The plant has friction besides, and the mass; without bodies it would differ by the payload's torque.
-        carried = plant.carried(part, states)
+        carried = plant.payload_torque(part, states)
         assert carried == pytest.approx(full - bare, abs=size)
         assert plant.base(part, states) - carried == pytest.approx(baseline.regressor[run] @ values, abs=1e-6)
         assert plant.at(part, states).sensitivity("gravity") == pytest.approx(now.sensitivity("gravity")[run], abs=1e-5)

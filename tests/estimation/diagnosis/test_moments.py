@@ -86,10 +86,10 @@ def test_joints_must_agree_on_a_delay(recording: Recording, posed: Callable) -> 
     both, one = posed(late), posed(late * [1.0, -1.0] * [1.0, 0.5])
     same, apart = (refine(p, DELAY, (0.001,), accept(p, ())) for p in (both, one))
     assert same.coefficients[0] == pytest.approx(0.006, rel=0.4)
-    assert same.scatter < 0.1 * same.gain
-    assert same.bic(both.rows) > 10
-    assert apart.scatter > 10
-    assert apart.bic(one.rows) < 0
+    assert same.birge_ratio < 0.1 * same.gain
+    assert same.bic_gain(both.rows) > 10
+    assert apart.birge_ratio > 10
+    assert apart.bic_gain(one.rows) < 0
 
 
 @pytest.mark.parametrize(("top", "farthest"), [(0.6, 0.55), (1.0, 0.15), (0.0, 1.0)])
@@ -140,15 +140,22 @@ def test_a_lag_of_one_joint_is_told_no_better_than_its_reversals(
     plain = posed(np.zeros_like(recording.tau))
     problem = posed(lag * lateness(plain.situation, lag) * [0.0, 1.0])
     everywhere, both = np.ones(recording.q.shape, dtype=bool), np.ones(2, dtype=bool)
-    known = replace(problem.recording, clear=everywhere, trusted=both, late=np.full(recording.q.shape, moment))
+    known = replace(
+        problem.recording,
+        sign_known_from_velocity=everywhere,
+        trusted=both,
+        reversal_time_error=np.full(recording.q.shape, moment),
+    )
     found = refine(
         replace(problem, recording=known), Hypothesis(EFFECTS["current_lag"], joint), (lag,), accept(problem, ())
     )
     assert found.gain > 60
     own = score(problem, found.group, accept(problem, ()))
     gram, cross = float(own.gram[0, 0]), float(own.cross[0])
-    assert found.doubt == pytest.approx(cross**2 / gram * (1 - 1 / (1 + moment**2 * gram)), rel=0.01, abs=1e-9)
-    assert (found.worth(problem.rows) > 10) is (moment == 0)
+    assert found.motion_error_chi2 == pytest.approx(
+        cross**2 / gram * (1 - 1 / (1 + moment**2 * gram)), rel=0.01, abs=1e-9
+    )
+    assert (found.local_bic_gain(problem.rows) > 10) is (moment == 0)
 
 
 def test_friction_that_turns_round_over_microns_is_told_no_better_than_the_moments(
@@ -160,16 +167,19 @@ def test_friction_that_turns_round_over_microns_is_told_no_better_than_the_momen
     extra = np.zeros_like(recording.tau)
     extra[:, 1] = 3.0 * (z - np.sign(dq))
     everywhere = np.ones(recording.q.shape, dtype=bool)
-    problem = pose_arm(replace(recording.trusting(everywhere[0]), tau=recording.tau + extra))
+    problem = pose_arm(replace(recording.with_trusted(everywhere[0]), tau=recording.tau + extra))
     doubts = []
     for moment in (1e-6, 3e-4, 1e-3, 3e-3):
         known = replace(
-            problem.recording, clear=everywhere, trusted=everywhere[0], late=np.full(recording.q.shape, moment)
+            problem.recording,
+            sign_known_from_velocity=everywhere,
+            trusted=everywhere[0],
+            reversal_time_error=np.full(recording.q.shape, moment),
         )
         seen: Problem = replace(problem, recording=known)
         member = refine(seen, Hypothesis(EFFECTS["presliding_hysteresis"], 2), (2e-4,), accept(seen, ()))
         assert member.gain > 100.0
-        doubts.append(member.doubt / member.gain)
+        doubts.append(member.motion_error_chi2 / member.gain)
     assert doubts[0] < 0.01
     assert doubts == sorted(doubts)
     assert doubts[-1] > 0.2

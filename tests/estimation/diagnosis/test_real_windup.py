@@ -25,7 +25,7 @@ def test_a_heavy_arm_s_gears(data: Callable[[str], Path], tmp_path: Path) -> Non
     recording = build_recording(robot, [log])
     base = build_baseline(base_parameters(robot, "polynomial", (0.001,) * 6), recording)
     values = fit_values(
-        base, recording.tau.std(axis=0), recording.unsure, recording.tau, base_model_prior(base, recording)
+        base, recording.tau.std(axis=0), recording.sign_unknown, recording.tau, base_model_prior(base, recording)
     )
     found = measure_gear_compliance(base.situation(recording, values), recording, [log], false_alarm=0.01)
     assert [windup.finding.joint for windup in found] == [2, 3]

@@ -58,18 +58,18 @@ def test_a_joint_that_trembles_by_a_count_is_at_rest(arm: Robot, arm_log: Callab
     first = build_recording(arm, [both])
     recording = build_recording(arm, [both, alone(0, 100.0)])
     second = recording.runs[1]
-    assert recording.unsure[second, 1].all()
-    assert recording.unsure[second, 0].mean() < 0.3
-    assert not recording.clear[second, 1].any()
+    assert recording.sign_unknown[second, 1].all()
+    assert recording.sign_unknown[second, 0].mean() < 0.3
+    assert not recording.sign_known_from_velocity[second, 1].any()
     assert recording.floor[1] == pytest.approx(first.floor[1])
-    assert recording.jolts[1] == pytest.approx(first.jolts[1])
+    assert recording.reversal_acceleration_error[1] == pytest.approx(first.reversal_acceleration_error[1])
 
 
 def test_an_unseen_log_of_one_joint_is_judged_by_that(arm: Robot, arm_log: Callable, alone: Callable[..., Log]) -> None:
     """Torque that friction holds is no error of the model there; the joint that moves errs by noise."""
     found = diagnose(arm, arm_log(torque_noise=0.02), held_out=alone(0, 100.0), candidates=("stribeck",))
     recording = build_recording(arm, [alone(0, 100.0)], travel=np.array([1.0, 1.0]))
-    assert recording.unsure[:, 1].all()
+    assert recording.sign_unknown[:, 1].all()
     assert found.baseline[0] < 0.05
     assert np.isnan(found.baseline[1])  # nobody has seen its model err
 

@@ -38,8 +38,8 @@ def test_a_value_at_the_edge_of_what_machines_have_is_no_name(
     for seconds in (5.0, 20.0):
         hot = replace(member_of("torque_constant_heat", 1, 300.0, 1), coefficients=np.array([-0.1]), shape=(seconds,))
         assert verdict._is_plausible(problem, hot) is (seconds > 5.0)  # type: ignore[arg-type]
-    assert EFFECTS["backlash"].believable(arm, 1, np.full(1, 1e-6))
-    assert not EFFECTS["backlash"].believable(arm, 1, np.full(1, 1e-7))
+    assert EFFECTS["backlash"].is_plausible(arm, 1, np.full(1, 1e-6))
+    assert not EFFECTS["backlash"].is_plausible(arm, 1, np.full(1, 1e-7))
 
 
 @pytest.mark.parametrize(
@@ -66,11 +66,11 @@ def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
 
     accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=0.0))
     monkeypatch.setattr(verdict, "refine", refined)
-    problem: Any = SimpleNamespace(rows=ROWS, sees=lambda effect: None, situation=SimpleNamespace(robot=None))
+    problem: Any = SimpleNamespace(rows=ROWS, state_for=lambda effect: None, situation=SimpleNamespace(robot=None))
     given = verdict._plausible_form(problem, SelectedEffect(torn, 1e-9, ()), [torn])
     assert (given is not None) is kept
     if given is not None:
-        assert given.member.shape == (near(0.004)[0][1],)
+        assert given.effect.shape == (near(0.004)[0][1],)
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,7 @@ def test_what_cannot_be_is_refused(problem_named):
     data = problem_named("two joints").data(noise=0.02)
     with pytest.raises(InputError, match="f1_1"):
         solved(ConstrainedLeastSquares(bounds={"f1_9": (0.0, 1.0)}), data)
-    with pytest.raises(InfeasibleError, match="loosen the bounds"):
+    with pytest.raises(InfeasibleError, match="relax the bounds"):
         solved(ConstrainedLeastSquares(bounds={"m_1": (5.0, 6.0)}, total_mass=1.0), data)
 
 

@@ -66,7 +66,7 @@ def test_gains_need_a_payload(problem_named):
     problem = problem_named("two joints")
     with pytest.raises(InputError, match="known payload"):
         fit_drive_gains(problem.base, runs(problem, loads=(None, None)))
-    with pytest.raises(NotIdentifiableError, match="drive gains open"):
+    with pytest.raises(NotIdentifiableError, match="do not determine all drive gains"):
         fit_drive_gains(problem.base, runs(problem, loads=(None, np.zeros(10))))
     with pytest.raises(InputError, match="allowed: "):
         fit_drive_gains(problem.base, runs(problem, loads=(np.zeros(3),)))

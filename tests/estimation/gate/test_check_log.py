@@ -47,7 +47,7 @@ def test_motor_side_positions_are_refused(er3a, good, spoilt):
     """Positions of the motors leave the ranges, and divided by the gear ratios do not."""
     report = spoilt(q=good().q * er3a.gear_ratio)
     assert report.findings[0].name == "motor_side_position"
-    with pytest.raises(InputError, match="the motor's, not the link's") as caught:
+    with pytest.raises(InputError, match="of the motors, not the links") as caught:
         report.raise_if_refused()
     assert "mapping" in caught.value.remedy
 

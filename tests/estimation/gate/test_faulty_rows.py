@@ -93,7 +93,7 @@ def test_rows_that_a_logger_writes_again_are_left_out(good, spoilt):
     q, tau = log.q[rows], log.tau[rows]
     report = spoilt(q=q, tau=tau)
     (finding,) = found(report, "repeated_rows")
-    assert "left out" in finding.action
+    assert "ignored" in finding.action
     (usable,) = report.usable(replace(log, q=q, tau=tau))
     moving = slice(100, -100)
     assert (np.diff(usable.t)[moving] > 3.5 * np.diff(log.t).mean()).all()

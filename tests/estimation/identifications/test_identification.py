@@ -73,7 +73,7 @@ def test_white_noise_errors_would_be_too_small(experiment):
     estimates, errors, _ = experiment
     white = np.array([estimate.white_noise_errors for estimate in estimates])
     assert np.mean((errors / white) ** 2) > 3
-    assert all(any("coloured" in warning for warning in estimate.warnings) for estimate in estimates)
+    assert all(any("correlated in time" in warning for warning in estimate.warnings) for estimate in estimates)
     assert all(2 < estimate.colour < 5 for estimate in estimates)
 
 
@@ -139,7 +139,7 @@ def test_a_joint_that_stands_is_told(arm, arm_log):
     estimate = identify(arm, replace(log, q=np.column_stack([log.q[:, 0], np.full(len(log), 0.3)]), tau=tau))
     assert [joint.identified for joint in estimate.joints] == [True, False]
     assert not estimate.success
-    assert any("Badly excited: joints 2 (elbow)" in warning for warning in estimate.warnings)
+    assert any("Not identified: joints 2 (elbow)" in warning for warning in estimate.warnings)
     known = dict(zip(estimate.model.names, estimate.model.determined, strict=True))
     assert not any(known[name] for name in ("f1_2", "f2_2", "f3_2", "f4_2", "Im_2", "offset_2"))
     assert "NOT IDENTIFIED" in estimate.summary()
@@ -208,7 +208,7 @@ def test_a_pull_moves_no_value_without_widening_its_interval(arm, arm_log):
     # The residual, and with it the noise, is that of the pulled fit.
     np.testing.assert_allclose(np.sqrt(np.diag(rest)), np.sqrt(np.diag(free.model.covariance)), rtol=0.5)
     assert (np.abs(moved) <= np.sqrt(np.diag(pulled.model.covariance))).all()
-    assert any("what it moves each value by" in text for text in pulled.warnings)
+    assert any("the shift by the regularisation" in text for text in pulled.warnings)
 
 
 def test_parameters_at_their_bounds_are_named(arm, arm_log):

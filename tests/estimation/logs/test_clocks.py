@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimation import on_one_clock, read_log, write_log
-from estimation.logs.clocks import UNKNOWN_PAUSE, later_by, put_on_clock
+from estimation.logs.clocks import UNKNOWN_PAUSE, clock_shift_between, put_on_clock
 from estimation.logs.provenance import describe_logs
 from robots.common.errors import InputError
 from robots.signals import Log
@@ -49,7 +49,7 @@ def test_only_logs_that_overlap_are_moved() -> None:
     both = put_on_clock([early, unseen], [])
     assert both.dated
     assert [log.t[0] for log in both.logs] == [0.0, pytest.approx(61.0)]
-    assert "in the order given" in both.notes[0]
+    assert "in the given order" in both.notes[0]
 
 
 def test_a_copy_is_refused() -> None:
@@ -57,7 +57,7 @@ def test_a_copy_is_refused() -> None:
     log = replace(_log(0.0, 11), name="first")
     with pytest.raises(InputError, match="given twice"):
         put_on_clock([log, replace(log, t=log.t + 20.0)], [])
-    with pytest.raises(InputError, match="fitted to"):
+    with pytest.raises(InputError, match="also one of the logs for the fit"):
         put_on_clock([log], [log])
     assert log.tau is not None
     again = replace(log, tau=log.tau + 1.0)
@@ -71,13 +71,15 @@ def test_a_log_of_the_fit_keeps_its_place_and_another_comes_after() -> None:
     q = np.zeros((11, 1))
     first, second = (Log(t=start + 0.1 * np.arange(11), q=q) for start in (0.0, 100.0))
     known = describe_logs([first, second])
-    assert later_by(known, second) == later_by(known, replace(first, t=first.t + 500.0)) == (0.0, "")
-    assert later_by(known, replace(first, t=first.t - 50.0)) == (0.0, "")
-    late, word = later_by(known, replace(first, t=first.t + 0.3))
+    assert (
+        clock_shift_between(known, second) == clock_shift_between(known, replace(first, t=first.t + 500.0)) == (0.0, "")
+    )
+    assert clock_shift_between(known, replace(first, t=first.t - 50.0)) == (0.0, "")
+    late, word = clock_shift_between(known, replace(first, t=first.t + 0.3))
     assert late == pytest.approx(101.0 + UNKNOWN_PAUSE - 0.3)
     assert "recorded 60 s after" in word
-    assert later_by([{**known[0], "start": None}], replace(first, t=first.t + 0.3)) == (0.0, "")
-    assert later_by([], first) == (0.0, "")
+    assert clock_shift_between([{**known[0], "start": None}], replace(first, t=first.t + 0.3)) == (0.0, "")
+    assert clock_shift_between([], first) == (0.0, "")
 
 
 def test_a_file_of_the_fit_is_put_where_the_fit_had_it(tmp_path: Path) -> None:
@@ -87,6 +89,6 @@ def test_a_file_of_the_fit_is_put_where_the_fit_had_it(tmp_path: Path) -> None:
         write_log(tmp_path / f"{k}.csv", Log(t=0.1 * np.arange(11), q=np.full((11, 1), 0.1 * k)))
         logs.append(read_log(tmp_path / f"{k}.csv", torque=False))
     known = describe_logs(on_one_clock(logs))
-    assert [later_by(known, log)[0] for log in logs] == pytest.approx([0.0, 1.0 + UNKNOWN_PAUSE])
+    assert [clock_shift_between(known, log)[0] for log in logs] == pytest.approx([0.0, 1.0 + UNKNOWN_PAUSE])
     # A part of one stays within it.
-    assert later_by(known, on_one_clock(logs)[1].rows(slice(5, None)))[0] == 0.0
+    assert clock_shift_between(known, on_one_clock(logs)[1].rows(slice(5, None)))[0] == 0.0

@@ -145,7 +145,7 @@ def test_a_saved_model_predicts_under_every_gravity_it_knows(
 def test_a_model_of_a_level_base_does_not_guess_what_a_tilt_shows(upright: Robot, build: Build, two: tuple) -> None:
     """Its parameters lack the waist's first moments: an error that names them; other payloads are no trouble."""
     level = identify(upright, build(0), friction="coulomb-viscous", offset=False).model
-    with pytest.raises(InputError, match=r"mPx_1, mPy_1.*identify the model with a log"):
+    with pytest.raises(InputError, match=r"mPx_1, mPy_1.*identify the model again with"):
         predict(level, build(1, TILTED))
     assert np.all(predict(level, build(1, None, MASS)).nrmse < 0.02)
     same = replace(build(1), gravity=LEVEL)
@@ -181,6 +181,6 @@ def test_what_does_not_know_a_payload_or_a_gravity_refuses_it(
     """One error that names the column, before any work."""
     log = build(0)
     changed = replace(log, **{stated: TILTED if stated == "gravity" else point_mass(MASS, CENTRE)})
-    with pytest.raises(InputError, match=f"states a {stated}, which .* does not know") as caught:
+    with pytest.raises(InputError, match=f"states a {stated}, which .* cannot use") as caught:
         use(upright, two[1].model, changed)
     assert caught.value.column == stated

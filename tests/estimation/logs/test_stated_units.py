@@ -58,7 +58,7 @@ def test_spellings_of_a_unit_are_one(tmp_path, unit):
         ("# period: true\n", "`period`"),
         ("# period: [1]\n", "`period`"),
         ("# %ECSV 1.0\n# delimiter: ','\n# datatype: [{name: q1, unit: turns}]\n", "turns"),
-        ("# %ECSV 1.0\n# delimiter: ','\n# datatype: [{name: q1, unit: rad}]\n# meta: {units: deg}\n", "says 'deg'"),
+        ("# %ECSV 1.0\n# delimiter: ','\n# datatype: [{name: q1, unit: rad}]\n# meta: {units: deg}\n", "states 'deg'"),
     ],
 )
 def test_statement_that_is_not_understood_is_refused(tmp_path, block, word):

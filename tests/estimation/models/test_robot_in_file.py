@@ -108,7 +108,7 @@ def test_effects_of_a_file_without_limits_are_refused(base, tmp_path):
             del data["robot"][key]
         path.write_text(json.dumps(data))
         if extensions:
-            with pytest.raises(InputError, match="not the robot's limits"):
+            with pytest.raises(InputError, match="lacks the robot's limits"):
                 load_model(path)
         else:
             assert np.isinf(load_model(path).robot.limits.upper).all()

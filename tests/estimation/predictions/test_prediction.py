@@ -46,7 +46,7 @@ def test_the_errors_are_those_of_the_arrays(model, arm_log):
     np.testing.assert_allclose(prediction.nrmse, prediction.error_rms / np.sqrt((log.tau**2).mean(axis=0)))
     np.testing.assert_allclose(prediction.relative_spread, error.std(axis=0) / log.tau.std(axis=0))
     assert prediction.to_dict()["nrmse"] == prediction.nrmse.tolist()
-    assert "over RMS" in prediction.summary()
+    assert "rel. RMS" in prediction.summary()
 
 
 def test_below_the_cut_off_only_what_the_model_lacks_is_left():
@@ -75,7 +75,7 @@ def test_a_log_of_positions_is_enough(model, arm_log):
     assert np.isnan(blind.error_rms).all()
     assert np.isnan(blind.nrmse).all()
     assert blind.to_dict()["nrmse"] == [None, None]
-    assert "none to compare with" in blind.summary()
+    assert "no torques to compare with" in blind.summary()
     assert np.array_equal(blind.predicted, predict(model, log).predicted)
 
 
@@ -119,7 +119,7 @@ def test_another_number_of_joints_is_refused(model):
     """A log of three joints is none of a two-joint model."""
     t = 0.01 * np.arange(100)
     log = Log(t=t, q=np.zeros((100, 3)), metadata={"file": "three.csv"})
-    with pytest.raises(InputError, match=r"three\.csv: 3 joints; allowed: 2, as the model of arm has"):
+    with pytest.raises(InputError, match=r"three\.csv: 3 joints; allowed: 2, as in the model of arm"):
         predict(model, log)
 
 

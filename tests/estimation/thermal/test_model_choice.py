@@ -29,7 +29,7 @@ def test_two_time_constants_are_chosen_where_there_are_two(four_duties: Callable
     assert 0.05 < first.heating.largest_share < 0.15
     # Noise of 1 % remains in what was held out.
     assert second.held_out == pytest.approx(0.009, rel=0.15)
-    assert "model of choice is second" in choice.summary()
+    assert "chosen model: second" in choice.summary()
     assert list(choice.to_frame().index) == ["first", "second"]
     assert choice.to_dict()["best"] == "second"
     assert len(choice.plot().get_lines()) == 2

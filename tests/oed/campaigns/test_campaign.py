@@ -179,7 +179,7 @@ def test_a_changed_file_is_refused(saved: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"friction\.csv"):
         Campaign.load(folder)
     (folder / "campaign.json").write_text("{}")
-    with pytest.raises(InputError, match="no campaign file"):
+    with pytest.raises(InputError, match="not a campaign file"):
         Campaign.load(folder)
 
 
@@ -199,7 +199,7 @@ def test_a_design_is_read_from_its_folder(er3a: Robot, er3a_design: Design, tmp_
 def test_a_design_beyond_the_limits_is_refused(er3a: Robot, er3a_design: Design) -> None:
     """An excitation that passes a limit of this robot is refused with joint and number."""
     slow = dataclasses.replace(er3a, limits=er3a.limits.scaled(velocity=0.5))
-    with pytest.raises(InfeasibleError, match="excitation stage passes its velocity limit"):
+    with pytest.raises(InfeasibleError, match="excitation stage exceeds the velocity limit"):
         oed.campaign(slow, design=er3a_design)
 
 
@@ -207,12 +207,12 @@ def test_a_design_beyond_the_limits_is_refused(er3a: Robot, er3a_design: Design)
     ("change", "match"),
     [
         ({"cycles": -1}, "cycles"),
-        ({"cycles": 0}, "nothing"),
+        ({"cycles": 0}, "empty"),
         ({"cycles": 2.5}, "cycles"),
         ({"cooling": -1}, "cooling"),
         ({"cycle_time": 0.0}, "cycle_time"),
         ({"cycle_time": np.nan}, "cycle_time"),
-        ({"warm_up": 300.0}, "leaves nothing"),
+        ({"warm_up": 300.0}, "does not fit"),
         ({"warm_up_range": 1.1}, "warm_up_range"),
         ({"duties": ()}, "duties"),
         ({"duties": (0.0,)}, "duties"),
@@ -221,7 +221,7 @@ def test_a_design_beyond_the_limits_is_refused(er3a: Robot, er3a_design: Design)
         ({"power_on": -1.0}, "power_on"),
         ({"plateau": 0.0}, "plateau"),
         ({"levels": (0.0, 1.0)}, "levels"),
-        ({"cycles": 10_000}, "a campaign of"),
+        ({"cycles": 10_000}, "the campaign lasts"),
     ],
 )
 def test_a_bad_programme_is_refused(change: dict[str, object], match: str) -> None:

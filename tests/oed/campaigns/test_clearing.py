@@ -11,7 +11,7 @@ import pytest
 import oed
 from oed.campaigns import Campaign, Programme
 from oed.campaigns.checking import TorqueCheck
-from oed.campaigns.clearing import Clearing
+from oed.campaigns.clearing import CollisionFreeRanges
 from oed.campaigns.planning import Planner
 from oed.experiments import Design
 from oed.trajectories import Segment
@@ -30,7 +30,7 @@ def test_no_pose_of_a_trimmed_box_collides(name: str) -> None:
     """
     robot = load_robot(name)
     model, home = collision_model(robot), robot.limits.home
-    box = Clearing(model, home).box(robot.limits, 0.8)
+    box = CollisionFreeRanges(model, home).box(robot.limits, 0.8)
     assert ((box.lower <= home) & (home <= box.upper)).all()
     q = np.random.default_rng(1).uniform(box.lower, box.upper, (20_000, robot.n))
     assert model.clearance(q).min() > 0.0
@@ -43,7 +43,7 @@ def test_a_box_of_a_free_arm_is_not_trimmed() -> None:
     """Where nothing collides, the whole wanted range is used."""
     robot = load_robot("er3a")
     alone = dataclasses.replace(collision_model(robot), capsules=collision_model(robot).capsules[-1:])
-    box = Clearing(alone, robot.limits.home).box(robot.limits, 0.8)
+    box = CollisionFreeRanges(alone, robot.limits.home).box(robot.limits, 0.8)
     assert box.upper - box.lower == pytest.approx(0.8 * (robot.limits.upper - robot.limits.lower))
 
 
@@ -51,7 +51,7 @@ def test_a_stretch_ends_where_the_next_step_collides() -> None:
     """A joint's stretch is free of collisions, and one grid step beyond its ends is not, or is the end of the range."""
     robot = load_robot("er3a")
     model, limits = collision_model(robot), robot.limits
-    low, high = Clearing(model, limits.home, clearance=1e-6).stretch(limits, 3, limits.home)
+    low, high = CollisionFreeRanges(model, limits.home, clearance=1e-6).stretch(limits, 3, limits.home)
     step = (limits.upper[2] - limits.lower[2]) / 180.0
     inside = np.tile(limits.home, (200, 1))
     inside[:, 2] = np.linspace(low, high, 200)
@@ -67,7 +67,7 @@ def test_ways_lead_from_pose_to_pose() -> None:
     robot = load_robot("er3a")
     home, rng = robot.limits.home, np.random.default_rng(2)
     start, end = rng.uniform(-1.0, 1.0, (2, robot.n))
-    ways = list(Clearing(collision_model(robot), home).ways(start, end))
+    ways = list(CollisionFreeRanges(collision_model(robot), home).ways(start, end))
     assert len(ways) == 6
     for poses in ways:
         np.testing.assert_array_equal(poses[0], start)
@@ -83,7 +83,7 @@ def test_planned_stages_are_proved_free(thesis_campaign: Campaign) -> None:
         if stage.kind != "excitation":
             assert check_motion(model, stage.motion, confirm=False).certified, stage.name
             assert CoalChecker(model).clearance(stage.motion.q[::SPARSE]).min() > 0.0
-    assert any("To stay clear of bodies" in note for note in thesis_campaign.notes)
+    assert any("To avoid collisions" in note for note in thesis_campaign.notes)
 
 
 def test_without_clearing_the_warm_up_drives_what_was_asked_and_says_that_it_collides(
@@ -105,7 +105,11 @@ def test_moves_go_around_an_obstacle(er3a: Robot) -> None:
     home, start, end = np.zeros((3, 6))
     home[2], start[0], end[0] = 1.4, 0.0, 1.5
     planner = Planner(
-        robot=er3a, limits=er3a.limits, home=home, torque=TorqueCheck(er3a, 0.1), clearing=Clearing(model, home)
+        robot=er3a,
+        limits=er3a.limits,
+        home=home,
+        torque=TorqueCheck(er3a, 0.1),
+        free_ranges=CollisionFreeRanges(model, home),
     )
 
     def least(segments: list[Segment]) -> float:

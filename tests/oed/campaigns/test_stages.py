@@ -124,14 +124,14 @@ def test_torque_limits_soften_the_accelerations(two: Robot) -> None:
     made = oed.campaign(weak, programme=programme, torque_margin=0.0)
     (stage,) = made.stages
     assert stage.details["acceleration_share"] < 1.0
-    assert any("accelerates at" in note for note in made.notes)
+    assert any("of the acceleration limits" in note for note in made.notes)
     assert np.abs(stage.motion.dq).max() == pytest.approx(2.0, rel=1e-3)
     assert made.success
 
 
 def test_a_torque_limit_that_no_motion_keeps_is_infeasible(two: Robot) -> None:
-    """A joint that cannot even overcome its friction at full speed is told with its number."""
+    """A joint that cannot even overcome its friction at full speed is named."""
     weak = dataclasses.replace(two, limits=dataclasses.replace(two.limits, torque=np.array([5.0, 60.0])))
-    with pytest.raises(InfeasibleError, match="torque even with soft") as told:
+    with pytest.raises(InfeasibleError, match="even with low accelerations") as told:
         oed.campaign(weak, programme=Programme(cycles=0, cooling=1))
     assert told.value.joint == 1

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from oed.cli.set_up import told
+from oed.cli.set_up import with_known_setup
 from robots.common.errors import InputError
 from robots.signals import Log
 from robots.terms.situations.flange_body import point_mass
@@ -22,7 +22,7 @@ def three() -> list[Log]:
 
 def test_logs_are_told_by_their_number(three: list[Log]) -> None:
     """A point mass and a field of gravity, each on its log; the others stay as they were."""
-    first, second, third = told(three, ["2=5,0,0,0.1"], ["2=0,-2.54,-9.48", "3=1,2,3"])
+    first, second, third = with_known_setup(three, ["2=5,0,0,0.1"], ["2=0,-2.54,-9.48", "3=1,2,3"])
     assert first.payload is None
     assert first.gravity is None
     assert second.payload == pytest.approx(point_mass(5.0, (0.0, 0.0, 0.1)))
@@ -39,7 +39,7 @@ def test_another_form_is_refused_with_an_example(three: list[Log], option: str, 
     """The option, what was typed, and how it is typed."""
     known = ([text], None) if option == "--payload" else (None, [text])
     with pytest.raises(InputError) as caught:
-        told(three, *known)
+        with_known_setup(three, *known)
     assert f"{option} {text}" in str(caught.value)
     assert "NUMBER=" in str(caught.value)
 
@@ -58,7 +58,7 @@ def test_a_log_that_is_not_there_or_a_value_that_is_none_is_refused(
 ) -> None:
     """A number beyond the logs, a log told twice, a number that is not finite."""
     with pytest.raises(InputError, match=words):
-        told(three, None, gravities)
+        with_known_setup(three, None, gravities)
 
 
 def test_commands_count_what_they_are_told(run, robot: Path, experiment: Path, tmp_path: Path) -> None:

@@ -67,7 +67,7 @@ def test_the_floor_that_would_do_is_stated(robot):
 
 def test_a_floor_above_the_first_joint_is_named(robot):
     """A floor above the foot is told as such, with the height of the first joint."""
-    with pytest.raises(InfeasibleError, match=r"'floor' at 0.4 m lies above the first joint, at 0.3215 m"):
+    with pytest.raises(InfeasibleError, match=r"'floor' at 0.4 m is above the first joint, which is at 0.3215 m"):
         check_feasible(robot, _limits(robot, obstacles=(floor(0.4),)), HOME)
 
 
@@ -90,7 +90,7 @@ def test_an_obstacle_in_the_way(robot):
 def test_a_box_out_of_reach_states_the_nearest_point(robot):
     """A tool box out of reach is refused with the distance and the box that would do, by the arm's closed form."""
     limits = GeometricLimits(robot=robot, limits=(ToolBox(lower=(1.0, 0.0, 0.0), upper=(2.0, 1.0, 1.0)),))
-    with pytest.raises(InfeasibleError, match="cannot enter its box") as caught:
+    with pytest.raises(InfeasibleError, match="cannot reach its box") as caught:
         check_feasible(robot, limits, HOME)
     # stretched out, the wrist bent into the line: 50 + 270 + |(70, 299)| + 78 mm from the axis of joint 1
     reach = 0.05 + 0.27 + np.hypot(0.07, 0.299) + 0.078

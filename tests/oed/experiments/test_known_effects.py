@@ -92,7 +92,7 @@ def test_a_gear_bears_the_spring_behind_it(robot: Robot) -> None:
 def test_an_effect_of_the_past_is_refused(robot: Robot) -> None:
     """A limit that is watched instant by instant cannot count heat."""
     model = default_model(robot, velocity_scale=WIDTH)
-    with pytest.raises(InputError, match="depends on the past"):
+    with pytest.raises(InputError, match="depends on the motion's history"):
         TorqueLimit(model, model.nominal, robot.limits.torque, effects=(HEAT,))
 
 
@@ -132,8 +132,8 @@ def test_the_motion_keeps_the_limit_with_the_spring(tight: Robot, tmp_path) -> N
     stated = next(margin for margin in aware.margins if margin.quantity == "torque" and margin.joint == 2)
     # The effect's own thousandth in its exponent, see `Stribeck`.
     assert abs(stated.value) == pytest.approx(np.abs(kept).max(), rel=1e-3)
-    assert "counted within the torque limits: spring of joint 2, stribeck of joint 2" in aware.summary()
-    assert "NOT counted within the torque limits, for it depends on time or on the past: thermal" in aware.summary()
+    assert "included in the torque limits: spring of joint 2, stribeck of joint 2" in aware.summary()
+    assert "NOT included in the torque limits, because they depend on time or history: thermal" in aware.summary()
     aware.save(tmp_path)
     again = Design.load(tmp_path, tight)
     assert again.effects == effects
@@ -144,7 +144,7 @@ def test_without_limits_nothing_is_claimed_to_count(make_robot) -> None:
     """A robot without torque limits or dynamics: the summary says that the spring could not be counted."""
     spring = PlantEffect(effect="spring", joint=1, coefficients=(1.0, 0.0, 0.0, 0.0), shape=(0.0, 0.0))
     result = made_plain(make_robot("RR", "plain"), spring)
-    assert "NOT counted within the torque limits, for torque limits or dynamics are not described" in result.summary()
+    assert "NOT included in the torque limits, because torque limits or dynamics are not described" in result.summary()
 
 
 def made_plain(robot: Robot, effect: PlantEffect) -> Design:

@@ -50,7 +50,7 @@ def test_beaten_designs_are_marked(front: ParetoFront) -> None:
     values = np.array([[20.0, 500.0], [25.0, 490.0], [30.0, 600.0]])
     made = ParetoFront(criteria=front.criteria, weights=front.weights, designs=front.designs, values=values)
     assert made.efficient.tolist() == [True, False, True]
-    assert "beaten" in made.summary().splitlines()[3]
+    assert "dominated" in made.summary().splitlines()[3]
     assert list(made.to_frame()["efficient"]) == [True, False, True]
 
 
@@ -87,7 +87,7 @@ def test_weights_cover_all_mixtures() -> None:
         ({"criteria": ("cond",)}, "two or three"),
         ({"criteria": ("cond", "cond")}, "two or three"),
         ({"criteria": ("cond", "d", "a", "e")}, "two or three"),
-        ({"criteria": ("cond", "i")}, "design for it alone"),
+        ({"criteria": ("cond", "i")}, "use oed design"),
         ({"points": 1}, "at least 2"),
         ({"criteria": ("cond", "beauty")}, "criterion"),
     ],

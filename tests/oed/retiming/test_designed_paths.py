@@ -98,7 +98,7 @@ def test_a_given_timing_that_passes_a_limit_is_named(limits):
     assert "limit of joint" in result.verdict()
     # Should a result ever be slower than a feasible timing, it says so plainly.
     feasible = {name: np.minimum(use, 1.0) for name, use in result.usage_before.items()}
-    assert "keep that one" in dataclasses.replace(result, usage_before=feasible).summary()
+    assert "keep it" in dataclasses.replace(result, usage_before=feasible).summary()
 
 
 def test_torque_that_cannot_hold_the_arm_names_the_joint(limits):

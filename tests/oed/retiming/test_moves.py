@@ -113,7 +113,7 @@ def test_poses_outside_the_limits_are_infeasible(limits):
     """A start or an end outside the position limits is an error with joint, value and range."""
     end = np.zeros(6)
     end[2] = 2.0
-    with pytest.raises(InfeasibleError, match="joint 3: its position 2 rad"):
+    with pytest.raises(InfeasibleError, match="joint 3: the position 2 rad"):
         plan_move(limits, np.zeros(6), end, period=PERIOD)
 
 

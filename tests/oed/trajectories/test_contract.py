@@ -196,7 +196,7 @@ def test_motion_holds_both_ends_at_the_period(make):
 @pytest.mark.parametrize("make", ALL)
 def test_an_uneven_period_is_refused_with_a_remedy(make):
     """A duration that is no multiple of the period is an error that names the next one that is."""
-    with pytest.raises(InputError, match="no multiple of the sample period"):
+    with pytest.raises(InputError, match="not a multiple of the sample period"):
         make().motion(0.0033)
 
 

@@ -72,7 +72,7 @@ def test_a_jump_between_segments_is_refused(second, quantity):
     coefficients = np.zeros((1, 2, 3))
     coefficients[0, 1, : len(second)] = second
     jump = PiecewisePolynomial(breakpoints=np.array([0.0, 0.4]), coefficients=coefficients)
-    with pytest.raises(InputError, match=f"joint 2: the {quantity} jumps .* segment 1 .* segment 2") as caught:
+    with pytest.raises(InputError, match=f"joint 2: the {quantity} jumps .* segments 1 .* and 2 ") as caught:
         Sequence(segments=(Segment(kind="move", trajectory=rest), Segment(kind="move", trajectory=jump)), period=PERIOD)
     assert caught.value.joint == 2
 

@@ -146,10 +146,10 @@ def test_what_cannot_be_swept_is_refused(limits):
     with pytest.raises(InputError, match="2 joints"):
         friction_sweep(limits, 2, [0.0, 0.0], period=PERIOD)
     for joint in (0, 4):
-        with pytest.raises(InputError, match="no such joint"):
+        with pytest.raises(InputError, match="joint does not exist"):
             friction_sweep(limits, joint, pose, period=PERIOD)
     path = PiecewisePolynomial.hold([0.0], 1.0)
-    with pytest.raises(InputError, match="no such joint"):
+    with pytest.raises(InputError, match="joint does not exist"):
         Sweep(pose=pose, joint=4, path=path, plateaus=())
     with pytest.raises(InputError, match="path of 2 joints"):
         Sweep(pose=pose, joint=1, path=PiecewisePolynomial.hold([0.0, 0.0], 1.0), plateaus=())

@@ -105,7 +105,7 @@ def test_no_folder_at_all_is_done_without(fresh, needs_compiler, square, tmp_pat
     fresh.write_text("")
     (tmp_path / f"robot-oed-{os.getuid()}").write_text("")
     assert isinstance(batch_function(square), VectorisedFunction)
-    with pytest.raises(InputError, match="no folder for compiled code"):
+    with pytest.raises(InputError, match="no writable folder for compiled code"):
         batch_function(square, "compiled")
 
 

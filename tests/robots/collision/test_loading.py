@@ -105,7 +105,7 @@ def test_other_limits_keep_the_stated_capsules():
 def test_assumed_shapes_of_the_catalogue_warn_once(monkeypatch):
     """The shapes of the ER3A are assumed, which is said once; those of the Panda are the maker's."""
     monkeypatch.setattr(loading, "_warned", set())
-    with pytest.warns(AssumedValueWarning, match="er3a: the shapes of its links are assumed .*upper arm"):
+    with pytest.warns(AssumedValueWarning, match="er3a: the link shapes for collision checks are assumed .*upper arm"):
         collision_model(load_robot("er3a"))
     panda = load_robot("panda")
     with warnings.catch_warnings():

@@ -121,7 +121,7 @@ def test_neighbours_and_what_always_touches_are_not_watched():
     assert all(pair.second.link - pair.first.link > 1 or pair.first.name == "floor" for pair in model.pairs)
     assert "floor / base" not in names
     assert dict(model.excluded) == {"forearm tube / flange": "overlap in every pose"}
-    for text in ("forearm tube / flange (overlap in every pose)", "25 pairs watched", "radius 80 mm", "assumed"):
+    for text in ("forearm tube / flange (overlap in every pose)", "25 pairs checked", "radius 80 mm", "assumed"):
         assert text in model.summary()
 
 

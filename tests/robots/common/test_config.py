@@ -62,7 +62,7 @@ def test_words_are_words():
         ("inner: 5", "inner", 1, "found 5"),
         ("many:\n- gain: [1]", "many[1].gain", 2, "found a list"),
         ("table:\n  a: 1\n  b: x", "table.b", 3, "found 'x'"),
-        ("count: 1\ninner: {gain: 1, gain: 2}", "inner.gain", 2, "the key stands twice"),
+        ("count: 1\ninner: {gain: 1, gain: 2}", "inner.gain", 2, "the key appears twice"),
         ("count: 1\ncount: [", None, 2, "not valid YAML"),
         ("count: 1\n\tlabel: x", None, 2, "not valid YAML"),
         ("a: b: c", None, 1, "not valid YAML: mapping values are not allowed here"),

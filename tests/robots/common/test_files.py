@@ -219,7 +219,7 @@ def test_interrupt_while_moving_restores_the_folder(tmp_path, monkeypatch, faili
 def test_file_in_the_place_of_the_folder_is_refused(tmp_path, inside):
     """A file where the folder or one of its parents should be is an input error that names it."""
     (tmp_path / "out").write_text("x")
-    with pytest.raises(InputError, match="a file stands") as caught, ResultFolder(tmp_path / "out" / inside):
+    with pytest.raises(InputError, match="this is a file") as caught, ResultFolder(tmp_path / "out" / inside):
         pytest.fail("the work began")
     assert caught.value.file == str(tmp_path / "out")
 
@@ -227,7 +227,7 @@ def test_file_in_the_place_of_the_folder_is_refused(tmp_path, inside):
 def test_folder_in_the_place_of_a_result_is_refused(tmp_path):
     """A folder of the name of a result is an input error, with force too."""
     (tmp_path / "model.json").mkdir()
-    with pytest.raises(InputError, match="a folder stands"), ResultFolder(tmp_path, force=True, names=["model.json"]):
+    with pytest.raises(InputError, match="this is a folder"), ResultFolder(tmp_path, force=True, names=["model.json"]):
         pytest.fail("the work began")
 
 

@@ -73,7 +73,7 @@ def test_a_choice_gives_its_chain(choice, names, write_urdf):
         ({"joints": []}, "the list of moving joints is empty"),
         ({"joints": ["j2", "j1"]}, "not in the chain's order: j2, j1; allowed: j1, j2"),
         ({"joints": ["j1", "j1"]}, "joint j1: the joint is named twice"),
-        ({"joints": ["j1", "hand_mount"]}, "joint hand_mount: a fixed joint cannot be a moving one"),
+        ({"joints": ["j1", "hand_mount"]}, "joint hand_mount: a fixed joint cannot be selected as a moving joint"),
         ({"joints": ["j1", "left", "right"]}, "does not lie between the root and link '(left|right)_finger'"),
         ({"joints": ["j1", "j2"], "tip": "camera"}, "joint j2: the joint does not lie between .* one path: j1"),
         ({"joints": ["j1"], "locked": {"j1": 0.0}}, "joint j1: the joint is both moving and locked"),

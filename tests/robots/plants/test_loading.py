@@ -114,7 +114,10 @@ def test_effects_are_listed(write, er3a):
         ),
         ("{effect: base_tilt, parameters: {tilt_2: 9}}", "tilt_2 is 9.0 rad; allowed: -0.5 to 0.5"),
         ("{effect: base_tilt, parameters: {tilt_2: .nan}}", "tilt_2 is nan"),
-        ("{effect: base_tilt, parameters: {}}", "base_tilt has no size; allowed: one of tilt_1, tilt_2"),
+        (
+            "{effect: base_tilt, parameters: {}}",
+            "base_tilt needs at least one nonzero coefficient; allowed: one of tilt_1, tilt_2",
+        ),
         ("{effect: friction_step, joint: 1, parameters: {coulomb_step: 1}}", "friction_step lacks change_time"),
         ("{effect: base_tilt}", "parameters"),
         ("base_tilt", "effects"),

@@ -57,7 +57,7 @@ def test_beside_reversals_a_fit_to_the_other_rows_leaves_no_more_than_the_torque
     """
     log = simulate(arm_plant(velocity_scale=1e-3, torque_noise=0.01), fourier_motion(arm, 0, duration=30.0), seed=0)
     recording = build_recording(arm, [log])
-    recording = replace(recording, unsure=recording.unsure | (np.abs(recording.dq) < 0.05))
+    recording = replace(recording, sign_unknown=recording.sign_unknown | (np.abs(recording.dq) < 0.05))
     _, settled = fit_plain(base_parameters(arm, "polynomial", (0.001, 0.001)), recording)
     assert np.all(np.abs(settled.residual).max(axis=0) < np.abs(recording.tau).max(axis=0))
 

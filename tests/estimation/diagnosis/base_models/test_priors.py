@@ -49,7 +49,7 @@ def test_a_standing_joint_does_not_make_another_motion_absurd(arm: Robot, arm_lo
     recording = build_recording(arm, [replace(log, q=q, dq=None, ddq=None)])
     baseline = build_baseline(base_parameters(arm, "polynomial", (0.001, 0.001)), recording)
     scale = 0.02 * recording.tau.std(axis=0)
-    values = fit_values(baseline, scale, recording.unsure, recording.tau, base_model_prior(baseline, recording))
+    values = fit_values(baseline, scale, recording.sign_unknown, recording.tau, base_model_prior(baseline, recording))
     error = other.tau - baseline.base.torque(other.q, other.dq, other.ddq, values)
     # Wrong by its own size is what the pull allows: three times for friction, which holds where joints are fast.
     assert np.all(np.sqrt((error**2).mean(axis=0)) < 4 * np.sqrt((other.tau**2).mean(axis=0)))

@@ -140,7 +140,7 @@ def test_a_joint_at_rest_is_told(ur10):
     assert limits[4].note == "joint hardly moves"
     assert np.isfinite(limits[5].detectable)
     # Of a joint that moves nobody is told that it does not.
-    assert limits[1].note == "nothing of it shows in this motion"
+    assert limits[1].note == "not excited by this motion"
 
 
 def test_unknown_dynamics_are_refused():
@@ -158,7 +158,7 @@ def test_a_log_shorter_than_the_slowest_heat_is_told(ur10):
     problem = planned_problem(model, model.nominal, [_motion(2000)], noise=Sensors())
     limits = find_limits(problem, measure(problem, [Hypothesis(EFFECTS["thermal_friction"], 2)]))
     note = next(limit.note for limit in limits if (limit.effect, limit.joint) == ("thermal_friction", 2))
-    assert "time constants beyond 16 s look alike" in note
+    assert "time constants above 16 s, the length of the data, cannot be distinguished" in note
 
 
 def test_what_shows_at_no_size_is_named() -> None:
@@ -167,8 +167,8 @@ def test_what_shows_at_no_size_is_named() -> None:
     seen = Limit(effect="spring", joint=1, detectable=0.01, **known)
     hidden = [Limit(effect="backlash", joint=j + 1, detectable=np.inf, **known) for j in range(6)]
     some = ", ".join(f"backlash of joint {j + 1}" for j in range(4))
-    assert "hidden" not in summarise_limits([seen])
-    assert summarise_limits([seen, *hidden[:4]]).endswith(f"; at any size hidden: {some}")
+    assert "not detectable" not in summarise_limits([seen])
+    assert summarise_limits([seen, *hidden[:4]]).endswith(f"; not detectable at any size: {some}")
     assert summarise_limits([seen, *hidden[:5]]).endswith(f"{some}, backlash of joint 5")
     assert summarise_limits([seen, *hidden]).endswith(f"{some}, and 2 more")
     assert summarise_limits(hidden) == ""

@@ -273,7 +273,7 @@ def test_a_tilted_base_counts_with_the_parameters_that_it_shows(problem):
 def test_a_base_that_stands_otherwise_stays_there(problem):
     """Without a pose of its own an experiment is made where the last log was; a second pose tilts from there."""
     wall = np.array([-9.81, 0.0, 0.0])
-    stands = replace(problem, recording=replace(problem.recording, fields=(wall,)))
+    stands = replace(problem, recording=replace(problem.recording, gravity_fields=(wall,)))
     causes = [_guess(problem, "stribeck", 4, (0.05, 1.0), 0.02), _guess(problem, "spring", 4, (0.0, 0.0), 0.02)]
     room = motion_range(problem.situation.robot, problem.recording)
     (stage,) = MAKERS["repeat"](room, 3, 0)

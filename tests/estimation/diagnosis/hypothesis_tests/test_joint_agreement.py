@@ -64,10 +64,15 @@ def test_reversals_tell_a_delay_no_better_than_their_moments_are_known() -> None
 
     def measured(clear: np.ndarray, moment: float) -> tuple[np.ndarray, np.ndarray]:
         trusted = np.arange(6) < 4
-        known = replace(problem.recording, clear=clear, trusted=trusted, late=np.full(motion.q.shape, moment))
+        known = replace(
+            problem.recording,
+            sign_known_from_velocity=clear,
+            trusted=trusted,
+            reversal_time_error=np.full(motion.q.shape, moment),
+        )
         seen: Problem = replace(problem, recording=known)
         told = per_joint_evidence(seen, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accept(seen, ()))
-        return told.gram, told.sure
+        return told.gram, told.certain_share
 
     everywhere, nowhere = np.ones(motion.q.shape, dtype=bool), np.zeros(motion.q.shape, dtype=bool)
     gram, sure = measured(everywhere, 1e-4)
@@ -102,7 +107,7 @@ def test_what_other_effects_explain_on_a_joint_makes_its_own_coefficient_doubtfu
     root = 1.0 / np.sqrt(friction.gram)
     accepted = Accepted((friction,), root, np.array([100.0]), np.zeros((1, 0)))
     told = per_joint_evidence(problem, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accepted)
-    np.testing.assert_array_equal(told.apart[[0, 2, 3, 4, 5]], 0.0)
+    np.testing.assert_array_equal(told.formula_variance[[0, 2, 3, 4, 5]], 0.0)
     coefficients = root.T @ accepted.cross
     torque = friction.columns[0].astype(float) @ coefficients
-    assert told.apart[1] == pytest.approx((0.05**2) * float(torque @ torque) / told.gram[1], rel=1e-4)
+    assert told.formula_variance[1] == pytest.approx((0.05**2) * float(torque @ torque) / told.gram[1], rel=1e-4)

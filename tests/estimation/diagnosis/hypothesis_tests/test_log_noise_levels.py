@@ -34,7 +34,7 @@ def test_the_profile_is_that_of_least_squares_with_a_level_for_each_log():
     group = Group((0,), (effect[:, None].astype(np.float32),), effect[None] @ base, np.eye(1), np.ones(1), np.ones(1))
     problem = SimpleNamespace(
         whitening=SimpleNamespace(precision=np.eye(1), weights=None, stride=1),
-        mixed=base[None],
+        weighted_base_columns=base[None],
         white=without[:, None],
         rows=1000,
         n=1,
@@ -69,9 +69,9 @@ def test_logs_have_levels_of_their_own():
         cycles=(None, None),
         cutoff=50.0,
         floor=np.full(2, 1e-20),
-        unsure=zero.astype(bool),
-        clear=zero.astype(bool),
-        jolts=np.zeros(2),
+        sign_unknown=zero.astype(bool),
+        sign_known_from_velocity=zero.astype(bool),
+        reversal_acceleration_error=np.zeros(2),
         names=("one", "two"),
     )
     whitening = estimate_whitening(recording, residual, 0, np.eye(2))

@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import chi2
 
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.null_products import null_products
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scan import measure, neg_log_p, scan
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
@@ -102,7 +103,7 @@ def test_the_null_has_the_size_it_promises(problem: Problem) -> None:
     joints, columns = problem.columns_of(Hypothesis(EFFECTS["asymmetric_friction"], 2), ())
     group = problem.group(joints, columns)
     result = score(problem, group, accept(problem, ()))
-    stats = ((result.root @ problem.null_crosses([group])[0]) ** 2).sum(axis=0)
+    stats = ((result.root @ null_products(problem, [group])[0]) ** 2).sum(axis=0)
     share = float(np.mean(stats > chi2.ppf(0.9, result.degrees)))
     assert share == pytest.approx(0.1, abs=0.07)
 
@@ -130,5 +131,5 @@ def test_base_parameters_come_back(arm_plant: Callable[..., Plant], problem: Pro
     plant = arm_plant()
     recording = problem.recording
     clean = plant.model.torque(recording.q, recording.dq, recording.ddq, plant.parameters)
-    error = (problem.situation.torque - clean)[~recording.unsure.any(axis=1)]
+    error = (problem.situation.torque - clean)[~recording.sign_unknown.any(axis=1)]
     assert np.all(error.std(axis=0) < 0.0067 * clean.std(axis=0))

@@ -43,7 +43,7 @@ def _boxes(size: float = 1.0) -> tuple[np.ndarray, ...]:
 
 def _price(member: FittedEffect) -> float:
     """What a degree of freedom costs."""
-    return (GAIN - member.worth(ROWS)) / DEGREES
+    return (GAIN - member.local_bic_gain(ROWS)) / DEGREES
 
 
 @pytest.mark.parametrize("size", [1.0, 0.02, 300.0])
@@ -78,7 +78,9 @@ def test_columns_of_different_length_cost_their_mean_and_two_rows_at_least() -> 
 def test_a_rare_effect_has_to_explain_more() -> None:
     """Its odds are paid for beside its parameters."""
     columns = _boxes()[:1]
-    difference = _member("stribeck", 1, columns).worth(ROWS) - _member("load_stribeck", 1, columns).worth(ROWS)
+    difference = _member("stribeck", 1, columns).local_bic_gain(ROWS) - _member(
+        "load_stribeck", 1, columns
+    ).local_bic_gain(ROWS)
     assert difference == pytest.approx(RARE)
 
 
@@ -95,9 +97,9 @@ def test_a_push_leaves_other_rows_alone() -> None:
 def test_what_errors_of_the_motion_may_make_of_a_gain_says_nothing_of_its_being_there() -> None:
     """It is not counted to say whether an effect is there, alone or beside others, but against what may be instead."""
     delay = _member("time_delay", None, _boxes())
-    doubted = replace(delay, doubt=GAIN - 40.0)
-    assert doubted.bic(ROWS) == delay.bic(ROWS)
-    assert doubted.worth(ROWS) == pytest.approx(delay.worth(ROWS) - GAIN + 40.0)
+    doubted = replace(delay, motion_error_chi2=GAIN - 40.0)
+    assert doubted.bic_gain(ROWS) == delay.bic_gain(ROWS)
+    assert doubted.local_bic_gain(ROWS) == pytest.approx(delay.local_bic_gain(ROWS) - GAIN + 40.0)
     problem = SimpleNamespace(rows=ROWS, recording=SimpleNamespace(runs=(slice(0, ROWS),)))
     for others in ([], [_member("spring", 1, _boxes()[:1])]):
         assert passes_bic(problem, delay, others)  # type: ignore[arg-type]
@@ -114,7 +116,7 @@ def test_a_contact_that_cannot_win_is_not_searched() -> None:
         return Outcome(Hypothesis(EFFECTS[name], joint), (), gain, 1.0, gain / 2, degrees)
 
     situation = SimpleNamespace(t=np.array([0.0, 60.0]), robot=SimpleNamespace(n=2))
-    problem = SimpleNamespace(rows=ROWS, situation=situation, sees=lambda effect: situation)
+    problem = SimpleNamespace(rows=ROWS, situation=situation, state_for=lambda effect: situation)
     best = outcome("asymmetric_friction", 1, 400.0, 3)
     # Of 6 coefficients; the moment, the duration and the hardness of a push are fitted too.
     weak, strong = (outcome("external_contact", None, gain, 6) for gain in (215.0, 250.0))
@@ -171,7 +173,7 @@ def test_what_is_far_from_chance_is_sure_on_a_joint_of_its_own(
         return replace(member, group=replace(member.group, joints=(0, 1) if joint is None else (joint - 1,)))
 
     own = replace(on(1), gain=gain, degrees=2)
-    assert own.bic(ROWS) < MIN_BIC_GAIN
+    assert own.bic_gain(ROWS) < MIN_BIC_GAIN
     problem: Any = SimpleNamespace(rows=ROWS)
     assert is_certain(problem, own, chance * SURE * 0.01, [on(joint) for joint in beside], 0.01) is sure
 
@@ -213,7 +215,7 @@ class _Summits(Stribeck):
     def likely(self, *_: object) -> tuple[tuple[float | None, ...], ...]:
         return ()
 
-    def elsewhere(self, *_: object) -> tuple[tuple[tuple[float, ...], ...], ...]:
+    def other_optima(self, *_: object) -> tuple[tuple[tuple[float, ...], ...], ...]:
         # Too far from the other summit, and near it.
         return (((0.02,), (0.0013,)),) if self.far else ()
 
@@ -235,7 +237,7 @@ def test_a_search_starts_again_from_other_summits(far: bool, expected: float, mo
         joints = group.joints
 
     situation = SimpleNamespace(robot=None)
-    problem = SimpleNamespace(sees=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
+    problem = SimpleNamespace(state_for=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
     effect = _Summits(far)
     member = refinement.refine(problem, Hypothesis(effect, 1), (0.08,), None)  # type: ignore[arg-type]
     assert member.shape[0] == pytest.approx(expected, rel=0.05)
@@ -252,7 +254,7 @@ class _More(Stribeck):
     def likely(self, *_: object) -> tuple[tuple[float | None, ...], ...]:
         return ()
 
-    def elsewhere(self, *_: object) -> tuple[tuple[tuple[float, ...], ...], ...]:
+    def other_optima(self, *_: object) -> tuple[tuple[tuple[float, ...], ...], ...]:
         return ()
 
 
@@ -274,7 +276,7 @@ def test_what_an_effect_is_whole_without_is_a_parameter_only_where_it_pays(
         joints = (0,)
 
     situation = SimpleNamespace(robot=None)
-    problem = SimpleNamespace(sees=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
+    problem = SimpleNamespace(state_for=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
     member = refinement.refine(problem, Hypothesis(_More(), 1), (0.08, 0.0), None)  # type: ignore[arg-type]
     assert member.shape == (pytest.approx(place, rel=0.05), pytest.approx(more, abs=0.05))
     assert member.degrees == degrees
@@ -298,8 +300,8 @@ def test_friction_that_turns_round_over_no_way_is_no_presliding(
         joints = (0,)
 
     situation = SimpleNamespace(robot=None)
-    problem = SimpleNamespace(sees=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
+    problem = SimpleNamespace(state_for=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
     presliding = Hypothesis(EFFECTS["presliding_hysteresis"], 1)
     member = refinement.refine(problem, presliding, (1e-4,), None)  # type: ignore[arg-type]
-    assert (member.bic(ROWS) > 100.0) is worth
-    assert (member.worth(ROWS) > 100.0) is worth
+    assert (member.bic_gain(ROWS) > 100.0) is worth
+    assert (member.local_bic_gain(ROWS) > 100.0) is worth

@@ -151,7 +151,7 @@ def test_a_vibration_keeps_its_phase_in_a_later_motion(
 
 def _rows(recording: Recording, rows: slice) -> dict[str, object]:
     """A recording's fields on some of its rows."""
-    names = ("t", "q", "dq", "ddq", "tau", "unsure", "clear")
+    names = ("t", "q", "dq", "ddq", "tau", "sign_unknown", "sign_known_from_velocity")
     return {"starts": (0,), **{name: getattr(recording, name)[rows] for name in names}}
 
 
@@ -168,7 +168,7 @@ def test_no_log_knows_a_delay_better_than_its_formula(
     member = refine(posed, hypothesis, (0.008,), accept(posed, ()))
     extension = fit_extended(posed, [member], {}).model.extensions[0]
     (value,), error = extension.coefficients, float(np.sqrt(extension.covariance[0, 0]))
-    by_noise = np.sqrt(member.scatter / member.group.gram[0, 0])
+    by_noise = np.sqrt(member.birge_ratio / member.group.gram[0, 0])
     assert by_noise < 0.04 * delay
     assert (0.05 * value) ** 2 + (0.5 * by_noise) ** 2 < error**2 < (0.05 * value) ** 2 + (2 * by_noise) ** 2
 

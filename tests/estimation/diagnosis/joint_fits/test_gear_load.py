@@ -68,9 +68,9 @@ def test_a_friction_by_the_load_is_asked_for_with_the_spring_that_the_gear_bears
     problem = pose_arm(recording, draws=2)
     found = _members(problem, SPRING, BY_PLACE)
     told = find_gear_load(problem, found, fit_jointly(problem, found)[0])
-    assert told.shows
-    assert told.bearing is not None
-    (weight,) = told.bearing.weights
+    assert told.improves_fit
+    assert told.extra_load is not None
+    (weight,) = told.extra_load.sources
     assert (weight.effect.name, weight.joint, weight.shape) == ("spring", 1, found[0].shape)
 
 
@@ -85,12 +85,12 @@ def test_the_load_is_what_base_model_and_spring_have_together(
     found = _members(problem, SPRING, BY_LOAD)
     values = fit_jointly(problem, found)[0]
     told = find_gear_load(problem, found, values)
-    assert told.bearing is not None
+    assert told.extra_load is not None
     alone = problem.baseline.situation(recording, values[: problem.baseline.base.size])
     motion = Motion(recording.t, recording.q, recording.dq, recording.ddq)
     true = pinocchio_torque(arm, motion)[:, 0] + _pull(recording.q[:, 0])
     # A pull that is the same at all angles is the offset's.
-    errors = [load[:, 0] - true for load in (told.bearing.on(alone).load, alone.load)]
+    errors = [load[:, 0] - true for load in (told.extra_load.on(alone).load, alone.load)]
     errors = [float(np.std(error) / true.std()) for error in errors]
     assert errors[0] < 0.02
     assert errors[1] > 0.1
@@ -103,7 +103,7 @@ def test_the_model_is_what_was_fitted_with_a_load_that_the_gear_bears(
     problem = pose_arm(recording, draws=2)
     found = _members(problem, SPRING, BY_LOAD)
     values, left, full = fit_jointly(problem, found)
-    extra = full[:, :, len(problem.pull.target) :] @ values[len(problem.pull.target) :]
+    extra = full[:, :, len(problem.prior.target) :] @ values[len(problem.prior.target) :]
     posed = build_problem(
         recording,
         problem.baseline,
@@ -111,10 +111,12 @@ def test_the_model_is_what_was_fitted_with_a_load_that_the_gear_bears(
         draws=2,
         rng=np.random.default_rng(0),
         extra=extra,
-        bearing=find_gear_load(problem, found, values).bearing,
+        extra_load=find_gear_load(problem, found, values).extra_load,
     )
     members = _members(posed, SPRING, BY_LOAD)
-    assert np.std(fit_jointly(posed, members)[1][~recording.unsure[:, 0], 0]) < np.std(left[~recording.unsure[:, 0], 0])
+    assert np.std(fit_jointly(posed, members)[1][~recording.sign_unknown[:, 0], 0]) < np.std(
+        left[~recording.sign_unknown[:, 0], 0]
+    )
     fitted = fit_extended(posed, members, {"gravities": []})
     by_load = fitted.model.extensions[1]
     error = float(np.sqrt(by_load.covariance[0, 0]))
@@ -151,8 +153,8 @@ def test_nothing_is_borne_of_what_no_gear_feels(recording: Recording, pose_arm: 
     assert find_gear_load(problem, [friction], fit_jointly(problem, [friction])[0]) is NO_GEAR_LOAD
     (spring,) = _members(problem, SPRING)
     told = find_gear_load(problem, [spring], fit_jointly(problem, [spring])[0])
-    assert told.bearing is not None
-    assert not told.shows
+    assert told.extra_load is not None
+    assert not told.improves_fit
 
 
 def test_a_spring_that_preloads_its_gear_has_the_offset(recording: Recording, pose_arm: Callable[..., Problem]) -> None:

@@ -112,9 +112,9 @@ def test_a_moment_while_the_arm_stands_may_be_anywhere_there(
 ) -> None:
     """Friction holds what pushes then; and how long it lasts from there is known as badly."""
     recording = build_recording(arm, [arm_log(torque_noise=0.02)])
-    stands = recording.unsure.copy()
+    stands = recording.sign_unknown.copy()
     stands[1000:1200] = True
-    problem = pose_arm(replace(recording, unsure=stands))
+    problem = pose_arm(replace(recording, sign_unknown=stands))
     begins, ends = recording.t[1000], recording.t[1199]
     push = refine(
         problem, Hypothesis(EFFECTS["external_contact"], None), (begins + 0.1, 1.0, 0.5, 0.0, 0.0), accept(problem, ())
@@ -135,9 +135,9 @@ def test_a_change_between_two_logs_may_have_come_at_any_time_there(
     first = arm_log(torque_noise=0.02)
     recording = build_recording(arm, [first, replace(first, t=first.t + 500.0)])
     border = recording.starts[1]
-    stands = recording.unsure.copy()
+    stands = recording.sign_unknown.copy()
     stands[border : border + 100] = True
-    problem = pose_arm(replace(recording, unsure=stands))
+    problem = pose_arm(replace(recording, sign_unknown=stands))
     ends, begins = float(recording.t[border - 1]), float(recording.t[border + 99])
     step = refine(problem, Hypothesis(EFFECTS["friction_step"], 1), (begins,), accept(problem, ()))
     for moment in (begins + 0.01, ends - 0.01):

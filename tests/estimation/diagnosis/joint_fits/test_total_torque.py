@@ -57,10 +57,10 @@ def test_all_of_the_torque_is_known_beside_what_cuts_it_off(hidden: tuple[Proble
         return float(np.sqrt(np.mean((torque - true)[above] ** 2)))
 
     most = float(np.sqrt(np.mean((np.abs(true) - limit)[above] ** 2)))
-    assert sharp.whole is not None
-    assert rough.whole is not None
-    assert error(sharp.whole.whole[:, 0]) < 0.03 * most
-    assert error(rough.whole.whole[:, 0]) < 0.1 * most
+    assert sharp.total_torque_state is not None
+    assert rough.total_torque_state is not None
+    assert error(sharp.total_torque_state.whole[:, 0]) < 0.03 * most
+    assert error(rough.total_torque_state.whole[:, 0]) < 0.1 * most
     assert error(problem.situation.torque[:, 0]) > 0.3 * most
     # All of what is beyond the limit is lost, and the limit is that of the log.
     again = refine(sharp, CLIPPING, clipping.shape, accept(problem, (other.group,)))

@@ -37,9 +37,9 @@ def counted() -> tuple[Recording, np.ndarray, np.ndarray]:
         cycles=(None,),
         cutoff=100.0,
         floor=np.array([COUNT**2 / 12 * 2 * STEP]),
-        unsure=np.zeros((ROWS, 1), dtype=bool),
-        clear=np.zeros((ROWS, 1), dtype=bool),
-        jolts=np.zeros(1),
+        sign_unknown=np.zeros((ROWS, 1), dtype=bool),
+        sign_known_from_velocity=np.zeros((ROWS, 1), dtype=bool),
+        reversal_acceleration_error=np.zeros(1),
         names=("log",),
     )
     return recording, accelerations[0], NOISE * rng.standard_normal((ROWS, 1))
@@ -102,7 +102,7 @@ def test_rows_at_rest_are_told_apart(counted: tuple[Recording, np.ndarray, np.nd
         recording,
         **{name: np.concatenate([getattr(recording, name), still]) for name in ("q", "dq", "ddq", "tau")},
         t=recording.t[0] + STEP * np.arange(2 * ROWS),
-        unsure=np.concatenate([recording.unsure, still == 0.0]),
+        sign_unknown=np.concatenate([recording.sign_unknown, still == 0.0]),
     )
     whole = unbiased_frequencies(recording, np.eye(1), noise)
     rested = unbiased_frequencies(longer, np.eye(1), np.concatenate([noise, still]), np.array([0.5]))
@@ -154,7 +154,7 @@ def test_kicks_drown_where_their_torque_is_below_the_noise() -> None:
     """Torque per acceleration times the accelerations' error, over a sample's noise: 0.9 drowns, 1.1 does not."""
     residual = np.random.default_rng(0).standard_normal((10_000, 2)) * [3.0, 0.5]
     slow = 100.0 * np.sin(0.5 * STEP * np.arange(10_000))[:, None]
-    recording = replace(recording_of(), jolts=np.array([0.9 * 3.0 / 20.0, 1.1 * 0.5 / 2.0]))
+    recording = replace(recording_of(), reversal_acceleration_error=np.array([0.9 * 3.0 / 20.0, 1.1 * 0.5 / 2.0]))
     # 10 000 samples tell the noise to 1 %.
     assert quiet_joints(recording, residual + slow, np.diag([20.0, 2.0])).tolist() == [True, False]
     assert quiet_joints(recording, 2.0 * residual + slow, np.diag([20.0, 2.0])).tolist() == [True, True]

@@ -63,7 +63,7 @@ def test_a_ripple_tells_its_energy_over_the_noise(recording: Recording, pose_arm
     quarter is lost where white noise happens to look like a burst of it.
     """
     below, both = (pose_arm(_rippled(recording), wider=wider) for wider in (None, WIDER))
-    cutoffs = below.whitening.bands[0].cutoff, both.upper.whitening.bands[0].cutoff  # type: ignore[union-attr]
+    cutoffs = below.whitening.bands[0].cutoff, both.high_band.whitening.bands[0].cutoff  # type: ignore[union-attr]
     assert cutoffs[0] < 12.0
     assert cutoffs[1] > 2 * cutoffs[0]
     spectrum = np.fft.rfft(np.cos(SHAPE[0] * recording.q[:, 0]))
@@ -71,7 +71,7 @@ def test_a_ripple_tells_its_energy_over_the_noise(recording: Recording, pose_arm
     half = 1 - TRANSITION / 2  # of a cut-off, where the filter passes half
     spectrum[(f < half * cutoffs[0]) | (f > half * cutoffs[1])] = 0.0
     wave = np.fft.irfft(spectrum, len(recording))
-    wave[recording.unsure[:, 0]] = 0.0
+    wave[recording.sign_unknown[:, 0]] = 0.0
     edge = round(7.2 / cutoffs[0] / recording.step)
     (_, slow), (size, error) = _cosine(below), _cosine(both)
     assert error**-2 - slow**-2 == pytest.approx(0.75 * np.sum(wave[edge:-edge] ** 2) / NOISE**2, rel=0.2)
@@ -85,7 +85,7 @@ def test_the_slope_has_the_products_of_an_effect_with_the_residual(
     """In the bands, and above them of what is fast: what moments and orders are ranked by is what they explain."""
     problem = pose_arm(_rippled(recording), wider=WIDER)
     hypothesis, shape = (RIPPLE, SHAPE) if name == "torque_ripple" else (Hypothesis(EFFECTS[name], 1), ())
-    slope = problem.slope_of(hypothesis.effect)
+    slope = problem.score_gradient_for(hypothesis.effect)
     joints, columns = problem.columns_of(hypothesis, shape)
     products = np.sum([part.T @ slope[:, j] for j, part in zip(joints, columns, strict=True)], axis=0)
     group = problem.measured(hypothesis, shape)
@@ -106,11 +106,14 @@ def test_what_shakes_the_arm_is_no_inertia(arm: Robot, recording: Recording, pos
     tau[:, 0] += SIZE * wave
     problem = pose_arm(replace(recording, ddq=recording.ddq + answer, tau=tau), wider=WIDER)
     vibration = Hypothesis(build_pattern("pattern:vibration:0:even"), 1)  # type: ignore[arg-type]
-    assert problem.whitening.bands[0].cutoff < SHAKEN < problem.upper.whitening.bands[0].cutoff  # type: ignore[union-attr]
-    known, taken = (problem.upper.columns(wave[:, None], 0, bare=bare) for bare in (True, False))  # type: ignore[union-attr]
+    assert problem.whitening.bands[0].cutoff < SHAKEN < problem.high_band.whitening.bands[0].cutoff  # type: ignore[union-attr]
+    known, taken = (problem.high_band.columns(wave[:, None], 0, bare=bare) for bare in (True, False))  # type: ignore[union-attr]
     assert np.sum(taken**2) < 0.3 * np.sum(known**2)
     found = refine(
-        problem, vibration, vibration.effect.propose(problem.situation, 1, problem.steepest, 4)[0], accept(problem, ())
+        problem,
+        vibration,
+        vibration.effect.propose(problem.situation, 1, problem.score_gradient_exogenous, 4)[0],
+        accept(problem, ()),
     )
     assert found.shape[0] == pytest.approx(SHAKEN, abs=0.01)
     # As if nothing but noise were about it: by the wave's own energy, over that of the noise.
@@ -121,11 +124,11 @@ def test_what_shakes_the_arm_is_no_inertia(arm: Robot, recording: Recording, pos
 def test_only_fast_effects_are_measured_there(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """An effect by acceleration has no rows above the band; what is slow has next to nothing of its energy there."""
     problem = pose_arm(recording, wider=WIDER)
-    assert problem.measured(RIPPLE, SHAPE).above[0].shape[1] == 4
-    assert not problem.measured(Hypothesis(EFFECTS["encoder_offset"], 1), ()).above
-    assert problem.upper is not None
+    assert problem.measured(RIPPLE, SHAPE).high_band_columns[0].shape[1] == 4
+    assert not problem.measured(Hypothesis(EFFECTS["encoder_offset"], 1), ()).high_band_columns
+    assert problem.high_band is not None
     slow = np.sin(recording.t)[:, None]
-    assert np.sum(problem.upper.columns(slow, 0) ** 2) < 1e-3 * np.sum(problem.whitening.apply(slow, 0) ** 2)
+    assert np.sum(problem.high_band.columns(slow, 0) ** 2) < 1e-3 * np.sum(problem.whitening.apply(slow, 0) ** 2)
 
 
 def test_found_beside_it_a_ripple_is_taken_off(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
@@ -171,8 +174,8 @@ def test_noise_that_repeats_with_the_motion_tells_less(
     for repeated in (np.tile(noise[:period], (5, 1)), noise) if same else (noise, noise[::-1]):
         log = cut_recording(clean, rows)
         problem = pose_arm(replace(log, tau=log.tau + NOISE * repeated[rows], cycles=(cycle,)), wider=WIDER)
-        assert problem.upper is not None
-        told.append(float(np.sum(problem.upper.columns(np.cos(SHAPE[0] * log.q[:, :1]), 0) ** 2)))
+        assert problem.high_band is not None
+        told.append(float(np.sum(problem.high_band.columns(np.cos(SHAPE[0] * log.q[:, :1]), 0) ** 2)))
     assert told[1] / told[0] == pytest.approx(5.0 if same else 1.0, rel=0.5)
 
 
@@ -187,9 +190,9 @@ def test_noise_is_levelled(clean: Recording, pose_arm: Callable[..., Problem], p
     noise += np.gradient(np.gradient(rng.standard_normal(clean.tau.shape), axis=0), axis=0) * 0.3
     cycle = Cycle(0, len(clean), len(clean) * clean.step / periods, 2) if periods else None
     problem = pose_arm(replace(clean, tau=clean.tau + noise, cycles=(cycle,)), wider=WIDER)
-    assert problem.upper is not None
-    wide = problem.upper.whitening
-    for j, above in enumerate(problem.upper.joints):
+    assert problem.high_band is not None
+    wide = problem.high_band.whitening
+    for j, above in enumerate(problem.high_band.joints):
         assert above is not None
         power = np.abs(np.fft.rfft(above.residual)) ** 2 / np.count_nonzero(above.counts)
         f = np.fft.rfftfreq(len(above.residual), clean.step * wide.stride)
@@ -214,16 +217,16 @@ def test_a_log_in_which_a_joint_stands_levels_no_noise(clean: Recording, pose_ar
             dq=clean.dq * [0.0, 1.0],
             ddq=clean.ddq * [0.0, 1.0],
             tau=clean.tau + [3.0, 0.0] + NOISE * rng.standard_normal(clean.tau.shape),
-            unsure=clean.unsure | np.array([True, False]),
+            sign_unknown=clean.sign_unknown | np.array([True, False]),
         )
         whole = join_recordings(whole, stands)
-    upper = pose_arm(whole, wider=WIDER).upper
+    upper = pose_arm(whole, wider=WIDER).high_band
     assert upper is not None
     above = upper.joints[0]
     assert above is not None
     power = np.abs(np.fft.rfft(above.residual)) ** 2 / np.count_nonzero(above.counts)
     f = np.fft.rfftfreq(len(above.residual), clean.step * upper.whitening.stride)
-    cutoffs = [above.passing.cutoff / (1 - TRANSITION / 2), 15.0]
+    cutoffs = [above.high_pass.cutoff / (1 - TRANSITION / 2), 15.0]
     assert cutoffs[0] > 20.0
     assert power[(f > cutoffs[1]) & (f < 0.8 * cutoffs[0])].mean() == pytest.approx(1.0, abs=0.4)
 
@@ -232,7 +235,7 @@ def test_a_vibration_above_the_band_is_told(recording: Recording, pose_arm: Call
     """A steady torque between the two cut-offs shows beside accelerations that are not known there."""
     size = 0.03
     cutoffs = [pose_arm(recording, wider=WIDER).whitening.bands[0].cutoff]
-    cutoffs.append(pose_arm(recording, wider=WIDER).upper.whitening.bands[0].cutoff)  # type: ignore[union-attr]
+    cutoffs.append(pose_arm(recording, wider=WIDER).high_band.whitening.bands[0].cutoff)  # type: ignore[union-attr]
     frequency = float(np.mean(cutoffs)) * (1 - TRANSITION / 2)
     wave = np.cos(2 * np.pi * frequency * (recording.t - recording.t[0]))
     tau = recording.tau.copy()

@@ -64,9 +64,9 @@ def test_neither_rests_nor_effects_colour_the_noise(arm: Robot, arm_plant: Calla
     recording = build_recording(arm, [replace(log, tau=tau)])
     baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
     pull = base_model_prior(baseline, recording)
-    values = fit_values(baseline, recording.tau.std(axis=0), recording.unsure, recording.tau, pull)
+    values = fit_values(baseline, recording.tau.std(axis=0), recording.sign_unknown, recording.tau, pull)
     residual = recording.tau - baseline.regressor @ values
-    assert recording.unsure.mean() > 0.2
+    assert recording.sign_unknown.mean() > 0.2
     spared = build_nuisance_projection(recording, baseline, residual)
     found = estimate_whitening(recording, residual, baseline.base.size, np.eye(2), spared=spared)
     true = 2 * 0.004 * NOISE**2 * (1 - 0.8**2) / np.abs(1 - 0.8 * np.exp(-2j * np.pi * 0.004 * SLOW)) ** 2

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.diagnosis.hypothesis_tests.residual_shares import period_differences, period_mean, residual_shares
 from estimation.diagnosis.noise_models.masked_rows import find_masked_rows
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.periods import Cycle
+from estimation.diagnosis.validations.residual_shares import period_differences, period_mean, residual_shares
 from estimation.linear_algebra.orthonormal import orthonormal
 from tests.estimation.diagnosis.noisy_logs import STEP, noise_of, recording_of
 
@@ -107,7 +107,7 @@ def test_rows_of_unknown_direction_do_not_count() -> None:
     whitening = replace(estimate_whitening(recording, noise_of(10_000), 0, np.eye(2)), weights=None)
     kick = np.zeros(10_000)
     kick[3001:3005] = 1000.0
-    plain = replace(whitening, gaps=find_masked_rows(np.zeros_like(unsure), (0,)))
+    plain = replace(whitening, masked=find_masked_rows(np.zeros_like(unsure), (0,)))
     assert np.linalg.norm(whitening.apply(kick, 0)) < 1e-9 * np.linalg.norm(plain.apply(kick, 0))
     assert np.linalg.norm(whitening.apply(kick, 1)) == pytest.approx(np.linalg.norm(plain.apply(kick, 1)))
 
@@ -125,7 +125,7 @@ def test_the_adjoint_has_the_products_of_the_filter() -> None:
     noise = noise_of(rows) * np.repeat([1.0, 0.3], [3_001, rows - 3_001])[:, None]
     whitening = estimate_whitening(recording, noise, 0, 0.2 * np.eye(2))
     whitening = replace(whitening, bands=tuple(replace(band, stride=2) for band in whitening.bands))
-    whitening = replace(whitening, weights=None, gaps=replace(whitening.gaps, free=()))
+    whitening = replace(whitening, weights=None, masked=replace(whitening.masked, free=()))
     for joint in range(2):
         white = rng.standard_normal(len(whitening.apply(noise[:, joint], joint)))
         slope = whitening.adjoint(white, joint, rows)
@@ -182,9 +182,9 @@ def test_what_reversals_leave_does_not_repeat_as_an_effect_does() -> None:
     noise[turns] += 20.0
     noise[:, 1] += np.sqrt(2) * np.sin(6 * np.pi * phase / period)
     unsure = np.repeat(turns[:, None], 2, axis=1)
-    shares = residual_shares(SimpleNamespace(recording=replace(recording, unsure=unsure), remainder=noise))  # type: ignore[arg-type]
+    shares = residual_shares(SimpleNamespace(recording=replace(recording, sign_unknown=unsure), base_residual=noise))  # type: ignore[arg-type]
     np.testing.assert_allclose(shares, [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0]], atol=0.03)
-    assert residual_shares(SimpleNamespace(recording=recording, remainder=noise))[0, 1] > 0.5  # type: ignore[arg-type]
+    assert residual_shares(SimpleNamespace(recording=recording, base_residual=noise))[0, 1] > 0.5  # type: ignore[arg-type]
 
 
 def test_an_orthonormal_basis_leaves_out_what_is_not_determined() -> None:

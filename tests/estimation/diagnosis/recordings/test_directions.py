@@ -50,13 +50,13 @@ def _kicked(motion: Motion, friction: float = KICK, loop: float = 1.0) -> tuple[
 
 def _trusting(arm: Robot, log: Log) -> Recording:
     """A recording of which all rows count that are clear."""
-    return build_recording(arm, [log]).trusting(np.ones(2, dtype=bool))
+    return build_recording(arm, [log]).with_trusted(np.ones(2, dtype=bool))
 
 
 def _beside(log: Log, arm: Robot) -> float:
     """Rows flagged at each reversal of the shoulder, slow ones not counted."""
     recording = _trusting(arm, log)
-    dq, unsure = recording.dq[:, 0], recording.unsure[:, 0]
+    dq, unsure = recording.dq[:, 0], recording.sign_unknown[:, 0]
     turns = np.flatnonzero(dq[1:] * dq[:-1] < 0)
     sharp = [k for k in turns if np.abs(recording.ddq[k, 0]) > 0.3 * recording.ddq[:, 0].std()]
     found = [[b - a for a, b in spans(unsure) if a - 1 <= k < b] for k in sharp]
@@ -74,8 +74,8 @@ def test_few_rows_are_lost(arm: Robot, fourier_motion: Callable) -> None:
     motion = fourier_motion(arm, duration=20.0)
     recording = _trusting(arm, _counted(motion, motion.q, 2**12))
     turned = recording.dq[1:] * recording.dq[:-1] < 0
-    assert recording.unsure[1:][turned].all()
-    assert recording.unsure.mean() < 0.15
+    assert recording.sign_unknown[1:][turned].all()
+    assert recording.sign_unknown.mean() < 0.15
 
 
 def test_no_more_rows_are_lost_at_a_reversal_than_a_kick_spreads_to(arm: Robot, fourier_motion: Callable) -> None:
@@ -106,7 +106,7 @@ def test_rows_that_count_beside_a_reversal_have_a_velocity_that_is_known(
         first = int(np.argmin(np.abs(motion.t - recording.t[0])))
         true = dq[first : first + len(recording), 0]
         near = _beside_reversals(true)
-        counted = near[~recording.unsure[near, 0]]
+        counted = near[~recording.sign_unknown[near, 0]]
         error = np.abs(recording.dq[counted, 0] - true[counted])
         change = np.abs(recording.ddq[counted, 0]) * STEP
         assert np.all(error < np.maximum(4 / 3 / CLEAR * np.abs(true[counted]), ALIKE * change))
@@ -119,12 +119,14 @@ def test_rows_beside_a_reversal_count_of_joints_that_are_trusted_alone(arm: Robo
     plain = build_recording(arm, [_counted(motion, motion.q, 2**40)])
     turned = np.zeros(plain.dq.shape, dtype=bool)
     turned[1:] = plain.dq[1:] * plain.dq[:-1] < 0
-    assert plain.unsure[turned].all()
-    assert plain.trusting(None) is plain
-    trusting = plain.trusting(np.array([True, False]))
-    assert not trusting.unsure[turned[:, 0], 0].all()
-    assert trusting.unsure[:, 1] == pytest.approx(plain.unsure[:, 1])
-    assert cut_recording(trusting, slice(100, 200)).clear == pytest.approx(plain.clear[100:200])
+    assert plain.sign_unknown[turned].all()
+    assert plain.with_trusted(None) is plain
+    trusting = plain.with_trusted(np.array([True, False]))
+    assert not trusting.sign_unknown[turned[:, 0], 0].all()
+    assert trusting.sign_unknown[:, 1] == pytest.approx(plain.sign_unknown[:, 1])
+    assert cut_recording(trusting, slice(100, 200)).sign_known_from_velocity == pytest.approx(
+        plain.sign_known_from_velocity[100:200]
+    )
 
 
 @pytest.mark.parametrize(
@@ -152,9 +154,9 @@ def test_a_jolt_is_what_a_kick_may_leave_of_the_acceleration(
     turns = np.flatnonzero(recording.dq[1:, 0] * recording.dq[:-1, 0] < 0)
     near = np.unique(np.clip(turns[:, None] + np.arange(-2, 4), 0, len(true) - 1))
     error = float(np.sqrt(np.mean((recording.ddq[near, 0] - true[near]) ** 2)))
-    assert error / 2 < recording.jolts[0] < most * error
+    assert error / 2 < recording.reversal_acceleration_error[0] < most * error
     smooth = build_recording(arm, [_counted(motion, motion.q, 2**26)])
-    assert smooth.jolts[0] < recording.jolts[0] / 30
+    assert smooth.reversal_acceleration_error[0] < recording.reversal_acceleration_error[0] / 30
 
 
 @pytest.mark.parametrize("counts", [2.0**26, 2.0**30, 2.0**40])
@@ -167,8 +169,8 @@ def test_moments_of_reversals_are_as_wrong_as_is_said(arm: Robot, fourier_motion
     turns = _crossings(recording.dq[:, 0])
     errors = turns - _crossings(dq[first : first + len(recording), 0])
     assert len(errors) >= 5
-    assert recording.late is not None
-    usual, told = STEP * np.abs(errors), recording.late[turns.astype(int), 0]
+    assert recording.reversal_time_error is not None
+    usual, told = STEP * np.abs(errors), recording.reversal_time_error[turns.astype(int), 0]
     assert 1 / 3 < np.sqrt(np.mean(told**2) / np.mean(usual**2)) < 3
 
 
@@ -200,14 +202,14 @@ def test_positions_beside_reversals_tell_how_well_those_are_known(
     motion = fourier_motion(arm, duration=59.9)
     q, dq, _ = _kicked(motion, friction=friction, loop=loop)
     recording = _trusting(arm, _counted(motion, q, counts))
-    assert recording.late is not None
+    assert recording.reversal_time_error is not None
     if friction == 0.0 and counts >= 2**20:
-        late = recording.late[_crossings(recording.dq[:, 0]).astype(int), 0]
+        late = recording.reversal_time_error[_crossings(recording.dq[:, 0]).astype(int), 0]
         assert 0.0 < late.min() <= late.max() < 3e-4
     first = int(np.argmin(np.abs(motion.t - recording.t[0])))
     true = dq[first : first + len(recording), 0]
     near = _beside_reversals(true)
-    counted = near[~recording.unsure[near, 0]]
+    counted = near[~recording.sign_unknown[near, 0]]
     error = np.abs(recording.dq[counted, 0] - true[counted])
     allowed = np.maximum(np.abs(true[counted]) / 8, ALIKE * np.abs(recording.ddq[counted, 0]) * STEP)
     assert np.sum(error > allowed) <= 0.01 * len(counted)

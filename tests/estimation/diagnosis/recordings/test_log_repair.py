@@ -84,7 +84,7 @@ def test_faults_of_a_recording_are_no_effects(arm: Robot, log: Log) -> None:
         for given, check in ((log, True), (faulty, True), (faulty, False))
     )
     assert sound.verdict == checked.verdict == "none"
-    assert any("stick out" in note for note in checked.notes)
+    assert any("outlier" in note for note in checked.notes)
     assert checked.baseline == pytest.approx(sound.baseline, rel=0.3)
     assert taken.baseline[1] > 3 * sound.baseline[1]
 

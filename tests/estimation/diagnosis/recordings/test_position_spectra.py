@@ -51,10 +51,10 @@ def test_between_two_samples_a_joint_may_have_turned_round() -> None:
     known = Directions(unsure, unsure.copy(), np.zeros(2), np.zeros(2))
     # Rows 1 to 3 lie between samples 0 and 4, row 6 between 5 and 7.
     spread = known.spread(np.array([-1, 1, 1, 1, -1, -1, 2, -1]))
-    assert np.flatnonzero(spread.unsure[:, 0]).tolist() == [1, 2, 3]
-    assert np.flatnonzero(spread.unsure[:, 1]).tolist() == [5]
+    assert np.flatnonzero(spread.sign_unknown[:, 0]).tolist() == [1, 2, 3]
+    assert np.flatnonzero(spread.sign_unknown[:, 1]).tolist() == [5]
     # What is told by the velocity must have been sampled.
-    assert np.flatnonzero(spread.clear[:, 0]).tolist() == [2]
+    assert np.flatnonzero(spread.sign_known_from_velocity[:, 0]).tolist() == [2]
     assert known.spread(np.full(8, -1)) is known
 
 

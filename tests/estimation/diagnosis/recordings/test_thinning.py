@@ -55,31 +55,33 @@ def test_each_log_is_thinned_by_itself_and_straight_lines_stay_what_they_are() -
 
 def test_rows_are_those_of_the_finer_recording(thin_log: Recording) -> None:
     """Motion is that of every second row; a row's direction is in doubt where that of one beside is."""
-    finer = thin_log.finer
+    finer = thin_log.full_rate
     assert finer is not None
     assert thin_log.stride == 2
     for name in ("t", "q", "dq", "ddq"):
         np.testing.assert_array_equal(getattr(thin_log, name), getattr(finer, name)[::2])
-    assert np.all(thin_log.unsure | ~finer.unsure[::2])
-    assert not np.any(thin_log.clear & finer.unsure[::2] & ~finer.clear[::2])
+    assert np.all(thin_log.sign_unknown | ~finer.sign_unknown[::2])
+    assert not np.any(
+        thin_log.sign_known_from_velocity & finer.sign_unknown[::2] & ~finer.sign_known_from_velocity[::2]
+    )
 
 
 def test_parts_of_a_thinned_log_keep_all_their_samples(thin_log: Recording) -> None:
     """Cut and joined again."""
     first, second = cut_recording(thin_log, slice(3, 1000)), cut_recording(thin_log, slice(1000, 1800))
     for part in (first, second):
-        assert part.finer is not None
-        np.testing.assert_array_equal(part.t, part.finer.t[::2])
+        assert part.full_rate is not None
+        np.testing.assert_array_equal(part.t, part.full_rate.t[::2])
     whole = join_recordings(first, second)
-    assert whole.finer is not None
+    assert whole.full_rate is not None
     assert whole.stride == 2
-    assert len(whole.finer.starts) == 2
-    np.testing.assert_array_equal(whole.finer.t[whole.finer.starts[1] :][::2], second.t)
+    assert len(whole.full_rate.starts) == 2
+    np.testing.assert_array_equal(whole.full_rate.t[whole.full_rate.starts[1] :][::2], second.t)
 
 
 def test_signs_and_what_turns_round_are_low_passed_as_the_torque_is(arm: Robot, thin_log: Recording) -> None:
     """Friction of every sample, filtered and thinned; so are the columns of an effect that passes within some rows."""
-    finer = thin_log.finer
+    finer = thin_log.full_rate
     assert finer is not None
     base = base_parameters(arm, "coulomb-viscous", (0.001, 0.001))
     values = np.full(base.size, 0.7)
@@ -111,16 +113,16 @@ def test_torque_of_other_effects_is_known_at_all_samples(arm: Robot, thin_log: R
 
 def test_rows_at_reversals_fit_where_signs_are_those_of_all_samples(arm: Robot, thin_log: Recording) -> None:
     """Torque of a sharp friction, rows at reversals counted: the sign of every second row leaves far more of it."""
-    finer = thin_log.finer
+    finer = thin_log.full_rate
     assert finer is not None
     model = base_parameters(arm, "coulomb-viscous", (0.001, 0.001)).model
     exact = decimate_recording(replace(finer, tau=build_situation(finer, model, model.nominal).torque), 2)
-    fine = exact.trusting(np.ones(arm.n, dtype=bool))
-    assert fine.counting.any()
+    fine = exact.with_trusted(np.ones(arm.n, dtype=bool))
+    assert fine.counted_rows.any()
     left = []
-    for recording in (fine, replace(fine, finer=None)):
+    for recording in (fine, replace(fine, full_rate=None)):
         baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
-        counts = ~recording.unsure
+        counts = ~recording.sign_unknown
         rows, tau = baseline.regressor[counts], recording.tau[counts]
         left.append(float(np.std(tau - rows @ np.linalg.lstsq(rows, tau, rcond=None)[0])))
     assert left[1] > 10.0 * left[0]
@@ -133,7 +135,7 @@ def test_presliding_of_a_thinned_log_is_found(
     log = arm_log(torque_noise=0.02)
     monkeypatch.setattr(log_reading, "MOST_ROWS", int(0.6 * len(log.t)))
     model = base_parameters(arm, "coulomb-viscous", (0.001, 0.001)).model
-    whole = build_recording(arm, [log]).finer
+    whole = build_recording(arm, [log]).full_rate
     assert whole is not None
     state = build_situation(whole, model, np.array(model.nominal))
     torque = 6.0 * EFFECTS["presliding_hysteresis"].columns(state, 2, (1e-4,))[:, :, 0]

@@ -15,7 +15,7 @@ def test_joints_that_the_extension_makes_worse_are_told() -> None:
     before = np.array([0.050, 0.050, 0.0005, 0.050, np.nan])
     after = np.array([0.051, 0.074, 0.0012, 0.080, np.nan])
     (note,) = worse_joints(before, after)
-    assert note == "The extended model errs more than the base model on joints 2 (5 -> 7.4 %), 4 (5 -> 8 %)."
+    assert note == "The extended model has a larger held-out error on joints 2 (5 -> 7.4 %), 4 (5 -> 8 %)."
     assert WORSE * 0.05 < 0.074
     assert 0.0005 + LITTLE > 0.0012
     assert worse_joints(before[:1], after[:1]) == []
@@ -29,9 +29,9 @@ def test_rows_at_rest_explain_an_error_that_is_far_larger_with_them() -> None:
     counts[:400, 0] = counts[:350, 1] = counts[:400, 2] = counts[:2, 3] = False
     after = np.array([0.025, 0.025, 0.025, 0.025])
     (note,) = turning_joints(np.array([0.31, 0.08, 0.04, 0.30]), after, counts)
-    assert note.startswith("Joints 1, 2: in 35 to 40 % of the unseen rows the joint rests or turns round.")
+    assert note.startswith("Joints 1, 2: in 35 to 40 % of the held-out rows the joint rests or reverses.")
     (one,) = turning_joints(np.array([0.31, 0.04, 0.04, 0.30]), after, counts)
-    assert one.startswith("Joint 1: in 40 % of the unseen rows")
+    assert one.startswith("Joint 1: in 40 % of the held-out rows")
     assert turning_joints(np.full(4, np.nan), after, counts) == []
     assert turning_joints(after, after, counts) == []
 
@@ -49,17 +49,17 @@ def test_a_name_of_which_nothing_is_determined_is_no_more_than_likely() -> None:
         return Finding(effect=effect, joint=2, parameters=parameters, gain=gain, **told)
 
     open_ = unsure_gain(finding("stribeck", False, False))
-    assert open_.startswith("The gain of stribeck of joint 2 on unseen data is not sure")
-    assert open_.endswith("the name is no more than the likeliest for it.")
+    assert open_.startswith("The held-out gain of stribeck of joint 2 is not significant")
+    assert open_.endswith("the effect is reported as the most likely cause only.")
     for other in (finding("stribeck", False, True), finding("unexplained", False), finding("stribeck")):
-        assert unsure_gain(other).endswith("its interval begins below zero.")
+        assert unsure_gain(other).endswith("its interval includes zero.")
 
 
 def test_what_is_as_small_as_formulas_leave_is_told_all_the_same() -> None:
     """Beside the name that does most there, with the share; nothing where there is none, or nothing beside it."""
     step, delay, friction, spring = (
         SimpleNamespace(
-            hypothesis=SimpleNamespace(label=label, effect=SimpleNamespace(alike=label == "a delay")),
+            hypothesis=SimpleNamespace(label=label, effect=SimpleNamespace(shared_coefficient=label == "a delay")),
             group=SimpleNamespace(joints=tuple(gains)),
             gain_on=lambda joints, gains=gains: sum(gains.get(j, 0.0) for j in joints),
         )
@@ -71,8 +71,9 @@ def test_what_is_as_small_as_formulas_leave_is_told_all_the_same() -> None:
         )
     )
     (note,) = beside_larger(step, [spring, friction])
-    assert note.startswith("a step stands out of the noise, too, but explains 6.0 % of what a friction does on joint 3")
+    assert note.startswith("a step is significant too, but not reported as a finding.")
+    assert "explains only 6.0 % of what a friction explains on joint 3" in note
     (note,) = beside_larger(delay, [friction])
-    assert note.startswith("a delay stands out of the noise, too, but not beyond what a friction may leave")
+    assert note.startswith("a delay is significant too, but not reported as a finding. The formula error of a friction")
     assert beside_larger(None, [friction]) == ()
     assert beside_larger(step, []) == ()

@@ -104,9 +104,9 @@ def test_what_is_no_part_of_the_model_says_so() -> None:
     )
     refuted = no_part(finding)
     assert (refuted.effect, refuted.joint, refuted.parameters, refuted.rivals) == ("unexplained", 2, (), ())
-    assert "looks like a gear that winds up under load" in refuted.sentence
-    assert "no part of it" in refuted.sentence
-    assert "do not bear that function out" in no_part(finding_of("pattern:load:0:odd", finding)).sentence
+    assert "resembles joint elasticity" in refuted.sentence
+    assert "the model does not contain it" in refuted.sentence
+    assert "did not improve the held-out prediction" in no_part(finding_of("pattern:load:0:odd", finding)).sentence
 
 
 def finding_of(pattern: str, finding: Finding) -> Finding:
@@ -141,7 +141,7 @@ def test_what_warms_up_gains_no_friction(arm: Robot, effect: str, falls: tuple[f
     """One kind of friction may rise while the other falls; where it rises at all speeds, it is no heat."""
     shape = tuple(400.0 if own.name == "time_constant" else 0.0 for own in EFFECTS[effect].shapes)
     fast = replace(arm, limits=replace(arm.limits, velocity=np.full(arm.n, 10.0)))
-    assert EFFECTS[effect].believable(fast, 1, np.array(falls), shape) is believed
+    assert EFFECTS[effect].is_plausible(fast, 1, np.array(falls), shape) is believed
 
 
 def test_a_change_is_told_at_its_time_or_between_two() -> None:
@@ -164,4 +164,4 @@ def test_a_push_whose_edges_are_not_told_lasted_at_least_so_long() -> None:
     assert _when(sentence, [start, duration]) == sentence
     open_ = replace(start, ci95=(-np.inf, np.inf), determined=False)
     told = _when(sentence, [open_, duration])
-    assert told == "Something pushed the arm from t = 43.0 to 47.0 s at least: joint 1 felt 1.26 N m."
+    assert told == "Something pushed the arm at least from t = 43.0 to 47.0 s: joint 1 felt 1.26 N m."

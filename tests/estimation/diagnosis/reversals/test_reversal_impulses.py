@@ -46,7 +46,7 @@ def _elastic(problem: Problem) -> FittedEffect:
 
 def _with(problem: Problem, member: FittedEffect, calm: float, beside: float) -> Problem:
     """The same data with so many times an effect's torque in calm rows and beside reversals, and nothing else."""
-    return _sized(problem, member, np.where(problem.calm, calm, beside))
+    return _sized(problem, member, np.where(problem.far_from_reversals, calm, beside))
 
 
 def _sized(problem: Problem, member: FittedEffect, sizes: np.ndarray) -> Problem:
@@ -55,23 +55,23 @@ def _sized(problem: Problem, member: FittedEffect, sizes: np.ndarray) -> Problem
     for j, part in zip(member.group.joints, member.group.columns, strict=True):
         white[:, j] = sizes * (part @ member.coefficients)
     own = white @ problem.whitening.precision
-    base = sum(problem.mixed[j].T @ white[:, j] for j in range(problem.n))
+    base = sum(problem.weighted_base_columns[j].T @ white[:, j] for j in range(problem.n))
     # Less what the base model takes of it: <Q, r> is zero for a residual.
-    return replace(problem, residual=own - np.einsum("jnb,b->nj", problem.mixed, base))
+    return replace(problem, residual=own - np.einsum("jnb,b->nj", problem.weighted_base_columns, base))
 
 
 def test_rows_beside_reversals_and_the_ends_of_rests_are_not_calm(recording: Recording) -> None:
     """All joints are disturbed by one that turns round, for 50 ms before and after; while one rests, none is."""
-    unsure = np.zeros_like(recording.unsure)
+    unsure = np.zeros_like(recording.sign_unknown)
     unsure[300:304, 0] = True
     unsure[1000:1400, 1] = True
     reach = round(BESIDE / recording.step)
     disturbed = np.zeros(len(recording), dtype=bool)
     for first, last in ((300, 303), (1000, 1000), (1399, 1399)):
         disturbed[first - reach : last + reach + 1] = True
-    known = replace(recording, unsure=unsure)
-    np.testing.assert_array_equal(known.calm(), ~disturbed)
-    np.testing.assert_array_equal(known.calm(3), ~disturbed[::3])
+    known = replace(recording, sign_unknown=unsure)
+    np.testing.assert_array_equal(known.far_from_reversals(), ~disturbed)
+    np.testing.assert_array_equal(known.far_from_reversals(3), ~disturbed[::3])
 
 
 def test_reversals_of_one_motion_in_several_logs_are_of_one_kind(
@@ -95,7 +95,7 @@ def test_reversals_of_one_motion_in_several_logs_are_of_one_kind(
 def test_the_parts_of_a_torque_are_the_whole(problem: Problem) -> None:
     """Calm rows and others have the products of the group together, beside the base model."""
     member = _elastic(problem)
-    parts = problem.split(member.group, member.coefficients, problem.calm)
+    parts = problem.split(member.group, member.coefficients, problem.far_from_reversals)
     assert parts.cross.sum() == pytest.approx(float(member.coefficients @ member.group.cross), rel=1e-4)
     energy = float(member.coefficients @ member.group.gram @ member.coefficients)
     assert parts.gram.sum() == pytest.approx(energy, rel=1e-4)
@@ -113,7 +113,7 @@ def test_kicks_without_the_rest_are_no_effect(problem: Problem) -> None:
     """What is there beside reversals alone is dropped where calm rows would show it; a part of it counts for less."""
     member = _elastic(problem)
     nothing = accept(problem, ())
-    parts = score(problem, problem.split(member.group, member.coefficients, problem.calm), nothing)
+    parts = score(problem, problem.split(member.group, member.coefficients, problem.far_from_reversals), nothing)
     assert parts.gram.sum(axis=1)[0] ** 2 / parts.gram[0, 0] > 20, "calm rows tell too little for this test"
     assert _reversal_scatter(_with(problem, member, -0.2, 1.0), member, nothing) == np.inf
     assert 1.0 < _reversal_scatter(_with(problem, member, 0.55, 2.0), member, nothing) < np.inf
@@ -129,10 +129,10 @@ def test_a_delay_must_be_told_aside_from_the_kicks_of_a_play(problem: Problem, a
     near = maximum_filter1d(torque > 0.02 * torque.max(), 2 * reach + 1)
     assert 0.05 < near.mean() < MOSTLY
     lag = Hypothesis(EFFECTS["time_delay"], None)
-    at = lag.effect.grid(problem.sees(lag.effect), None)[0]
+    at = lag.effect.grid(problem.state_for(lag.effect), None)[0]
     group = problem.measured(lag, at)
     late = FittedEffect(lag, at, group, 1e4, np.array([50.0 / np.sqrt(group.gram[0, 0])]), 1, 1.0)
-    noise = np.zeros((problem.n, problem.rows, 1), np.float32), np.zeros((problem.mixed.shape[2], 1))
+    noise = np.zeros((problem.n, problem.rows, 1), np.float32), np.zeros((problem.weighted_base_columns.shape[2], 1))
     data = replace(_sized(problem, late, np.where(near, 1.0, aside)), nulls=noise)
     assert delay_supported_away_from_impacts(data, late, [play]) is told
     # Beside nothing that kicks nothing is asked.
@@ -141,18 +141,18 @@ def test_a_delay_must_be_told_aside_from_the_kicks_of_a_play(problem: Problem, a
 
 def test_above_the_bands_play_counts_in_calm_rows(problem: Problem) -> None:
     """Its columns are zero where a joint turns round, before the base model is projected out."""
-    assert problem.upper is not None
-    upper = problem.upper
+    assert problem.high_band is not None
+    upper = problem.high_band
     series = problem.columns_of(PLAY, PLAY.effect.grid(problem.situation, 2)[0])[1][1]
     whole, calm = upper.columns(series, 1), upper.columns(series, 1, calm=True)
     own = upper.joints[1]
     assert own is not None
     np.testing.assert_allclose(own.base.T @ calm, 0.0, atol=1e-9 * np.linalg.norm(whole))
-    assert not upper.calm.all()
+    assert not upper.far_from_reversals.all()
 
     def left(columns: np.ndarray) -> float:
         """What columns have outside calm rows that no combination of the base model's has there."""
-        there, base = columns[~upper.calm], own.base[~upper.calm]
+        there, base = columns[~upper.far_from_reversals], own.base[~upper.far_from_reversals]
         return float(np.linalg.norm(there - base @ np.linalg.lstsq(base, there)[0]) / np.linalg.norm(there))
 
     # The base model's share, which is orthogonal to what it was taken from, is all that is there.
@@ -162,12 +162,12 @@ def test_above_the_bands_play_counts_in_calm_rows(problem: Problem) -> None:
 
 def test_an_extension_is_fitted_in_the_rows_it_was_found_in(problem: Problem) -> None:
     """Above the bands, the fit takes play in calm rows too, and a ripple beside it in all."""
-    assert problem.upper is not None
+    assert problem.high_band is not None
     play = problem.columns_of(PLAY, PLAY.effect.grid(problem.situation, 2)[0])[1][1]
     ripple = np.cos(40.0 * problem.recording.q[:, 1:])
     columns = np.zeros((len(play), 2, 2))
     columns[:, 1] = np.column_stack([play[:, 0], ripple[:, 0]])
-    rows, torque = problem.upper.regression(columns, calm=np.array([True, False]))
-    np.testing.assert_array_equal(rows[:, :1], problem.upper.columns(play[:, :1], 1, calm=True))
-    np.testing.assert_array_equal(rows[:, 1:], problem.upper.columns(ripple, 1))
+    rows, torque = problem.high_band.regression(columns, calm=np.array([True, False]))
+    np.testing.assert_array_equal(rows[:, :1], problem.high_band.columns(play[:, :1], 1, calm=True))
+    np.testing.assert_array_equal(rows[:, 1:], problem.high_band.columns(ripple, 1))
     assert len(torque) == len(rows)

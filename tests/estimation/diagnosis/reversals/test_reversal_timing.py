@@ -13,6 +13,7 @@ from estimation import diagnose
 from estimation.diagnosis.base_models.baseline import base_parameters
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
+from estimation.diagnosis.hypothesis_tests.null_products import null_products
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
@@ -108,7 +109,10 @@ def test_positions_that_say_too_little_of_reversals_say_nothing(cases: Callable)
     _, robot, log = cases(1006, True)
     recording = build_recording(robot, [log])
     baseline, settled = fit_plain(base_parameters(robot, "polynomial", (0.001,) * robot.n), recording)
-    assert measure_reversal_timing(replace(recording, rest=None), baseline, settled.values, settled.residual) is None
+    assert (
+        measure_reversal_timing(replace(recording, position_residual=None), baseline, settled.values, settled.residual)
+        is None
+    )
     friction = [i for i, column in enumerate(baseline.base.columns) if column.symbol == "f1" and column.joint == 2]
     values = settled.values.copy()
     values[friction] = 0.0
@@ -151,13 +155,21 @@ def test_joints_whose_rows_count_are_timed_where_that_tells_far_more(recording: 
     everywhere = np.ones(recording.q.shape, dtype=bool)
     for late, kept in ((1e-3, [True, True]), (1e-4, [False, True])):
         counting = replace(
-            recording, clear=everywhere, trusted=np.array([True, False]), late=np.full(recording.q.shape, late)
+            recording,
+            sign_known_from_velocity=everywhere,
+            trusted=np.array([True, False]),
+            reversal_time_error=np.full(recording.q.shape, late),
         )
         told = timing.beside(counting)
         assert told is not None
         np.testing.assert_array_equal(np.isfinite(told.errors), kept)
         np.testing.assert_array_equal(told.residual[~np.array(kept)], 0.0)
-    both = replace(recording, clear=everywhere, trusted=np.ones(2, dtype=bool), late=np.zeros(recording.q.shape))
+    both = replace(
+        recording,
+        sign_known_from_velocity=everywhere,
+        trusted=np.ones(2, dtype=bool),
+        reversal_time_error=np.zeros(recording.q.shape),
+    )
     assert timing.beside(both) is None
 
 
@@ -198,7 +210,7 @@ def test_null_logs_meet_reversals_whose_lags_are_noise(pose_arm: Callable[..., P
     errors = np.array([5e-4, 1e-3])
     problem = replace(plain, timing=ReversalTiming(np.zeros(2), errors, np.zeros(2)))
     hypothesis = Hypothesis(EFFECTS["time_delay"], None)
-    before, after = (p.null_crosses([p.measured(hypothesis, (1e-3,))])[0] for p in (plain, problem))
+    before, after = (null_products(p, [p.measured(hypothesis, (1e-3,))])[0] for p in (plain, problem))
     assert np.var(after - before) == pytest.approx(np.sum(errors**-2.0), rel=0.2)
 
 
@@ -210,8 +222,8 @@ def test_reversals_of_a_thinned_log_are_timed_by_all_its_samples(
     plain = _timed(robot, log)
     monkeypatch.setattr(log_reading, "MOST_ROWS", 8000)
     recording = build_recording(robot, [log])
-    assert recording.finer is not None
-    assert recording.step == pytest.approx(2 * recording.finer.step)
+    assert recording.full_rate is not None
+    assert recording.step == pytest.approx(2 * recording.full_rate.step)
     thinned = _timed(robot, log)
     told = np.isfinite(thinned.errors)
     assert told.sum() >= 3
@@ -220,4 +232,4 @@ def test_reversals_of_a_thinned_log_are_timed_by_all_its_samples(
     # The base model is another, fitted to half of the rows: how sharp its signs are is another chance of the noise.
     assert np.all(np.abs(thinned.lags - plain.lags)[both] < np.hypot(plain.errors, thinned.errors)[both])
     monkeypatch.setattr(log_reading, "MOST_FINE", 10_000)
-    assert build_recording(robot, [log]).finer is None
+    assert build_recording(robot, [log]).full_rate is None

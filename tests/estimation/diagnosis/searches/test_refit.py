@@ -52,8 +52,12 @@ def test_torque_that_is_cut_off_does_not_draw_the_base_model(
     assert error((problem.baseline.regressor @ settled.values)[:, 0]) < 0.05
     assert settled.extra is not None
     np.testing.assert_allclose(settled.extra[:, 1], 0.0)
-    kept = ~recording.unsure[:, 0]
-    assert settled.residual[kept, 0].std() < whole.remainder[kept, 0].std() < problem.remainder[kept, 0].std() / 1.5
+    kept = ~recording.sign_unknown[:, 0]
+    assert (
+        settled.residual[kept, 0].std()
+        < whole.base_residual[kept, 0].std()
+        < problem.base_residual[kept, 0].std() / 1.5
+    )
 
 
 def test_little_is_searched_anew_where_it_changes_what_was_found(

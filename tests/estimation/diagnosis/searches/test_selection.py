@@ -39,30 +39,30 @@ def _searching(
     def replace(name: str, value: Callable) -> None:
         monkeypatch.setattr(selection, name, value)
 
-    replace("_seen", lambda *args: ([], []))
+    replace("_visible_in_torque", lambda *args: ([], []))
     replace("accept", lambda problem, groups: groups)
-    replace("all_but", _all_but)
+    replace("accept_all_but", _all_but)
     replace("scan", scan)
-    replace("contenders", lambda problem, result, members: result.outcomes)
+    replace("screen_candidates", lambda problem, result, members: result.outcomes)
     replace(
-        "best",
+        "refine_candidates",
         lambda problem, outcomes, accepted, known=None: [
             SimpleNamespace(hypothesis=o.hypothesis, group=o.hypothesis, shape=(), gain=1.0) for o in outcomes
         ],
     )
-    for name in ("is_told", "is_sure", "beyond"):
+    for name in ("is_accepted", "is_certain", "exceeds_leakage"):
         replace(name, lambda *args: True)
     replace(
-        "polished",
+        "refine_with_swaps",
         lambda problem, entries, members, p_values, *rest: (kept := polished(members), p_values[: len(kept)]),
     )
-    replace("measured", lambda problem, member, beside: member)
+    replace("remeasure", lambda problem, member, beside: member)
     return scans
 
 
 def _selected() -> set[Hypothesis]:
     result = selection.select(None, [], false_alarm=0.01, rng=np.random.default_rng(0))  # type: ignore[arg-type]
-    return {found.member.hypothesis for found in result.found}
+    return {found.effect.hypothesis for found in result.found}
 
 
 def test_effects_are_added_while_they_show(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -112,7 +112,9 @@ def _rivals(
 
     def member(hypothesis: Hypothesis, bic: float, worth: float) -> SimpleNamespace:
         values = {"group": hypothesis, "shape": (), "gain": 5.0}
-        return SimpleNamespace(hypothesis=hypothesis, bic=lambda rows: bic, worth=lambda rows: worth, **values)
+        return SimpleNamespace(
+            hypothesis=hypothesis, bic_gain=lambda rows: bic, local_bic_gain=lambda rows: worth, **values
+        )
 
     monkeypatch.setattr(selection, "accept", lambda problem, groups: groups)
     monkeypatch.setattr(selection, "accept_all_but", _all_but)
@@ -123,7 +125,7 @@ def _rivals(
     )
     chosen = selection.Selection(
         found=(selection.SelectedEffect(member(A, bic, worth), 1e-30),),  # type: ignore[arg-type]
-        seen=frozenset(seen),
+        visible_in_torque=frozenset(seen),
         first=None,  # type: ignore[arg-type]
         last=None,  # type: ignore[arg-type]
         accepted=None,  # type: ignore[arg-type]

@@ -31,7 +31,7 @@ def test_a_shape_that_is_known_is_refined_from_too(monkeypatch: pytest.MonkeyPat
 
     def refine(problem, hypothesis, shape, accepted):
         starts.append((hypothesis, shape))
-        return SimpleNamespace(hypothesis=hypothesis, shape=shape, bic=lambda rows: 10.0 * shape[0])
+        return SimpleNamespace(hypothesis=hypothesis, shape=shape, bic_gain=lambda rows: 10.0 * shape[0])
 
     monkeypatch.setattr(swap_search, "refine", refine)
     outcomes = [SimpleNamespace(hypothesis=A, shape=(1.0,)), SimpleNamespace(hypothesis=B, shape=(2.0,))]
@@ -58,8 +58,8 @@ def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
             group=SimpleNamespace(joints=(0,)),
             shape=(),
             gain=gain,
-            bic=lambda rows: gain,
-            worth=lambda rows: gain,
+            bic_gain=lambda rows: gain,
+            local_bic_gain=lambda rows: gain,
         )
 
     looked: list[int] = []
@@ -126,7 +126,12 @@ def test_a_rival_is_tried_with_the_others_refined_beside_it(
     def member(hypothesis: Hypothesis, gain: float, form: str = "") -> SimpleNamespace:
         group = SimpleNamespace(joints={A: (0,), B: (1,), C: (0, 1)}[hypothesis], form=(hypothesis, form))
         return SimpleNamespace(
-            hypothesis=hypothesis, group=group, shape=(), gain=gain, bic=lambda rows: gain, worth=lambda rows: gain
+            hypothesis=hypothesis,
+            group=group,
+            shape=(),
+            gain=gain,
+            bic_gain=lambda rows: gain,
+            local_bic_gain=lambda rows: gain,
         )
 
     def refined(problem, hypothesis, shape, beside) -> SimpleNamespace:
@@ -145,13 +150,13 @@ def test_a_rival_is_tried_with_the_others_refined_beside_it(
 
     for name, value in {
         "accept": accepted,
-        "all_but": others,
-        "composed": lambda problem, members, hypotheses: problem,
+        "accept_all_but": others,
+        "with_total_torque": lambda problem, members, hypotheses: problem,
         "refine": refined,
-        "measured": lambda problem, m, beside: m,
+        "remeasure": lambda problem, m, beside: m,
         "scan": lambda *args, nulls: None,
-        "contenders": lambda *args: [SimpleNamespace(hypothesis=C)],
-        "best": lambda problem, rest, beside: [refined(problem, o.hypothesis, (), beside) for o in rest],
+        "screen_candidates": lambda *args: [SimpleNamespace(hypothesis=C)],
+        "refine_candidates": lambda problem, rest, beside: [refined(problem, o.hypothesis, (), beside) for o in rest],
         "_acts_on": lambda problem, hypothesis: (0, 1),
     }.items():
         monkeypatch.setattr(swap_search, name, value)

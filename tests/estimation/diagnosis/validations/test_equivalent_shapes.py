@@ -111,16 +111,16 @@ def test_a_tilt_is_told_beside_the_first_axis_own_moments() -> None:
     assert plain.shape == (0.0, 0.0)
     # With the moments free the angles are known as those beside four columns of them are.
     errors = np.sqrt(np.diag(np.linalg.pinv(posed.gram, rcond=1e-10, hermitian=True))[:2])
-    assert np.all(np.abs(told.member.coefficients - angles) < 3 * errors)
+    assert np.all(np.abs(told.effect.coefficients - angles) < 3 * errors)
     assert np.any(np.abs(plain.coefficients - angles) > 3 * errors)
     # The search for the moments has come as far as the true ones are.
     true = refine(posed, tilt, moments, _nothing(), effort=0)  # type: ignore[arg-type]
-    assert told.member.gain > true.gain - 0.1
-    assert told.member.gain > plain.gain + 10.0
+    assert told.effect.gain > true.gain - 0.1
+    assert told.effect.gain > plain.gain + 10.0
     # What is hardly there is not worth two more parameters.
     posed = _Tilted(problem, tilt, 0.02 * np.kron([1.0, *moments], angles), 0.02 * rng.normal(size=6))
     plain = refine(posed, tilt, (0.0, 0.0), _nothing(), effort=0)  # type: ignore[arg-type]
-    assert complete_effects(posed, [SelectedEffect(plain, 1e-9, ())])[0].member is plain  # type: ignore[arg-type]
+    assert complete_effects(posed, [SelectedEffect(plain, 1e-9, ())])[0].effect is plain  # type: ignore[arg-type]
 
 
 def _nothing() -> Accepted:

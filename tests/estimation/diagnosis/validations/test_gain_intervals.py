@@ -69,18 +69,18 @@ def _of_sizes(errors: list[float], fitted: list[float] | None) -> HeldOutErrors:
 def test_what_is_kept_of_a_gain_is_its_share_of_the_fit_s() -> None:
     """A fall of .02 where fits that have seen the rows fall by .05 keeps two fifths; without such fits, all."""
     errors = [0.30, 0.30, 0.28]
-    assert _of_sizes(errors, [0.20, 0.20, 0.15]).kept(1, [0]) == pytest.approx(0.4)
-    assert _of_sizes(errors, None).kept(1, [0]) == 1.0
+    assert _of_sizes(errors, [0.20, 0.20, 0.15]).retained_share(1, [0]) == pytest.approx(0.4)
+    assert _of_sizes(errors, None).retained_share(1, [0]) == 1.0
     # A fit that hardly gains says nothing of what should be left.
-    assert _of_sizes(errors, [0.20, 0.20, 0.195]).kept(1, [0]) == 1.0
+    assert _of_sizes(errors, [0.20, 0.20, 0.195]).retained_share(1, [0]) == 1.0
 
 
 def test_a_model_goes_astray_by_its_error_where_it_was_fitted() -> None:
     """Four times the error of the fit, and a fifth of the torque, is astray; twice it, or a small error, is not."""
-    assert _of_sizes([0.3, 0.2], [0.06, 0.05]).astray(0)
-    assert not _of_sizes([0.3, 0.1], [0.06, 0.05]).astray(0)
-    assert not _of_sizes([0.3, 0.08], [0.06, 0.01]).astray(0)
-    assert not _of_sizes([0.3, 0.2], None).astray(0)
+    assert _of_sizes([0.3, 0.2], [0.06, 0.05]).is_unreliable(0)
+    assert not _of_sizes([0.3, 0.1], [0.06, 0.05]).is_unreliable(0)
+    assert not _of_sizes([0.3, 0.08], [0.06, 0.01]).is_unreliable(0)
+    assert not _of_sizes([0.3, 0.2], None).is_unreliable(0)
 
 
 class Rows(SimpleNamespace):
@@ -110,13 +110,11 @@ def _other_motion(seed: int, effect: float, there: float) -> HeldOutErrors:
     )
     moving = np.zeros((rows, 1), dtype=bool)
     problem = SimpleNamespace(
-        recording=Rows(unsure=moving, tau=tau),
+        recording=Rows(sign_unknown=moving, tau=tau),
         baseline=SimpleNamespace(regressor=Y, nuisance=np.zeros((rows, 1, 0))),
-        whitening=SimpleNamespace(
-            scales=lambda count: np.ones((count, 1)), scale=np.ones(1), at_rest=np.ones(1), stride=1
-        ),
+        whitening=SimpleNamespace(scales=lambda count: np.ones((count, 1)), scale=np.ones(1), row_weight=1.0),
     )
-    other = Rows(unsure=moving, tau=unseen, t=t, step=0.01, runs=[slice(0, rows)], names=("other",))
+    other = Rows(sign_unknown=moving, tau=unseen, t=t, step=0.01, runs=[slice(0, rows)], names=("other",))
     return held_out_errors(problem, [X], other, Z, [W], GaussianPrior(np.zeros((3, 3)), np.zeros(3)))  # type: ignore[arg-type]
 
 

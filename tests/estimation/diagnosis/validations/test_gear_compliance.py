@@ -43,7 +43,7 @@ def found_in(robot: Robot, log: Log, **options: object) -> tuple[MeasuredComplia
     recording = build_recording(robot, [log])
     base = build_baseline(base_parameters(robot, "coulomb-viscous", (0.001,) * robot.n), recording)
     scale = recording.tau.std(axis=0)
-    values = fit_values(base, scale, recording.unsure, recording.tau, base_model_prior(base, recording))
+    values = fit_values(base, scale, recording.sign_unknown, recording.tau, base_model_prior(base, recording))
     return measure_gear_compliance(base.situation(recording, values), recording, [log], false_alarm=0.01, **options)
 
 
@@ -64,7 +64,7 @@ def test_the_stiffness_of_a_gear_is_measured(arm: Robot, arm_plant: Callable, fo
     assert values["compliance"].value == pytest.approx(COMPLIANCE, rel=0.03)
     assert finding.gain.ci95[0] > 0
     assert finding.gain.nrmse_after < 0.2 * finding.gain.nrmse_before
-    assert "by its two encoders" in finding.sentence
+    assert "measured by its two encoders" in finding.sentence
     assert "3.0" in finding.sentence
     assert windup.extension.coefficients == pytest.approx([COMPLIANCE], rel=0.03)
     assert np.std(windup.after) < 0.2 * np.std(windup.before)

@@ -52,7 +52,7 @@ def test_the_simulated_robot_comes_nearer_with_what_was_found(found: Diagnosis) 
     assert simulation.note == ""
     assert simulation.start >= 100.0
     assert simulation.end - simulation.start == pytest.approx(5.0, abs=0.1)
-    assert "on joint 2 the loop adds" in found.summary()
+    assert "Forward simulation, joint 2: controller correction" in found.summary()
 
 
 def test_what_grows_worse_is_told_before_what_hardly_grows_better() -> None:
@@ -60,10 +60,12 @@ def test_what_grows_worse_is_told_before_what_hardly_grows_better() -> None:
     still = np.zeros(2)
     torque = (np.array([0.0231, 0.042]), np.array([0.0230, 0.051]))
     made = Simulation(start=0.0, end=5.0, loop=Loop(), torque=torque, motion=(still, still))
-    assert "on joint 2 the loop adds 4.20 -> 5.10 %" in made.summary(["rad", "rad"])
-    assert made.summary(["rad", "rad"]).endswith("off: what was found makes the simulation worse there")
+    assert "joint 2: controller correction 4.2 -> 5.1 % of torque" in made.summary(["rad", "rad"])
+    assert made.summary(["rad", "rad"]).endswith(
+        "position loop). The findings make the simulation of this joint worse."
+    )
     better = replace(made, torque=made.torque[::-1], note="It did not settle.")
-    assert better.summary(["rad", "rad"]).endswith("mrad off. It did not settle.")
+    assert better.summary(["rad", "rad"]).endswith("position loop). It did not settle.")
 
 
 def test_it_is_written_and_read(found: Diagnosis, tmp_path: object) -> None:

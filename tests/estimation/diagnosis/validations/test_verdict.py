@@ -158,7 +158,7 @@ def test_a_formula_is_not_named_for_what_is_unexplained_on_joints_that_it_reache
     said = verdict.decide_verdict(SimpleNamespace(rows=ROWS), selection, [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
     assert said.verdict == "unexplained"
     assert said.patterns == (free,)
-    assert said.kept == ((found,) if kept else ())
+    assert said.named == ((found,) if kept else ())
 
 
 @pytest.mark.parametrize(
@@ -243,7 +243,7 @@ def test_small_names_beside_one_that_holds_are_left_out(monkeypatch: pytest.Monk
     selection = SimpleNamespace(found=found, accepted=SimpleNamespace(gain=800.0))
     said = verdict.decide_verdict(SimpleNamespace(rows=ROWS), selection, [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
     assert said.verdict == "named"
-    assert [(f.member.hypothesis.label, f.member.gain) for f in said.kept] == [
+    assert [(f.effect.hypothesis.label, f.effect.gain) for f in said.named] == [
         ("stribeck of joint 3", 705.0),
         ("spring of joint 2", 9.0),
     ]

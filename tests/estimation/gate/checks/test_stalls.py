@@ -30,7 +30,7 @@ def test_rows_that_waited_are_put_back(good):
     result = check_stalls(replace(log, t=late))
     (finding,) = result.findings
     assert (finding.name, finding.severity) == ("late_rows", "warning")
-    assert "stalled 4 times" in finding.text
+    assert "stopped 4 times" in finding.text
     assert not len(result.lost)
     np.testing.assert_allclose(result.t, log.t, atol=1e-9)
 
@@ -42,7 +42,7 @@ def test_rows_of_a_rush_in_which_some_were_lost_are_left_out(good):
     kept = np.setdiff1d(np.arange(len(log)), [501, 502, 904, 905, 906])
     result = check_stalls(replace(log.rows(kept), t=late[kept]))
     (finding,) = result.findings
-    assert "with others missing, are left out" in finding.action
+    assert "ignored because others are missing" in finding.action
     assert set(kept[result.lost]) == {500, 503, 504, 505, 506} | set(range(900, 911)) - {904, 905, 906}
 
 

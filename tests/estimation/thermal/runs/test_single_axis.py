@@ -98,7 +98,7 @@ def test_stretches_of_constant_speed_are_found() -> None:
 def test_what_cannot_be_told_is_said() -> None:
     """A single speed, no constant speed, and arrays of other shapes are named."""
     t, q, dq, ddq = swings()
-    with pytest.raises(NotIdentifiableError, match="apart"):
+    with pytest.raises(NotIdentifiableError, match="separately"):
         fit_single_axis(0.1 * t, np.ones(len(t)), np.zeros(len(t)) + 1e-3, np.ones(len(t)))
     with pytest.raises(NotIdentifiableError, match="constant speed"):
         sweep_friction(t, q, np.random.default_rng(0).normal(size=len(t)), ddq)

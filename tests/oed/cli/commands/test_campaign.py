@@ -33,8 +33,8 @@ def test_a_campaign_is_written_whole(run: Callable[..., Any], robot: Path, exper
         "warm_up_100.csv",
     }
     page = (planned / "report.html").read_text()
-    assert "What runs when" in page
-    assert "keeps all limits" in page
+    assert "Schedule" in page
+    assert "respects all limits" in page
     again = run("campaign", "--robot", robot, "--design", experiment, "--out", planned, *SHORT)
     assert again.code == 2
     assert "the file exists" in again.err
@@ -60,17 +60,17 @@ def test_a_campaign_and_its_stages_play(run: Callable[..., Any], robot: Path, pl
 
 
 def test_without_a_design_a_quick_one_is_made(run: Callable[..., Any], robot: Path, tmp_path: Path) -> None:
-    """Without --design an excitation is designed on the spot, and the summary says so."""
+    """Without --design the excitation comes from a quick search, and the summary says so."""
     done = run("campaign", "--robot", robot, "--cycles", 1, "--out", tmp_path / "campaign", "--workers", 1)
     assert done.code == 0, done.err
-    assert "designed on the spot" in done.out
+    assert "comes from a quick search" in done.out
 
 
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
         (("--cycles", -1), 2, "cycles"),
-        (("--cycles", 0), 2, "nothing"),
+        (("--cycles", 0), 2, "empty"),
         (("--duty", "0,50"), 2, "duties"),
         (("--duty", "much"), 2, "--duty much"),
         (("--cycle-time", 0), 2, "cycle_time"),

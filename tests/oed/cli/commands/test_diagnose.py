@@ -77,9 +77,9 @@ def test_its_files_are_of_use(done: Path) -> None:
     model = load_model(done / "model.json")
     assert [extension.effect for extension in model.extensions] == ["friction_step"]
     page = (done / "report.html").read_text()
-    assert "friction that changed at one moment" in page
+    assert "sudden change of friction" in page
     assert "Simulated motion" in page
-    assert "Smallest size that would be found" in page
+    assert "smallest effect size" in page
 
 
 def test_limits_before_any_experiment(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
@@ -124,7 +124,7 @@ def test_an_extended_model_is_a_model_like_any_other(
     assert np.sqrt(np.mean((log.tau - expected) ** 2)) < 0.03 * np.sqrt(np.mean(expected**2))
     planned = run("design", "--robot", robot, "--after", model, "--effort", "quick", "--out", tmp_path / "next")
     assert planned.code == 0, planned.err
-    assert "NOT counted within the torque limits" in planned.out
+    assert "NOT included in the torque limits" in planned.out
     assert "friction_step of joint 2" in planned.out
     line = ("diagnose", "--limits", "--robot", robot, "--trajectory", motion, "--model", model)
     limits = run(*line, "--out", tmp_path / "limits", "--json")
@@ -157,8 +157,8 @@ def test_a_model_knows_its_robot(run, done: Path, experiment: Path, tmp_path: Pa
     ("arguments", "message"),
     [
         ((), "give --log"),
-        (("--limits",), "--limits takes --trajectory"),
-        (("--limits", "--log", "a.csv", "--trajectory", "b.csv"), "--limits takes --trajectory"),
+        (("--limits",), "--limits needs --trajectory"),
+        (("--limits", "--log", "a.csv", "--trajectory", "b.csv"), "--limits needs --trajectory"),
         (("--log", "a.csv", "--trajectory", "b.csv"), "give --log"),
         (("--log", "nowhere.csv"), "nowhere.csv"),
         (("--limits", "--trajectory", "nowhere.csv"), "nowhere.csv"),

@@ -71,7 +71,7 @@ def done(robot: Path, logs: Path, tmp_path_factory: pytest.TempPathFactory) -> P
     result = CliRunner().invoke(app, [str(part) for part in line])
     assert result.exit_code == 0, result.output
     assert "slow / fast" in result.output
-    assert "only their ratios are determined" in result.output
+    assert "only the ratios of alpha to heat exchanges" in result.output
     return out
 
 
@@ -94,8 +94,8 @@ def test_predictions_follow_the_heat(run: Callable[..., Any], done: Path, logs: 
     """The last log, 14 minutes in, is predicted better after the logs before it than as a cold start; both are said."""
     errors = []
     for options, told in (
-        ((), "begin cold"),
-        (("--before", logs / "0.parquet", "--before", logs / "1.parquet"), "2 logs"),
+        ((), "assumed cold"),
+        (("--before", logs / "0.parquet", "--before", logs / "1.parquet"), "2 earlier logs"),
     ):
         ended = run(
             "predict", "--model", done, "--log", logs / "2.parquet", "--ambient", 20, "--out", tmp_path / "tau.csv",
@@ -114,7 +114,7 @@ def test_what_warmed_the_robot_needs_a_model_with_heat(
 ) -> None:
     """--before with a model without heat, or with logs that come later, is refused with code 2."""
     line = ("predict", "--log", logs / "0.parquet", "--before", logs / "1.parquet", "--out", tmp_path / "tau.csv")
-    for model, message in ((experiment, "the model has no heat"), (done, "overlap in time")):
+    for model, message in ((experiment, "the model has no thermal part"), (done, "overlap in time")):
         ended = run(*line, "--model", model)
         assert ended.code == 2
         assert message in ended.err
@@ -126,7 +126,7 @@ def test_the_page_shows_time_powers_and_curves(done: Path) -> None:
     page = (done / "report.html").read_text()
     for name in ("friction_time", "friction_duty", "time_constants", "friction_curves"):
         assert name in page
-    assert "Not determined by these logs" in page
+    assert "These logs determine time constants and friction ratios, but not" in page
 
 
 def test_results_are_not_overwritten(run: Callable[..., Any], done: Path, robot: Path, logs: Path) -> None:

@@ -144,7 +144,7 @@ def test_a_second_experiment_adds_what_the_first_lacks(er3a):
         ({"scaling": "odd"}, "none, nominal, unit"),
         ({"noise": [1.0, 2.0]}, "6 positive numbers"),
         ({"noise": [1.0, 1.0, 1.0, 1.0, 1.0, 0.0]}, "6 positive numbers"),
-        ({"criterion": "i"}, "belong together"),
+        ({"criterion": "i"}, "needs a task"),
         ({"torque_margin": 1.0}, "0 to below 1"),
     ],
 )

@@ -78,15 +78,15 @@ def test_warns(html: str) -> None:
     """Assumed values, and what was not checked, are said."""
     assert "limits.torque" in html
     assert "Collisions were not checked." in html
-    assert "Torque was not checked" in html  # for the robot's dynamics are not described
+    assert "Torque limits were not checked" in html  # for the robot's dynamics are not described
 
 
 def test_warns_of_assumed_limits() -> None:
     """Acceleration and jerk limits that the description lacks are named by joint, with what was taken instead."""
     design = design_for(robot(acceleration=np.array([10.0, np.inf]), jerk=np.array([np.inf, np.inf])))
     warnings = " ".join(design_page(design).warnings)
-    assert "acceleration limit of joint 2;" in warnings
-    assert "jerk limit of joint 1, 2;" in warnings
+    assert "acceleration limit for joint 2;" in warnings
+    assert "jerk limit for joint 1, 2;" in warnings
 
 
 def test_a_passed_limit_is_bad_news(design: Design) -> None:
@@ -95,7 +95,7 @@ def test_a_passed_limit_is_bad_news(design: Design) -> None:
     worst = replace(fast, slack_fraction=-0.5, value=9.0)
     page = design_page(replace(design, margins=(worst, *design.margins)))
     assert page.status == "bad"
-    assert f"passes a limit: velocity of joint 2 at {fast.time:.3f} s" in page.verdict
+    assert f"exceeds a limit: velocity of joint 2 at {fast.time:.3f} s" in page.verdict
     assert design_page(design).status == "good"
 
 

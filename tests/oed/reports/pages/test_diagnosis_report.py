@@ -40,7 +40,7 @@ def view():
     base = random.normal(size=(N, 2))
     bend = np.column_stack([np.zeros(N), np.exp(-np.abs(speed) / 0.1) * np.sign(speed)])
     finding = FindingView(
-        title="more friction at low speed (Stribeck)",
+        title="Stribeck friction",
         sentence="Joint 2 needs 1 N m more than its Coulomb friction to break away.",
         joint=2,
         parameters=(
@@ -90,8 +90,8 @@ def test_the_page_tells_all(view):
         assert part in text, part
     assert "not determined by these logs" in text
     assert "319.967 to 320.033" in text
-    assert "one of a few that machines have" in text
-    assert "Make constant speeds" in text
+    assert "chosen from a list of usual values" in text
+    assert "Record constant speeds" in text
     assert "two <joints>" not in text
 
 
@@ -100,11 +100,11 @@ def test_the_page_tells_all(view):
     [
         (
             "none",
-            "Nothing that the model leaves out was found. Of 3 effects and places half would have shown from 1.0 % of "
+            "No missing effect was found. Of 3 effects and places half would have shown from 1.0 % of "
             "the joint's torque on, nine in ten from 1.8 %; at any size hidden: stribeck of joint 2.",
-            "Nothing is left to tell apart.",
+            "No further experiment is needed.",
         ),
-        ("unexplained", "no effect of the catalogue explains", "no experiment of the catalogue gives it one"),
+        ("unexplained", "no effect of the catalogue explains", "no experiment of the catalogue can identify it"),
     ],
 )
 def test_a_page_without_findings(verdict, expected, following, view):
@@ -127,24 +127,24 @@ def test_what_brings_nothing_explains_nothing(interval, told, view):
     """A free function that stands out of the noise and does not surely help elsewhere explains no part of the error."""
     finding = replace(view.findings[0], interval=interval)
     page = diagnosis_page(replace(view, verdict="unexplained", findings=(finding,)))
-    assert page.verdict.startswith("A part of the error is explained") == told
+    assert page.verdict.startswith("The error is explained in part") == told
     assert page.verdict.endswith(finding.sentence)
 
 
 def test_the_error_of_every_row_is_told_where_it_is_known(view):
     """Beside the error of rows that count stands that of `oed predict`, which has them all."""
     (table,) = next(s for s in diagnosis_page(view).sections if s.title.startswith("Measured")).tables
-    assert table.headings[-1] == "every row [%]"
+    assert table.headings[-1] == "all rows [%]"
     assert [row[-1] for row in table.rows] == [pytest.approx(7.0), None]
 
 
 def test_the_error_told_is_that_of_a_joint_with_a_finding(view):
     """Another joint may change by more, for what the base model makes of it: that is not what was found."""
     page = diagnosis_page(replace(view, nrmse_before=np.array([0.2, 0.1]), nrmse_after=np.array([0.1, 0.11])))
-    assert page.facts[1].label == "Error of joint 2, unseen data"
+    assert page.facts[1].label == "Error of joint 2, held-out data"
     whole = replace(view.findings[0], joint=None)
     page = diagnosis_page(replace(view, findings=(whole,), nrmse_before=np.array([0.2, 0.1])))
-    assert page.facts[1].label == "Error of joint 1, unseen data"
+    assert page.facts[1].label == "Error of joint 1, held-out data"
 
 
 def test_what_has_no_name_is_not_told_to_need_no_experiment(view):
@@ -154,14 +154,14 @@ def test_what_has_no_name_is_not_told_to_need_no_experiment(view):
     )
     assert "No further experiment is needed" in named
     assert "No further experiment is needed" not in unexplained
-    assert "move it alone" in unexplained
+    assert "Move the joint alone" in unexplained
 
 
 def test_a_rare_rival_that_fits_as_well_is_not_passed_over(view):
     """A cause is named although what few robots have fits about as well: the next step says so."""
     close = replace(view.findings[0], rivals=(("shear thinning", 7.9), ("presliding", 40.0)))
     text = render(diagnosis_page(replace(view, findings=(close,), next_kind="")))
-    assert "unless the robot may have" in text
+    assert "If your robot may have it" in text
     assert "about as well: shear thinning." in text
 
 
@@ -217,7 +217,7 @@ def test_the_simulated_motion_is_told(view):
     assert picture.panels[1].y_label == "[mrad]"
     assert picture.panels[1].series[0].y == pytest.approx(two[:, 1])
     text = render(page)
-    for part in ("Simulated motion", "From 2.0 to 7.0 s", "The loop is assumed", "5 Hz", "As it is.", "mm"):
+    for part in ("Simulated motion", "from 2.0 to 7.0 s", "The controller is assumed", "5 Hz", "As it is.", "mm"):
         assert part in text, part
     again = diagnosis_page(replace(view, simulation=replace(simulation, curves=None)))
     assert "simulation" not in [picture.name for picture in again.pictures]
@@ -227,7 +227,7 @@ def test_an_ambiguous_verdict_is_no_good_news(view):
     """An ambiguous diagnosis says so, and warns."""
     page = diagnosis_page(replace(view, verdict="ambiguous"))
     assert page.status == "warning"
-    assert "not which of several" in page.verdict
+    assert "several causes fit" in page.verdict
 
 
 def test_without_unseen_data_no_gain_is_claimed(view):
@@ -273,10 +273,10 @@ def test_the_page_of_a_plan():
     """A planned experiment's page counts what would be named, and lists what is hidden."""
     page = limits_page((*LIMITS, replace(LIMITS[0], joint=3, note="joint hardly moves")), "two")
     text = render(page)
-    assert "Of 5 effects and places, 3 would be seen and named at 2 %" in page.verdict
+    assert "Of 5 pairs of effect and joint, 3 would be found and named at 2 %" in page.verdict
     assert "1 (7) / 2" in text
     assert "2 (never) / 4" in text
     assert "0.4 / 0.8" in text
     assert "on joint 3: joint hardly moves." in text
     assert "hidden" in text
-    assert "more friction at low speed" in page.warnings[0]
+    assert "Stribeck friction" in page.warnings[0]

@@ -50,7 +50,7 @@ def html(estimate: Estimate) -> str:
 def test_tells_every_parameter(estimate: Estimate, html: str) -> None:
     """Each parameter has its value, its standard error and its unit on the page; an undetermined one says so."""
     model = estimate.model
-    table = html[html.index("Values rounded to two digits") :].partition("</table>")[0]
+    table = html[html.index("Values are rounded to two digits") :].partition("</table>")[0]
     rows = {
         cells[0]: cells
         for cells in (

@@ -125,7 +125,7 @@ def test_a_gap_too_large_for_its_time_may_be_crossed_with_the_motor(seen):
     effect, small, large = EFFECTS["backlash"], 1e-5, 4e-4
     turns = [np.count_nonzero(np.diff(np.sign(now.load[:, joint - 1]))) for joint in range(1, 6)]
     joint = 1 + int(np.argmax(turns))
-    (((gap, longest, *rest),),) = effect.elsewhere(now, joint, (small, 0.1, 0.0, 0.0, 0.03), np.array([large / 2]))
+    (((gap, longest, *rest),),) = effect.other_optima(now, joint, (small, 0.1, 0.0, 0.0, 0.03), np.array([large / 2]))
     assert (gap, rest) == (pytest.approx(large), [0.0, 0.0, 0.03])
     load = now.load[:, joint - 1]
     i = _sides_changed(load)
@@ -133,4 +133,4 @@ def test_a_gap_too_large_for_its_time_may_be_crossed_with_the_motor(seen):
     flights = (6 * small * inertia / (np.abs(load[i + 1] - load[i]) / 0.004)) ** (1 / 3)
     assert longest == pytest.approx(float(np.clip(np.median(flights), 0.01, 0.1)), rel=1e-3)
     # A gap that flight alone explains has no other summit.
-    assert effect.elsewhere(now, joint, (large, 0.1, 0.0, 0.0, 0.03), np.array([small / 2])) == ()
+    assert effect.other_optima(now, joint, (large, 0.1, 0.0, 0.0, 0.03), np.array([small / 2])) == ()

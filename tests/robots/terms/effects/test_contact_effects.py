@@ -39,11 +39,11 @@ def test_a_push_on_a_further_joint_alone_is_none(catalogue_robot) -> None:
     robot = catalogue_robot("er3a")
     each = np.eye(12)
     alone = each[3] * 5.0 + 0.04 * each[: robot.n].sum(axis=0)
-    assert not push.believable(robot, None, alone, brief)
-    assert push.believable(robot, None, alone + 0.4 * each[1], brief)
-    assert push.believable(robot, None, each[0] * 5.0, brief)
-    assert push.believable(robot, None, each[1] * 5.0, brief)
-    assert push.believable(robot, None, alone, lasting)
+    assert not push.is_plausible(robot, None, alone, brief)
+    assert push.is_plausible(robot, None, alone + 0.4 * each[1], brief)
+    assert push.is_plausible(robot, None, each[0] * 5.0, brief)
+    assert push.is_plausible(robot, None, each[1] * 5.0, brief)
+    assert push.is_plausible(robot, None, alone, lasting)
 
 
 def test_a_push_that_lasts_is_a_wrench_on_the_flange(now, twin):
@@ -108,7 +108,7 @@ def test_a_push_on_a_body_is_a_force_at_one_place_of_it(now, twin):
 
 def test_a_push_that_lasts_is_looked_for_about_a_brief_one(now):
     """From the part in which the arm moves least the whole is found: so long before, about and after it."""
-    (points,) = EFFECTS["external_contact"].elsewhere(now, None, (2.0, 0.3, 0.6, 0.0, 0.0), np.zeros(12))
+    (points,) = EFFECTS["external_contact"].other_optima(now, None, (2.0, 0.3, 0.6, 0.0, 0.0), np.zeros(12))
     assert all(0.0 <= start <= now.t[-1] and flange == 1.0 for start, _, _, flange, _ in points)
     spans = {(round(start, 3), round(start + duration, 3)) for start, duration, *_ in points}
     assert {(2.0, 2.3), (2.0, 3.2), (1.1, 2.3), (1.55, 2.75)} <= spans
@@ -193,6 +193,6 @@ def test_a_push_is_told_by_what_joints_feel_of_it() -> None:
         ("a force of 5 N", [3.0, 4.0, 0, 0, 0, 0]),
     ):
         sentence = EFFECTS["external_contact"].describe(None, np.array(size), shape)
-        assert f"with {told} that stayed" in sentence
+        assert f"with {told}, constant" in sentence
     both = EFFECTS["external_contact"].describe(None, np.array([3.0, 4.0, 0.0, 0.0, 2.0, 0.0]), shape)
     assert "with a force of 5 N and a moment of 2 N m" in both

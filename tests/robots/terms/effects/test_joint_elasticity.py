@@ -29,7 +29,7 @@ def test_a_gear_has_one_stiffness() -> None:
     """What winds up by one stiffness and swings by another, far from it, is no gear."""
     gear, robot = EFFECTS["joint_elasticity"], load_robot("ur10")
     compliance = np.array([1e-4])
-    assert gear.believable(robot, 2, compliance, (1e4, 0.0))
-    assert gear.believable(robot, 2, compliance, (0.9 * APART * 1e4, 0.0))
+    assert gear.is_plausible(robot, 2, compliance, (1e4, 0.0))
+    assert gear.is_plausible(robot, 2, compliance, (0.9 * APART * 1e4, 0.0))
     for ratio in (1.1 * APART, 1 / (1.1 * APART)):
-        assert not gear.believable(robot, 2, compliance, (ratio * 1e4, 0.0))
+        assert not gear.is_plausible(robot, 2, compliance, (ratio * 1e4, 0.0))

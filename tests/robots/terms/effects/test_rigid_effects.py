@@ -69,9 +69,9 @@ def test_a_tilt_may_leave_more_on_an_axis_along_gravity(random_robot):
     across = np.cross(down, np.eye(3)[int(np.argmin(np.abs(down)))])
     lying = replace(robot, chain=replace(robot.chain, gravity=tuple(9.81 * across / np.linalg.norm(across))))
     tilt = EFFECTS["base_tilt"]
-    assert [tilt.leaves(upright, j) for j in range(3)] == [0.5, 0.08, 0.08]
-    assert tilt.leaves(upright, 0, (1.0, 0.0)) == 0.08  # its own moments are told
-    assert tilt.leaves(lying, 0) == EFFECTS["spring"].leaves(upright, 0) == 0.08
+    assert [tilt.leakage(upright, j) for j in range(3)] == [0.5, 0.08, 0.08]
+    assert tilt.leakage(upright, 0, (1.0, 0.0)) == 0.08  # its own moments are told
+    assert tilt.leakage(lying, 0) == EFFECTS["spring"].leakage(upright, 0) == 0.08
 
 
 def test_a_tilted_base_turns_gravity(now, twin):
@@ -229,7 +229,7 @@ def test_a_gear_of_known_compliance_has_a_resonance(now, seen, twin):
 def test_a_delay_of_less_than_friction_tells_is_none(random_robot, name, joint):
     """A fiftieth of a sample is how a sign is drawn between two rows; .5 ms is a delay, 50 ms no drive's."""
     robot = random_robot(2, 3)
-    believed = [EFFECTS[name].believable(robot, joint, np.array([delay])) for delay in (8e-5, 5e-4, 0.05)]
+    believed = [EFFECTS[name].is_plausible(robot, joint, np.array([delay])) for delay in (8e-5, 5e-4, 0.05)]
     assert believed == [False, True, False]
 
 
@@ -238,5 +238,5 @@ def test_a_delay_that_reversals_and_all_else_tell_otherwise_is_none(random_robot
     """A filter may be a little other for a step than for a ramp; one that stops where it must is two things."""
     robot, effect, shape = random_robot(2, 3), EFFECTS[name], (0.01,)
     low, high = effect.ranges(robot, joint, shape)[0]
-    believed = [effect.believable(robot, joint, np.array([lag]), shape) for lag in (low, 0.008, 0.01, 0.013, high)]
+    believed = [effect.is_plausible(robot, joint, np.array([lag]), shape) for lag in (low, 0.008, 0.01, 0.013, high)]
     assert believed == [False, True, True, True, False]

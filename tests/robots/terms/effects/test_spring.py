@@ -70,4 +70,4 @@ def test_the_ends_of_a_spring_do_not_meet_where_the_joint_passes(random_robot, r
     """On a joint that turns a radian each way: at an angle there, or a turn from it; beyond its stops they may."""
     robot = random_robot(2, 2)
     robot = replace(robot, limits=replace(robot.limits, lower=np.full(2, -1.0), upper=np.full(2, 1.0)))
-    assert SPRING.believable(robot, 1, np.array([400.0, -300.0, 0.0, 900.0]), (ratio, angle)) is believed
+    assert SPRING.is_plausible(robot, 1, np.array([400.0, -300.0, 0.0, 900.0]), (ratio, angle)) is believed

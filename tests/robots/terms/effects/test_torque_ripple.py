@@ -165,7 +165,10 @@ def test_the_sentence_tells_what_grows_with_the_load():
     """A motor's constant that ripples does so by a share of its torque: that is no small ripple."""
     for share, what in ((0.0, "load"), (1.0, "motor torque")):
         told = RIPPLE.describe(3, np.array([0.003, 0.004, 0.03, -0.04]), (12.0, 0.0, share))
-        assert told == f"The torque of joint 3 ripples by 0.005 N m and 5 % of its {what} up and down, 12 times a turn."
+        assert (
+            told
+            == f"The torque of joint 3 ripples with an amplitude of 0.005 N m and 5 % of its {what}, 12 times per turn."
+        )
 
 
 def test_a_motors_constant_ripples_by_all_of_its_torque(seen):

@@ -16,7 +16,7 @@ from robots.signals import Log
 from robots.terms.discrepancies.patterns import Pattern, is_of_time
 from robots.terms.discrepancies.session_friction import SESSIONS, SessionFriction
 from robots.terms.effects import Situation
-from robots.terms.situations.situation import joined
+from robots.terms.situations.joining import join_situations
 
 DAY = 86400.0
 
@@ -28,7 +28,7 @@ def _later(seen: Situation, by: float) -> Situation:
 
 def test_each_session_has_shares_of_its_own(swept: Situation) -> None:
     """Friction of each joint in the second and in the third, none in the first; a short pause begins none."""
-    days = joined([_later(swept, by) for by in (0.0, 30.0, DAY, 2 * DAY)])
+    days = join_situations([_later(swept, by) for by in (0.0, 30.0, DAY, 2 * DAY)])
     rows, n = len(swept), 6
     X = SessionFriction().columns(days, None).reshape(4 * rows, n, SESSIONS - 1, n)
     assert not X[: 2 * rows].any()
@@ -38,8 +38,8 @@ def test_each_session_has_shares_of_its_own(swept: Situation) -> None:
         np.testing.assert_allclose(np.einsum("tjj->tj", part), swept.q + 2.0)
         assert not part[:, ~np.eye(n, dtype=bool)].any()
     assert len(SessionFriction().grid(days, None)) == 1
-    assert SessionFriction().grid(joined([swept, _later(swept, 30.0)]), None) == ()
-    many = joined([_later(swept, k * DAY) for k in range(9)])
+    assert SessionFriction().grid(join_situations([swept, _later(swept, 30.0)]), None) == ()
+    many = join_situations([_later(swept, k * DAY) for k in range(9)])
     assert SessionFriction().columns(many, None).any(axis=(0, 1)).sum() == (SESSIONS - 1) * n
 
 
@@ -49,7 +49,7 @@ def test_logs_whose_pauses_nobody_noted_may_be_of_several_days(swept: Situation)
     for start in rng.uniform(0.0, 1e4, 50):
         log = Log(t=swept.t + start, q=swept.q, tau=swept.q)
         first, second = on_one_clock([log, log])
-        pair = joined([replace(swept, t=np.asarray(part.t), _cache={}) for part in (first, second)])
+        pair = join_situations([replace(swept, t=np.asarray(part.t), _cache={}) for part in (first, second)])
         assert SessionFriction().grid(pair, None) == ((),)
 
 
@@ -77,6 +77,6 @@ def test_it_is_found_by_its_name_and_its_phases_do_not_last_for_days(swept: Situ
     """A model file names it; a vibration is looked for with as many frequencies as the recorded time asks for."""
     assert isinstance(find_effect(SessionFriction.name), SessionFriction)
     assert is_of_time(SessionFriction())
-    days = joined([swept, _later(swept, DAY)])
+    days = join_situations([swept, _later(swept, DAY)])
     for kind in ("sway", "vibration"):
         assert len(Pattern(kind).grid(days, 1)) < 3 * max(len(Pattern(kind).grid(swept, 1)), 20)

@@ -33,7 +33,7 @@ def residual_shares(problem: Problem) -> Array:
         if cycle is None or cycle.count < FEWEST:
             continue
         # Where friction turns round, what is left is the doubt of when: it would repeat, but it is no effect.
-        own = (problem.remainder[run] * ~recording.unsure[run])[cycle.start : cycle.stop]
+        own = (problem.base_residual[run] * ~recording.sign_unknown[run])[cycle.start : cycle.stop]
         period = cycle.period / recording.step
         mean = period_mean(own, period, cycle.count)
         differences = period_differences(own, period, cycle.count)

@@ -108,4 +108,4 @@ def test_it_is_told_in_words_and_read_from_its_name(robot: Robot) -> None:
     assert units[-1] == ("own_2", "rad")
     assert "0.29 deg per 1000 N m" in effect.describe(None, np.array([5e-6, 1e-6, 0.0, 0.3, 0.2]))
     # No base leans against its load.
-    assert "leans" not in effect.describe(None, np.array([-5e-6, 1e-6, 0.0, 0.3, 0.2]))
+    assert "under the robot's weight" not in effect.describe(None, np.array([-5e-6, 1e-6, 0.0, 0.3, 0.2]))

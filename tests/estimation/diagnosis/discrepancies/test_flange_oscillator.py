@@ -16,7 +16,7 @@ from robots.robot import Robot
 from robots.terms.discrepancies.flange_oscillator import FlangeOscillator
 from robots.terms.discrepancies.resonance import DAMPING
 from robots.terms.effects import Situation, situation
-from robots.terms.situations.situation import joined
+from robots.terms.situations.joining import join_situations
 from tests.estimation.diagnosis.pinocchio_chains import chain_of
 
 PERIOD = 0.004
@@ -173,7 +173,7 @@ def test_each_log_begins_at_rest_under_its_own_gravity(robot: Robot) -> None:
     t = PERIOD * np.arange(500)
     one, wedge = _state(robot, t), replace(robot, chain=replace(robot.chain, gravity=np.array([0.0, -6.0, -7.5])))
     two = _state(wedge, t + 100.0)
-    X = FlangeOscillator().columns(joined([one, two]), None, (1.5,))
+    X = FlangeOscillator().columns(join_situations([one, two]), None, (1.5,))
     for run, alone in ((slice(0, 500), one), (slice(500, 1000), two)):
         assert X[run] == pytest.approx(FlangeOscillator().columns(alone, None, (1.5,)), abs=1e-9)
     both = FlangeOscillator().columns(_state(robot, np.concatenate([t, t + 100.0]), (0, 500)), None, (1.5,))
