@@ -108,6 +108,10 @@ class Robot:
             i = int(np.argmin(valid))
             raise InputError(f"{self.name}: {quantity} is {getattr(self, quantity)[i]}", joint=i + 1, allowed=allowed)
 
+    def __repr__(self) -> str:
+        known = "known" if self.has_inertia else "unknown"
+        return f"Robot({self.name!r}, {self.n} joints, period {1e3 * self.period:g} ms, nominal dynamics {known})"
+
     @property
     def n(self) -> int:
         """Number of moving joints."""

@@ -48,6 +48,13 @@ class _Samples:
         # A default pickle would return writable arrays.
         return _rebuild, (type(self), {item.name: getattr(self, item.name) for item in fields(self)})
 
+    def __repr__(self) -> str:
+        name = f"{self.name!r}, " if getattr(self, "name", "") else ""
+        signals = ("q", "dq", "ddq", "tau", "current", "temperature")
+        held = [key for key in signals if getattr(self, key, None) is not None]
+        span = f"{self.t[0]:.6g} to {self.t[-1]:.6g} s"
+        return f"{type(self).__name__}({name}{len(self)} samples, {self.n} joints, {span}, {', '.join(held)})"
+
     @property
     def n(self) -> int:
         """The number of joints."""
@@ -64,7 +71,7 @@ class _Samples:
         return uniform_period(self.t)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Motion(_Samples):
     """Positions, velocities and accelerations of n joints at N instants.
 
@@ -134,7 +141,7 @@ class Motion(_Samples):
         return Motion(np.concatenate(times), *parts)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Log(_Samples):
     """What was recorded of a motion of n joints at N instants.
 

@@ -28,7 +28,7 @@ from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.discrepancies.patterns import all_patterns
-from robots.terms.effects import EFFECTS, Effect
+from robots.terms.effects import EFFECTS, Effect, check_effect
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,8 @@ def diagnose(
         logs: one or several, of t, q and tau or current; t is one clock. Logs that overlap count one after the other,
             in the order given. A log that says so carries a known payload, or was recorded under another gravity.
         held_out: logs of other motions to measure the gain on; without, runs or stretches are kept apart.
-        candidates: effects to look for, by name; all by default.
+        candidates: effects to look for, by name or as objects; by default all that are registered. An own effect is
+            registered by being given.
         friction: of the base model: ``polynomial`` or ``coulomb-viscous``.
         false_alarm: chance of finding an effect in logs that have none.
         check: whether each log passes the gate first, which refuses what would be diagnosed wrongly; rows that stick
@@ -80,7 +81,7 @@ def diagnose(
         raise InputError("no logs", allowed="one or more")
     if not 0 < false_alarm < 0.5:
         raise InputError(f"false-alarm probability {false_alarm}", allowed="between 0 and 0.5")
-    effects = _effects(candidates)
+    effects = _effects(robot, candidates)
     bar = progress or SILENT
     bar.start("diagnosing", 1.0)
     try:
@@ -152,16 +153,23 @@ def _log_name(name: str) -> str:
     return f" ({name})" if name else ""
 
 
-def _effects(candidates: Sequence[str | Effect] | None) -> list[Effect]:
+def _effects(robot: Robot, candidates: Sequence[str | Effect] | None) -> list[Effect]:
+    """The effects to look for; own ones are checked and registered, so that all stages find them by name."""
     if candidates is None:
-        return list(EFFECTS.values())
+        return [_checked(effect, robot) for effect in EFFECTS.values()]
     chosen = []
     for candidate in candidates:
         if isinstance(candidate, str):
-            if candidate not in EFFECTS:
-                raise InputError(f"unknown effect {candidate!r}", allowed=", ".join(EFFECTS))
-            candidate = EFFECTS[candidate]
-        chosen.append(candidate)
+            candidate = EFFECTS.get_or_raise(candidate)
+        else:
+            EFFECTS.register(candidate)
+        chosen.append(_checked(candidate, robot))
     if not chosen:
         raise InputError("no effects to look for", allowed="one or more names")
     return chosen
+
+
+def _checked(effect: Effect, robot: Robot) -> Effect:
+    if not type(effect).__module__.startswith("robots."):
+        check_effect(effect, robot)
+    return effect

@@ -90,6 +90,10 @@ class Estimate:
     dropped_rows: int
     gates: tuple[GateReport, ...] = ()
 
+    def __repr__(self) -> str:
+        errors = ", ".join(f"{100 * joint.nrmse:.3g}" for joint in self.joints)
+        return f"Estimate({self.model!r}, held-out error {errors} % of torque)"
+
     @property
     def success(self) -> bool:
         """Whether every joint and every parameter is determined."""

@@ -150,9 +150,14 @@ def find_effect(name: str) -> Effect:
     """
     if name in EFFECTS:
         return EFFECTS[name]
+    EFFECTS.refuse_failed(name)
     pattern = build_pattern(name)
     if pattern is None:
-        raise InputError(f"unknown effect {name!r}", allowed=", ".join(EFFECTS), remedy="use a newer version")
+        raise InputError(
+            f"unknown effect {name!r}",
+            allowed=", ".join(EFFECTS),
+            remedy="register it, install the package that offers it, or use a newer version of robot-oed",
+        )
     return pattern
 
 

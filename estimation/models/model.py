@@ -67,6 +67,11 @@ class Model:
     bearing: ExtraGearLoad | None = None
     since: float | None = None
 
+    def __repr__(self) -> str:
+        found = f"{int(self.determined.sum())} of {len(self.values)} parameters determined"
+        effects = "".join(f", {extension.effect} of joint {extension.joint}" for extension in self.extensions)
+        return f"Model({self.robot.name!r}, {found}{effects})"
+
     @property
     def gravities(self) -> tuple[tuple[float, ...], ...]:
         """Gravities (3,) in the base frame [m/s2] besides the description's, under which the parameters hold too."""

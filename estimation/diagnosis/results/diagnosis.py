@@ -90,6 +90,10 @@ class Diagnosis:
     trace: Trace | None = field(default=None, repr=False)
     simulation: Simulation | None = None
 
+    def __repr__(self) -> str:
+        places = [f"{f.effect} of joint {f.joint}" if f.joint else f.effect for f in self.findings]
+        return f"Diagnosis({self.model.robot.name!r}, {self.verdict}: {', '.join(places) or 'no effect'})"
+
     @property
     def success(self) -> bool:
         """Whether the question is answered: nothing found, or named without a rival left."""

@@ -74,6 +74,11 @@ class Design:
     freedom: Mapping[str, Any] | None = None
     strokes_left_out: tuple[int, ...] = ()
 
+    def __repr__(self) -> str:
+        cond = self.optimised.to_dict()["cond_Y"] if self.qualities else None
+        worth = "not all parameters excited" if cond is None else f"cond(Y) {cond:.4g}"
+        return f"Design({self.robot.name!r}, {self.motion.duration:.1f} s, {self.base.size} parameters, {worth})"
+
     @property
     def optimised(self) -> Quality:
         """The quality of the optimised part."""

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+from robots.common.registry import Registry
 from robots.terms.effect_bases.base import Coefficient, Effect, JointEffect, Shape, Situation
+from robots.terms.effect_bases.check import check_definition, check_effect
 from robots.terms.effect_bases.experiments import EXPERIMENTS
-from robots.terms.effect_bases.static import StaticEffect
+from robots.terms.effect_bases.static import StaticEffect, StaticJointEffect
 from robots.terms.effects.asymmetric_friction import AsymmetricFriction
 from robots.terms.effects.backlash import Backlash
 from robots.terms.effects.base_tilt import BaseTilt
@@ -68,7 +72,20 @@ _ALL: tuple[Effect, ...] = (
     TorqueConstantHeat(),
     LoadHeat(),
 )
-EFFECTS: dict[str, Effect] = {effect.name: effect for effect in _ALL}
+
+
+def _instance(effect: Any) -> Effect:
+    made: Effect = effect() if isinstance(effect, type) else effect
+    return made
+
+
+EFFECTS: Registry[Effect] = Registry(
+    "effect",
+    "robot_oed.effects",
+    _ALL,
+    check=check_definition,
+    adapt=_instance,
+)
 
 __all__ = [
     "EFFECTS",
@@ -79,5 +96,7 @@ __all__ = [
     "Shape",
     "Situation",
     "StaticEffect",
+    "StaticJointEffect",
+    "check_effect",
     "situation",
 ]
