@@ -178,7 +178,7 @@ def test_interrupt(tmp_path: Path) -> None:
     running.send_signal(signal.SIGINT)
     _, said = running.communicate(timeout=60)
     assert running.returncode == 130
-    assert said == "oed: interrupted; the best design so far was written\n"
+    assert said == "oed: interrupted; the best design found so far was written\n"
     assert Design.load(tmp_path / "out").interrupted
 
 
