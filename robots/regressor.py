@@ -46,15 +46,16 @@ class TorqueModel:
     def columns(self) -> tuple[Column, ...]:
         """The p parameters, in the order of the regressor's columns."""
         columns = tuple(column for term in self.terms for column in term.columns(self.robot))
-        names = [column.name for column in columns]
+        known: set[str] = set()
         for column in columns:
             if not column.unit:
                 raise InputError(f"the parameter {column.name} of the term {column.term!r} has no unit")
-            if names.count(column.name) > 1:
+            if column.name in known:
                 raise InputError(
                     f"the term {column.term!r} has a parameter {column.name}, which exists already",
                     remedy="give its symbol another name",
                 )
+            known.add(column.name)
         return columns
 
     @property

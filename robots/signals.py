@@ -49,7 +49,8 @@ class _Samples:
         return _rebuild, (type(self), {item.name: getattr(self, item.name) for item in fields(self)})
 
     def __repr__(self) -> str:
-        name = f"{self.name!r}, " if getattr(self, "name", "") else ""
+        own = getattr(self, "name", "")
+        name = f"{own!r}, " if own else ""
         signals = ("q", "dq", "ddq", "tau", "current", "temperature")
         held = [key for key in signals if getattr(self, key, None) is not None]
         span = f"{self.t[0]:.6g} to {self.t[-1]:.6g} s"

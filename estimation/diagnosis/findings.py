@@ -45,7 +45,7 @@ class Parameter:
         unit = "" if self.unit in ("", "1") else f" {self.unit}"
         if high <= low:
             return f"{self.name} = {self.value:.3g}{unit}"
-        # As many digits as tell the ends of a narrow interval apart.
+        # As many digits as distinguish the ends of a narrow interval.
         digits = max(3, 1 + math.ceil(math.log10(max(abs(low), abs(high)) / (high - low))))
         return f"{self.name} ({low:.{digits}g} to {high:.{digits}g}{unit})"
 
@@ -63,7 +63,7 @@ class Parameter:
 
 @dataclass(frozen=True, kw_only=True)
 class Gain:
-    """What an effect brings on unseen data, averaged over the joints on which it shows.
+    """Held-out gain of an effect, averaged over the joints on which it acts.
 
     Attributes:
         nrmse_before: residual RMS over torque RMS without it.
@@ -178,7 +178,7 @@ def read_finding(item: dict[str, Any]) -> Finding:
     )
 
 
-def list_parameters(told: Sequence[str]) -> str:
+def list_parameters(texts: Sequence[str]) -> str:
     """Lists parameters, no more than a line holds: a force at a place of a body has twelve."""
-    left = len(told) - MOST_LISTED
-    return ", ".join(told if left <= 1 else [*told[:MOST_LISTED], f"and {left} more in diagnosis.json"])
+    left = len(texts) - MOST_LISTED
+    return ", ".join(texts if left <= 1 else [*texts[:MOST_LISTED], f"and {left} more in diagnosis.json"])

@@ -1,4 +1,4 @@
-"""The verb: finds what a robot's model gets wrong, names the cause, extends the model, measures the gain."""
+"""The diagnosis: finds model errors, names their causes, extends the model and validates it on held-out data."""
 
 from __future__ import annotations
 
@@ -48,24 +48,24 @@ def diagnose(
 ) -> Diagnosis:
     """Finds what rigid body, friction, rotors and offsets do not explain in a robot's logs.
 
-    Positions become noise-free motion (harmonics where it repeats, a low-pass chosen by its spectrum elsewhere); the
-    torque noise is estimated with its colour; every effect of the catalogue at every joint is scored beside the base
-    model, against what noise alone would have made of the strongest; shapes are refined, and rivals tried, before the
-    next effect is sought. What no effect explains is told as such.
+    Positions are smoothed: by harmonics where the motion repeats, else by a low-pass chosen from the spectrum. The
+    spectrum of the torque noise is estimated. Every effect of the catalogue is scored at every joint, jointly with the
+    base model, against the null distribution of the maximum. Shapes are refined and rivals tried before the next
+    effect is searched. A significant residual that no effect explains is reported as unexplained.
 
     Args:
         robot: the robot.
         logs: one or several, of t, q and tau or current; t is one clock. Logs that overlap count one after the other,
             in the order given. A log that says so carries a known payload, or was recorded under another gravity.
-        held_out: logs of other motions to measure the gain on; without, runs or stretches are kept apart.
+        held_out: logs of other motions for validation; without them, logs or stretches are left out in turn.
         candidates: effects to look for, by name or as objects; by default all that are registered. An own effect is
             registered by being given.
         friction: of the base model: ``polynomial`` or ``coulomb-viscous``.
         false_alarm: chance of finding an effect in logs that have none.
-        check: whether each log passes the gate first, which refuses what would be diagnosed wrongly; rows that stick
-            out of their neighbours are filled in, and logs are cut at gaps.
+        check: whether each log passes the gate first, which rejects unusable logs. Outlier rows are then interpolated,
+            and logs are cut at gaps.
         seed: of the noise that is drawn.
-        progress: is told how far it is.
+        progress: receives the progress.
 
     Returns:
         The diagnosis.
@@ -90,21 +90,21 @@ def diagnose(
         found: list[str] = []
         if check:
             bar.update(0.0, "checking the logs")
-            (data, told_of_logs), (other, told_of_others) = (
+            (data, log_notes), (other, held_out_notes) = (
                 _repaired(robot, data, "Log"),
                 _repaired(robot, other, "Held out"),
             )
-            found = [*told_of_logs, *told_of_others]
+            found = [*log_notes, *held_out_notes]
         recording = subtract_known_payload(robot, build_recording(robot, data))
         if not (np.ptp(recording.q, axis=0) > 0).any():
             raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
-        # Unseen logs count too: what only they show is told by the description at least.
+        # Held-out logs count too: gravities that only they have need the description as prior.
         gravities = [log.gravity for log in (*data, *other) if log.gravity is not None]
         base = base_parameters(robot, friction, (0.001,) * robot.n, gravities)
-        hopeless = find_unusable_logs(base, recording)
-        notes = tuple(_UNUSABLE.format(k + 1, _log_name(recording.names[k]), 100 * s) for k, s in hopeless.items())
-        if hopeless:
-            data = [log for k, log in enumerate(data) if k not in hopeless]
+        unusable = find_unusable_logs(base, recording)
+        notes = tuple(_UNUSABLE.format(k + 1, _log_name(recording.names[k]), 100 * s) for k, s in unusable.items())
+        if unusable:
+            data = [log for k, log in enumerate(data) if k not in unusable]
             recording = subtract_known_payload(robot, build_recording(robot, data))
         searched = search(base, recording, effects, false_alarm, seed, bar)
         problem, selection, entries = searched.problem, searched.selection, searched.entries
@@ -119,7 +119,7 @@ def diagnose(
         bar.update(0.93, "validation on held-out data")
         del patterns
         give_back()
-        told = DiagnosisInputs(
+        inputs = DiagnosisInputs(
             problem=problem,
             selection=selection,
             verdict=judgement,
@@ -132,7 +132,7 @@ def diagnose(
             seed=seed,
             notes=(*on_clock.notes, *found, *notes),
         )
-        return assemble(robot, told)
+        return assemble(robot, inputs)
     finally:
         bar.finish()
 
@@ -144,7 +144,7 @@ _UNUSABLE = (
 
 
 def _repaired(robot: Robot, logs: Sequence[Log], kind: str) -> tuple[list[Log], list[str]]:
-    """The stretches of logs that can be used, and what is to be told of them."""
+    """Gives the usable stretches of logs, and notes about them."""
     several = [repair_log(robot, log, f"{kind} {k}{_log_name(log.name)}") for k, log in enumerate(logs, start=1)]
     return [part for one in several for part in one.logs], [note for one in several for note in one.notes]
 

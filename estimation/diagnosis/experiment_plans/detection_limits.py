@@ -188,8 +188,8 @@ def _limit(
 
 def _certain_share(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> float:
     """Gives the share of an effect's energy that counts, where joints tell it by reversals."""
-    told = per_joint_evidence(problem, hypothesis, shape, accept(problem, ()))
-    return float(np.sum(told.certain_share * told.gram) / np.sum(told.gram)) if told.gram.any() else 1.0
+    evidence = per_joint_evidence(problem, hypothesis, shape, accept(problem, ()))
+    return float(np.sum(evidence.certain_share * evidence.gram) / np.sum(evidence.gram)) if evidence.gram.any() else 1.0
 
 
 def _toughest(

@@ -1,4 +1,4 @@
-"""From numbers to a diagnosis: the extended model, its gain on unseen data, findings in words."""
+"""Builds the result: fits the extended model, validates it on held-out data, and words the findings."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ SHOWN = 4000  # rows of the curves kept for pictures
 
 @dataclass(frozen=True, eq=False)
 class DiagnosisInputs:
-    """All that a diagnosis is made of."""
+    """Inputs of the final step of a diagnosis."""
 
     problem: Problem
     selection: Selection
@@ -75,30 +75,30 @@ class DiagnosisInputs:
     notes: tuple[str, ...] = ()
 
 
-def assemble(robot: Robot, told: DiagnosisInputs) -> Diagnosis:
-    """Fits the extended model, measures it on unseen data, and puts the findings into words."""
-    problem = told.problem
-    judgement = replace(told.verdict, named=complete_effects(problem, told.verdict.named))
+def assemble(robot: Robot, inputs: DiagnosisInputs) -> Diagnosis:
+    """Fits the extended model, validates it on held-out data, and words the findings."""
+    problem = inputs.problem
+    judged = replace(inputs.verdict, named=complete_effects(problem, inputs.verdict.named))
     held = validate_on_held_out(
-        judgement,
-        lambda members, gone: measure_held_out(robot, problem, members, told.held_out, told.seed + 3, gone),
-        partial(_is_beyond, told),
+        judged,
+        lambda members, absent: measure_held_out(robot, problem, members, inputs.held_out, inputs.seed + 3, absent),
+        partial(_is_beyond, inputs),
         partial(equivalent_shapes, problem),
         lambda member: member.local_bic_gain(problem.rows),
-        partial(_unnamed, robot, told),
+        partial(_unnamed, robot, inputs),
     )
-    members, founds, seen = held.effects, held.findings, held.measured
-    twisted = _compliances(told, seen)
-    # Where nothing else is left, a name that unseen data refuted shows at least where something is unexplained.
-    spoiling = held.rejected_discrepancies or (() if members or twisted else held.refuted)
-    verdict = judgement.verdict
-    if len(members) > len(founds) or spoiling:
+    members, selected, seen = held.effects, held.findings, held.measured
+    compliances = _compliances(inputs, seen)
+    # If no finding is left, an effect rejected by held-out data still shows where the residual is unexplained.
+    rejected_functions = held.rejected_discrepancies or (() if members or compliances else held.refuted)
+    verdict = judged.verdict
+    if len(members) > len(selected) or rejected_functions:
         verdict = "unexplained"
     elif held.notes:
-        # Something did stand out of the noise clearly, if a name that did does not hold.
-        verdict = "ambiguous" if any(map(has_close_rivals, founds)) else "named"
+        # The residual was significant even if the held-out data rejected its name.
+        verdict = "ambiguous" if any(map(has_close_rivals, selected)) else "named"
         verdict = verdict if members else "unexplained" if held.refuted else "none"
-    fitted = fit_extended(problem, members, _provenance(told))
+    fitted = fit_extended(problem, members, _provenance(inputs))
     findings = tuple(
         word_finding(
             robot,
@@ -107,32 +107,32 @@ def assemble(robot: Robot, told: DiagnosisInputs) -> Diagnosis:
             fitted,
             i,
             held.p_values[i],
-            founds[i] if i < len(founds) else None,
+            selected[i] if i < len(selected) else None,
             seen.gains[i],
         )
         for i, member in enumerate(members)
     )
     order = sorted(range(len(findings)), key=lambda i: -findings[i].delta_bic)
     findings = tuple(findings[i] for i in order)
-    if spoiling:
-        fit = fit_extended(problem, [*members, *(member for member, _, _ in spoiling)], {})
+    if rejected_functions:
+        fit = fit_extended(problem, [*members, *(member for member, _, _ in rejected_functions)], {})
         findings += tuple(
             no_part(word_finding(robot, problem, member, fit, i, p_value, None, gain))
-            for i, (member, p_value, gain) in enumerate(spoiling, start=len(members))
+            for i, (member, p_value, gain) in enumerate(rejected_functions, start=len(members))
         )
     unseen, apart = seen.errors, findings[len(members) :]
-    if twisted and not members and not spoiling:
+    if compliances and not members and not rejected_functions:
         verdict = "named"
-    findings += tuple(windup.finding for windup in twisted)
+    findings += tuple(windup.finding for windup in compliances)
     known = {extension.joint for extension in fitted.model.extensions if extension.effect == ELASTICITY}
-    added = [windup.extension for windup in twisted if windup.extension.joint not in known]
-    simulation = simulate_held_out(problem, members, seen, bool(told.held_out)) if members else None
+    added = [windup.extension for windup in compliances if windup.extension.joint not in known]
+    simulation = simulate_held_out(problem, members, seen, bool(inputs.held_out)) if members else None
     lost = (_LOST,) if members and simulation is None else ()
     timed = [member for member in members if member.group.by_reversals]
     whole = replace(fitted.model, extensions=(*fitted.model.extensions, *added))
-    whole = with_best_sign_sharpness(with_best_cutoff(whole, problem, told.logs), told.logs)
-    model = with_band(whole, told.logs, told.held_out, unseen)
-    # Of a joint that rests in all of them unseen data say nothing: that is no error of zero.
+    whole = with_best_sign_sharpness(with_best_cutoff(whole, problem, inputs.logs), inputs.logs)
+    model = with_band(whole, inputs.logs, inputs.held_out, unseen)
+    # A joint that rests in all held-out data has no error: NaN, not zero.
     shown = unseen.counts.any(axis=0)
     before, after = (np.where(shown, unseen.nrmse(model), np.nan) for model in (0, len(unseen.errors) - 1))
     return Diagnosis(
@@ -140,54 +140,54 @@ def assemble(robot: Robot, told: DiagnosisInputs) -> Diagnosis:
         findings=findings,
         baseline=before,
         extended=after,
-        explained=judgement.explained,
-        excess=told.excess,
-        limits=told.limits,
-        next_experiment=_next(problem, founds) if verdict == "ambiguous" else None,
+        explained=judged.explained,
+        excess=inputs.excess,
+        limits=inputs.limits,
+        next_experiment=_next(problem, selected) if verdict == "ambiguous" else None,
         model=model,
         how_unseen=unseen.how,
         notes=_each_once(
-            *told.notes,
-            *notes_of(problem, told.false_alarm, findings, apart, after, [m.hypothesis.name for m in timed]),
+            *inputs.notes,
+            *notes_of(problem, inputs.false_alarm, findings, apart, after, [m.hypothesis.name for m in timed]),
             *worse_joints(before, after),
             *turning_joints(all_row_errors(model), after, unseen.counts),
             *faster_joints(problem, seen),
             *farther_joints(problem, seen, findings),
             *held.notes,
-            *beside_larger(told.selection.strongest_unaccepted, members),
+            *beside_larger(inputs.selection.strongest_unaccepted, members),
             *lost,
         ),
-        trace=_trace(unseen, [seen.coordinates[i] for i in order], twisted),
+        trace=_trace(unseen, [seen.coordinates[i] for i in order], compliances),
         simulation=simulation,
     )
 
 
 def _each_once(*notes: str) -> tuple[str, ...]:
-    """Several functions of one joint are told in the same words."""
+    """Removes duplicates: several functions of one joint have the same note."""
     return tuple(dict.fromkeys(notes))
 
 
-def _is_beyond(told: DiagnosisInputs, effect: Effect) -> bool:
-    """Whether unseen logs say nothing of an effect that belongs to the logs of the fit: a contact, a drift.
+def _is_beyond(inputs: DiagnosisInputs, effect: Effect) -> bool:
+    """Whether held-out logs cannot test an effect because it belongs to the fitted logs: a contact, a drift.
 
-    Where it is not known when they were recorded, they say nothing of what comes with time.
+    If the recording times are unknown, they cannot test time-dependent effects either.
     """
-    if any(f.effect.hypothesis.effect is effect and f.effect.group.by_reversals for f in told.selection.found):
+    if any(f.effect.hypothesis.effect is effect and f.effect.group.by_reversals for f in inputs.selection.found):
         return True
-    if not told.held_out:
+    if not inputs.held_out:
         return False
-    return effect.transient or (not told.dated and effect.depends_on == "time")
+    return effect.transient or (not inputs.dated and effect.depends_on == "time")
 
 
 def _unnamed(
-    robot: Robot, told: DiagnosisInputs, member: FittedEffect, beside: Sequence[FittedEffect]
+    robot: Robot, inputs: DiagnosisInputs, member: FittedEffect, beside: Sequence[FittedEffect]
 ) -> tuple[FittedEffect, float] | None:
-    """Finds a free function on the joint of a name that unseen data refuted, or on all where it was the robot's."""
+    """Finds a free function on the joint of a rejected effect, or on all joints for an effect of the whole robot."""
     own = member.hypothesis.joint
     wanted = [h for h in all_hypotheses(robot, list(all_patterns(robot))) if own is None or h.joint == own]
-    entries = measure(told.problem, wanted)
-    rng = np.random.default_rng(told.seed + 4)
-    return strongest_pattern(told.problem, entries, beside, told.false_alarm, rng)
+    entries = measure(inputs.problem, wanted)
+    rng = np.random.default_rng(inputs.seed + 4)
+    return strongest_pattern(inputs.problem, entries, beside, inputs.false_alarm, rng)
 
 
 _LOST = (
@@ -195,21 +195,23 @@ _LOST = (
 )
 
 
-def _compliances(told: DiagnosisInputs, seen: HeldOutResult) -> tuple[MeasuredCompliance, ...]:
-    """Gears whose wind-up was logged; on held-out logs their gain is measured where those have it too."""
-    if all(log.qlink is None for log in told.logs):
+def _compliances(inputs: DiagnosisInputs, seen: HeldOutResult) -> tuple[MeasuredCompliance, ...]:
+    """Measures gears with logged wind-up; their gain is measured on held-out logs that have link positions too."""
+    if all(log.qlink is None for log in inputs.logs):
         return ()
-    now, unseen = told.problem.situation, None
-    if any(log.qlink is not None for log in told.held_out):
+    now, unseen = inputs.problem.situation, None
+    if any(log.qlink is not None for log in inputs.held_out):
         other = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
-        there = build_situation(other, now.model, told.problem.parameters_without_payload)
-        unseen = (there, other, told.held_out)
-    return measure_gear_compliance(now, told.problem.recording, told.logs, false_alarm=told.false_alarm, unseen=unseen)
+        there = build_situation(other, now.model, inputs.problem.parameters_without_payload)
+        unseen = (there, other, inputs.held_out)
+    return measure_gear_compliance(
+        now, inputs.problem.recording, inputs.logs, false_alarm=inputs.false_alarm, unseen=unseen
+    )
 
 
-def _next(problem: Problem, founds: Sequence[SelectedEffect]) -> NextExperiment | None:
-    """Plans the experiment that tells the causes that are left apart."""
-    for found in founds:
+def _next(problem: Problem, selected: Sequence[SelectedEffect]) -> NextExperiment | None:
+    """Plans the experiment that distinguishes the remaining causes."""
+    for found in selected:
         close = [rival for rival, worse in found.rivals if worse < CLOSE_RIVAL_BIC]
         if close:
             return plan_next(problem, [found.effect, *close])
@@ -227,17 +229,17 @@ def _trace(unseen: HeldOutErrors, seen_as: Sequence[Array], windups: Sequence[Me
     return Trace(unseen.t[rows], unseen.measured[rows], before[rows], after[rows], coordinates, curves)
 
 
-def _provenance(told: DiagnosisInputs) -> dict[str, object]:
-    problem = told.problem
+def _provenance(inputs: DiagnosisInputs) -> dict[str, object]:
+    problem = inputs.problem
     torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
     return {
-        "logs": describe_logs(told.logs),
+        "logs": describe_logs(inputs.logs),
         "method": "diagnosis",
         "tool_version": VERSION,
         "cutoff_hz": float(max(problem.recording.cutoff, *(band.cutoff for band in problem.whitening.bands))),
         "velocity_scales": [float(v) for v in problem.situation.velocity_scale],
-        "seed": told.seed,
-        "false_alarm": told.false_alarm,
+        "seed": inputs.seed,
+        "false_alarm": inputs.false_alarm,
         "residual_rms": np.sqrt(np.mean(problem.base_residual**2, axis=0)).tolist(),
         "torque_rms": torque.tolist(),
         "gravities": [list(gravity) for gravity in problem.baseline.base.gravities],

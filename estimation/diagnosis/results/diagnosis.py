@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.experiment_plans.detection_limits import Limit, summarise_limits
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
 from estimation.diagnosis.findings import Finding, list_parameters, read_finding
+from estimation.diagnosis.results.verdict_text import format_p_value, state_verdict
 from estimation.diagnosis.validations.prediction_settings import all_row_errors
 from estimation.diagnosis.validations.simulation_result import Simulation, read_simulation
 from estimation.models.model import Model, load_model
@@ -61,19 +61,19 @@ class Diagnosis:
     Attributes:
         verdict: ``none``, ``named``, ``ambiguous`` or ``unexplained``.
         findings: the strongest first.
-        baseline: NRMSE of the base model per joint (n,), on data that the fit has not seen.
+        baseline: NRMSE of the base model per joint (n,), on held-out data.
         extended: NRMSE of the extended model there.
-        explained: share of the excess over noise that the named effects explain; 1 where nothing is left.
+        explained: share of the residual above noise that the named effects explain; 1 if nothing is left.
         excess: per joint the shares (n, 3) of the base model's squared residual that are noise, that repeat with the
             motion, and that change with time; NaN where the motion does not repeat.
-        limits: what the logs could have shown.
+        limits: detection limits per effect and joint.
         next_experiment: what to measure next; None where nothing is open.
         model: the extended model.
-        how_unseen: how the unseen data were kept apart.
+        how_unseen: how the held-out data were separated.
         notes: what a reader must know.
         trace: curves for pictures; None once loaded from a file.
-        simulation: the motion of a stretch of unseen data, simulated without and with what was found; None where
-            nothing was.
+        simulation: forward simulation of a stretch of held-out data, without and with the findings; None without
+            findings.
     """
 
     verdict: str
@@ -101,7 +101,7 @@ class Diagnosis:
 
     @property
     def every_row(self) -> Array:
-        """NRMSE (n,) of the extended model on unseen data as `predict` has it; NaN where it is not known.
+        """NRMSE (n,) of the extended model on all held-out rows, as in `predict`; NaN where unknown.
 
         `baseline` and `extended` leave out rows in which a joint's direction of motion is not known.
         """
@@ -110,13 +110,13 @@ class Diagnosis:
     def summary(self) -> str:
         """States the findings, their gain on held-out data, and what is still unknown."""
         robot = self.model.robot
-        lines = [f"{robot.name}: {_headline(self.verdict, self.findings)}"]
+        lines = [f"{robot.name}: {state_verdict(self.verdict, self.findings)}"]
         if self.verdict == "none" and (seen := summarise_limits(self.limits)):
             lines.append(f"  {seen[0].lower()}{seen[1:]}")
         for finding in self.findings:
             where = f"joint {finding.joint}" if finding.joint else "whole robot"
             gain = finding.gain
-            lines.append(f"  {finding.effect} ({where}), p {_p(finding.p_value)}: {finding.sentence}")
+            lines.append(f"  {finding.effect} ({where}), p {format_p_value(finding.p_value)}: {finding.sentence}")
             of = "wind-up" if finding.measured_by else "torque"
             before, after = (f"{100 * value:.3g}" for value in (gain.nrmse_before, gain.nrmse_after))
             decrease = " to ".join(f"{100 * value:.3g}" for value in gain.ci95)
@@ -286,34 +286,3 @@ def _next(item: dict[str, Any]) -> NextExperiment:
         times=int(item.get("times", 1)),
         logged=str(item.get("logged", "")),
     )
-
-
-def _headline(verdict: str, findings: Sequence[Finding]) -> str:
-    """States the verdict in one line, with the causes that have a name."""
-    joints: dict[str, list[int]] = {}
-    for finding in findings:
-        if finding.effect != "unexplained":
-            joints.setdefault(finding.effect, []).extend([finding.joint] if finding.joint else [])
-    known = ", ".join(name + _at_joints(sorted(places)) for name, places in sorted(joints.items()))
-    count = f"{len(joints)} known cause{'s' if len(joints) > 1 else ''} found: {known}" if known else ""
-    if verdict == "named" and known:
-        return count
-    return _VERDICTS[verdict] + (f"; {count}" if known else "")
-
-
-def _at_joints(joints: Sequence[int]) -> str:
-    if not joints:
-        return " (whole robot)"
-    return f" (joint{'s' if len(joints) > 1 else ''} {', '.join(map(str, joints))})"
-
-
-_VERDICTS = {
-    "none": "no significant effect found; base model and noise explain the residual",
-    "named": "a known cause was found",
-    "ambiguous": "several known causes explain the residual about equally well",
-    "unexplained": "part of the residual is significant, and no effect of the catalogue explains it",
-}
-
-
-def _p(value: float) -> str:
-    return f"{value:.3f}" if value >= 0.001 else "< 0.001"

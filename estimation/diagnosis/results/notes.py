@@ -1,4 +1,4 @@
-"""What a person must know besides: joints that rest or err, values not told, what unseen data do not bear out."""
+"""Notes of a diagnosis: joints at rest, large held-out errors, undetermined values, findings without support."""
 
 from __future__ import annotations
 
@@ -20,16 +20,15 @@ from robots.terms.effects.current_clipping import CERTAIN, CurrentClipping
 
 Array = NDArray[np.float64]
 
-# Error on unseen data that is worth a word: so many times that of the fit and more than this share of the torque, or
-# more than the second share, whatever the fit's.
+# A held-out error is reported above STRANGE times the fit error and FAR of the torque, or above ODD of the torque.
 STRANGE, FAR, ODD = 1.5, 0.035, 0.2
-# Unseen speeds beyond the fitted ones by this factor are worth one, too.
+# Held-out speeds above this factor of the fitted speeds are reported.
 FASTER = 1.3
-# So are positions beyond the fitted ones by this share of their range, for this share of the time.
+# So are positions outside the fitted range by this share of it, for this share of the time.
 FARTHER, PLACED = 0.05, ("spring", "unexplained")
-# So is a joint on which the extended model errs by so many times what the base model does, and so much more.
+# So is a joint whose NRMSE grows with the extended model by this factor and by this difference.
 WORSE, LITTLE = 1.1, 0.001
-# So is a joint that errs so many times as much in all rows as in those that count, where this share or more does not.
+# So is a joint whose error in all rows is MUCH_MORE times that of the counted rows, if SEVERAL of them do not count.
 MUCH_MORE, SEVERAL = 2.0, 0.01
 CLIPPING = CurrentClipping()
 
@@ -48,15 +47,15 @@ def notes_of(
     after: Array,
     timed: Sequence[str] = (),
 ) -> tuple[str, ...]:
-    """Says what the logs and the findings leave open.
+    """Lists what the logs and the findings leave open.
 
     Args:
         problem: the logs.
         false_alarm: chance of one.
         findings: all of them.
-        apart: those that are no part of the extended model.
-        after: error of that model over torque RMS on unseen data (n,).
-        timed: effects that reversals tell whose rows do not count.
+        apart: those that the extended model does not contain.
+        after: NRMSE of that model on held-out data (n,).
+        timed: effects identified from reversals, whose rows do not count.
     """
     recording, robot = problem.recording, problem.situation.robot
     notes = []
@@ -65,8 +64,8 @@ def notes_of(
         names = ", ".join(map(str, still))
         whose = f"Joints {names} hardly moved: their" if len(still) > 1 else f"Joint {names} hardly moved: its"
         notes.append(f"{whose} friction, gear and rotor effects cannot be detected. Gravity and coupling torques can.")
-    told_of = {finding.joint for finding in findings if finding.effect == CLIPPING.name}
-    for j in sorted({*range(1, recording.n + 1)} - told_of):
+    clipped_joints = {finding.joint for finding in findings if finding.effect == CLIPPING.name}
+    for j in sorted({*range(1, recording.n + 1)} - clipped_joints):
         if CLIPPING.chance(problem.state_for(CLIPPING), j, recording.tau) < CERTAIN:
             notes.append(_AT_LIMIT.format(j, float(np.abs(recording.tau[:, j - 1]).max()), force_unit(robot, j - 1)))
     strange = _strange(problem, after)
@@ -86,7 +85,7 @@ def notes_of(
                 f"{finding.effect}: {recording.duration:.0f} s of logs do not determine {parameter.name}. The value "
                 f"{parameter.value:.3g} s is one of many that fit."
             )
-        # What is no part of the model says so itself.
+        # Findings outside the model have their own sentence.
         if finding.effect in timed:
             notes.append(_TIMED.format(finding.effect))
         elif finding.gain.ci95[0] <= 0 and finding not in apart:
@@ -118,7 +117,7 @@ _AGAINST = (
 
 
 def unsure_gain(finding: Finding) -> str:
-    """Says that the interval of a gain begins below zero, and what else is open of a name."""
+    """States that a held-out gain is not significant, and whether any parameter is determined."""
     named = finding.effect != "unexplained"
     what = finding.effect if named else "the unexplained residual"
     where = f"{what} of joint {finding.joint}" if finding.joint else what
@@ -127,7 +126,7 @@ def unsure_gain(finding: Finding) -> str:
 
 
 def _strange(problem: Problem, after: Array) -> dict[int, str]:
-    """Says where the model predicts logs far worse than it fits them: there is more in them than was found."""
+    """Lists joints whose held-out error is far larger than the fit error."""
     counts = ~problem.recording.sign_unknown
     number = np.maximum(counts.sum(axis=0), 1)
     torque = np.sqrt((problem.recording.tau**2 * counts).sum(axis=0) / number)
@@ -143,9 +142,9 @@ _STRANGE = (
 
 
 def worse_joints(before: Array, after: Array) -> list[str]:
-    """Says on which joints the extended model errs more on unseen data than the base model does, by their NRMSE (n,).
+    """Lists joints whose held-out NRMSE (n,) is larger with the extended model than with the base model.
 
-    What helps on one joint moves base parameters of others.
+    An effect on one joint can change the base parameters of others.
     """
     worse = np.flatnonzero(after > np.maximum(WORSE * before, before + LITTLE))
     if not len(worse):
@@ -155,7 +154,7 @@ def worse_joints(before: Array, after: Array) -> list[str]:
 
 
 def turning_joints(every: Array, after: Array, counts: NDArray[np.bool_]) -> list[str]:
-    """Says on which joints rows that do not count make the model's error far larger, and why no model has less there.
+    """Lists joints whose error is dominated by rows with unknown friction sign, which do not count otherwise.
 
     Args:
         every: its NRMSE with every row counted (n,).
@@ -178,7 +177,7 @@ _TURNING = (
 
 
 def faster_joints(problem: Problem, seen: HeldOutResult) -> list[str]:
-    """Says which joints are faster on unseen data than their friction's polynomial was fitted for."""
+    """Lists joints that are faster in the held-out data than in the data of the friction polynomial."""
     if seen.whole is problem.recording or not any(column.symbol == "f4" for column in problem.baseline.base.columns):
         return []
     unseen = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
@@ -190,7 +189,7 @@ def faster_joints(problem: Problem, seen: HeldOutResult) -> list[str]:
 
 
 def farther_joints(problem: Problem, seen: HeldOutResult, findings: Sequence[Finding]) -> list[str]:
-    """Says where unseen data go beyond the positions by which a function of a joint's position was fitted."""
+    """Lists joints with position-dependent findings that the held-out data extrapolate."""
     if seen.whole is problem.recording:
         return []
     unseen = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
@@ -217,7 +216,7 @@ _FASTER = (
 
 
 def beside_larger(slight: FittedEffect | None, members: Sequence[FittedEffect]) -> tuple[str, ...]:
-    """Says what stood out beside what was found, but is as small as formulas may leave of that."""
+    """Reports a significant candidate that the formula error of a finding can explain."""
     if slight is None:
         return ()
     told = [(slight.gain_on([j]) / m.gain_on([j]), m, j) for m in members for j in slight.group.joints if _acts(m, j)]

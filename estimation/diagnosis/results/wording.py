@@ -1,4 +1,4 @@
-"""A fitted effect as a finding: its parameters with intervals, its rivals, its gain, and what it means in words."""
+"""Turns a fitted effect into a finding: parameters with intervals, rivals, gain and a sentence."""
 
 from __future__ import annotations
 
@@ -19,10 +19,9 @@ from robots.terms.discrepancies.patterns import PREFIX
 from robots.terms.effect_bases.base import Coefficient, Effect, Shape
 from robots.terms.effects import EFFECTS
 
-# A parameter that an effect is not linear in is determined where its interval reaches no farther than this share of it;
-# a moment, so many seconds.
+# A nonlinear parameter is determined if the half-width of its interval is at most WITHIN of its value (a time: MOMENT).
 WITHIN, MOMENT = 0.2, 0.2
-# Share of an effect's largest coefficient that is none.
+# Share of an effect's largest coefficient that counts as zero.
 NOTHING = 1e-6
 
 
@@ -46,7 +45,7 @@ def word_finding(
         i: its place there.
         p_value: of the effect.
         found: with its rivals; None for a free function.
-        gain: on unseen data.
+        gain: on held-out data.
     """
     extension, known = fitted.model.extensions[i], fitted.effects[i]
     hypothesis = member.hypothesis
@@ -79,7 +78,7 @@ def word_finding(
 
 
 def _when(sentence: str, parameters: Sequence[Parameter]) -> str:
-    """Says between which times a change came where it is not known better, and at least when something pushed."""
+    """Replaces an uncertain change time by its interval, and an uncertain push by its minimum duration."""
     for own in parameters:
         if own.name == "change_time" and not own.determined and np.isfinite(own.ci95).all():
             between = f"between t = {own.ci95[0]:.1f} and {own.ci95[1]:.1f} s"
@@ -125,14 +124,14 @@ def _parameters(
         if not own.name or k in unused or (isinstance(own, Shape) and own.is_left(value)):
             continue
         if isinstance(own, Coefficient) and abs(value) <= largest and not np.isfinite(error):
-            # A column that is none in these logs, such as a knot of a short drift.
+            # A column that is zero in these logs, such as a knot of a short drift.
             continue
         interval = (value - 1.96 * error, value + 1.96 * error)
         if isinstance(own, Shape) and own.scale == "log" and np.isfinite(error) and value > 0:
             factor = float(np.exp(1.96 * error / value))
             interval = (value / factor, value * factor)
         rough = isinstance(own, Shape) and (_roughly(own, value, interval) or _stopped(own, value))
-        # No machine has what lies beyond, whatever the data leave open.
+        # Values outside these bounds are physically impossible.
         interval = (min(max(interval[0], own.lower), value), max(min(interval[1], own.upper), value))
         result.append(
             Parameter(
@@ -149,7 +148,7 @@ def _parameters(
 
 
 def _stopped(shape: Shape, value: float) -> bool:
-    """Whether a size is the least or the largest that machines have: what the data would have beyond is not known."""
+    """Whether a size is at its bound, so that the data may favour a value beyond it."""
     return shape.scale == "log" and value != shape.default and bool(np.isclose(value, [shape.lower, shape.upper]).any())
 
 
@@ -158,7 +157,7 @@ def _opened(parameter: Parameter) -> Parameter:
 
 
 def _perhaps_unused(effect: Effect, shape: tuple[float, ...], intervals: Mapping[str, tuple[float, float]]) -> set[str]:
-    """Names shape parameters that mean nothing at a value that another may have: levers perhaps none have no angle."""
+    """Names shape parameters without meaning if another may have its default: an angle of a lever of zero length."""
     names: set[str] = set()
     for k, own in enumerate(effect.shapes):
         if own.default is None or own.name not in intervals:
@@ -171,7 +170,7 @@ def _perhaps_unused(effect: Effect, shape: tuple[float, ...], intervals: Mapping
 
 
 def _roughly(shape: Shape, value: float, interval: tuple[float, float]) -> bool:
-    """Whether a value is known but roughly; of a place, such as a dead centre, that may have either sign, never."""
+    """Whether an interval is too wide for a determined value; never for positions, which may have either sign."""
     half = 0.5 * (interval[1] - interval[0])
     if not np.isfinite(half):
         return False

@@ -250,15 +250,20 @@ def _extension(now: Situation, joint: int, compliance: float, error: float) -> E
 def _sentence(joint: int, parameters: Sequence[Parameter], force: str, length: str) -> str:
     compliance, motion, delay = parameters
     low, high = compliance.ci95
-    span = f"{1 / high:.3g} to {1 / low:.3g}" if low > 0 else f"above {1 / high:.3g}"
+    span = f"{_three(1 / high)} to {_three(1 / low)}" if low > 0 else f"above {_three(1 / high)}"
     text = (
         f"The gear of joint {joint} winds up under load, as measured by its two encoders: stiffness "
-        f"{1 / compliance.value:.3g} ({span}) {force}/{length}"
+        f"{_three(1 / compliance.value)} ({span}) {force}/{length}"
     )
     if motion.determined:
         text += f", lost motion {abs(motion.value):.2g} {length} at reversals"
     text += "."
     if delay.determined:
         which = "later" if delay.value > 0 else "earlier"
-        text += f" The link encoder is logged {1e3 * abs(delay.value):.2g} ms {which} than the motor encoder."
+        text += f" The link encoder is logged {1e3 * abs(delay.value):.2f} ms {which} than the motor encoder."
     return text
+
+
+def _three(value: float) -> str:
+    """Rounds to three significant digits, without an exponent for usual stiffnesses."""
+    return f"{float(f'{value:.3g}'):.9g}"

@@ -1,4 +1,4 @@
-"""What members of the extended model bring on data that no fit has seen: logs kept apart, or parts left out in turn."""
+"""Held-out errors and gains of effects, from separate logs or by cross-validation."""
 
 from __future__ import annotations
 
@@ -32,30 +32,30 @@ from robots.terms.effects import Situation
 Array = NDArray[np.float64]
 
 SHORTEST_UNSEEN = 1.0  # [s] of held-out logs
-# A joint tells an effect of another, or of its own, by this share of the gain and more.
+# A joint counts for the gain of an effect from this share of the total gain on.
 TELLING = 0.1
-# An effect lives in one log that holds more than this share of its energy.
+# An effect acts in one log only if that log has more than this share of its energy.
 ALONE = 0.9
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOutResult:
-    """Errors on unseen data.
+    """Errors and gains on held-out data.
 
     Attributes:
         errors: of all models.
-        gains: what each member brings there.
-        rmse_ratio: by what factor each member changes the error of all joints that it acts on.
-        contradicts: whether unseen rows speak against each member.
-        cv_retained_gain: share of what each member does to the error of the fit that is left there.
-        support: share of each member's gain by which unseen rows speak for it (`Unseen.growth`).
-        coordinates: on which each member shows there (M,).
-        whole: the unseen data, after the logs of the fit where heat may last from them.
-        first_held_out_row: row of `whole` at which the unseen data begin.
+        gains: held-out gain of each member.
+        rmse_ratio: error with over error without each member, on all joints that it acts on.
+        contradicts: whether held-out rows contradict each member.
+        cv_retained_gain: share of the error reduction of each member in the fit that remains on held-out data.
+        support: chi2 by which held-out rows support each member, over its gain in the fit.
+        coordinates: coordinate of each member on the held-out data (M,).
+        whole: the held-out data, preceded by the logs of the fit if their heat may last.
+        first_held_out_row: row of `whole` at which the held-out data begin.
         effects: columns (N, n, k) of each member on the data of the fit.
-        torque: of all members together on the unseen data (M, n).
+        torque: of all members together on the held-out data (M, n).
         prior: on base model, nuisance and members, of all fits.
-        absent: members that came with a change, and that the unseen data are taken to be without.
+        absent: indices of members that are taken to be absent from the held-out data.
     """
 
     errors: HeldOutErrors
@@ -87,9 +87,9 @@ def measure_held_out(
         robot: the robot.
         problem: the data of the fit.
         members: what was found.
-        held_out: logs that the fit has not seen; none to leave parts out in turn.
-        seed: of the intervals.
-        gone: members that held-out logs are taken to be without.
+        held_out: logs not used in the fit; none for cross-validation.
+        seed: of the intervals' resampling.
+        gone: indices of members that are absent from the held-out logs.
     """
     effects = tuple(dense(problem, member.hypothesis, member.shape) for member in members)
     rng = np.random.default_rng(seed)
@@ -125,7 +125,7 @@ def measure_held_out(
 
 
 def _left_out(problem: Problem, effects: Sequence[Array], pull: GaussianPrior) -> HeldOutErrors:
-    """Leaves out logs in turn; parts of logs where an effect lives in one log alone, which no other log could tell."""
+    """Leaves out logs in turn, or parts of logs if an effect acts in one log only."""
     recording = problem.recording
     why = found_in_one_log_only(recording, effects)
     if len(recording.runs) == 1 or not why:
@@ -141,7 +141,7 @@ _WITHIN = (
 
 
 def found_in_one_log_only(recording: Recording, effects: Sequence[Array]) -> str:
-    """Says what is told by one of several logs alone; nothing where all is told by others too."""
+    """States what acts in one of several logs only; empty if nothing does."""
     for X in effects:
         energies = np.array([float(np.sum(X[run] ** 2)) for run in recording.runs])
         if energies.max() > ALONE * energies.sum():
@@ -160,7 +160,7 @@ def split_runs(recording: Recording) -> list[slice]:
 
 
 def _gain(unseen: HeldOutErrors, i: int, member: FittedEffect, rng: np.random.Generator) -> Gain:
-    """The fall of the error by one member, over the joints on which it is told."""
+    """Gives the error reduction by one member, over the joints on which it acts."""
     joints = _joints(member)
     last = len(unseen.errors) - 1
     low, high = unseen.interval(i + 1, last, joints, rng)
@@ -173,15 +173,15 @@ def _gain(unseen: HeldOutErrors, i: int, member: FittedEffect, rng: np.random.Ge
 
 
 def _joints(member: FittedEffect) -> list[int]:
-    """The joints, counted from 0, on which a member's gain is told.
+    """Lists the joints, counted from 0, over which a member's gain is averaged.
 
-    What is wrong with one joint may show on others above all: an encoder's zero on those that gravity pulls beyond it.
+    An error of one joint may act mainly on others: an encoder offset on the joints that carry the gravity load.
     """
     if member.hypothesis.joint is None:
         return list(member.group.joints)
     gains = {j: member.gain_on([j]) for j in member.group.joints}
-    told = [j for j, gain in gains.items() if gain > TELLING * sum(gains.values())]
-    return told or [member.hypothesis.joint - 1]
+    shown = [j for j, gain in gains.items() if gain > TELLING * sum(gains.values())]
+    return shown or [member.hypothesis.joint - 1]
 
 
 def _rise(unseen: HeldOutErrors, i: int, member: FittedEffect) -> float:
@@ -205,7 +205,7 @@ def _on_logs(
         robot, build_recording(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN, travel=travel)
     )
     other = other.with_trusted(recording.trusted)
-    # One clock: where the unseen logs come later, the heat of the ones before is still there.
+    # One clock: later held-out logs start with the heat of the logs before.
     later = bool(other.t[0] > recording.t[-1])
     whole = join_recordings(recording, other) if later else other
     first = len(recording) if later else 0

@@ -1,4 +1,4 @@
-"""Which of the names that were found unseen data bear out: others are left out, or give way to a rival that is."""
+"""Validates findings on held-out data: unsupported ones are rejected or replaced by a rival that is supported."""
 
 from __future__ import annotations
 
@@ -18,39 +18,35 @@ from estimation.diagnosis.validations.verdict import Verdict
 from robots.terms.discrepancies.patterns import PREFIX, is_of_time, is_oscillation
 from robots.terms.effects import Effect
 
-MIN_RETAINED_GAIN = 0.2  # share of an effect's gain that stretches left out must show
-OSCILLATION_P_VALUE = 1e-5  # chance from which on a swing of which unseen data cannot say is taken for noise
+MIN_RETAINED_GAIN = 0.2  # minimum share of an effect's gain that remains in cross-validation
+OSCILLATION_P_VALUE = 1e-5  # p-value above which an oscillation counts as noise if held-out data cannot test it
 MINOR_SHARE, MINOR_BIC_GAIN = (
     0.1,
     50.0,
-)  # share of the strongest name's worth, and BIC, below which another hardly stands out
-CONTRADICTION_SHARE = 0.1  # share of an effect's gain by which unseen data must speak against it
-MAX_RMSE_RATIO = 1.05  # times the unseen error: an effect that makes it so much larger is left out, sure or not
-REJECT_RMSE_RATIO = (
-    1.2  # the same, whatever unseen rows say of it: where they go beyond what was fitted, its formula does not hold
-)
-MAX_FREE_RMSE_RATIO = (
-    1.02  # times the base model's unseen error of a joint, by which free functions together are no model of it
-)
+)  # an effect is minor below this share of the strongest BIC gain, and below this BIC gain
+CONTRADICTION_SHARE = 0.1  # share of an effect's gain by which held-out data must contradict it
+MAX_RMSE_RATIO = 1.05  # held-out error ratio above which an effect is rejected, significant or not
+REJECT_RMSE_RATIO = 1.2  # the same despite support by held-out rows: the formula does not hold in extrapolation
+MAX_FREE_RMSE_RATIO = 1.02  # held-out error ratio of a joint above which its free functions are rejected together
 MIN_SUPPORT, MIN_SUPPORT_CHI2 = (
     0.4,
     30.0,
-)  # share and size of the growth by which unseen rows speak for an effect, whatever the error
+)  # relative and absolute chi2 growth by which held-out rows support an effect, whatever the error
 
 
 @dataclass(frozen=True, eq=False)
 class ValidatedFindings:
-    """What is left of what was found.
+    """Findings after validation.
 
     Attributes:
-        findings: names that hold.
-        effects: theirs, and free functions after them.
-        p_values: of the members.
-        measured: what the members bring on unseen data.
-        rejected_discrepancies: free functions that err on unseen data, with p-value and gain.
-        notes: what was left out, in words.
-        refuted: names that stood out clearly and that unseen data speak against, with p-value and gain: they are no
-            cause, but there is one.
+        findings: accepted named effects.
+        effects: their fits, followed by free functions.
+        p_values: of the effects.
+        measured: held-out results of the effects.
+        rejected_discrepancies: free functions rejected by held-out data, with p-value and gain.
+        notes: rejected and replaced effects, in words.
+        refuted: significant named effects that held-out data contradict, with p-value and gain. The residual they
+            explained is still significant.
     """
 
     findings: tuple[SelectedEffect, ...]
@@ -70,80 +66,80 @@ def validate_on_held_out(
     worth: Callable[[FittedEffect], float],
     unnamed: Callable[[FittedEffect, Sequence[FittedEffect]], tuple[FittedEffect, float] | None],
 ) -> ValidatedFindings:
-    """Leaves out what makes unseen errors larger, one after the other, the surest first.
+    """Rejects effects that increase the held-out error, one after the other, the most certain first.
 
-    However well it fits, it is no cause: a few rows at the end of a log. Where another form of it that fits about as
-    well is borne out, or a rival, that takes its place; else what it was for is told as unexplained.
+    An equivalent shape or a close rival that the held-out data support replaces a rejected effect. Otherwise its
+    residual is reported as unexplained.
 
     Args:
-        judgement: what was found.
-        measure: measures members on unseen data, which are without some of them, by their place.
-        beyond: tells of which effects those data can say nothing.
-        forms: lists other forms of one of some members, the likeliest first.
-        worth: how clearly a name stands out of the noise, by its BIC. Of one that hardly does, or hardly beside a far
-            stronger one, whose formula may leave as much, unseen data that do not speak for it are the odds against it.
-        unnamed: finds a free function of what a name that is left out was for, beside other members; with its p-value.
+        judgement: the findings.
+        measure: measures members on held-out data; the second argument holds indices of members absent there.
+        beyond: whether held-out data cannot test an effect.
+        forms: lists equivalent shapes of one of the members, the most likely first.
+        worth: BIC gain of an effect. A minor effect needs support by held-out data.
+        unnamed: finds a free function for the residual of a rejected effect, jointly with other members; with its
+            p-value.
     """
-    founds = list(judgement.named)
-    members = [*(found.effect for found in founds), *judgement.patterns]
-    p_values = [*(found.p_value for found in founds), *judgement.p_values]
-    spoiling: list[tuple[FittedEffect, float, Gain]] = []
+    selected = list(judgement.named)
+    members = [*(found.effect for found in selected), *judgement.patterns]
+    p_values = [*(found.p_value for found in selected), *judgement.p_values]
+    rejected_functions: list[tuple[FittedEffect, float, Gain]] = []
     notes: list[str] = []
     refuted: list[tuple[FittedEffect, float, Gain]] = []
-    gone: set[Hypothesis] = set()
-    cooled: set[Hypothesis] = set()
+    absent: set[Hypothesis] = set()
+    cooling_explains: set[Hypothesis] = set()
 
-    def look(members: Sequence[FittedEffect]) -> HeldOutResult:
-        return measure(members, frozenset(i for i, member in enumerate(members) if member.hypothesis in gone))
+    def measure_members(members: Sequence[FittedEffect]) -> HeldOutResult:
+        return measure(members, frozenset(i for i, member in enumerate(members) if member.hypothesis in absent))
 
-    seen = look(members)
-    strongest = max((worth(found.effect) for found in founds), default=0.0)
-    while idle := [i for i in range(len(founds)) if _is_insignificant(seen, i, members[i], beyond, worth, strongest)]:
+    seen = measure_members(members)
+    strongest = max((worth(found.effect) for found in selected), default=0.0)
+    while idle := [i for i in range(len(selected)) if _is_insignificant(seen, i, members[i], beyond, worth, strongest)]:
         notes.append(_FAINT.format(members[idle[0]].hypothesis.label))
-        for items in (founds, members, p_values):
+        for items in (selected, members, p_values):
             items.pop(idle[0])
-        seen = look(members)
+        seen = measure_members(members)
     while harmful := (
-        [i for i, m in enumerate(members) if m.hypothesis not in cooled and _is_harmful(seen, i, m, beyond)]
-        or _harmful_free_functions(seen, members, len(founds))
+        [i for i, m in enumerate(members) if m.hypothesis not in cooling_explains and _is_harmful(seen, i, m, beyond)]
+        or _harmful_free_functions(seen, members, len(selected))
     ):
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         label = members[worst].hypothesis.label
-        if len(members) == 1 > len(founds) and _is_weak(members[0].hypothesis.effect, p_values[0]):
-            # All that stood out, and hardly: unseen data against it are the odds that it is noise.
+        if len(members) == 1 > len(selected) and _is_weak(members[0].hypothesis.effect, p_values[0]):
+            # The only finding is barely significant, and held-out data contradict it: it counts as noise.
             own = members[0].hypothesis.joint
             notes.append(_FAINT.format(f"a free function of {f'joint {own}' if own else _WHOLE}"))
             members.clear()
             p_values.clear()
-        elif worst >= len(founds):
-            # A free function that errs elsewhere is no model; that something is unexplained is as true as before.
-            spoiling.append((members.pop(worst), p_values.pop(worst), seen.gains[worst]))
-        elif (undone := _without_change(members, worst, gone, look)) is not None:
+        elif worst >= len(selected):
+            # A free function that fails on held-out data is no model, but the residual is still unexplained.
+            rejected_functions.append((members.pop(worst), p_values.pop(worst), seen.gains[worst]))
+        elif (undone := _without_change(members, worst, absent, measure_members)) is not None:
             seen = undone
             notes.append(_UNDONE.format(label))
             continue
-        elif instead := _alternative(founds[worst], worst, members, look, beyond, forms):
-            founds[worst], seen = instead
-            members[worst] = founds[worst].effect
+        elif instead := _alternative(selected[worst], worst, members, measure_members, beyond, forms):
+            selected[worst], seen = instead
+            members[worst] = selected[worst].effect
             if members[worst].hypothesis.label != label:
                 notes.append(_REPLACED.format(label, members[worst].hypothesis.label))
             continue
         elif _explained_by_cooling(seen, worst, members[worst]):
-            cooled.add(members[worst].hypothesis)
+            cooling_explains.add(members[worst].hypothesis)
             continue
         else:
-            founds.pop(worst)
-            refused = members.pop(worst)
-            refuted.append((refused, p_values.pop(worst), seen.gains[worst]))
+            selected.pop(worst)
+            rejected = members.pop(worst)
+            refuted.append((rejected, p_values.pop(worst), seen.gains[worst]))
             notes.append(_DROPPED.format(label))
-            if (free := unnamed(refused, members)) is not None:
+            if (free := unnamed(rejected, members)) is not None:
                 members.append(free[0])
                 p_values.append(free[1])
-        seen = look(members)
-    joints = sorted({member.hypothesis.joint or 0 for member, _, _ in spoiling})
+        seen = measure_members(members)
+    joints = sorted({member.hypothesis.joint or 0 for member, _, _ in rejected_functions})
     notes += [_SPOILING.format(f"joint {joint}" if joint else _WHOLE) for joint in joints]
     return ValidatedFindings(
-        tuple(founds), tuple(members), tuple(p_values), seen, tuple(spoiling), tuple(notes), tuple(refuted)
+        tuple(selected), tuple(members), tuple(p_values), seen, tuple(rejected_functions), tuple(notes), tuple(refuted)
     )
 
 
@@ -164,20 +160,20 @@ _SPOILING = (
 def _without_change(
     members: Sequence[FittedEffect],
     place: int,
-    gone: set[Hypothesis],
-    look: Callable[[Sequence[FittedEffect]], HeldOutResult],
+    absent: set[Hypothesis],
+    measure_members: Callable[[Sequence[FittedEffect]], HeldOutResult],
 ) -> HeldOutResult | None:
-    """Measures unseen data that a change is gone from again, such as a payload; None where that is no better."""
+    """Measures held-out data with a change undone, such as a removed payload; None if that is no better."""
     hypothesis = members[place].hypothesis
     effect = hypothesis.effect
     comes = effect.depends_on == "time" and not effect.transient and any(shape.moment for shape in effect.shapes)
-    if hypothesis in gone or not comes:
+    if hypothesis in absent or not comes:
         return None
-    gone.add(hypothesis)
-    seen = look(members)
+    absent.add(hypothesis)
+    seen = measure_members(members)
     if seen.gains[place].ci95[0] > 0:
         return seen
-    gone.remove(hypothesis)
+    absent.remove(hypothesis)
     return None
 
 
@@ -189,9 +185,9 @@ def _alternative(
     beyond: Callable[[Effect], bool],
     forms: Callable[[Sequence[FittedEffect], int], Sequence[FittedEffect]],
 ) -> tuple[SelectedEffect, HeldOutResult] | None:
-    """Finds another form or the closest rival of a name that unseen data bear out, and what all bring with it.
+    """Finds an equivalent shape or close rival that held-out data support, and the results with it.
 
-    Where none is, the same cause may stay in a form that the log does not tell from the first and that does no harm.
+    If there is none, an equivalent shape that does not increase the held-out error is kept.
     """
     harmless: list[tuple[SelectedEffect, HeldOutResult]] = []
     for form in forms(members, place):
@@ -210,9 +206,9 @@ def _alternative(
 
 
 def _harmful_free_functions(seen: HeldOutResult, members: Sequence[FittedEffect], named: int) -> list[int]:
-    """Lists free functions, after the named members, that are not sure to bring anything where all together harm.
+    """Lists free functions without significant gain on joints whose error the free functions increase together.
 
-    Each may bring something beside the others, what those first took away.
+    Each may have a gain given the others, because it compensates their error.
     """
     before, after = seen.errors.nrmse(0), seen.errors.nrmse(-1)
     worse = set((np.flatnonzero(after > MAX_FREE_RMSE_RATIO * before) + 1).tolist())
@@ -221,9 +217,9 @@ def _harmful_free_functions(seen: HeldOutResult, members: Sequence[FittedEffect]
 
 
 def _is_weak(free: Effect, p_value: float) -> bool:
-    """Whether a free function that is alone stands out so little that unseen data against it are the odds against it.
+    """Whether a single free function is so barely significant that contradicting held-out data reject it.
 
-    Of what knows nothing of the motion they can say nothing.
+    Held-out data cannot test functions of time.
     """
     return not is_of_time(free) and p_value > (OSCILLATION_P_VALUE if is_oscillation(free) else SURE)
 
@@ -236,10 +232,10 @@ def _is_insignificant(
     worth: Callable[[FittedEffect], float],
     strongest: float,
 ) -> bool:
-    """Whether a name that hardly stands out brings nothing on unseen data that it should be seen in.
+    """Whether a barely significant effect has no gain on held-out data that can test it.
 
-    One that stands out of the noise, and hardly beside another, may move base parameters to where they err there, and
-    be true: then those data speak for it, or it surely brings something after all.
+    An effect that is minor beside another may be true and still increase the error, because it moves base parameters.
+    Then support or a significant gain keeps it.
     """
     gain = seen.gains[i]
     if beyond(member.hypothesis.effect):
@@ -253,42 +249,41 @@ def _is_insignificant(
 
 
 def _is_harmful(seen: HeldOutResult, i: int, member: FittedEffect, beyond: Callable[[Effect], bool]) -> bool:
-    """Whether unseen errors are surely larger with a member, or larger by so much that it is no gain to have it.
+    """Whether a member increases the held-out error, significantly or by a large factor.
 
-    A cause that acts at all times must also leave on stretches left out some of what it does where it was fitted: of
-    the error or, where a base model that other stretches hardly tell hides that, of what unseen rows say beside it. Of
-    a joint whose base model the logs do not tell nothing can be named.
+    A state-dependent effect must retain part of its gain in cross-validation, in the error or in the support by
+    held-out rows. No effect is accepted on a joint whose base model the logs do not determine.
     """
     effect, joint = member.hypothesis.effect, member.hypothesis.joint
     if beyond(effect):
         return False
     gain, speaks = seen.gains[i], seen.support[i]
-    told = (speaks >= MIN_RETAINED_GAIN and gain.ci95[0] > 0) or (
+    supported = (speaks >= MIN_RETAINED_GAIN and gain.ci95[0] > 0) or (
         speaks >= MIN_SUPPORT and speaks * member.gain > MIN_SUPPORT_CHI2
     )
-    if effect.depends_on == "state" and seen.cv_retained_gain[i] < MIN_RETAINED_GAIN and not told:
+    if effect.depends_on == "state" and seen.cv_retained_gain[i] < MIN_RETAINED_GAIN and not supported:
         return True
     if joint is not None and seen.errors.is_unreliable(joint - 1):
         return True
-    # A free function claims no cause: what it brings elsewhere is all that it is good for.
+    # A free function names no cause: it is kept for its held-out gain only.
     least = gain.ci95[1] if len(seen.gains) == 1 or is_of_time(effect) else gain.nrmse_before - gain.nrmse_after
     idle = effect.name.startswith(PREFIX) and least < 0
-    # By less of its gain than this a base model that errs there, too, makes them speak against a cause.
+    # A smaller contradiction can come from errors of the base model.
     against = seen.contradicts[i] and speaks < -CONTRADICTION_SHARE
-    # Base parameters that it moves may err elsewhere by more than it is, whatever those rows say of it.
+    # Base parameters that it moves may increase the error by more than the effect itself.
     risen = (
         seen.rmse_ratio[i] > MAX_RMSE_RATIO
         if speaks < MIN_RETAINED_GAIN
         else seen.rmse_ratio[i] > REJECT_RMSE_RATIO and gain.ci95[0] <= 0
     )
-    # Heat that was stored before the unseen data, and what a pause left of it, are told by neither.
+    # Neither shows the heat stored before the held-out data, or its decay in a pause.
     return (against and not effect.has_thermal_memory) or idle or risen
 
 
 def _explained_by_cooling(seen: HeldOutResult, i: int, member: FittedEffect) -> bool:
-    """Whether what unseen data have against a member may be but the heat that a pause left of what they do not show.
+    """Whether unknown heat after a pause can explain that held-out data contradict a member.
 
-    One mass stands for gear and housing: how warm a joint is when it moves again it tells worse than how it warmed.
+    One thermal mass stands for gear and housing, so cooling in a pause is predicted worse than warming.
     """
     joint = member.hypothesis.joint
     known = seen.cv_retained_gain[i] >= MIN_RETAINED_GAIN and not (

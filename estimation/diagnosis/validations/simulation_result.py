@@ -1,4 +1,4 @@
-"""What a closed-loop forward simulation with and without the findings says: does the robot move as the real one did?"""
+"""Result of a closed-loop forward simulation, without and with the findings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robots.plants.closed_loop import Loop
 
 Array = NDArray[np.float64]
 
-# Times the torque that the loop adds without what was found, from which on that is worth a word.
+# Ratio of controller corrections with and without findings above which the summary reports a deterioration.
 WORSE = 1.05
 
 
@@ -37,17 +37,16 @@ class Curves:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Simulation:
-    """How well the robot with and without what was found repeats a stretch of unseen data under a position loop.
+    """How well the simulated robot follows a stretch of held-out data, without and with the findings.
 
-    The simulated robot is driven by the measured torque, and a loop holds it to the measured motion. A robot that is
-    simulated as it is makes that motion by itself: what the loop must add is torque that the model gets wrong, and how
-    far it still deviates is the error of the simulated motion.
+    The measured torque drives the simulated robot, and a position loop controls it to the measured motion. The
+    controller correction is therefore the torque error of the model; the remaining deviation is its position error.
 
     Attributes:
         start: of the stretch [s].
         end: of the stretch [s].
-        loop: the loop, which is assumed.
-        torque: RMS over the measured torque's (n,) of what the loop adds, without and with what was found.
+        loop: the assumed position loop.
+        torque: RMS of the controller correction over RMS of the measured torque (n,), without and with findings.
         motion: RMS deviation from the measured position (n,) [rad or m], without and with it.
         note: what a reader must know; empty for nothing.
         curves: for pictures; None once loaded from a file.

@@ -75,7 +75,7 @@ class Fourier(Family):
 
     def regressor_times(self, samples: int) -> Array:
         """Times (M,) [s], half a step off the start."""
-        times: Array = (np.arange(samples) + 0.5) / (samples * self.base_frequency)
+        times: Array = (np.arange(samples, dtype=np.float64) + 0.5) / (samples * self.base_frequency)
         return times
 
     def limit_times(self, samples: int) -> Array:

@@ -112,5 +112,5 @@ def test_limits_say_that_a_push_in_a_rest_is_not_seen(arm: Robot, arm_log: Calla
     stopped = replace(log, q=log.q[at], tau=log.tau[at], dq=None, ddq=None)
     for logs, rests in ((log, False), (stopped, True)):
         limits = diagnose(arm, logs, candidates=("external_contact", "stribeck"), check=False).limits
-        told = {limit.effect for limit in limits if "stands" in limit.note}
+        told = {limit.effect for limit in limits if "at rest" in limit.note}
         assert told == ({"external_contact"} if rests else set())

@@ -236,7 +236,7 @@ def test_a_free_function_that_errs_is_told_and_no_part_of_the_model() -> None:
     ((member, p_value, gain),) = result.rejected_discrepancies
     assert (member, p_value, gain.ci95) == (FREE, 1e-4, (HARMS.low, HARMS.high))
     (note,) = result.notes
-    assert note.startswith("On joint 3 something is unexplained")
+    assert note.startswith("Part of the residual of joint 3 is unexplained")
 
 
 def test_a_free_function_that_brings_nothing_beside_others_is_no_part_of_the_model() -> None:
@@ -268,7 +268,7 @@ def test_what_errs_on_all_joints_is_told_of_the_whole_robot() -> None:
     """What swings at the flange has no joint to name."""
     result = borne(bench_with(swinging=HARMS), free=[SWING], p_values=[1e-10])
     assert [member for member, _, _ in result.rejected_discrepancies] == [SWING]
-    assert result.notes[0].startswith("On the robot as a whole something is unexplained")
+    assert result.notes[0].startswith("Part of the residual of the whole robot is unexplained")
 
 
 def test_a_passing_effect_is_not_judged_on_other_logs() -> None:
@@ -354,7 +354,7 @@ def test_what_was_undone_before_the_unseen_data_stays() -> None:
     result = borne(bench, SelectedEffect(payload, 1e-9, ()))
     assert result.effects == (payload,)
     (note,) = result.notes
-    assert "undone" in note
+    assert "absent from the held-out data" in note
     bench.without["payload_change"] = IDLE
     assert borne(bench, SelectedEffect(payload, 1e-9, ())).effects == ()
     # A spring does not come and go.
