@@ -44,7 +44,7 @@ def main() -> int:
     robot = load_robot("er3a")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        design = timed("quick design", lambda: oed.design(robot, effort="quick", workers=1))
+        design = timed("quick design", lambda: oed.design(robot, search=oed.SearchOptions(effort="quick", workers=1)))
         planned = timed("plan of 24 cycles, all stages checked", lambda: oed.campaign(robot, design=design))
         timed("stages written", lambda: planned.save(folder))
         loaded = timed("stages read back", lambda: Campaign.load(folder))

@@ -59,8 +59,11 @@ def main() -> int:
         heat=plant_heat(robot, known=True),
     )
     assert plant.heat is not None
-    design = timed("quick design", lambda: oed.design(robot, effort="quick", workers=1))
-    other = timed("another one, for testing", lambda: oed.design(robot, effort="quick", workers=1, seed=5))
+    design = timed("quick design", lambda: oed.design(robot, search=oed.SearchOptions(effort="quick", workers=1)))
+    other = timed(
+        "another one, for testing",
+        lambda: oed.design(robot, search=oed.SearchOptions(effort="quick", workers=1, seed=5)),
+    )
     campaign = timed("plan", lambda: oed.campaign(robot, design=design, programme=Programme(cycles=cycles)))
     logs = timed("played", lambda: list(play(campaign, plant, seed=1)))
     without = timed("fit without heat", lambda: identify(robot, logs).model)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robots.common.lazy import lazy_exports
+from robots.common.lazy import lazy_exports, listed
 
 _EXPORTS = {
     "Diagnosis": "estimation.diagnosis",
@@ -30,6 +30,8 @@ _EXPORTS = {
     "read_log": "estimation.logs",
     "read_logs": "estimation.logs",
     "write_log": "estimation.logs",
+    "__version__": "robots.version",
 }
-__all__ = list(_EXPORTS)
+__all__ = [name for name in _EXPORTS if name != "__version__"]
 __getattr__ = lazy_exports(__name__, _EXPORTS)
+__dir__ = listed(_EXPORTS)

@@ -21,7 +21,6 @@
 
 # %%
 import tempfile
-from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -44,7 +43,11 @@ print("assumed values, without a source:", ", ".join(robot.assumed))
 # friction of six joints.
 
 # %%
-design = oed.design(robot, friction="coulomb-viscous", effort="quick", seed=1)
+design = oed.design(
+    robot,
+    model=oed.ModelOptions(friction="coulomb-viscous"),
+    search=oed.SearchOptions(effort="quick", seed=1),
+)
 print(design.summary())
 design.save(folder)  # trajectory.csv for the controller, design.json for the record
 
@@ -114,7 +117,11 @@ print(f"friction parameters: RMS of error over standard error {np.sqrt(np.mean(s
 # %%
 estimate.save(folder)
 model = load_model(folder)
-other = oed.design(robot, friction="coulomb-viscous", effort=replace(oed.Effort(), islands=1, starts=1, hops=0), seed=2)
+other = oed.design(
+    robot,
+    model=oed.ModelOptions(friction="coulomb-viscous"),
+    search=oed.SearchOptions(effort=oed.Effort(islands=1, starts=1, hops=0), seed=2),
+)
 unseen = simulate(plant, other.motion, seed=5)
 prediction = predict(model, unseen)
 print(prediction.summary())

@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
-from robots.common.lazy import lazy_exports
+from robots.common.lazy import lazy_exports, listed
 
 _EXPORTS = {
+    "BSpline": "oed.trajectories",
     "Campaign": "oed.campaigns",
+    "Criterion": "oed.criteria",
     "Design": "oed.experiments",
     "Effort": "oed.experiments",
+    "Family": "oed.trajectories",
+    "Fourier": "oed.trajectories",
+    "FourierPolynomial": "oed.trajectories",
+    "GeometricLimit": "oed.constraints.geometric",
     "InteriorPoint": "oed.experiments",
     "Ipopt": "oed.experiments",
+    "LimitOptions": "oed.experiments",
+    "ModelOptions": "oed.experiments",
     "ParetoFront": "oed.experiments",
     "Programme": "oed.campaigns",
     "RetimedExperiment": "oed.experiments",
+    "SearchOptions": "oed.experiments",
+    "StateLimit": "oed.constraints",
+    "TrajectoryOptions": "oed.experiments",
+    "WeightOptions": "oed.experiments",
     "campaign": "oed.campaigns",
     "design": "oed.experiments",
     "pareto": "oed.experiments",
     "read_trajectory": "oed.exports",
     "retime": "oed.experiments",
     "write_trajectory": "oed.exports",
+    "__version__": "robots.version",
 }
-__all__ = list(_EXPORTS)
+__all__ = [name for name in _EXPORTS if name != "__version__"]
 __getattr__ = lazy_exports(__name__, _EXPORTS)
+__dir__ = listed(_EXPORTS)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robots.common.lazy import lazy_exports
+from robots.common.lazy import lazy_exports, listed
 
 _EXPORTS = {
     "AssumedValueWarning": "robots.common.errors",
@@ -24,6 +24,8 @@ _EXPORTS = {
     "load_robot": "robots.loading",
     "nominal_plant": "robots.plants",
     "simulate": "robots.plants",
+    "__version__": "robots.version",
 }
-__all__ = list(_EXPORTS)
+__all__ = [name for name in _EXPORTS if name != "__version__"]
 __getattr__ = lazy_exports(__name__, _EXPORTS)
+__dir__ = listed(_EXPORTS)

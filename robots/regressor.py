@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi
@@ -16,8 +16,10 @@ from robots.robot import Robot
 from robots.terms import (
     COULOMB_VISCOUS,
     POLYNOMIAL,
+    TERMS,
     Column,
     FrictionPolynomial,
+    FrictionTerm,
     RigidBody,
     RotorInertia,
     Term,
@@ -43,7 +45,17 @@ class TorqueModel:
     @cached_property
     def columns(self) -> tuple[Column, ...]:
         """The p parameters, in the order of the regressor's columns."""
-        return tuple(column for term in self.terms for column in term.columns(self.robot))
+        columns = tuple(column for term in self.terms for column in term.columns(self.robot))
+        names = [column.name for column in columns]
+        for column in columns:
+            if not column.unit:
+                raise InputError(f"the parameter {column.name} of the term {column.term!r} has no unit")
+            if names.count(column.name) > 1:
+                raise InputError(
+                    f"the term {column.term!r} has a parameter {column.name}, which exists already",
+                    remedy="give its symbol another name",
+                )
+        return columns
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -77,6 +89,10 @@ class TorqueModel:
         n = self.robot.n
         q, dq, ddq = (casadi.SX.sym(name, n) for name in ("q", "dq", "ddq"))
         parts = [term.regressor(self.robot, q, dq, ddq) for term in self.terms]
+        for term, part in zip(self.terms, parts, strict=True):
+            shape = (n, len(term.columns(self.robot)))
+            if part.shape != shape:
+                raise InputError(f"the term {term.name!r} gives columns of shape {part.shape}", allowed=f"{shape}")
         return [q, dq, ddq], casadi.horzcat(*parts)
 
     def symbolic(self, columns: Sequence[int] | None = None) -> casadi.Function:
@@ -171,7 +187,7 @@ class TorqueModel:
 def default_model(
     robot: Robot,
     *,
-    friction: str = "polynomial",
+    friction: str | FrictionTerm = "polynomial",
     velocity_scale: float | tuple[float, ...] = 0.0,
     rotor: bool = True,
     offset: bool = True,
@@ -180,7 +196,8 @@ def default_model(
 
     Args:
         robot: the robot.
-        friction: ``polynomial`` (f1..f4, thesis eq. 35) or ``coulomb-viscous`` (f1, f2).
+        friction: ``polynomial`` (f1..f4, thesis eq. 35), ``coulomb-viscous`` (f1, f2), the name of another friction
+            term, or a term of one's own; its velocity scale is replaced.
         velocity_scale: see `FrictionPolynomial`.
         rotor: with rotor inertia.
         offset: with a torque offset on each joint.
@@ -188,11 +205,30 @@ def default_model(
     Raises:
         InputError: an unknown friction model.
     """
-    if friction not in FRICTIONS:
-        raise InputError(f"friction model {friction!r}", allowed=", ".join(FRICTIONS))
-    terms: list[Term] = [RigidBody(), FrictionPolynomial(FRICTIONS[friction], velocity_scale)]
+    terms: list[Term] = [RigidBody(), friction_term(friction, velocity_scale)]
     if rotor:
         terms.append(RotorInertia())
     if offset:
         terms.append(TorqueOffset())
     return TorqueModel(robot, tuple(terms))
+
+
+def friction_term(choice: str | FrictionTerm, velocity_scale: float | tuple[float, ...] = 0.0) -> FrictionTerm:
+    """Gives the friction term of a name, or the one given, with a velocity scale.
+
+    Raises:
+        InputError: an unknown friction model.
+    """
+    if isinstance(choice, FrictionTerm):
+        return replace(choice, velocity_scale=velocity_scale)
+    if choice in FRICTIONS:
+        return FrictionPolynomial(powers=FRICTIONS[choice], velocity_scale=velocity_scale)
+    own = [name for name in TERMS if name != FrictionPolynomial.name and issubclass(TERMS[name], FrictionTerm)]
+    if choice not in own:
+        TERMS.refuse_failed(choice)
+        if choice not in TERMS:
+            raise InputError(f"friction model {choice!r}", allowed=", ".join([*FRICTIONS, *own]))
+        raise InputError(f"the term {choice!r} is no friction", allowed=", ".join([*FRICTIONS, *own]))
+    kind = TERMS[choice]
+    assert issubclass(kind, FrictionTerm)
+    return kind(velocity_scale=velocity_scale)

@@ -6,3 +6,4 @@ try:
     VERSION = version("robot-oed")
 except PackageNotFoundError:  # run from a source tree that was never installed
     VERSION = "0+unknown"
+__version__ = VERSION

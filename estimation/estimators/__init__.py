@@ -16,24 +16,24 @@ from estimation.estimators.simulated import Loop
 from estimation.estimators.tls import TotalLeastSquares
 from estimation.estimators.wls import WeightedLeastSquares
 from estimation.regressions.regression_data import RegressionData
-from robots.common.errors import InputError
+from robots.common.registry import Registry, subclass_check
 
-ESTIMATORS: dict[str, type[Estimator]] = {
-    kind.name: kind
-    for kind in (
-        WeightedLeastSquares,
-        OrdinaryLeastSquares,
-        Huber,
-        Tukey,
-        TotalLeastSquares,
-        ConstrainedLeastSquares,
-        PhysicallyConsistent,
-        InstrumentalVariables,
-        MaximumLikelihood,
-        DirectAndInverse,
-        RecursiveLeastSquares,
-    )
-}
+_ORDER = (
+    WeightedLeastSquares,
+    OrdinaryLeastSquares,
+    Huber,
+    Tukey,
+    TotalLeastSquares,
+    ConstrainedLeastSquares,
+    PhysicallyConsistent,
+    InstrumentalVariables,
+    MaximumLikelihood,
+    DirectAndInverse,
+    RecursiveLeastSquares,
+)
+ESTIMATORS: Registry[type[Estimator]] = Registry(
+    "method", "robot_oed.estimators", _ORDER, check=subclass_check(Estimator)
+)
 
 
 def estimator(choice: str | Estimator) -> Estimator:
@@ -44,9 +44,7 @@ def estimator(choice: str | Estimator) -> Estimator:
     """
     if isinstance(choice, Estimator):
         return choice
-    if choice not in ESTIMATORS:
-        raise InputError(f"method {choice!r}", allowed=", ".join(ESTIMATORS))
-    return ESTIMATORS[choice]()
+    return ESTIMATORS.get_or_raise(choice)()
 
 
 __all__ = [

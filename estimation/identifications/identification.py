@@ -27,6 +27,7 @@ from robots.common.progress import SILENT, Progress
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log
+from robots.terms import FrictionTerm
 from robots.version import VERSION
 
 Array = NDArray[np.float64]
@@ -51,7 +52,7 @@ def identify(
     logs: Log | Sequence[Log],
     *,
     method: str | Estimator = "wls",
-    friction: str = "polynomial",
+    friction: str | FrictionTerm = "polynomial",
     rotor: bool = True,
     offset: bool = True,
     candidates: Candidates | None = None,

@@ -19,9 +19,9 @@ from oed.campaigns.remarks import campaign_notes
 from oed.campaigns.result import Campaign
 from oed.campaigns.stages import Stage
 from oed.campaigns.timetable import make_timetable
-from oed.experiments import Design, usable_limits
+from oed.experiments import Design, LimitOptions, SearchOptions, usable_limits
 from oed.experiments import design as design_experiment
-from oed.trajectories import Posture
+from oed.trajectories import PiecewisePolynomial
 from robots.collision import collision_model
 from robots.common.errors import InputError
 from robots.common.parallel import one_blas_thread
@@ -99,13 +99,12 @@ def campaign(
         if design is None:
             design = design_experiment(
                 robot,
-                effort="quick",
-                velocity_fraction=velocity_fraction,
-                torque_margin=torque_margin,
-                collision=bodies is not None and bool(bodies.pairs),
-                seed=seed,
-                workers=workers,
-                executor=executor,
+                limits=LimitOptions(
+                    velocity_fraction=velocity_fraction,
+                    torque_margin=torque_margin,
+                    collision=bodies is not None and bool(bodies.pairs),
+                ),
+                search=SearchOptions(effort="quick", seed=seed, workers=workers, executor=executor),
                 progress=progress,
             )
             notes.append("The excitation comes from a quick search. For a better one, run oed design and use --design.")
@@ -162,6 +161,6 @@ def _power_on_stage(plan: Programme, home: Array, period: float) -> Stage:
     return Stage(
         name="power_on",
         kind="power_on",
-        motion=Posture(pose=home, duration=end).motion(period),
+        motion=PiecewisePolynomial.hold(home, end).motion(period),
         segments=({"kind": "power_on", "start": 0.0, "end": end, "joint": None},),
     )

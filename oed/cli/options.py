@@ -47,8 +47,15 @@ WorkersOption = Annotated[
 ]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
 FrictionOption = Annotated[str, typer.Option("--friction", help="Friction model: polynomial or coulomb-viscous.")]
-HarmonicsOption = Annotated[int, typer.Option("--harmonics", help="Number of harmonics of the Fourier series.")]
-BaseFrequencyOption = Annotated[float, typer.Option("--base-frequency", help="Frequency of the first harmonic [Hz].")]
+FamilyOption = Annotated[
+    str, typer.Option("--family", help="Family of the optimised part: fourier, bspline or fourier-polynomial.")
+]
+HarmonicsOption = Annotated[
+    int, typer.Option("--harmonics", help="Number of harmonics; a B-spline gets as many coefficients per joint.")
+]
+BaseFrequencyOption = Annotated[
+    float, typer.Option("--base-frequency", help="Frequency of the first harmonic: one over the period [Hz].")
+]
 CollisionOption = Annotated[
     bool, typer.Option("--collision", help="Avoid self-collisions and the obstacles in the robot file.")
 ]

@@ -13,7 +13,7 @@ from oed.constraints.between_samples import (
 )
 from oed.constraints.kinematic import QUANTITIES, KinematicRows, kinematic_rows
 from oed.constraints.pointwise import PointwiseLimit
-from oed.constraints.spline import hull_matrices, spline_extremes, spline_rows
+from oed.constraints.state import StateLimit, StateLimits
 from oed.constraints.torque import TorqueLimit
 from oed.constraints.torque_rms import TorqueRms
 
@@ -22,18 +22,17 @@ __all__ = [
     "Extremes",
     "KinematicRows",
     "PointwiseLimit",
+    "StateLimit",
+    "StateLimits",
     "TorqueLimit",
     "TorqueRms",
     "TrigonometricPolynomial",
     "certified_extremes",
     "exact_extremes",
-    "hull_matrices",
     "kinematic_rows",
     "overshoot_factor",
     "sampled_bounds",
     "series_extremes",
     "series_polynomials",
-    "spline_extremes",
-    "spline_rows",
     "tightened_bounds",
 ]

@@ -92,22 +92,19 @@ def overshoot_factor(degree: int, samples: int) -> float:
     return float(np.cos(np.pi * degree / samples))
 
 
-def tightened_bounds(lower: ArrayLike, upper: ArrayLike, degree: int, samples: int) -> tuple[Array, Array]:
-    """Shrinks bounds so that a polynomial that keeps them at its samples keeps the given ones always.
-
-    They shrink about their middle by `overshoot_factor`.
+def tightened_bounds(lower: ArrayLike, upper: ArrayLike, share: float) -> tuple[Array, Array]:
+    """Shrinks bounds about their middle so that what keeps them at its samples keeps the given ones always.
 
     Args:
         lower: lower bounds, (n,); -inf where there is none.
         upper: upper bounds, (n,); +inf where there is none.
-        degree: N of the polynomial.
-        samples: M, equidistant over the period.
+        share: of half their distance that is left, such as `overshoot_factor`.
 
     Returns:
         The bounds to impose at the samples, (n,) each.
 
     Raises:
-        InputError: too few samples, or a quantity with only one bound, for which no such bound exists.
+        InputError: a quantity with only one bound, for which no such bound exists.
     """
     low, high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
     lonely = np.isfinite(low) != np.isfinite(high)
@@ -117,10 +114,9 @@ def tightened_bounds(lower: ArrayLike, upper: ArrayLike, degree: int, samples: i
             joint=int(np.argmax(lonely)) + 1,
             allowed="a limit on both sides, or none",
         )
-    factor = overshoot_factor(degree, samples)
     bounded = np.isfinite(low)
     centre = np.where(bounded, (np.where(bounded, low, 0.0) + np.where(bounded, high, 0.0)) / 2.0, 0.0)
-    return centre + factor * (low - centre), centre + factor * (high - centre)
+    return centre + share * (low - centre), centre + share * (high - centre)
 
 
 def sampled_bounds(values: ArrayLike, degree: int) -> tuple[Array, Array]:

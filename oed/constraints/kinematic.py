@@ -1,4 +1,4 @@
-"""The limits of position, velocity, acceleration and jerk as linear rows in the free Fourier coefficients."""
+"""The limits of position, velocity, acceleration and jerk as linear rows in the free coefficients."""
 
 from __future__ import annotations
 
@@ -91,15 +91,15 @@ class KinematicRows:
 
 
 def kinematic_rows(
-    basis: Sequence[Array], limits: Limits, *, degree: int, quantities: Sequence[str] = QUANTITIES
+    basis: Sequence[Array], limits: Limits, *, shares: Sequence[float], quantities: Sequence[str] = QUANTITIES
 ) -> KinematicRows:
     """Writes the kinematic limits as rows that, kept at the samples, hold at all times.
 
     Args:
-        basis: matrices (M, K) from free coefficients to q, dq, ddq, dddq at M equidistant points of one period (the
-            end, which repeats the start, left out).
+        basis: matrices (M, K) from free coefficients to q, dq, ddq, dddq at M evenly spaced times.
         limits: bounds of all joints; infinite ones give no row where no joint has one.
-        degree: number N of harmonics; bounds shrink by cos(pi N / M) (`tightened_bounds`).
+        shares: to which the bounds of q, dq, ddq and dddq shrink, so that they hold between the times, too
+            (`tightened_bounds`).
         quantities: which of `q`, `dq`, `ddq`, `dddq` to limit.
 
     Returns:
@@ -107,7 +107,7 @@ def kinematic_rows(
 
     Raises:
         InfeasibleError: a joint with a limit of zero.
-        InputError: an unknown quantity, or M <= 2N.
+        InputError: an unknown quantity, or a limit on one side only.
     """
     bounds = {
         "q": (limits.lower, limits.upper),
@@ -127,7 +127,7 @@ def kinematic_rows(
         if np.any(high - low <= 0.0):
             joint = int(np.argmax(high - low <= 0.0)) + 1
             raise InfeasibleError(f"the limit of {quantity} leaves no room to move", joint=joint)
-        low, high = tightened_bounds(low, high, degree, samples)
+        low, high = tightened_bounds(low, high, shares[QUANTITIES.index(quantity)])
         if not np.any(np.isfinite(high)):
             continue
         blocks.append(basis[QUANTITIES.index(quantity)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 
 from oed.criteria.base import Criterion
@@ -15,10 +17,14 @@ from oed.criteria.smallest import SmallestSingularValue
 from oed.criteria.trace import Trace
 from oed.criteria.weighting import SCALINGS, Prior, Weighting, nominal_scale, task_transform
 from robots.common.errors import InputError
+from robots.common.registry import Registry, members_of, subclass_check
 
-CRITERIA: dict[str, type[Criterion]] = {
-    kind.name: kind for kind in (Cond, Determinant, Trace, SmallestSingularValue, PredictionVariance, CondDeterminant)
-}
+CRITERIA: Registry[type[Criterion]] = Registry(
+    "criterion",
+    "robot_oed.criteria",
+    members_of(sys.modules[__name__], Criterion),  # type: ignore[type-abstract]
+    check=subclass_check(Criterion),
+)
 
 
 def criterion(choice: str | Criterion) -> Criterion:
@@ -34,7 +40,9 @@ def criterion(choice: str | Criterion) -> Criterion:
     parts: dict[Criterion, float] = {}
     for item in choice.split("+"):
         weight, star, name = item.partition("*")
-        if not star or name.strip() not in CRITERIA or not _is_number(weight):
+        if not star or not _is_number(weight) or name.strip() not in CRITERIA:
+            if "*" not in choice:
+                CRITERIA.refuse_failed(choice)
             blends = "or a sum of weight*criterion such as 0.5*cond+0.5*d"
             raise InputError(f"criterion {choice!r}", allowed=f"{', '.join(CRITERIA)}, {blends}")
         parts[CRITERIA[name.strip()]()] = float(weight)

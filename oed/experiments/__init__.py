@@ -2,6 +2,7 @@
 
 from oed.experiments.checks import usable_limits
 from oed.experiments.designing import design
+from oed.experiments.options import LimitOptions, ModelOptions, SearchOptions, TrajectoryOptions, WeightOptions
 from oed.experiments.pareto import ParetoFront, pareto
 from oed.experiments.quality import Quality
 from oed.experiments.results.outcome import Outcome
@@ -18,13 +19,18 @@ __all__ = [
     "Effort",
     "InteriorPoint",
     "Ipopt",
+    "LimitOptions",
+    "ModelOptions",
     "Outcome",
     "ParetoFront",
     "Quality",
     "RetimedExperiment",
+    "SearchOptions",
     "Slsqp",
     "Solver",
     "TorqueUse",
+    "TrajectoryOptions",
+    "WeightOptions",
     "design",
     "pareto",
     "retime",

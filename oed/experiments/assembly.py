@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from oed.retiming import plan_move
-from oed.trajectories import FourierSeries, PiecewisePolynomial, Segment, Sequence, velocity_reaching_stroke
+from oed.trajectories import PiecewisePolynomial, Segment, Sequence, Trajectory, velocity_reaching_stroke
 from robots.common.errors import InputError
 from robots.limits import Limits
 
@@ -21,35 +21,37 @@ QUINTIC_ACCELERATION = 0.024
 
 
 def assemble(
-    series: FourierSeries,
+    excitation: Trajectory,
     limits: Limits,
     *,
     period: float,
     home: ArrayLike | None = None,
+    kind: str = "fourier",
     strokes: bool | tuple[int, ...] = True,
 ) -> Sequence:
     """Joins the parts of an excitation experiment; the robot rests at both ends.
 
-    Approach from the home pose, the periods of the series, then per joint a stroke there and back that reaches its
+    Approach from the home pose, the optimised part, then per joint a stroke there and back that reaches its
     velocity bound both ways where its range allows (thesis eq. 81 to 83), jerk-limited moves in between, and back home.
 
     Args:
-        series: the excitation; at rest at its ends.
+        excitation: the optimised part; at rest at its ends.
         limits: that all parts keep.
         period: the controller's period [s].
         home: pose (n,) where it begins and ends; by default `Limits.home`.
+        kind: of the optimised part's segment.
         strokes: with the strokes of all joints, of some (counted from 1), or of none.
 
     Returns:
         The experiment.
 
     Raises:
-        InputError: a period of the series that is no multiple of the controller's period, a home pose outside the
+        InputError: a duration of the excitation that is no multiple of the controller's period, a home pose outside the
             limits.
         InfeasibleError: a limit of zero.
     """
     pose = rest_pose(limits, home)
-    parts = [Segment(kind="fourier", trajectory=series)]
+    parts = [Segment(kind=kind, trajectory=excitation)]
     joints = (tuple(range(1, limits.n + 1)) if strokes else ()) if isinstance(strokes, bool) else strokes
     for joint in joints:
         stroke = velocity_reaching_stroke(limits, joint, pose, period=period)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from oed.retiming import finite_limits
-from robots.common.errors import InfeasibleError, InputError
+from robots.common.errors import InfeasibleError
 from robots.limits import Limits
 
 # The controller interpolates between the file's samples; a hair of every limit is left to it.
@@ -16,26 +16,7 @@ RESERVE = 0.9995
 TRAVEL = 0.01
 
 
-def check_options(
-    harmonics: int, base_frequency: float, periods: int, velocity_fraction: float, time_limit: float, seed: int
-) -> None:
-    """Checks the numbers among the options of `oed.design`.
-
-    Raises:
-        InputError: naming the option, its value, and what is allowed.
-    """
-    for name, value, least in (("harmonics", harmonics, 2), ("periods", periods, 1), ("seed", seed, 0)):
-        if value < least or value != int(value):
-            raise InputError(f"{name} is {value}", allowed=f"a whole number, at least {least}")
-    if not (np.isfinite(base_frequency) and base_frequency > 0):
-        raise InputError(f"the base frequency is {base_frequency} Hz", allowed="a positive number")
-    if not 0 < velocity_fraction <= 1:
-        raise InputError(f"the velocity fraction is {velocity_fraction}", allowed="above 0, up to 1")
-    if not time_limit > 0:
-        raise InputError(f"the time limit is {time_limit} s", allowed="a positive number")
-
-
-def check_period(limits: Limits, base_frequency: float) -> None:
+def check_period(limits: Limits, duration: float) -> None:
     """Checks that each joint can move visibly within one period.
 
     A joint that follows x sin(2 pi t / T) reaches the velocity 2 pi x / T, the acceleration (2 pi / T)^2 x and the jerk
@@ -43,7 +24,7 @@ def check_period(limits: Limits, base_frequency: float) -> None:
 
     Args:
         limits: the joint limits.
-        base_frequency: 1 / T [Hz].
+        duration: T [s].
 
     Raises:
         InfeasibleError: a period too short for a joint, with the shortest that would do.
@@ -56,10 +37,10 @@ def check_period(limits: Limits, base_frequency: float) -> None:
             [2 * np.pi * (travel / bound) ** (1 / order) for order, bound in enumerate(bounds, 1)], axis=0
         )
     joint = int(np.argmax(shortest))
-    if np.isfinite(shortest[joint]) and shortest[joint] > 1 / base_frequency:
+    if np.isfinite(shortest[joint]) and shortest[joint] > duration:
         raise InfeasibleError(
             (
-                f"a period of {1 / base_frequency:.4g} s is too short: within its velocity, acceleration and jerk "
+                f"a period of {duration:.4g} s is too short: within its velocity, acceleration and jerk "
                 f"limits the joint covers less than {100 * TRAVEL:g} % of its range"
             ),
             joint=joint + 1,

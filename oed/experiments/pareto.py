@@ -161,7 +161,7 @@ def pareto(
     designs = [
         design(robot, criterion=Blend(dict(zip(chosen, row.tolist(), strict=True))), **options) for row in weights
     ]
-    weighted = [made.qualities[1] if "(" in made.qualities[1].part else made.fourier for made in designs]
+    weighted = [made.qualities[1] if "(" in made.qualities[1].part else made.optimised for made in designs]
     values = np.array([[quality.value(part) for part in chosen] for quality in weighted])
     return ParetoFront(criteria=chosen, weights=weights, designs=tuple(designs), values=values)
 

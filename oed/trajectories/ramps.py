@@ -93,6 +93,33 @@ class Profile:
         return float(self.durations.sum())
 
 
+def used_range(lower: float, upper: float, centre: float, fraction: float, joint: int) -> tuple[float, float]:
+    """The part of a joint's range that a motion uses, about the middle.
+
+    Args:
+        lower: lowest position [rad].
+        upper: highest position [rad].
+        centre: about which a joint without limits on both sides turns [rad].
+        fraction: of the range, above 0 and up to 1.
+        joint: counted from 1, for the error message.
+
+    Returns:
+        Where it starts and where it turns [rad].
+
+    Raises:
+        InputError: a fraction out of range.
+    """
+    if not 0.0 < fraction <= 1.0:
+        raise InputError(f"found {fraction} of the range", joint=joint, allowed="a fraction above 0 and up to 1")
+    if not np.isfinite(upper - lower):
+        half = ENDLESS_RANGE / 2.0
+        # A limit on one side pushes the turn away from it.
+        centre = float(np.clip(centre, lower + half, upper - half))
+        lower, upper = centre - half, centre + half
+    inset = (1.0 - fraction) * (upper - lower) / 2.0
+    return lower + inset, upper - inset
+
+
 def joint_bounds(limits: Limits, joint: int, *, reserve: float = HAIR) -> JointBounds:
     """Takes one joint's limits, a hair inside.
 

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from oed.trajectories.base import Array, Kinematics, Trajectory, count_periods, frozen
-from oed.trajectories.constant_speed import used_range
 from oed.trajectories.polynomial import PiecewisePolynomial
-from oed.trajectories.ramps import Profile, checked_pose, fill, joined, joint_bounds, stroke
+from oed.trajectories.ramps import Profile, checked_pose, fill, joined, joint_bounds, stroke, used_range
 from robots.common.errors import InputError
 from robots.limits import Limits
 

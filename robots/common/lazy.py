@@ -24,3 +24,8 @@ def lazy_exports(package: str, exports: Mapping[str, str]) -> Callable[[str], An
         return getattr(import_module(exports[name]), name)
 
     return load
+
+
+def listed(exports: Mapping[str, str]) -> Callable[[], list[str]]:
+    """Builds a package's ``__dir__``: its public names, whether they were used or not."""
+    return lambda: sorted(exports)

@@ -7,24 +7,21 @@ from dataclasses import fields
 from typing import Any
 
 from robots.common.errors import InputError
+from robots.common.registry import Registry, subclass_check
 from robots.terms.base import Column, Term
-from robots.terms.friction import COULOMB_VISCOUS, POLYNOMIAL, FrictionPolynomial
+from robots.terms.friction import COULOMB_VISCOUS, POLYNOMIAL, FrictionPolynomial, FrictionTerm
 from robots.terms.rigid_body import RigidBody
 from robots.terms.rotor_inertia import RotorInertia
 from robots.terms.torque_offset import TorqueOffset
 
-# Adding an effect is one file, and one line here.
-TERMS: dict[str, type[Term]] = {
-    "rigid_body": RigidBody,
-    "friction": FrictionPolynomial,
-    "rotor_inertia": RotorInertia,
-    "torque_offset": TorqueOffset,
-}
+TERMS: Registry[type[Term]] = Registry(
+    "term", "robot_oed.terms", (RigidBody, FrictionPolynomial, RotorInertia, TorqueOffset), check=subclass_check(Term)
+)
 
 
 def describe_term(term: Term) -> dict[str, Any]:
     """Writes a term as plain data, for a model file."""
-    return {item.name: getattr(term, item.name) for item in fields(term)}  # type: ignore[arg-type]
+    return {"name": term.name} | {item.name: getattr(term, item.name) for item in fields(term)}  # type: ignore[arg-type]
 
 
 def build_term(description: Mapping[str, Any]) -> Term:
@@ -35,15 +32,10 @@ def build_term(description: Mapping[str, Any]) -> Term:
     """
     settings = dict(description)
     name = settings.pop("name", None)
-    if name not in TERMS:
-        raise InputError(
-            f"unknown term {name!r}",
-            allowed=", ".join(TERMS),
-            remedy="the file was written by a newer version: update robot-oed",
-        )
+    kind = TERMS.get_or_raise(name)
     try:
         values = {key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()}
-        return TERMS[name](**values)
+        return kind(**values)
     except TypeError as error:
         raise InputError(f"term {name}: {error}") from error
 
@@ -54,6 +46,7 @@ __all__ = [
     "POLYNOMIAL",
     "Column",
     "FrictionPolynomial",
+    "FrictionTerm",
     "RigidBody",
     "RotorInertia",
     "Term",

@@ -30,7 +30,7 @@ def test_the_default_model(model):
 def test_parts_can_be_left_out(model):
     """Friction may be Coulomb and viscous alone, rotor inertia and offset may be left out."""
     small = default_model(model.robot, friction="coulomb-viscous", velocity_scale=0.02, rotor=False, offset=False)
-    assert small.terms == (RigidBody(), FrictionPolynomial((1, 2), 0.02))
+    assert small.terms == (RigidBody(), FrictionPolynomial(powers=(1, 2), velocity_scale=0.02))
     with pytest.raises(InputError, match="friction model 'stiction'; allowed: polynomial, coulomb-viscous"):
         default_model(model.robot, friction="stiction")
 

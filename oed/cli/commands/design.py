@@ -12,6 +12,7 @@ from oed.cli.console import Console
 from oed.cli.options import (
     BaseFrequencyOption,
     CollisionOption,
+    FamilyOption,
     ForceOption,
     FrictionOption,
     HarmonicsOption,
@@ -48,9 +49,10 @@ def design(
     offset: Annotated[
         bool, typer.Option("--offset", help="Include a constant torque offset per joint in the model.")
     ] = False,
+    family: FamilyOption = "fourier",
     harmonics: HarmonicsOption = 5,
     base_frequency: BaseFrequencyOption = 0.1,
-    periods: Annotated[int, typer.Option(help="Repetitions of the Fourier series.")] = 3,
+    periods: Annotated[int, typer.Option(help="Repetitions of the optimised part.")] = 3,
     strokes: Annotated[
         bool, typer.Option(help="Add one velocity stroke per joint: to the velocity limit, forwards and backwards.")
     ] = True,
@@ -159,9 +161,11 @@ def design(
             return
         from oed.cli.priors import prior_from
         from oed.cli.spaces import spaces_from
+        from oed.experiments import LimitOptions, ModelOptions, SearchOptions, TrajectoryOptions, WeightOptions
         from oed.experiments import design as run
         from oed.exports import read_trajectory
         from oed.reports import save_design_report
+        from oed.trajectories import family as choose_family
         from robots.common.files import ResultFolder
 
         with ResultFolder(out, force, names=["trajectory.csv", "design.json", "report.html"]) as folder:
@@ -170,36 +174,42 @@ def design(
             result = run(
                 described,
                 criterion=criterion,
-                friction=friction,
-                offset=offset,
-                harmonics=harmonics,
-                base_frequency=base_frequency,
-                periods=periods,
-                strokes=strokes,
-                home=numbers("--home", home),
-                velocity_fraction=velocity_fraction,
-                torque=torque,
-                torque_margin=torque_margin,
-                collision=collision,
-                clearance=clearance,
-                space=spaces_from(tool_box, singularity),
-                essential=essential,
-                scaling=scaling,
-                noise=numbers("--noise", noise),
-                after=prior,
-                effects=effects,
-                task=read_trajectory(task, n=described.n)[0] if task else None,
-                effort=effort,
-                time_limit=float("inf") if time_limit is None else time_limit,
-                keep_on_interrupt=True,
-                seed=seed,
-                workers=workers,
+                model=ModelOptions(friction=friction, offset=offset, essential=essential),
+                trajectory=TrajectoryOptions(
+                    family=choose_family(family, harmonics=harmonics, base_frequency=base_frequency),
+                    periods=periods,
+                    strokes=strokes,
+                    home=numbers("--home", home),
+                ),
+                limits=LimitOptions(
+                    velocity_fraction=velocity_fraction,
+                    torque=torque,
+                    torque_margin=torque_margin,
+                    collision=collision,
+                    clearance=clearance,
+                    space=spaces_from(tool_box, singularity),
+                    effects=effects,
+                ),
+                weights=WeightOptions(
+                    scaling=scaling,
+                    noise=numbers("--noise", noise),
+                    after=prior,
+                    task=read_trajectory(task, n=described.n)[0] if task else None,
+                ),
+                search=SearchOptions(
+                    effort=effort,
+                    seed=seed,
+                    time_limit=float("inf") if time_limit is None else time_limit,
+                    keep_on_interrupt=True,
+                    workers=workers,
+                ),
                 progress=progress,
             )
             result.save(folder.path("trajectory.csv").parent)
             save_design_report(result, folder, png=png)
     data = result.to_dict()
-    del data["segments"], data["fourier"]
+    for long in ("segments", "fourier", "excitation"):
+        data.pop(long, None)
     console.result(f"{result.summary()}\nwritten to {out.resolve()}", data)
     if result.interrupted:
         print("oed: interrupted; the best design found so far was written", file=sys.stderr)

@@ -11,6 +11,7 @@ from oed.cli.console import Console
 from oed.cli.options import (
     BaseFrequencyOption,
     CollisionOption,
+    FamilyOption,
     ForceOption,
     FrictionOption,
     HarmonicsOption,
@@ -30,6 +31,7 @@ def pareto(
     criteria: Annotated[str, typer.Option(help="Two or three of cond, d, a, e, comma-separated.")] = "cond,d",
     points: Annotated[int, typer.Option(help="Number of designs between two criteria, both ends included.")] = 5,
     friction: FrictionOption = "polynomial",
+    family: FamilyOption = "fourier",
     harmonics: HarmonicsOption = 5,
     base_frequency: BaseFrequencyOption = 0.1,
     collision: CollisionOption = False,
@@ -51,8 +53,10 @@ def pareto(
     """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
+        from oed.experiments import LimitOptions, ModelOptions, SearchOptions, TrajectoryOptions, WeightOptions
         from oed.experiments import pareto as run
         from oed.reports import save_pareto_report
+        from oed.trajectories import family as choose_family
         from robots.common.files import ResultFolder
 
         with ResultFolder(out, force, names=["pareto.json", "report.html"]) as folder:
@@ -60,14 +64,13 @@ def pareto(
                 robot_from(robot),
                 criteria=[name.strip() for name in criteria.split(",")],
                 points=points,
-                friction=friction,
-                harmonics=harmonics,
-                base_frequency=base_frequency,
-                collision=collision,
-                scaling=scaling,
-                effort=effort,
-                seed=seed,
-                workers=workers,
+                model=ModelOptions(friction=friction),
+                trajectory=TrajectoryOptions(
+                    family=choose_family(family, harmonics=harmonics, base_frequency=base_frequency)
+                ),
+                limits=LimitOptions(collision=collision),
+                weights=WeightOptions(scaling=scaling),
+                search=SearchOptions(effort=effort, seed=seed, workers=workers),
                 progress=progress,
             )
             front.save(folder.path("pareto.json").parent)

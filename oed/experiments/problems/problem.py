@@ -1,4 +1,4 @@
-"""The design problem: a criterion of the information matrix over Fourier coefficients, under kinematic limits."""
+"""The design problem: a criterion of the information matrix over a family's coefficients, under kinematic limits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from oed.constraints import KinematicRows, PointwiseLimit, TorqueRms, kinematic_rows
 from oed.criteria import Criterion, Information, Weighting
-from oed.trajectories import FourierSeries, Kinematics, fourier_basis, rest_basis
+from oed.trajectories import Family, Fourier, Kinematics, Trajectory
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InfeasibleError
 from robots.limits import Limits
@@ -23,17 +23,16 @@ ROOM = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class FourierProblem:
-    """Minimise a criterion over the Fourier series that start and end at rest and keep the limits at all times.
+    """Minimise a criterion over the motions of a family that keep the limits at all times.
 
-    The unknown z (n K,), K = 2 N - 1, scales the free coefficients of each joint (`rest_basis`) so that entries of
-    about one bring the joint to its limits.
+    The unknown z (n K,) scales the free coefficients of each joint so that entries of about one bring the joint to its
+    limits.
 
     Attributes:
         base: the parameters that will be fitted (m columns).
         criterion: what is minimised.
         limits: of position, velocity, acceleration and jerk.
-        harmonics: N.
-        base_frequency: of the first harmonic [Hz].
+        family: of motions, with K coefficients a joint; they start and end at rest.
         samples: per period, at which the regressor is evaluated; they lie half a step off the start, for all joints
             rest there and a row of zeros informs of nothing.
         limit_samples: per period, at which the limits are imposed, tightened for what lies between.
@@ -46,8 +45,7 @@ class FourierProblem:
     base: BaseParameters
     criterion: Criterion
     limits: Limits
-    harmonics: int = 5
-    base_frequency: float = 0.1
+    family: Family = field(default_factory=Fourier)
     samples: int = 104
     limit_samples: int = 250
     pointwise: tuple[PointwiseLimit, ...] = ()
@@ -78,7 +76,7 @@ class FourierProblem:
     @property
     def size(self) -> int:
         """N K, the number of unknowns."""
-        return self.joints * (2 * self.harmonics - 1)
+        return self.joints * self.family.size
 
     @cached_property
     def information(self) -> Information:
@@ -90,9 +88,8 @@ class FourierProblem:
         """(n, K): free coefficients per unit of z, from the range and the velocity limit of each joint."""
         ranges = (self.limits.upper - self.limits.lower) / 2
         half = np.where(np.isfinite(ranges), ranges, np.pi)
-        velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, 1.0) / 2
-        rest = np.repeat(velocity[:, None], 2 * self.harmonics - 2, axis=1)
-        return np.column_stack([half, rest])
+        velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, 1.0)
+        return self.family.scale(half, velocity)
 
     @cached_property
     def centre(self) -> Array:
@@ -130,32 +127,23 @@ class FourierProblem:
         return bool(self.pointwise or self.averaged)
 
     @cached_property
-    def _free(self) -> Array:
-        return rest_basis(self.harmonics, self.base_frequency)
-
-    def _bases(self, samples: int, offset: float) -> Kinematics:
-        t = (np.arange(samples) + offset) / (samples * self.base_frequency)
-        whole = fourier_basis(t, self.harmonics, self.base_frequency)
-        return Kinematics(*(matrix @ self._free for matrix in whole))
-
-    @cached_property
     def _sampled(self) -> Kinematics:
-        return self._bases(self.samples, 0.5)
+        return self.family.basis(self.family.regressor_times(self.samples))
 
     @cached_property
     def rows(self) -> KinematicRows:
         """The limits as rows in the free coefficients of each joint; kept there, they hold at all times."""
-        return kinematic_rows(self.limit_bases, self.limits, degree=self.harmonics)
+        return kinematic_rows(self.limit_bases, self.limits, shares=self.family.shares(self.limit_samples))
 
     def free(self, z: Array) -> Array:
-        """Unscales z (n K,) to the free coefficients (n, K) of `rest_basis`."""
+        """Unscales z (n K,) to the free coefficients (n, K)."""
         coefficients = z.reshape(self.joints, -1) * self.scale
         coefficients[:, 0] += self.centre
         return coefficients
 
-    def series(self, z: Array, periods: int = 1) -> FourierSeries:
+    def series(self, z: Array, periods: int = 1) -> Trajectory:
         """Builds the trajectory of z."""
-        return FourierSeries.from_coefficients(self.free(z) @ self._free.T, self.base_frequency, periods)
+        return self.family.trajectory(self.free(z), periods)
 
     def gram(self, z: Array) -> Array:
         """Evaluates the mean information matrix Y'Y / samples (m, m)."""
@@ -184,7 +172,7 @@ class FourierProblem:
     @cached_property
     def limit_bases(self) -> Kinematics:
         """The basis matrices (M, K) at the limit samples."""
-        return self._bases(self.limit_samples, 0.0)
+        return self.family.basis(self.family.limit_times(self.limit_samples))
 
     def pointwise_excess(self, z: Array) -> Array:
         """How far the pointwise limits are passed at the limit samples (M, R), negative within."""

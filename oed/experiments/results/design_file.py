@@ -65,7 +65,7 @@ def read_design(
             "margins": margins,
             "islands": tuple(Outcome.from_dict(island) for island in data["solver"]["islands"]),
             "settings": settings,
-            "coefficients": np.array(data["fourier"]["coefficients"]),
+            "coefficients": np.array((data.get("fourier") or data["excitation"])["coefficients"]),
             "home": np.array(data["home"]) if "home" in data else motion.q[0],
             "home_moved": data.get("home_moved", False),
             "space": tuple(SpatialMargin(**margin) for margin in data.get("limits_in_space", ())),

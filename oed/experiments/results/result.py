@@ -45,11 +45,11 @@ class Design:
         criterion: what was optimised.
         motion: the whole experiment at the controller's period.
         segments: kind, start [s], end [s] and joint of each part.
-        qualities: of the Fourier part, of the strokes and of the whole.
+        qualities: of the optimised part, of the strokes and of the whole.
         margins: the closest approach to each limit, by the samples of the motion.
         islands: every search's outcome; the best one was taken.
         settings: everything that, with the seed, makes the same design again.
-        coefficients: of the Fourier series, rows q0, a1..aN, b1..bN per joint (n, 2 N + 1).
+        coefficients: of the optimised part, one row a joint; of a Fourier series q0, a1..aN, b1..bN (n, 2 N + 1).
         home: pose (n,) at both ends.
         home_moved: whether that is the nearest pose that keeps the limits in space, for the usual one does not.
         space: the closest approach to each further limit in space.
@@ -75,7 +75,7 @@ class Design:
     strokes_left_out: tuple[int, ...] = ()
 
     @property
-    def fourier(self) -> Quality:
+    def optimised(self) -> Quality:
         """The quality of the optimised part."""
         return self.qualities[0]
 
@@ -104,7 +104,7 @@ class Design:
         """Whether all limits hold and all parameters are excited."""
         free = self.freedom is None or bool(self.freedom["certified"])
         free = free and not any(margin.violated for margin in self.space)
-        return free and not self.violated and self.fourier.to_dict()["cond_Y"] is not None
+        return free and not self.violated and self.optimised.to_dict()["cond_Y"] is not None
 
     @property
     def interrupted(self) -> bool:
@@ -215,12 +215,7 @@ class Design:
             "criterion": self.criterion.name,
             "criterion_label": self.criterion.label,
             "quality": [quality.to_dict() for quality in self.qualities],
-            "fourier": {
-                "base_frequency_hz": self.settings["base_frequency"],
-                "harmonics": self.settings["harmonics"],
-                "periods": self.settings["periods"],
-                "coefficients": self.coefficients.tolist(),
-            },
+            **self._excitation(),
             "segments": [dict(segment) for segment in self.segments],
             "duration": self.motion.duration,
             "period": self.robot.period,
@@ -237,6 +232,15 @@ class Design:
             "seed": self.settings["seed"],
             "settings": dict(self.settings),
         }
+
+    def _excitation(self) -> dict[str, Any]:
+        """Writes the optimised part: under ``fourier`` a series, under ``excitation`` another family's motion."""
+        common = {"periods": self.settings["periods"], "coefficients": self.coefficients.tolist()}
+        family = dict(self.settings.get("family") or {"name": "fourier"})
+        if family["name"] == "fourier":
+            frequency, harmonics = self.settings["base_frequency"], self.settings["harmonics"]
+            return {"fourier": {"base_frequency_hz": frequency, "harmonics": harmonics, **common}}
+        return {"excitation": {"family": family, **common}}
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Writes `trajectory.csv` and `design.json` into a folder that is there.

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.constraints import PointwiseLimit, TorqueLimit, TorqueRms
+from oed.constraints import PointwiseLimit, StateLimits, TorqueLimit, TorqueRms
 from oed.constraints.feasibility import check_feasible, nearest_feasible
-from oed.constraints.geometric import CollisionLimit, GeometricLimit, GeometricLimits
+from oed.constraints.geometric import CollisionLimit, GeometricLimits
 from oed.experiments.assembly import assemble
+from oed.experiments.options import LimitOptions
 from oed.experiments.safety_checks.spatial_check import SpatialCheck
-from oed.trajectories import FourierSeries
 from oed.trajectories import Sequence as Experiment
+from oed.trajectories import Trajectory
 from robots.base_parameters import BaseParameters
 from robots.collision import CollisionModel, CollisionReport, check_motion, collision_model
 from robots.common.errors import InfeasibleError
 from robots.limits import Limits
-from robots.plants import PlantEffect
 from robots.robot import Robot
 from robots.signals import Motion
 
@@ -43,6 +42,7 @@ class Safety:
         collision: bodies and obstacles, where they are to be watched.
         spatial: the same as rows for the solver, and further limits in space.
         check: judges those on a whole motion; None where there are none.
+        motion: further limits of position, velocity and acceleration; None where there are none.
         home: pose (n,) at both ends.
         moved: whether that is not the pose that was asked for, because it breaks a limit in space.
     """
@@ -53,12 +53,13 @@ class Safety:
     collision: CollisionModel | None = None
     spatial: GeometricLimits | None = None
     check: SpatialCheck | None = None
+    motion: StateLimits | None = None
     moved: bool = False
 
     @property
     def pointwise(self) -> tuple[PointwiseLimit, ...]:
         """The limits for the solver."""
-        return tuple(limit for limit in (self.torque, self.spatial) if limit is not None)
+        return tuple(limit for limit in (self.torque, self.spatial, self.motion) if limit is not None)
 
     @property
     def averaged(self) -> tuple[TorqueRms, ...]:
@@ -73,18 +74,18 @@ class Safety:
         return None if self.collision is None else check_motion(self.collision, motion, confirm=False)
 
     def assembled(
-        self, series: FourierSeries, limits: Limits, period: float, strokes: bool
+        self, excitation: Trajectory, kind: str, limits: Limits, period: float, strokes: bool
     ) -> tuple[Experiment, CollisionReport | None, tuple[int, ...]]:
         """Assembles an experiment that keeps these limits.
 
-        Strokes and moves become slower until they keep the torque limits; strokes on which the arm would collide or
-        break another limit in space are left out.
+        Strokes and moves become slower until they keep the limits of torque and motion; strokes on which the arm would
+        collide or break another limit in space are left out.
 
         Returns:
             The experiment, the proof of its clearance, and the joints whose stroke was left out.
 
         Raises:
-            InfeasibleError: moves that pass a torque limit however slow, or collide.
+            InfeasibleError: moves that pass a limit of torque or motion however slow, or collide.
         """
         joints = tuple(range(1, limits.n + 1)) if strokes else ()
         left_out: tuple[int, ...] = ()
@@ -92,7 +93,7 @@ class Safety:
             gentle = limits.scaled(velocity=factor, acceleration=factor, jerk=factor)
             while True:
                 kept = tuple(joint for joint in joints if joint not in left_out)
-                sequence = assemble(series, gentle, period=period, home=self.home, strokes=kept)
+                sequence = assemble(excitation, gentle, period=period, home=self.home, kind=kind, strokes=kept)
                 motion = sequence.motion()
                 report = self.report(motion)
                 wrong = self._broken(motion, report)
@@ -102,14 +103,14 @@ class Safety:
             if self._strong_enough(motion):
                 return sequence, report, left_out
         raise InfeasibleError(
-            "the moves between the segments exceed a torque limit, even at low speed",
+            "the moves between the segments exceed a limit of torque or motion, even at low speed",
             remedy="choose another home pose (--home), or leave out the strokes (--no-strokes)",
         )
 
     def _strong_enough(self, motion: Motion) -> bool:
         states = (motion.q, motion.dq, motion.ddq)
-        peak = self.torque is None or self.torque.excess(*states).max() <= 0
-        return peak and (self.torque_rms is None or self.torque_rms.values(*states).max() <= 1)
+        peaks = [limit.excess(*states).max() for limit in (self.torque, self.motion) if limit is not None]
+        return max(peaks, default=0.0) <= 0 and (self.torque_rms is None or self.torque_rms.values(*states).max() <= 1)
 
     def _broken(self, motion: Motion, report: CollisionReport | None) -> tuple[float, str] | None:
         """The time and the kind of the largest workspace violation; None without any."""
@@ -145,39 +146,23 @@ def _culprit(sequence: Experiment, time: float, what: str) -> int:
     )
 
 
-def choose_safety(
-    robot: Robot,
-    base: BaseParameters,
-    home: Array,
-    *,
-    movable: bool,
-    torque: bool,
-    torque_margin: float,
-    collision: bool,
-    clearance: float,
-    space: Sequence[GeometricLimit] = (),
-    effects: Sequence[PlantEffect] = (),
-) -> Safety:
+def choose_safety(robot: Robot, base: BaseParameters, home: Array, limits: LimitOptions, *, movable: bool) -> Safety:
     """Collects the limits that are to be kept, and checks the home pose against them.
 
     Args:
         robot: the robot.
         base: whose model gives the torques.
         home: pose (n,) at both ends.
+        limits: the limits to keep.
         movable: whether another home pose may be used if this one is in collision.
-        torque: keep torque limits, where they and the nominal dynamics are described.
-        torque_margin: share of them kept in reserve.
-        collision: watch the arm's own bodies, and the obstacles of the robot's file.
-        clearance: between them [m].
-        space: further limits in space.
-        effects: effects beyond the robot's description; their torque counts in the torque limits.
 
     Raises:
-        InfeasibleError: a home pose that cannot be held, is in collision or breaks another limit in space; a tool box
-            that the robot cannot enter.
+        InfeasibleError: a home pose that cannot be held, is in collision or breaks another limit; a tool box that the
+            robot cannot enter.
     """
-    model = collision_model(robot) if collision else None
-    bodies = () if model is None else (CollisionLimit(model=model, margin=clearance),)
+    model = collision_model(robot) if limits.collision else None
+    bodies = () if model is None else (CollisionLimit(model=model, margin=limits.clearance),)
+    space = tuple(limits.space)
     spatial, moved = None, False
     if bodies or space:
         spatial = GeometricLimits(robot=robot, limits=(*bodies, *space))
@@ -189,14 +174,45 @@ def choose_safety(
             if nearest is None:
                 raise
             home, moved = nearest, True
-    limit = rms = None
-    bound = np.asarray(robot.limits.torque)
-    if torque and np.isfinite(base.model.nominal).all() and np.isfinite(bound).any():
-        limit = TorqueLimit(base.model, base.model.nominal, bound, margin=torque_margin, effects=effects)
-        limit.check_holding(home)
-    continuous = np.asarray(robot.limits.torque_rms)
-    if torque and np.isfinite(base.model.nominal).all() and np.isfinite(continuous).any():
-        rms = TorqueRms(base.model, base.model.nominal, continuous, margin=torque_margin, effects=effects)
+    torque, torque_rms = _torque_limits(robot, base, home, limits)
+    motion = StateLimits(robot=robot, limits=tuple(limits.motion)) if limits.motion else None
+    if motion is not None:
+        _check_rest(motion, home)
+    return Safety(
+        home=home,
+        torque=torque,
+        torque_rms=torque_rms,
+        collision=model,
+        spatial=spatial,
+        check=SpatialCheck(GeometricLimits(robot=robot, limits=space)) if space else None,
+        motion=motion,
+        moved=moved,
+    )
+
+
+def _torque_limits(
+    robot: Robot, base: BaseParameters, home: Array, limits: LimitOptions
+) -> tuple[TorqueLimit | None, TorqueRms | None]:
+    """The limits of torque and of its root mean square, where they and the nominal dynamics are described."""
+    peak = rms = None
+    model, effects = base.model, limits.static_effects
+    known = limits.torque and np.isfinite(model.nominal).all()
+    if known and np.isfinite(robot.limits.torque).any():
+        peak = TorqueLimit(model, model.nominal, robot.limits.torque, margin=limits.torque_margin, effects=effects)
+        peak.check_holding(home)
+    if known and np.isfinite(robot.limits.torque_rms).any():
+        rms = TorqueRms(model, model.nominal, robot.limits.torque_rms, margin=limits.torque_margin, effects=effects)
         rms.check_holding(home)
-    check = SpatialCheck(GeometricLimits(robot=robot, limits=tuple(space))) if space else None
-    return Safety(home=home, torque=limit, torque_rms=rms, collision=model, spatial=spatial, check=check, moved=moved)
+    return peak, rms
+
+
+def _check_rest(motion: StateLimits, home: Array) -> None:
+    q = np.atleast_2d(home)
+    values = motion.values(q, np.zeros_like(q), np.zeros_like(q))[0]
+    wrong = np.flatnonzero(~(np.abs(values) <= 1))
+    if wrong.size:
+        row = int(wrong[0])
+        raise InfeasibleError(
+            f"at rest in the home pose the limit {motion.labels[row]!r} is at {values[row]:.3g} times its bound",
+            allowed="-1 to 1",
+        )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from oed.constraints import StateLimits
 from oed.constraints.geometric import GeometricLimits
 from robots.signals import Motion
 
@@ -76,3 +77,19 @@ class SpatialCheck:
             worst.time,
             f"breaks the limit {worst.limit!r} by {worst.between - worst.value:.3g} {worst.unit}".rstrip(),
         )
+
+
+def motion_margins(limits: StateLimits, motion: Motion) -> tuple[SpatialMargin, ...]:
+    """Gives the closest approach to each limit of motion at the samples, as a share of its bound."""
+    values = 1 - np.abs(limits.values(motion.q, motion.dq, motion.ddq))
+    rows = values.argmin(axis=0)
+    return tuple(
+        SpatialMargin(
+            limit=label,
+            unit="of its bound",
+            value=float(values[row, column]),
+            between=0.0,
+            time=float(motion.t[row]),
+        )
+        for column, (label, row) in enumerate(zip(limits.labels, rows, strict=True))
+    )

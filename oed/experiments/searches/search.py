@@ -237,7 +237,7 @@ class Island:
 def dense(problem: FourierProblem, z: Array) -> tuple[float, float]:
     """Evaluates cost and value of the criterion on one period at the controller's period, as the file will have it."""
     robot = problem.base.model.robot
-    t = robot.period * np.arange(count_periods(1 / problem.base_frequency, robot.period))
+    t = robot.period * np.arange(count_periods(problem.family.duration, robot.period))
     q, dq, ddq, _ = problem.series(z).sample(t)
     weighting = problem.weighting
     reduced = triangle(problem.base.model, problem.base.independent, q, dq, ddq, weighting.rows)

@@ -111,9 +111,9 @@ def implied(problem: FourierProblem) -> NDArray[np.bool_]:
     rows, samples = problem.rows, problem.limit_samples
     half = (rows.upper - rows.lower)[:, ::samples] / 2  # (n, quantities), the same for all samples
     order = [("q", "dq", "ddq", "dddq").index(rows.labels[i][0]) for i in range(0, len(rows.labels), samples)]
-    fastest = 2 * np.pi * problem.base_frequency * problem.harmonics
+    fastest = problem.family.fastest
     marks = np.zeros(half.shape, dtype=bool)
-    for number in range(1, len(order)):
+    for number in range(1, len(order) if np.isfinite(fastest) else 0):
         follows = order[number] == order[number - 1] + 1
         marks[:, number] = follows & (fastest * half[:, number - 1] <= half[:, number])
     return np.repeat(marks, samples, axis=1)

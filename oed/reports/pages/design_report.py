@@ -26,7 +26,7 @@ def save_design_report(design: Design, folder: ResultFolder, *, png: bool = Fals
 def design_page(design: Design) -> Page:
     """Builds the page: what the experiment is worth, how it moves, how far it stays from the limits."""
     robot, motion = design.robot, design.motion
-    label, value = design.criterion.label, design.fourier.value(design.criterion)
+    label, value = design.criterion.label, design.optimised.value(design.criterion)
     verdict = (
         f"The optimised motion reaches {label} = {significant(value)} over {design.base.size} parameters. The whole "
         f"experiment takes {motion.duration:.0f} s."
@@ -142,7 +142,7 @@ def parameters_section(names: tuple[str, ...], formulas: tuple[str, ...]) -> Sec
 
 
 def _facts(design: Design) -> tuple[Fact, ...]:
-    fourier, whole = design.fourier.to_dict(), design.whole.to_dict()
+    fourier, whole = design.optimised.to_dict(), design.whole.to_dict()
     tightest = min((m for m in design.margins if np.isfinite(m.limit)), key=lambda m: m.slack_fraction, default=None)
     facts = [
         Fact(label="cond(Y), optimised motion", value=fourier["cond_Y"]),

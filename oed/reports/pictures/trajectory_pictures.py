@@ -20,6 +20,7 @@ SEGMENT_ROLES = {
     "approach": "neutral",
     "move": "neutral",
     "fourier": "main",
+    "excitation": "main",
     "sinusoid": "third",
     "friction": "second",
     "warm_up": "residual",

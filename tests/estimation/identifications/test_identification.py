@@ -25,7 +25,11 @@ def er3a():
 @pytest.fixture(scope="module")
 def experiment(er3a):
     """A quick design, played on a robot that is 10 % off its description; 20 logs, each identified."""
-    plan = oed.design(er3a, effort=Effort(islands=1, starts=1, hops=0, screened=20), periods=1, workers=1)
+    plan = oed.design(
+        er3a,
+        trajectory=oed.TrajectoryOptions(periods=1),
+        search=oed.SearchOptions(effort=Effort(islands=1, starts=1, hops=0, screened=20), workers=1),
+    )
     plant = nominal_plant(er3a, spread=0.1, seed=1, sensors=Sensors(coloured_share=0.5, correlation_time=0.04))
     estimates = [identify(er3a, simulate(plant, plan.motion, seed=seed)) for seed in range(SEEDS)]
     truth = find_base_parameters(plant.model).from_standard(plant.parameters)

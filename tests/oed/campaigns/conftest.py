@@ -14,6 +14,7 @@ from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits
 from robots.loading import load_robot
 from robots.robot import Robot
+from tests.oed import flat
 
 TINY = Effort(islands=1, starts=1, screened=10, hops=0, finish_samples=100)
 BRIEF = Ipopt(max_iter=15, finish_iter=10)
@@ -27,7 +28,7 @@ def er3a() -> Robot:
 @pytest.fixture(scope="session")
 def er3a_design(er3a: Robot) -> Design:
     """A design that keeps its limits and is worth little."""
-    return oed.design(er3a, friction="coulomb-viscous", effort=TINY, solver=BRIEF, workers=1)
+    return flat.design(er3a, friction="coulomb-viscous", effort=TINY, solver=BRIEF, workers=1)
 
 
 @pytest.fixture(scope="session")
@@ -76,7 +77,7 @@ def two() -> Robot:
 
 @pytest.fixture(scope="session")
 def two_design(two: Robot) -> Design:
-    return oed.design(two, effort=TINY, solver=BRIEF, periods=1, workers=1)
+    return flat.design(two, effort=TINY, solver=BRIEF, periods=1, workers=1)
 
 
 @pytest.fixture(scope="session")

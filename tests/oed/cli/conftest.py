@@ -15,6 +15,7 @@ import pytest
 import robots.loading
 from oed.cli import main
 from oed.experiments import EFFORTS, Effort
+from tests.oed import flat
 
 TINY = Effort(islands=1, starts=1, screened=10, hops=0, finish_samples=100)
 
@@ -100,7 +101,6 @@ def stuck(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def experiment(robot: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Design an experiment, simulate it and identify the robot by the library: a folder with what commands read."""
-    import oed
     from estimation import identify
     from estimation.logs import write_log
     from oed.exports import read_trajectory
@@ -109,7 +109,7 @@ def experiment(robot: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     folder = tmp_path_factory.mktemp("experiment")
     described = load_robot(robot)
-    oed.design(described, effort=TINY, workers=1).save(folder)
+    flat.design(described, effort=TINY, workers=1).save(folder)
     log = simulate(nominal_plant(described), read_trajectory(folder / "trajectory.csv")[0])
     write_log(folder / "log.csv", log)
     identify(described, [log]).save(folder)

@@ -59,7 +59,7 @@ def test_tightened_bounds_kept_at_samples_are_given_bounds_kept_always(seed, deg
     count = 2 * degree + samples
     polynomial = _random(seed, degree)
     lower, upper = np.array([-1.0, 0.5, -3.0]), np.array([2.0, 0.8, -1.0])
-    low, high = tightened_bounds(lower, upper, degree, count)
+    low, high = tightened_bounds(lower, upper, overshoot_factor(degree, count))
     values = polynomial(2 * np.pi * np.arange(count) / count)
     centre = (lower + upper) / 2
     scale = ((high - centre) / np.abs(values - polynomial.mean[:, None]).max(axis=1))[:, None]
@@ -72,11 +72,11 @@ def test_tightened_bounds_kept_at_samples_are_given_bounds_kept_always(seed, deg
 
 def test_infinite_bounds_stay_and_one_sided_ones_are_refused():
     """No bound stays no bound; a bound on one side only cannot be guaranteed from samples and is an error."""
-    low, high = tightened_bounds([-np.inf, -1.0], [np.inf, 1.0], 5, 100)
+    low, high = tightened_bounds([-np.inf, -1.0], [np.inf, 1.0], overshoot_factor(5, 100))
     np.testing.assert_array_equal([low[0], high[0]], [-np.inf, np.inf])
     assert high[1] == pytest.approx(np.cos(np.pi * 5 / 100))
     with pytest.raises(InputError, match="joint 2"):
-        tightened_bounds([-1.0, -np.inf], [1.0, 1.0], 5, 100)
+        tightened_bounds([-1.0, -np.inf], [1.0, 1.0], 0.9)
 
 
 def test_too_few_samples_are_refused():

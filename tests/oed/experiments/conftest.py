@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import oed
 from oed.experiments import Design, Effort, InteriorPoint
 from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits
 from robots.loading import load_robot
 from robots.robot import Robot
+from tests.oed import flat
 
 Array = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ def _robots() -> dict[str, Robot]:
 
 @lru_cache(maxsize=32)
 def _designed(name: str, friction: str, criterion: str, seed: int) -> Design:
-    return oed.design(
+    return flat.design(
         _robots()[name],
         criterion=criterion,
         friction=friction,

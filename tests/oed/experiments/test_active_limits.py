@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import oed
 from oed.constraints.geometric import GeometricLimit
 from oed.constraints.singularity import SingularityLimit
 from oed.constraints.tool import PlaneLimit, ToolBox
@@ -16,6 +15,7 @@ from oed.experiments import Design, Effort, InteriorPoint
 from robots.common.errors import InfeasibleError
 from robots.loading import load_robot
 from robots.robot import Robot
+from tests.oed import flat
 
 EFFORT = Effort(islands=1, starts=1, screened=20, hops=0, finish_samples=60)
 SOLVER = InteriorPoint(max_iter=40, finish_iter=15)
@@ -31,7 +31,7 @@ def design(robot: Robot, **options: object) -> Design:
         "strokes": False,
         "workers": 1,
     }
-    return oed.design(robot, **{**settings, **options})
+    return flat.design(robot, **{**settings, **options})
 
 
 def used(design: Design, quantity: str) -> np.ndarray:

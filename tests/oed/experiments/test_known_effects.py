@@ -9,7 +9,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-import oed
 from oed.constraints import TorqueLimit, TorqueRms
 from oed.experiments import Design, Effort, InteriorPoint
 from robots.catalog import __path__ as catalog
@@ -19,6 +18,7 @@ from robots.plants import Plant, PlantEffect
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Motion
+from tests.oed import flat
 
 WIDTH = 0.02
 SPRING = PlantEffect(effect="spring", joint=2, coefficients=(40.0, 15.0, -8.0, 0.0), shape=(0.0, 0.0))
@@ -98,7 +98,7 @@ def test_an_effect_of_the_past_is_refused(robot: Robot) -> None:
 
 def made(robot: Robot, **options: object) -> Design:
     """A brief design."""
-    return oed.design(
+    return flat.design(
         robot,
         harmonics=3,
         periods=1,
@@ -149,7 +149,7 @@ def test_without_limits_nothing_is_claimed_to_count(make_robot) -> None:
 
 def made_plain(robot: Robot, effect: PlantEffect) -> Design:
     """A brief design of a robot that has no more than kinematics."""
-    return oed.design(
+    return flat.design(
         robot,
         friction="coulomb-viscous",
         harmonics=3,

@@ -7,18 +7,17 @@ import pytest
 
 from oed.trajectories import (
     BSpline,
+    Excitation,
+    Family,
     FourierPolynomial,
     FourierSeries,
-    HarmonicSine,
     PiecewisePolynomial,
-    Posture,
     Segment,
     Sequence,
     Sinusoid,
     Sweep,
     Trajectory,
     WarmUp,
-    constant_speed_sweep,
     friction_sweep,
     plan_warm_up,
     rest_basis,
@@ -45,31 +44,21 @@ def _fourier(n: int = 3) -> FourierSeries:
     return FourierSeries.from_coefficients(free @ rest_basis(5, 0.5).T, 0.5, periods=2)
 
 
-def _harmonic_sine(n: int = 3) -> HarmonicSine:
-    amplitudes = np.random.default_rng(2).normal(size=(n, 3))
-    return HarmonicSine(amplitudes=amplitudes, base_frequency=0.5, multiples=(1, 2, 4), offsets=np.ones(n))
+def _excitation(family: Family, n: int) -> Excitation:
+    free = np.random.default_rng(family.size).normal(size=(n, family.size))
+    return Excitation(family=family, free=free, periods=2)
 
 
-def _fourier_polynomial(n: int = 3) -> FourierPolynomial:
-    # The duration is no multiple of the base period.
-    rows = np.random.default_rng(3).normal(size=(n, 12))
-    return FourierPolynomial.from_coefficients(rows, 0.5, 3.2)
+def _fourier_polynomial(n: int = 3) -> Excitation:
+    return _excitation(FourierPolynomial(harmonics=4, base_frequency=0.5), n)
 
 
-def _quintic_spline(n: int = 3) -> BSpline:
-    return BSpline(points=np.random.default_rng(4).normal(size=(n, 9)), duration=4.0, degree=5)
-
-
-def _cubic_spline(n: int = 3) -> BSpline:
-    return BSpline(points=np.random.default_rng(5).normal(size=(n, 6)), duration=2.8, degree=3)
+def _spline(n: int = 3) -> Excitation:
+    return _excitation(BSpline(points=7, length=2.4), n)
 
 
 def _friction(n: int = 3) -> Sweep:
     return friction_sweep(_limits(n), n, np.full(n, 0.4), period=0.004, pause=0.1)
-
-
-def _constant_speed(n: int = 3) -> Sweep:
-    return constant_speed_sweep(_limits(n), min(2, n), np.full(n, 0.4), speeds=[0.5, 3.9], period=0.004)
 
 
 def _warm_up(n: int = 3) -> WarmUp:
@@ -78,10 +67,6 @@ def _warm_up(n: int = 3) -> WarmUp:
 
 def _pausing_warm_up(n: int = 3) -> WarmUp:
     return plan_warm_up(_limits(n), duration=20.0, period=0.004, duty=0.6, block=7.0)
-
-
-def _posture(n: int = 3) -> Posture:
-    return Posture(pose=np.linspace(0.0, 1.0, n), duration=0.8)
 
 
 def _sinusoid(n: int = 3) -> Sinusoid:
@@ -109,20 +94,15 @@ def _sequence(n: int = 3) -> Sequence:
 
 ALL = [
     _fourier,
-    _harmonic_sine,
     _fourier_polynomial,
-    _quintic_spline,
-    _cubic_spline,
+    _spline,
     _friction,
-    _constant_speed,
     _warm_up,
     _pausing_warm_up,
-    _posture,
     _sinusoid,
     _polynomial,
     _sequence,
 ]
-RESTING = [make for make in ALL if make is not _harmonic_sine]
 
 
 def _kinks(trajectory) -> np.ndarray:
@@ -134,8 +114,10 @@ def _kinks(trajectory) -> np.ndarray:
             return trajectory.breakpoints
         case Sequence():
             return trajectory.boundaries
-        case BSpline():
-            return np.unique(trajectory.knots)
+        case Excitation(family=BSpline() as family):
+            return np.concatenate([family.knots + turn * family.duration for turn in range(trajectory.periods)])
+        case Excitation(family=family):
+            return family.duration * np.arange(trajectory.periods)
         case Sweep():
             return trajectory.path.breakpoints
         case WarmUp():
@@ -169,7 +151,7 @@ def test_each_quantity_is_the_integral_of_the_next(make):
         np.testing.assert_allclose(np.diff(edge_values[order], axis=0), integral, atol=1e-12 * scale)
 
 
-@pytest.mark.parametrize("make", RESTING)
+@pytest.mark.parametrize("make", ALL)
 def test_it_rests_at_both_ends(make):
     """Velocity and acceleration vanish where it starts and where it ends."""
     trajectory = make()
@@ -179,7 +161,7 @@ def test_it_rests_at_both_ends(make):
     np.testing.assert_allclose(ddq, 0.0, atol=1e-10)
 
 
-@pytest.mark.parametrize("make", RESTING)
+@pytest.mark.parametrize("make", ALL)
 def test_it_can_be_chained(make):
     """It joins to a rest before and after it without a jump, in one experiment."""
     trajectory = make()

@@ -41,7 +41,7 @@ def test_a_term_can_be_written_and_read(term):
 
 def test_lists_from_a_file_become_settings():
     """Settings that a file holds as lists are accepted."""
-    assert build_term({"name": "friction", "powers": [1, 2]}) == FrictionPolynomial((1, 2))
+    assert build_term({"name": "friction", "powers": [1, 2]}) == FrictionPolynomial(powers=(1, 2))
 
 
 @pytest.mark.parametrize(

@@ -37,14 +37,14 @@ def test_the_polynomial(robot):
 
 def test_a_velocity_scale_smooths_the_sign(robot):
     """With a velocity scale v0 the sign is tanh(dq / v0), and the other powers stay as they are."""
-    term = FrictionPolynomial(COULOMB_VISCOUS, 0.02)
+    term = FrictionPolynomial(powers=COULOMB_VISCOUS, velocity_scale=0.02)
     expected = np.tanh(DQ / 0.02) * [1.0, 3.0] + DQ * [2.0, 4.0]
     np.testing.assert_allclose(torque(robot, term, [1.0, 2.0, 3.0, 4.0]), expected, rtol=1e-14)  # libm's tanh
 
 
 def test_some_powers_alone(robot):
     """Any choice of powers gives those columns alone, joint after joint, with the robot's coefficients."""
-    term = FrictionPolynomial((1, 4))
+    term = FrictionPolynomial(powers=(1, 4))
     assert [column.name for column in term.columns(robot)] == ["f1_1", "f4_1", "f1_2", "f4_2"]
     np.testing.assert_array_equal(term.nominal(robot), robot.friction[:, [0, 3]].reshape(-1))
 
@@ -60,7 +60,7 @@ def test_units_follow_the_joint(robot):
 def test_bad_powers_are_refused(powers):
     """No power, an unknown one or one given twice is refused, with what is allowed."""
     with pytest.raises(InputError, match="allowed: some of 1, 2, 3, 4, each once"):
-        FrictionPolynomial(powers)
+        FrictionPolynomial(powers=powers)
 
 
 @pytest.mark.parametrize("scale", [-0.1, np.nan])
@@ -73,6 +73,8 @@ def test_a_bad_velocity_scale_is_refused(scale):
 def test_each_joint_may_have_its_own_velocity_scale(robot):
     """Velocity scales are one for all joints or one each; any other number is refused."""
     expected = np.column_stack([np.tanh(DQ[:, 0] / 0.02), np.sign(DQ[:, 1])])
-    np.testing.assert_allclose(torque(robot, FrictionPolynomial((1,), (0.02, 0.0)), [1, 1]), expected, rtol=1e-14)
+    np.testing.assert_allclose(
+        torque(robot, FrictionPolynomial(powers=(1,), velocity_scale=(0.02, 0.0)), [1, 1]), expected, rtol=1e-14
+    )
     with pytest.raises(InputError, match="3 friction velocity scales; allowed: one, or 2"):
-        torque(robot, FrictionPolynomial((1,), (0.02, 0.0, 1.0)), [1, 1])
+        torque(robot, FrictionPolynomial(powers=(1,), velocity_scale=(0.02, 0.0, 1.0)), [1, 1])

@@ -44,7 +44,7 @@ def shares(problem: FourierProblem, z: np.ndarray, t: np.ndarray) -> np.ndarray:
 def test_rest_at_both_ends(problem: FourierProblem) -> None:
     """Every point, even a wild one, starts and ends at rest."""
     for z in points(problem, 20):
-        _, dq, ddq, _ = problem.series(z).sample(np.array([0.0, 1 / problem.base_frequency]))
+        _, dq, ddq, _ = problem.series(z).sample(np.array([0.0, problem.family.duration]))
         # Sums of ten terms of size ten.
         assert np.abs(dq).max() < 1e-12
         assert np.abs(ddq).max() < 1e-12
@@ -52,7 +52,7 @@ def test_rest_at_both_ends(problem: FourierProblem) -> None:
 
 def test_limits_hold_between_the_samples(problem: FourierProblem) -> None:
     """A point on the bound of the imposed rows keeps the limits on a 20 kHz grid, and wastes nearly nothing."""
-    t = np.arange(0, 1 / problem.base_frequency, 1 / 20_000)
+    t = np.arange(0, problem.family.duration, 1 / 20_000)
     for z in points(problem, 5):
         used = shares(problem, problem.shrunk(100 * z), t)
         assert used.max() <= 1 + 1e-12

@@ -14,6 +14,7 @@ from oed.experiments import Effort, InteriorPoint
 from robots.collision import check_motion, collision_model
 from robots.common.errors import InfeasibleError, InputError
 from robots.loading import load_robot
+from tests.oed import flat
 
 TINY = Effort(islands=1, starts=1, screened=10, hops=0, finish_samples=100)
 BRIEF = InteriorPoint(max_iter=25, finish_iter=15)
@@ -21,7 +22,7 @@ BRIEF = InteriorPoint(max_iter=25, finish_iter=15)
 
 def design(robot, **options):
     settings = {"friction": "coulomb-viscous", "effort": TINY, "solver": BRIEF, "strokes": False, "workers": 1}
-    return oed.design(robot, **{**settings, **options})
+    return flat.design(robot, **{**settings, **options})
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +135,7 @@ def test_a_second_experiment_adds_what_the_first_lacks(er3a):
     second = design(er3a, criterion="d", after=prior)
     part = second.qualities[1]
     assert "after an earlier model" in part.part
-    assert part.value("d") > first.fourier.value("d")
+    assert part.value("d") > first.optimised.value("d")
 
 
 @pytest.mark.parametrize(
@@ -158,7 +159,7 @@ def test_scaling_is_reported_beside_the_plain_numbers(er3a, scaling):
     """A scaled design says both: the plain regressor's numbers and those that it was optimised for."""
     made = design(er3a, scaling=scaling, noise=[1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
     assert made.qualities[1].part == f"fourier (columns by {scaling}, rows by noise)"
-    assert made.qualities[1].value("cond") != pytest.approx(made.fourier.value("cond"))
+    assert made.qualities[1].value("cond") != pytest.approx(made.optimised.value("cond"))
     assert made.islands[0].final == pytest.approx(made.qualities[1].value("cond"), rel=1e-6)
 
 
@@ -166,7 +167,7 @@ def test_essential_parameters_only(er3a, tmp_path):
     """With a share stated, columns whose torque is below it are left out, and what is left is easier to tell apart."""
     whole, part = design(er3a), design(er3a, essential=0.02)
     assert set(part.base.names) < set(whole.base.names)
-    assert part.fourier.value("cond") < whole.fourier.value("cond")
+    assert part.optimised.value("cond") < whole.optimised.value("cond")
     # By the description itself: each column left out is below the share of every joint's torque on the design.
     motion, nominal = whole.part("fourier"), whole.base.from_standard(whole.base.model.nominal)
     own = whole.base.regressor(motion.q, motion.dq, motion.ddq) * nominal

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import oed
 from oed.criteria import Cond, criterion
 from oed.experiments import Design, Effort
 from robots.common.errors import InputError
 from robots.loading import load_robot
+from tests.oed import flat
 
 REFERENCE = {"coulomb-viscous": 28.0, "polynomial": 180.0}
 
@@ -35,7 +35,7 @@ def test_same_seed_same_file(robot_named, tiny, brief, tmp_path: Path) -> None:
 
     def run(name: str, **options: object) -> bytes:
         chosen = {"friction": "coulomb-viscous", "effort": effort, "solver": brief, "periods": 1, **options}
-        return file_of(oed.design(robot_named("er3a"), **chosen), tmp_path / name)
+        return file_of(flat.design(robot_named("er3a"), **chosen), tmp_path / name)
 
     here = run("here", workers=1)
     assert run("again", workers=1) == here
@@ -48,14 +48,14 @@ def test_any_executor(make_robot, tiny, brief, tmp_path: Path) -> None:
     robot, effort = make_robot("RR", "two"), replace(tiny, islands=2)
     options = {"effort": effort, "solver": brief, "periods": 1}
     with ThreadPoolExecutor(1) as executor:
-        found = oed.design(robot, executor=executor, **options)
-    assert file_of(found, tmp_path / "a") == file_of(oed.design(robot, workers=1, **options), tmp_path / "b")
+        found = flat.design(robot, executor=executor, **options)
+    assert file_of(found, tmp_path / "a") == file_of(flat.design(robot, workers=1, **options), tmp_path / "b")
 
 
 def test_time_limit(robot_named) -> None:
     """A time limit stops a long search early; the design says so, and is a good one all the same."""
     start = time.monotonic()
-    design = oed.design(
+    design = flat.design(
         robot_named("er3a"), friction="coulomb-viscous", effort="thorough", time_limit=2.0, periods=1, workers=1
     )
     # Two islands one after the other share the limit; laying out and checking take their time, too, on a busy machine.
@@ -68,7 +68,7 @@ def test_time_limit(robot_named) -> None:
 
 def test_no_time_at_all(make_robot) -> None:
     """Even without time for any solution there is a design within its limits: the best point drawn."""
-    design = oed.design(make_robot("RR", "two"), effort="quick", time_limit=1e-6, periods=1, workers=1)
+    design = flat.design(make_robot("RR", "two"), effort="quick", time_limit=1e-6, periods=1, workers=1)
     assert design.success
     assert design.islands[0].iterations == 0
 
@@ -86,7 +86,7 @@ def test_better_than_chance(name: str, designed) -> None:
     assert island.status == "finished"
     assert design.to_dict()["criterion"] == name
     # The file holds one period, so that its Fourier part has the very value that the search states.
-    assert design.fourier.value(name) == pytest.approx(island.final, rel=1e-6)
+    assert design.optimised.value(name) == pytest.approx(island.final, rel=1e-6)
 
 
 def test_criteria_pull_apart(designed) -> None:
@@ -94,7 +94,7 @@ def test_criteria_pull_apart(designed) -> None:
     names = ("cond", "d", "e")
     designs = {name: designed("er3a", criterion=name) for name in names}
     cost = {
-        (by, of): criterion(by).cost(np.square(designs[of].fourier.singular_values)) for by in names for of in names
+        (by, of): criterion(by).cost(np.square(designs[of].optimised.singular_values)) for by in names for of in names
     }
     for by in ("cond", "d"):
         assert min(names, key=lambda of, by=by: cost[by, of]) == by
@@ -106,7 +106,7 @@ def test_own_criterion(make_robot, tiny, brief, tmp_path: Path) -> None:
     class Mine(Cond):
         name, label = "mine", "my condition number"
 
-    design = oed.design(make_robot("RR", "two"), criterion=Mine(), effort=tiny, solver=brief, periods=1, workers=1)
+    design = flat.design(make_robot("RR", "two"), criterion=Mine(), effort=tiny, solver=brief, periods=1, workers=1)
     design.save(tmp_path)
     assert design.to_dict()["criterion_label"] == "my condition number"
     with pytest.raises(InputError, match="mine"):
@@ -128,7 +128,7 @@ def test_errors_come_through_the_solver(error: type[BaseException], make_robot, 
             return super().surrogate(eigenvalues, sharpness)
 
     with pytest.raises(error):
-        oed.design(make_robot("RR", "two"), criterion=Failing(), effort=tiny, solver=brief, workers=1)
+        flat.design(make_robot("RR", "two"), criterion=Failing(), effort=tiny, solver=brief, workers=1)
     assert Failing.calls == 7
 
 
@@ -148,7 +148,7 @@ def test_interrupt_keeps_the_best(make_robot) -> None:
     """Ctrl-C ends the search with the best design so far on request, and is an exception otherwise."""
     robot, options = make_robot("RRR", "three"), {"effort": "thorough", "periods": 1, "workers": 1}
     Interrupting.calls = 0
-    design = oed.design(robot, criterion=Interrupting(), keep_on_interrupt=True, **options)
+    design = flat.design(robot, criterion=Interrupting(), keep_on_interrupt=True, **options)
     assert design.interrupted
     assert [island.status for island in design.islands] == ["interrupted"] * 2
     assert design.success
@@ -158,7 +158,7 @@ def test_interrupt_keeps_the_best(make_robot) -> None:
     assert "interrupted" in design.summary()
     Interrupting.calls = 0
     with pytest.raises(KeyboardInterrupt):
-        oed.design(robot, criterion=Interrupting(), **options)
+        flat.design(robot, criterion=Interrupting(), **options)
 
 
 def test_interrupt(tmp_path: Path) -> None:
@@ -205,7 +205,7 @@ class Listener:
 def test_progress(make_robot, brief) -> None:
     """The bar hears of every local solution, never backwards, with the best value in the criterion's own sense."""
     heard, effort = Listener(), Effort(islands=2, starts=4, screened=10, hops=6, finish_samples=100)
-    oed.design(
+    flat.design(
         make_robot("RRR", "three"), criterion="d", effort=effort, solver=brief, periods=1, workers=1, progress=heard
     )
     assert heard.total == 2 * effort.steps
@@ -226,6 +226,6 @@ def test_effort_out_of_range(wrong: dict) -> None:
 def test_quick_effort_reaches_the_reference() -> None:
     """Even with quick effort, er3a reaches 28 over 52 columns and 180 over 64, unscaled, in SI units."""
     for friction, bound in REFERENCE.items():
-        design = oed.design(load_robot("er3a"), friction=friction, effort="quick", workers=1)
+        design = flat.design(load_robot("er3a"), friction=friction, effort="quick", workers=1)
         assert design.success
-        assert design.fourier.to_dict()["cond_Y"] <= bound
+        assert design.optimised.to_dict()["cond_Y"] <= bound

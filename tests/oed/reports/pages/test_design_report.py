@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import oed
 from oed.experiments import Design, Effort, Ipopt
 from oed.reports import design_page, render, save_design_report, significant
 from robots.common.files import ResultFolder
 from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits
 from robots.robot import Robot
+from tests.oed import flat
 
 EFFORT, SOLVER = Effort(islands=1, starts=1, screened=10, hops=0, finish_samples=100), Ipopt(max_iter=10, finish_iter=5)
 
@@ -38,7 +38,7 @@ def robot(**changes) -> Robot:
 
 
 def design_for(described: Robot) -> Design:
-    return oed.design(described, effort=EFFORT, solver=SOLVER, periods=1, workers=1)
+    return flat.design(described, effort=EFFORT, solver=SOLVER, periods=1, workers=1)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_stands_alone(html: str) -> None:
 
 def test_tells_the_numbers(design: Design, html: str) -> None:
     """Condition numbers, duration, segments, searches and the parameters' meaning are on the page."""
-    for quality in (design.fourier, design.whole):
+    for quality in (design.optimised, design.whole):
         assert significant(quality.value("cond")) in html
     assert f"{design.motion.duration:.1f} s" in html
     assert f"over {design.base.size} parameters" in html
