@@ -120,11 +120,11 @@ def summarise_limits(limits: Sequence[Limit]) -> str:
         if not np.isfinite(limit.detectable)
     ]
     more = len(hidden) - NAMED
-    rest = f"; not detectable at any size: {', '.join(hidden if more <= 1 else [*hidden[:NAMED], f'and {more} more'])}"
+    rest = f"; at any size hidden: {', '.join(hidden if more <= 1 else [*hidden[:NAMED], f'and {more} more'])}"
     rest = rest if hidden else ""
     return (
-        f"Detection limits of {len(sizes)} combinations of effect and joint: half are detectable from {half} of the "
-        f"joint's torque, 90 % from {most}{rest}"
+        f"Of {len(sizes)} effects and places half would have shown from {half} of the joint's torque on, nine in ten "
+        f"from {most}{rest}"
     )
 
 

@@ -71,8 +71,8 @@ def notes_of(
     strange = _strange(problem, after)
     notes += strange.values()
     notes += [
-        f"Joint {j + 1}: the residual on held-out data is {100 * after[j]:.0f} % of the torque. A residual this large "
-        "raises the noise estimate, and effects may be missed. Diagnose each log separately."
+        f"Joint {j + 1}: the residual on held-out data is {100 * after[j]:.0f} % of the torque. Most of it "
+        "is treated as noise, so effects may be missed. Diagnose each log separately."
         for j in np.flatnonzero(after > ODD)
         if j not in strange
     ]

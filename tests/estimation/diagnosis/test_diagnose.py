@@ -170,10 +170,12 @@ def test_peaks_that_are_cut_off_are_named_though_they_explain_little(
     assert level.value == pytest.approx(limit, rel=0.1)
     limit, result = cut(40)
     assert result.verdict == "none"
-    assert any(note.startswith(f"The torque of joint 1 is at its largest, {limit:.4g}, in") for note in result.notes)
+    assert any(
+        note.startswith(f"Joint 1: the torque stays at its maximum, {limit:.3g} N m, for") for note in result.notes
+    )
     whole = diagnose(arm, log, candidates=some, friction=SIMPLE)
     assert whole.verdict == "none"
-    assert not any("at its largest" in note for note in whole.notes)
+    assert not any("at its maximum" in note for note in whole.notes)
 
 
 def test_noise_that_is_a_third_of_the_torque_is_said(arm: Robot, fourier_motion: Callable, arm_plant: Callable) -> None:
@@ -235,7 +237,7 @@ def test_bad_input_is_named(arm: Robot, hidden: Callable[..., tuple[Log, Log]]) 
         diagnose(arm, [log, log])
     with pytest.raises(InputError, match="one of the logs"):
         diagnose(arm, log, held_out=log)
-    with pytest.raises(InputError, match=r"s of logs"):
+    with pytest.raises(InputError, match=r"s of usable logs"):
         diagnose(arm, log.rows(slice(0, 200)))
     still = replace(log, q=np.zeros_like(log.q))
     with pytest.raises(NotIdentifiableError, match="moves"):

@@ -167,8 +167,8 @@ def test_what_shows_at_no_size_is_named() -> None:
     seen = Limit(effect="spring", joint=1, detectable=0.01, **known)
     hidden = [Limit(effect="backlash", joint=j + 1, detectable=np.inf, **known) for j in range(6)]
     some = ", ".join(f"backlash of joint {j + 1}" for j in range(4))
-    assert "not detectable" not in summarise_limits([seen])
-    assert summarise_limits([seen, *hidden[:4]]).endswith(f"; not detectable at any size: {some}")
+    assert "hidden" not in summarise_limits([seen])
+    assert summarise_limits([seen, *hidden[:4]]).endswith(f"; at any size hidden: {some}")
     assert summarise_limits([seen, *hidden[:5]]).endswith(f"{some}, backlash of joint 5")
     assert summarise_limits([seen, *hidden]).endswith(f"{some}, and 2 more")
     assert summarise_limits(hidden) == ""
