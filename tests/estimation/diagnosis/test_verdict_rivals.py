@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.refinement import RARE, FittedEffect
 from estimation.diagnosis.searches.selection import SelectedEffect
@@ -76,8 +77,8 @@ def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
 @pytest.mark.parametrize(
     ("rival", "worse", "stays_open"),
     [
-        ("spring", verdict.CLOSE - 1.0, True),
-        ("spring", verdict.CLOSE + 1.0, False),
+        ("spring", CLOSE_RIVAL_BIC - 1.0, True),
+        ("spring", CLOSE_RIVAL_BIC + 1.0, False),
         ("load_heat", RARE - 1.0, True),  # as rare as it is, the data speak for it as much
         ("load_heat", RARE + 1.0, False),
     ],

@@ -41,7 +41,7 @@ DESIGN = ("design", "--effort", "quick", "--workers", 1, "--out")
         (("--robot", "er3b"), ("er3b", "did you mean 'er3a'")),
         (("--robot", "missing.yaml"), ("missing.yaml",)),
         (("--robot", "missing.urdf"), ("missing.urdf",)),
-        (("--robot", "er3a", "--criterion", "best"), ("best", "cond, d, a, e")),
+        (("--robot", "er3a", "--criterion", "best"), ("best", "a, cond, cond-d, d, e")),
         (("--robot", "er3a", "--friction", "magic"), ("magic", "polynomial")),
         (("--robot", "er3a", "--effort", "huge"), ("huge", "quick, standard, thorough")),
         (("--robot", "er3a", "--harmonics", 1), ("harmonics",)),

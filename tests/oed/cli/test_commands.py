@@ -121,7 +121,7 @@ def test_help(command: str, run) -> None:
 def test_notes_go_to_standard_error(run, arguments) -> None:
     """Assumed values are noted once, on standard error, without a traceback."""
     done = run(*arguments("simulate"))
-    assert done.err.count("note: two: these values are assumed") == 1
+    assert done.err.count("note: two: these values are assumptions") == 1
     assert "note:" not in done.out
 
 

@@ -111,7 +111,7 @@ def test_the_model_is_what_was_fitted_with_a_load_that_the_gear_bears(
         draws=2,
         rng=np.random.default_rng(0),
         extra=extra,
-        extra_load=find_gear_load(problem, found, values).extra_load,
+        bearing=find_gear_load(problem, found, values).extra_load,
     )
     members = _members(posed, SPRING, BY_LOAD)
     assert np.std(fit_jointly(posed, members)[1][~recording.sign_unknown[:, 0], 0]) < np.std(
