@@ -101,7 +101,7 @@ def test_a_delay_is_named_that_only_reversals_tell(cases: Callable) -> None:
     timing = _timed(robot, log)
     assert delay.value == pytest.approx(np.average(timing.lags, weights=timing.errors**-2.0), abs=2e-4)
     (note,) = (note for note in diagnosis.notes if "time_delay" in note)
-    assert "impulses at reversals" in note
+    assert "impulses at velocity reversals" in note
 
 
 def test_positions_that_say_too_little_of_reversals_say_nothing(cases: Callable) -> None:
