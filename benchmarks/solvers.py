@@ -29,6 +29,7 @@ from threadpoolctl import threadpool_limits
 from oed.criteria import criterion
 from oed.experiments import EFFORTS, InteriorPoint, Ipopt, Slsqp, Solver, usable_limits
 from oed.experiments.assembly import rest_pose
+from oed.experiments.options import LimitOptions
 from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.safety_checks.safety import choose_safety
 from oed.experiments.searches.search import Island
@@ -55,9 +56,8 @@ def problem_of(name: str, *, all_limits: bool) -> FourierProblem:
     if not all_limits:
         return problem
     pose = rest_pose(limits, None)
-    safety = choose_safety(
-        robot, base, pose, movable=True, torque=True, torque_margin=0.1, collision=True, clearance=0.01
-    )
+    kept = LimitOptions(torque=True, torque_margin=0.1, collision=True, clearance=0.01)
+    safety = choose_safety(robot, base, pose, kept, movable=True)
     return replace(problem, pointwise=safety.pointwise, averaged=safety.averaged, home=safety.home)
 
 

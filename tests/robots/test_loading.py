@@ -142,7 +142,7 @@ def test_assumed_values_are_told_once(write, monkeypatch):
     """A robot with values that no source backs warns in one line the first time it is loaded, and then no more."""
     monkeypatch.setattr(loading, "_warned", set())
     path = write(TABLE.replace("cubic: {values: [3, 4]}", "cubic: {values: [3, 4], source: assumed}"))
-    with pytest.warns(AssumedValueWarning, match=r"^pair: .*assumed.*: dynamics\.friction\.cubic$") as caught:
+    with pytest.warns(AssumedValueWarning, match=r"^pair: .*assumptions.*: dynamics\.friction\.cubic$") as caught:
         load_robot(path)
     assert len(caught) == 1
     assert caught[0].filename == __file__
@@ -175,5 +175,5 @@ dynamics:
     assert robot.limits.scaled(torque=0.5).torque_rms[0] == 10.0
     without = text.replace("    gear_ratio: {values: [-100.0, 50.0]}\n", "")
     (tmp_path / "geared.yaml").write_text(without)
-    with pytest.raises(InputError, match="motor_speed is that of the motor; without gear_ratio"):
+    with pytest.raises(InputError, match="motor_speed refers to the motor, but the gear_ratio .* is missing"):
         load_robot(str(tmp_path / "geared.yaml"))

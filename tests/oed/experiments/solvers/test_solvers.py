@@ -9,11 +9,13 @@ import pytest
 
 from oed.criteria import criterion
 from oed.experiments import InteriorPoint, Ipopt, Slsqp, Solver, usable_limits
+from oed.experiments.options import LimitOptions
 from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.safety_checks.safety import choose_safety
 from oed.experiments.solvers import Stage
 from oed.experiments.solvers.curved_slacks import CurvedSlacks
 from oed.experiments.solvers.slacks import LinearSlacks, implied
+from oed.trajectories import Fourier
 from robots.base_parameters import find_base_parameters
 from robots.loading import load_robot
 from robots.regressor import default_model
@@ -122,11 +124,15 @@ def limited() -> FourierProblem:
     limits = usable_limits(robot.limits)
     torque = 0.5 * np.asarray(robot.limits.torque)
     robot = replace(robot, limits=replace(robot.limits, torque=torque))
-    safety = choose_safety(
-        robot, base, np.zeros(6), movable=True, torque=True, torque_margin=0.1, collision=True, clearance=0.01
-    )
+    kept = LimitOptions(torque=True, torque_margin=0.1, collision=True, clearance=0.01)
+    safety = choose_safety(robot, base, np.zeros(6), kept, movable=True)
     return FourierProblem(
-        base=base, criterion=criterion("cond"), limits=limits, pointwise=safety.pointwise, home=safety.home, harmonics=3
+        base=base,
+        criterion=criterion("cond"),
+        limits=limits,
+        pointwise=safety.pointwise,
+        home=safety.home,
+        family=Fourier(harmonics=3),
     )
 
 
