@@ -175,5 +175,5 @@ dynamics:
     assert robot.limits.scaled(torque=0.5).torque_rms[0] == 10.0
     without = text.replace("    gear_ratio: {values: [-100.0, 50.0]}\n", "")
     (tmp_path / "geared.yaml").write_text(without)
-    with pytest.raises(InputError, match="motor_speed refers to the motor, but the gear_ratio .* is missing"):
+    with pytest.raises(InputError, match=r"motor_speed refers to the motor, but the gear_ratio .* is missing"):
         load_robot(str(tmp_path / "geared.yaml"))
