@@ -6,6 +6,8 @@ import ast
 from collections import Counter
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("robots", "estimation", "oed")
 MOST_LINES, MOST_FILES, MEDIAN_LINES = 300, 15, 150
@@ -54,6 +56,7 @@ def test_families_are_larger_than_folders_may_be():
     assert all(counts[folder] > MOST_FILES for folder in FAMILIES)
 
 
+@pytest.mark.slow
 def test_modules_import_without_circles():
     """No module imports itself by way of others: not within functions, nor for type checkers."""
     modules = {name_of(path): path for path in FILES}

@@ -26,6 +26,7 @@ def test_names_and_version(name):
     assert all(getattr(package, public) is not None for public in package.__all__)
 
 
+@pytest.mark.slow
 def test_objects_print_as_one_line():
     """Robot, motion, log, estimate and model say in one line what they are."""
     robot = load_robot("er3a")

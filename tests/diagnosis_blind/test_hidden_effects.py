@@ -122,6 +122,7 @@ def truth_of(case: Case) -> Truth:
     return Truth(effects=case.effects, before=float((told.before / size).sum()), after=float((told.after / size).sum()))
 
 
+@pytest.mark.slow
 def test_two_effects_are_both_found_by_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """``oed diagnose``, given files of t, q and tau, names both of two effects and nothing else."""
     case = PAIR.draw()
@@ -147,11 +148,13 @@ def test_more_cases(hide: Hide) -> None:
     assert complaints(*examined(hide), ratio=hide.ratio) == []
 
 
+@pytest.mark.slow
 def test_nothing_is_found_where_nothing_is() -> None:
     """Logs without an effect get the verdict ``none``."""
     assert complaints(*examined(NOTHING)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "hide",
     [STRANGE, *(pytest.param(hide, marks=pytest.mark.longer) for hide in MORE_STRANGE)],
@@ -180,6 +183,7 @@ def test_what_swings_at_the_flange_is_told_with_its_frequency() -> None:
     assert "swings at" in finding["sentence"]
 
 
+@pytest.mark.slow
 def test_swapped_labels_break_the_score() -> None:
     """A step of friction, Stribeck friction and nothing are told; were labels swapped, each would be judged wrong."""
     cases = [(*examined(hide), hide.ratio) for hide in LABELLED]

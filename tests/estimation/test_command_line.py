@@ -73,6 +73,7 @@ def refused(ended, code, *fragments):
         assert fragment in messages[0]
 
 
+@pytest.mark.slow
 def test_identify_then_predict(run, log_file, tmp_path):
     """Identify writes model.json and report.html, predict a table; both print JSON on request."""
     out = tmp_path / "out"
@@ -150,6 +151,7 @@ def test_unknown_names_are_refused(run, log_file, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_results_are_not_overwritten(run, log_file, tmp_path):
     """Existing results are kept, byte for byte, and the message names the file and --force."""
     (tmp_path / "model.json").write_text("mine")
@@ -184,6 +186,7 @@ def test_predict_refuses_what_is_no_model(run, log_file, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["model.json"]
 
 
+@pytest.mark.slow
 def test_the_installed_command_says_the_same(edited, tmp_path):
     """The console script itself ends with code 2 and one line, without a traceback."""
     script = shutil.which("oed", path=str(Path(sys.executable).parent)) or shutil.which("oed")

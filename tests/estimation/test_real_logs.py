@@ -25,6 +25,7 @@ def filtered_spread(prediction, cutoff):
     return error.std(axis=0) / prediction.measured.std(axis=0)
 
 
+@pytest.mark.slow
 def test_ur10_half_to_half(data):
     """The first half of a UR10's log predicts the second to .16 .05 .05 .14 .12 .32 of its torque's deviation."""
     log = read_log(data("ur10_unisa") / "exciting.parquet")
@@ -41,6 +42,7 @@ def test_ur10_half_to_half(data):
     assert not estimate.model.determined.all()
 
 
+@pytest.mark.slow
 def test_lwr4_run_to_run(data):
     """Run 1 of a KUKA LWR4+ predicts run 2 to .24 .01 .08 .02 .30 .68 .44 of its torque's deviation."""
     folder = data("kuka_lwr4_flobaroid")
@@ -50,6 +52,7 @@ def test_lwr4_run_to_run(data):
     assert (spread <= [0.245, 0.015, 0.085, 0.025, 0.305, 0.685, 0.445]).all(), spread
 
 
+@pytest.mark.slow
 def test_tiago_is_told_to_be_badly_excited(data):
     """A badly excited log is not fitted in silence: its last arm joints are named, and their parameters marked."""
     folder = data("tiago_figaroh")
@@ -72,6 +75,7 @@ def test_tiago_is_told_to_be_badly_excited(data):
     assert sum(error is None for error in written) > len(written) / 2
 
 
+@pytest.mark.slow
 def test_panda_with_uneven_time(data):
     """A Panda's log of uneven time, with repeated messages, is fitted as well as today."""
     log = read_log(data("panda_gaz2019") / "traj1_first10s.parquet")
@@ -86,6 +90,7 @@ def test_panda_with_uneven_time(data):
     assert 400 < estimate.dropped_rows < 700
 
 
+@pytest.mark.slow
 def test_double_pendulum_runs(data):
     """Four runs of the double pendulum are fitted, friction and all, and predict one that was not."""
     folder = data("double_pendulum_dfki")
@@ -123,6 +128,7 @@ def test_simple_pendulum_that_rings_is_refused(data):
         identify(robot, log, check=False)
 
 
+@pytest.mark.slow
 def test_kr300_from_motor_torques(data, tmp_path):
     """A heavy arm from a DH table: motor torques times gear ratios are fitted to .25 .32 .46 .38 .19 .20."""
     robot, log = kr300(data("kuka_kr300_weigand"), tmp_path / "kr300.yaml")

@@ -66,6 +66,7 @@ def test_their_rows_do_not_count_beside_a_log_of_all_joints(
     assert not only.motion.ddq[:, 1].any()
 
 
+@pytest.mark.slow
 def test_they_make_no_estimate_worse(
     arm: Robot, arm_log: Callable[..., Log], alone: Callable[[int], Log], arm_plant: Callable, fourier_motion: Callable
 ) -> None:
@@ -77,6 +78,7 @@ def test_they_make_no_estimate_worse(
     assert np.all(after < 0.03)
 
 
+@pytest.mark.slow
 def test_the_errors_that_are_stated_are_those_of_joints_that_move(
     arm: Robot, arm_log: Callable[..., Log], alone: Callable[[int], Log]
 ) -> None:

@@ -37,6 +37,7 @@ def test_page_shows_every_example():
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_criterion(tmp_path):
     """The design by an own criterion is better by it than the design by cond(Y)."""
     values = dict(re.findall(r"^([\w-]+): ([\d.]+)$", example("criterion", tmp_path), flags=re.MULTILINE))
@@ -44,12 +45,14 @@ def test_criterion(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_limit(tmp_path):
     """The flange uses its own speed limit up, and does not pass it."""
     (speed,) = re.findall(r"fastest flange: ([\d.]+) m/s", example("limit", tmp_path))
     assert 0.45 < float(speed) <= 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_family(tmp_path):
     """An experiment of an own family determines all parameters within all limits."""
@@ -61,6 +64,7 @@ def test_family(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_friction(tmp_path):
     """Data with an own friction are explained by that term alone, to the noise of two per cent."""
     levels = dict(re.findall(r"^([\w-]+): ([\d.]+) % residual$", example("friction", tmp_path), flags=re.MULTILINE))
@@ -68,6 +72,7 @@ def test_friction(tmp_path):
     assert float(levels["coulomb-viscous"]) > 2 * float(levels["saturating_friction"])
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_estimator(tmp_path):
     """An own estimator fits to the noise; its largest relative residual is not above that of WLS."""
@@ -77,6 +82,7 @@ def test_estimator(tmp_path):
     assert largest["load-weighted"] <= largest["wls"]
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_effect(tmp_path):
     """An own effect is found on its joint with its parameters, and saved in a model that loads again."""

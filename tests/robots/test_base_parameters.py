@@ -89,6 +89,7 @@ def test_regrouping_keeps_the_torque(name, catalogue_robot, states):
     regroups(find_base_parameters(default_model(robot)), states(robot, 50, seed=77))
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(seed=st.integers(0, 10_000), n=st.integers(1, 6))
 def test_any_chain(seed, n, random_robot, twin, states):

@@ -105,6 +105,7 @@ def test_the_er3a_points_down(er3a):
     np.testing.assert_allclose(flange[:3, 3], [0.349, 0.0, 0.6615 - 0.078], atol=1e-15)
 
 
+@pytest.mark.slow
 def test_the_er3a_reaches_as_far_as_stated(er3a):
     """The wrist's largest horizontal reach is 627.1 mm; the data sheet says 628."""
     q2 = np.linspace(er3a.limits.lower[1], er3a.limits.upper[1], 1101)

@@ -102,6 +102,7 @@ def test_size_is_what_shows_beyond_the_base_model() -> None:
     assert whole > 0.012
 
 
+@pytest.mark.slow
 def test_every_effect_changes_the_log_and_is_reproducible() -> None:
     """Every effect can be drawn, adds torque, and the same seed gives the same log."""
     machine = draw_machine("panda", np.random.default_rng(5))
@@ -117,12 +118,14 @@ def test_every_effect_changes_the_log_and_is_reproducible() -> None:
     np.testing.assert_array_equal(first.logs[0].tau, second.logs[0].tau)
 
 
+@pytest.mark.slow
 def test_too_large_a_size_is_refused() -> None:
     """A size that no plausible value reaches is said to be hidden."""
     with pytest.raises(Hidden):
         draw_case(2, hide=[Elastic], size=0.5, kind="er3a", periodic=True, duration=20.0, unseen=0.0)
 
 
+@pytest.mark.slow
 def test_elastic_gear_obeys_both_inertias() -> None:
     """The link of an elastic joint, integrated by itself behind the motor's logged motion, moves as the truth says."""
     machine = draw_machine("heavy", np.random.default_rng(9))
@@ -150,6 +153,7 @@ def test_elastic_gear_obeys_both_inertias() -> None:
     assert np.abs(solved.y[0] - ride.link_q[rows, 5][::50]).max() < 0.03 * twist
 
 
+@pytest.mark.slow
 def test_a_loose_link_flies_lands_and_settles() -> None:
     """The link of a joint with play, its whole equation of motion integrated from where it leaves its flank.
 
@@ -271,6 +275,7 @@ def test_gears_bear_a_spring() -> None:
     np.testing.assert_allclose(ride.parts[0][:, 1], 0.1 * np.abs(ride.rigid[:, 1] + pull) * ride.sign[:, 1], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_stranger_shows_beyond_the_base_model_and_its_own_column_brings_a_gain() -> None:
     """An effect outside every catalogue shows beyond the base model, on motion that the fit has not seen, too."""
     case = draw_case(17, hide=[CrossWave], size=0.03, kind="er3a", periodic=True, duration=20.0, unseen=20.0)

@@ -48,6 +48,7 @@ def stepped(arm: Robot, hidden: Callable[..., tuple[Log, Log]]) -> tuple[Diagnos
     return diagnose(arm, log, held_out=unseen, candidates=SOME, friction=SIMPLE), unseen
 
 
+@pytest.mark.slow
 def test_a_log_without_effects_has_nothing_found(arm: Robot, hidden: Callable[..., tuple[Log, Log]]) -> None:
     """The verdict is none, and the extended model is the base model; a false alarm has a chance of 1 %."""
     log, _ = hidden(None)
@@ -59,6 +60,7 @@ def test_a_log_without_effects_has_nothing_found(arm: Robot, hidden: Callable[..
     assert "only log" in result.how_unseen
 
 
+@pytest.mark.slow
 def test_a_step_of_friction_is_named_with_its_joint_its_time_and_its_gain(stepped: tuple[Diagnosis, Log]) -> None:
     """Name, joint, change time within 0.2 s and coefficients within their intervals; the unseen error falls."""
     result, _ = stepped
@@ -136,6 +138,7 @@ def test_the_summary_names_cause_joint_and_gain(stepped: tuple[Diagnosis, Log]) 
     assert len(stepped[0].to_frame()) == sum(len(f.parameters) for f in stepped[0].findings)
 
 
+@pytest.mark.slow
 def test_a_cause_outside_the_candidates_is_not_forced_into_a_name(
     arm: Robot, hidden: Callable[..., tuple[Log, Log]]
 ) -> None:
@@ -149,6 +152,7 @@ def test_a_cause_outside_the_candidates_is_not_forced_into_a_name(
     assert result.extended[0] < result.baseline[0]
 
 
+@pytest.mark.slow
 def test_peaks_that_are_cut_off_are_named_though_they_explain_little(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable
 ) -> None:
@@ -178,6 +182,7 @@ def test_peaks_that_are_cut_off_are_named_though_they_explain_little(
     assert not any("at its maximum" in note for note in whole.notes)
 
 
+@pytest.mark.slow
 def test_noise_that_is_a_third_of_the_torque_is_said(arm: Robot, fourier_motion: Callable, arm_plant: Callable) -> None:
     """Nothing is found in it, and a note says how much is left, joint by joint; quiet joints have none."""
     log = simulate(arm_plant(torque_noise=0.02), fourier_motion(arm, 0), seed=0)
@@ -190,6 +195,7 @@ def test_noise_that_is_a_third_of_the_torque_is_said(arm: Robot, fourier_motion:
     assert note.startswith("Joint 2: ")
 
 
+@pytest.mark.slow
 def test_unseen_motion_that_is_faster_than_friction_was_fitted_for_is_said(
     arm: Robot, fourier_motion: Callable, arm_plant: Callable
 ) -> None:

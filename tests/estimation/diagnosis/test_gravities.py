@@ -54,6 +54,7 @@ def build(upright: Robot, fourier_motion: Callable[..., Motion], pinocchio_torqu
     return make
 
 
+@pytest.mark.slow
 def test_each_log_is_evaluated_as_its_base_stood(upright: Robot, build: Build, pinocchio_torque: Torque) -> None:
     """Columns, what effects feel, and the robot that is simulated: pinocchio's torque log by log, payloads included."""
     logs = (build(0), build(1, TILTED, MASS), build(2, TILTED))
@@ -109,6 +110,7 @@ def gained(upright: Robot, build: Build) -> tuple[Diagnosis, tuple[Log, Log]]:
     return diagnose(upright, logs, candidates=SOME, friction=SIMPLE), logs
 
 
+@pytest.mark.slow
 def test_a_wrong_torque_constant_is_told_from_a_tilt_and_a_mass(gained: tuple[Diagnosis, tuple[Log, Log]]) -> None:
     """Named on its joint with its size, by logs under two gravities; unseen errors fall."""
     result, _ = gained
@@ -135,6 +137,7 @@ def test_the_extended_model_predicts_on_the_base_as_described_and_as_tilted(
         assert np.all(predict(model, log).nrmse < 0.03)
 
 
+@pytest.mark.slow
 def test_a_tilt_that_was_not_told_is_not_taken_for_nothing(upright: Robot, build: Build) -> None:
     """A robot without fault: told of the tilt, each log predicts the other to the noise; not told, not at all."""
     logs = (build(0), build(1, TILTED))
@@ -145,6 +148,7 @@ def test_a_tilt_that_was_not_told_is_not_taken_for_nothing(upright: Robot, build
     assert max(untold.baseline) > 0.3
 
 
+@pytest.mark.slow
 def test_a_base_askew_on_its_mount_is_found_under_two_gravities(upright: Robot, build: Build) -> None:
     """Gravity is off by the same small rotation of the base frame in both logs: its angles come back to 0.1 degrees."""
     askew = (0.03, -0.02, 0.0)
@@ -157,6 +161,7 @@ def test_a_base_askew_on_its_mount_is_found_under_two_gravities(upright: Robot, 
     assert finding.gain.ci95[0] > 0
 
 
+@pytest.mark.slow
 def test_what_only_a_tilt_shows_of_an_upright_axis_is_no_spring(upright: Robot, build: Build) -> None:
     """Moments about the first axis, in no base parameter of a level robot, are fitted with the tilt and named so."""
     askew = (0.02, 0.015, 0.0)
@@ -170,6 +175,7 @@ def test_what_only_a_tilt_shows_of_an_upright_axis_is_no_spring(upright: Robot, 
     assert (told["own_moment_1"], told["own_moment_2"]) == pytest.approx((0.3 + 0.1 * 6, 0.2), abs=0.15)
 
 
+@pytest.mark.slow
 def test_unseen_logs_may_stand_as_none_before(upright: Robot, build: Build) -> None:
     """Fitted on a level base, judged on a tilted one: what only the tilt shows is the description's."""
     result = diagnose(upright, build(0), held_out=build(1, TILTED), candidates=SOME, friction=SIMPLE)

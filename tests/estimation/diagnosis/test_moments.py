@@ -64,6 +64,7 @@ def test_the_moment_is_the_best_of_all(recording: Recording, posed: Callable, si
     assert abs(found.shape[0] - TRUE) < 0.2
 
 
+@pytest.mark.slow
 def test_intervals_of_a_moment_hold_it(recording: Recording, posed: Callable) -> None:
     """Of sixteen logs with a step that hardly shows, the 95 % interval holds its moment in thirteen or more.
 

@@ -15,6 +15,7 @@ from estimation.diagnosis.validations.gear_compliance import measure_gear_compli
 from tests.kr300 import kr300
 
 
+@pytest.mark.slow
 def test_a_heavy_arm_s_gears(data: Callable[[str], Path], tmp_path: Path) -> None:
     """The stiffness of joints 2 and 3 is that of the maker within its interval; joint 1 has too little load to tell.
 

@@ -39,6 +39,7 @@ def alone(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> Callable
     return build
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flicker", [False, True])
 def test_a_joint_that_never_moves_is_told(arm: Robot, alone: Callable[..., Log], flicker: bool, tmp_path: Path) -> None:
     """Its encoder says one value throughout, or flickers by a count: no crash, no refusal, and a note; it is saved."""
@@ -65,6 +66,7 @@ def test_a_joint_that_trembles_by_a_count_is_at_rest(arm: Robot, arm_log: Callab
     assert recording.reversal_acceleration_error[1] == pytest.approx(first.reversal_acceleration_error[1])
 
 
+@pytest.mark.slow
 def test_an_unseen_log_of_one_joint_is_judged_by_that(arm: Robot, arm_log: Callable, alone: Callable[..., Log]) -> None:
     """Torque that friction holds is no error of the model there; the joint that moves errs by noise."""
     found = diagnose(arm, arm_log(torque_noise=0.02), held_out=alone(0, 100.0), candidates=("stribeck",))
@@ -83,6 +85,7 @@ def test_the_gate_asks_nothing_of_a_joint_that_stands(arm: Robot, alone: Callabl
     assert not [finding for finding in report.findings if finding.severity == "refuse"]
 
 
+@pytest.mark.slow
 def test_single_joint_logs_beside_another_find_nothing_that_is_not_there(
     arm: Robot, arm_log: Callable, alone: Callable[..., Log]
 ) -> None:
@@ -93,6 +96,7 @@ def test_single_joint_logs_beside_another_find_nothing_that_is_not_there(
     assert np.max(found.baseline) < 0.05
 
 
+@pytest.mark.slow
 def test_what_one_joint_alone_shows_is_found(arm: Robot, alone: Callable[..., Log]) -> None:
     """Logs of one joint each show that the first has more friction from a moment on; its own stretches measure that."""
     found = diagnose(arm, [alone(0, 100.0, step=0.6), alone(1, 200.0)])
@@ -101,6 +105,7 @@ def test_what_one_joint_alone_shows_is_found(arm: Robot, alone: Callable[..., Lo
     assert found.extended[0] < 0.8 * found.baseline[0]
 
 
+@pytest.mark.slow
 def test_limits_say_that_a_push_in_a_rest_is_not_seen(arm: Robot, arm_log: Callable) -> None:
     """Of what passes, and only where the arm stands for more than a moment."""
     log = arm_log(torque_noise=0.02)

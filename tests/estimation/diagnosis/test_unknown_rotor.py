@@ -15,6 +15,7 @@ from robots.robot import Robot
 SHARE = 0.08
 
 
+@pytest.mark.slow
 def test_friction_by_the_load_tells_the_rotor_that_loads_no_gear(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable, pinocchio_torque: Callable
 ) -> None:

@@ -212,6 +212,7 @@ def test_it_is_offered_by_name():
     assert ESTIMATORS["consistent"] is PhysicallyConsistent
 
 
+@pytest.mark.slow
 def test_on_a_real_arm_it_predicts_as_well(data):
     """On the unseen half of a UR10's log its error is at most 5 % above weighted least squares', on average."""
     log = read_log(data("ur10_unisa") / "exciting.parquet")

@@ -85,6 +85,7 @@ def test_what_cannot_be_is_refused(problem_named):
         solved(ConstrainedLeastSquares(bounds={"m_1": (5.0, 6.0)}, total_mass=1.0), data)
 
 
+@pytest.mark.slow
 def test_what_is_known_exactly_takes_its_share_of_the_uncertainty(problem_named):
     """With a parameter known, stated errors are the scatter of the others over many draws, and its own is zero."""
     problem = problem_named("two joints")
@@ -118,6 +119,7 @@ def free_covariance(problem, noise):
     return inverse @ meat @ inverse
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("member", [ConstrainedLeastSquares(), PhysicallyConsistent(weight=1e-5)], ids=lambda m: m.name)
 def test_at_a_bound_intervals_hold_more_often_than_stated(problem_named, member):
     """Where the truth lies at bounds, intervals as wide as without them hold it no less often, at the bounds more."""

@@ -56,6 +56,7 @@ def test_the_scale_is_the_noise_in_spite_of_outliers(problem_named, assemble):
     np.testing.assert_allclose(solved(Tukey(), data).extras["scale"], noise, rtol=0.2)
 
 
+@pytest.mark.slow
 def test_clean_data_cost_little(problem_named):
     """Under normal noise alone, robust estimates scatter at most 12 % more than least squares."""
     problem = problem_named("one joint")
@@ -68,6 +69,7 @@ def test_clean_data_cost_little(problem_named):
     assert (spread["tukey"] < 1.12 * spread["wls"]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("member", [Huber(), Tukey()], ids=lambda member: member.name)
 def test_their_standard_errors_are_honest(problem_named, assemble, member):
     """With outliers or without, stated 95 % intervals hold the truth in 88 % of 30 runs or more."""

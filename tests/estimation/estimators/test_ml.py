@@ -24,6 +24,7 @@ def correlated(problem, assemble, seed, rho=0.95, level=0.05, masked=False):
     return assemble(problem.base, parts)
 
 
+@pytest.mark.slow
 def test_knowing_the_correlation_pays(problem_named, assemble):
     """With noise that correlates by .95, maximum likelihood takes a third of the parameters' scatter away."""
     problem = problem_named("two joints")
@@ -46,6 +47,7 @@ def test_the_noise_is_found(problem_named, assemble):
     assert noise[0, 1] / np.sqrt(noise[0, 0] * noise[1, 1]) == pytest.approx(0.95, abs=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("masked", [False, True])
 def test_its_standard_errors_are_honest(problem_named, assemble, masked):
     """Stated 95 % intervals hold the truth in 90 to 98 % of 40 runs, also where rows are left out."""

@@ -144,6 +144,7 @@ def monte_carlo(truth, controller):
     return means
 
 
+@pytest.mark.slow
 def test_least_squares_is_biased_by_noise_in_the_positions(monte_carlo):
     """With 0.3 mrad of noise in the positions, least squares misses inertias by tens of standard errors of the mean."""
     assert np.abs(monte_carlo["ols"][0]).max() > 30

@@ -135,6 +135,7 @@ def test_joint_that_stands_is_told(er3a, good):
     assert still.refused
 
 
+@pytest.mark.slow
 def test_velocity_columns_are_compared(good, spoilt):
     """Velocities in degrees, with the wrong sign or of another joint are told."""
     log = good()
@@ -244,6 +245,7 @@ def test_report_says_everything(good, spoilt):
         report.raise_if_refused()
 
 
+@pytest.mark.slow
 def test_a_long_log_is_checked_whole(er3a, good):
     """A fault near the end of a long log is found, though physics are judged on excerpts of it."""
     log = good(duration=20.0)

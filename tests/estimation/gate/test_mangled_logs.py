@@ -7,6 +7,7 @@ import pytest
 BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 
 
+@pytest.mark.slow
 def test_mangled_logs_end_in_a_message_or_a_right_result(monkeypatch):
     """No traceback, and no wrong result in silence, whatever is done to a log."""
     pytest.importorskip("rosbags", reason="rosbags is not installed")

@@ -26,6 +26,7 @@ def test_tiago_is_told_to_be_badly_excited_on_its_last_joints(data):
     assert (report.information[:5] > 10).all()
 
 
+@pytest.mark.slow
 def test_ur10_and_lwr_are_usable(data):
     """Logs that carry an identification pass; what is said of them are small torques of the wrist."""
     report = check_log(load_robot("ur10"), read_log(data("ur10_unisa") / "exciting.parquet"))
@@ -50,6 +51,7 @@ def test_panda_is_told_its_uneven_time_and_repeated_rows(data):
     assert np.nanmax(report.unexplained) < 0.25
 
 
+@pytest.mark.slow
 def test_double_pendulum_runs_are_usable(data):
     """No run of the double pendulum is refused; joints beyond the description's range are told as such."""
     folder = data("double_pendulum_dfki")

@@ -113,6 +113,7 @@ def stop_and_go(rng, moves=50, period=0.004):
     return Motion(t=period * np.arange(len(q)), q=q, dq=dq, ddq=ddq)
 
 
+@pytest.mark.slow
 def test_left_out_errors_are_those_of_a_prediction(arm, arm_plant):
     """Where joints start from rest, left-out errors are those of an unseen log, and the cut-off is among the best."""
     plant = arm_plant(torque_noise=0.02)

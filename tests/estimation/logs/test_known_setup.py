@@ -105,6 +105,7 @@ def two(upright: Robot, build: Build) -> tuple[tuple[Log, Log], object]:
     return logs, identify(upright, logs, friction="coulomb-viscous", offset=False)
 
 
+@pytest.mark.slow
 def test_identify_counts_gravity_and_payload_of_logs(upright: Robot, build: Build, two: tuple) -> None:
     """The parameters are the arm's own and two more than without the tilt; all within five standard errors."""
     _, estimate = two

@@ -266,6 +266,7 @@ def test_logs_that_do_not_belong_together_are_refused(tmp_path):
         read_logs([path], n=6)
 
 
+@pytest.mark.slow
 def test_long_log_is_read_by_the_fast_reader(tmp_path):
     """A log of 200,000 rows takes a fraction of a second; a reader that walks lines would take tens."""
     import time

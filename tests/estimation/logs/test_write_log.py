@@ -41,6 +41,7 @@ def logs(draw):
     return Log(np.sort(times), matrix(), **fields, metadata=metadata)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=60)
 @given(log=logs())

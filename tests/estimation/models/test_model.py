@@ -48,6 +48,7 @@ def test_the_file_gives_back_the_model(estimate, tmp_path):
     assert (tmp_path / "again.json").read_text() == path.read_text()
 
 
+@pytest.mark.slow
 def test_the_file_is_enough_for_a_prediction(tmp_path, fourier_motion):
     """A model of a robot whose description is gone predicts the same torque, from its file or its folder."""
     description = tmp_path / "mine.yaml"

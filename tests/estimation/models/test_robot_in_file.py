@@ -65,6 +65,7 @@ def _extensions(effect, model, state):
             )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EFFECTS)
 def test_an_extended_model_says_the_same_once_loaded(name, base, moving, tmp_path):
     """Each effect's torque is the same by the model in memory and by its file: the file holds what it refers to."""

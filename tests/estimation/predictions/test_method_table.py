@@ -5,6 +5,7 @@ from estimation.predictions.method_table import compare_methods
 from robots.common.errors import InputError
 
 
+@pytest.mark.slow
 def test_estimators_are_compared_on_unseen_data(arm, arm_log):
     """Each estimator gets a row with its error on a log that none has seen, the best first."""
     table = compare_methods(arm, [arm_log(), arm_log(1, 1)], methods=["ols", "wls", "huber"])

@@ -67,6 +67,7 @@ def estimate(arm: Robot, recorded: tuple[Motion, Log]) -> CampaignEstimate:
     return fit_campaign(arm, [log.rows(slice(0, 40000)), log.rows(slice(40000, None))])
 
 
+@pytest.mark.slow
 def test_rigid_body_friction_and_heat_come_out_together(arm: Robot, estimate: CampaignEstimate) -> None:
     """Friction at T0 is that of the cold arm, and heat ratios are within their errors of the truth."""
     names = estimate.model.names
@@ -135,6 +136,7 @@ def test_the_model_file_carries_the_heat(estimate: CampaignEstimate) -> None:
         ThermalTorqueModel(model=estimate.model, thermal=(None,))
 
 
+@pytest.mark.slow
 def test_friction_from_logs_feeds_single_fits(
     arm: Robot, recorded: tuple[Motion, Log], estimate: CampaignEstimate
 ) -> None:

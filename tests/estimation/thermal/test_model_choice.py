@@ -12,6 +12,7 @@ from estimation.thermal import ThermalRun, choose_thermal, fit_thermal, predict_
 from robots.common.errors import InputError
 
 
+@pytest.mark.slow
 def test_two_time_constants_are_chosen_where_there_are_two(four_duties: Callable[[int], list[ThermalRun]]) -> None:
     """On the thesis' data the second order wins, and the first order's mean error is five times as large (Table 6)."""
     runs = [four_duties(11)[k] for k in (1, 3)]
@@ -36,6 +37,7 @@ def test_two_time_constants_are_chosen_where_there_are_two(four_duties: Callable
     assert choice.estimate is second.estimate
 
 
+@pytest.mark.slow
 def test_one_time_constant_is_enough_where_there_is_one() -> None:
     """Data of a single heat capacity are left to the first order, by the last third that was held out."""
     t = np.arange(0.0, 7201.0, 20.0)
@@ -61,6 +63,7 @@ def test_bad_options_are_named(four_duties: Callable[[int], list[ThermalRun]]) -
         choose_thermal(run, orders=())
 
 
+@pytest.mark.slow
 def test_the_warm_up_of_a_real_arm(data: Callable) -> None:
     """A UR3's joints warm up within 0.05 degC RMS of the model, and are predicted within 0.5 degC.
 

@@ -100,6 +100,7 @@ def test_logs_are_independent(monkeypatch):
     np.testing.assert_allclose(swapped, apart, rtol=0.05, atol=0.05 * np.abs(apart).max())
 
 
+@pytest.mark.slow
 def test_the_stated_covariance_is_that_of_repeated_experiments():
     """Over 400 draws of coloured, correlated noise, the estimates scatter as the covariance says."""
     Y = regressor(2000)

@@ -22,6 +22,7 @@ from robots.robot import Robot
 SPARSE = 25
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["er3a", "ur10", "panda"])
 def test_no_pose_of_a_trimmed_box_collides(name: str) -> None:
     """No pose of the box collides by coal's own distances, home is in it, and most of the wanted room is left.
@@ -76,6 +77,7 @@ def test_ways_lead_from_pose_to_pose() -> None:
         assert all(np.count_nonzero(a != b) == 1 for a, b in pairwise(poses))
 
 
+@pytest.mark.slow
 def test_planned_stages_are_proved_free(thesis_campaign: Campaign) -> None:
     """Friction sweeps, warm-up and moves of the er3a meet nothing at any time; the note tells what that cost."""
     model = collision_model(thesis_campaign.robot)
@@ -86,6 +88,7 @@ def test_planned_stages_are_proved_free(thesis_campaign: Campaign) -> None:
     assert any("To avoid collisions" in note for note in thesis_campaign.notes)
 
 
+@pytest.mark.slow
 def test_without_clearing_the_warm_up_drives_what_was_asked_and_says_that_it_collides(
     er3a: Robot, er3a_design: Design
 ) -> None:

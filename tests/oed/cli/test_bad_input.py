@@ -258,6 +258,7 @@ def test_a_file_where_the_folder_should_be(run, robot: Path, tmp_path: Path) -> 
     assert place.read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_nothing(run, robot: Path, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """When the last file cannot be written, none is."""
 

@@ -44,6 +44,7 @@ def arguments(robot: Path, experiment: Path, tmp_path: Path):
     return lambda command: [command, *lines[command]]
 
 
+@pytest.mark.slow
 @EACH
 def test_writes_its_results(command: str, run, arguments, tmp_path: Path) -> None:
     """A command writes its files, all of them and no other, and a summary that says where."""
@@ -53,6 +54,7 @@ def test_writes_its_results(command: str, run, arguments, tmp_path: Path) -> Non
     assert str(tmp_path) in done.out
 
 
+@pytest.mark.slow
 @EACH
 def test_never_overwrites(command: str, run, arguments, tmp_path: Path) -> None:
     """Results that are there stay as they are, with code 2 and the way out; with --force they are replaced."""
@@ -70,6 +72,7 @@ def test_never_overwrites(command: str, run, arguments, tmp_path: Path) -> None:
         assert (tmp_path / name).read_text() != "precious"
 
 
+@pytest.mark.slow
 @EACH
 def test_json(command: str, run, arguments) -> None:
     """With --json, standard output is one JSON object and nothing else."""
@@ -78,6 +81,7 @@ def test_json(command: str, run, arguments) -> None:
     assert isinstance(done.data, dict)
 
 
+@pytest.mark.slow
 @EACH
 def test_quiet(command: str, run, arguments) -> None:
     """With --quiet, nothing is printed at all."""
@@ -85,6 +89,7 @@ def test_quiet(command: str, run, arguments) -> None:
     assert (done.code, done.out, done.err) == (0, "", "")
 
 
+@pytest.mark.slow
 @EACH
 def test_interrupted(command: str, run, arguments, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C ends a command with code 130, one line, and no file or folder left."""
@@ -131,6 +136,7 @@ def test_version(run) -> None:
     assert (done.code, done.out.strip()) == (0, f"robot-oed {VERSION}")
 
 
+@pytest.mark.slow
 def test_whole_loop(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     """Simulated, identified and predicted, the robot's torque comes back to within its noise."""
     log, model, out = tmp_path / "log.parquet", tmp_path / "model", tmp_path / "p.csv"
@@ -161,6 +167,7 @@ def test_export_forms(run, experiment: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(read_trajectory(degrees)[0].dq, motion.dq, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_design_options_reach_the_design(run, robot: Path, tmp_path: Path) -> None:
     """Options of the command line are those of the design."""
     done = run(

@@ -7,12 +7,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from oed.exports import read_trajectory
 from robots.loading import load_robot
 
 PAIR = "stribeck:2,load_dependent_friction:2"
 
 
+@pytest.mark.slow
 def test_trajectory_design_and_report_are_written(run: Callable[..., Any], robot: Path, tmp_path: Path) -> None:
     """The command writes the motion, within the limits, its chance, and a page that names the rivals."""
     done = run("design", "--robot", robot, "--discriminate", PAIR, "--noise", "0.3,0.2", "--out", tmp_path, "--json")

@@ -30,6 +30,7 @@ def states(count: int = 20) -> np.ndarray:
     return np.random.default_rng(0).uniform(-2.0, 2.0, (3, count, 2))
 
 
+@pytest.mark.slow
 def test_urdf(identify, tmp_path: Path) -> None:
     """The URDF of --urdf loads in another program, which gives the model's rigid-body torques."""
     done = identify("--urdf", tmp_path / "arm.urdf")
@@ -46,6 +47,7 @@ def test_urdf(identify, tmp_path: Path) -> None:
     assert np.abs(found - expected).max() < 1e-8 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_c_code(identify, tmp_path: Path) -> None:
     """The C of --c-code compiles and gives the model's torque."""
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
@@ -93,6 +95,7 @@ def test_band(run, experiment: Path, tmp_path: Path) -> None:
     assert all(0.9 < share < 0.99 for share in done.data["band95_coverage"])
 
 
+@pytest.mark.slow
 def test_all_methods(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     """With --method all every estimator is in the table, with an error on unseen data or a reason; the best is used."""
     out, short = tmp_path / "out", tmp_path / "short.csv"
@@ -109,6 +112,7 @@ def test_all_methods(run, robot: Path, experiment: Path, tmp_path: Path) -> None
     assert "Estimators" in (out / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_mapping(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     """A log in degrees, milliseconds and foreign names gives, by its mapping, the parameters of the log itself."""
     table = pd.read_csv(experiment / "log.csv", comment="#")

@@ -61,6 +61,7 @@ def test_a_log_that_is_not_there_or_a_value_that_is_none_is_refused(
         with_known_setup(three, None, gravities)
 
 
+@pytest.mark.slow
 def test_commands_count_what_they_are_told(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     """Identify notes the gravity in its model, predict uses it, and a wrong one ends with code 2 and one line."""
     log, out = experiment / "log.csv", tmp_path / "out"

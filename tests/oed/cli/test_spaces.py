@@ -30,6 +30,7 @@ def test_nonsense_is_refused(tool_box: str | None, singularity: float | None) ->
         spaces_from(tool_box, singularity)
 
 
+@pytest.mark.slow
 def test_designed_flange_stays_in_its_box(run, robot: Path, tmp_path: Path) -> None:
     """The designed trajectory's flange keeps the box by the chain's own kinematics."""
     low, high = -0.08, 0.08

@@ -86,6 +86,7 @@ def test_too_few_samples_are_refused():
     assert overshoot_factor(5, 11) > 0.0
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(seed=st.integers(0, 10_000), degree=st.integers(1, 12))
 def test_exact_extremes_are_those_of_a_dense_sampling(seed, degree):

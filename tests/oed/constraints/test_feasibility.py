@@ -87,6 +87,7 @@ def test_an_obstacle_in_the_way(robot):
         check_feasible(robot, _limits(robot, obstacles=(post,)), HOME)
 
 
+@pytest.mark.slow
 def test_a_box_out_of_reach_states_the_nearest_point(robot):
     """A tool box out of reach is refused with the distance and the box that would do, by the arm's closed form."""
     limits = GeometricLimits(robot=robot, limits=(ToolBox(lower=(1.0, 0.0, 0.0), upper=(2.0, 1.0, 1.0)),))

@@ -66,6 +66,7 @@ def test_rows_are_labelled(everything):
     assert np.isposinf(everything.upper).all()
 
 
+@pytest.mark.slow
 def test_values_are_the_geometry(everything):
     """Tool box, plane and collision rows are what the numeric kinematics say."""
     robot, q = everything.robot, random_poses(everything.robot.limits, 40, seed=1)
@@ -130,6 +131,7 @@ def _scaled_jacobian(robot, q, length):
     return np.array(columns).T
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*ROBOTS, "ur10"])
 def test_the_distance_to_singularity_is_a_bound(name):
     """It is at most the smallest singular value of the scaled Jacobian, and at least 6^(-1/4) of it less 1e-4."""

@@ -183,6 +183,7 @@ def test_obstacle(arm: Robot, free: Design) -> None:
     assert nearest(made) > 0.07  # its radius and the clearance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("space", "message"),
     [

@@ -27,6 +27,7 @@ def design(request, designed) -> Design:
     return designed(request.param)
 
 
+@pytest.mark.slow
 def test_rest_at_both_ends(design: Design) -> None:
     """The whole experiment starts and ends at rest, in one pose."""
     for end in (0, -1):
@@ -40,6 +41,7 @@ def test_uniform_period(design: Design) -> None:
     np.testing.assert_allclose(np.diff(design.motion.t), design.robot.period, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_limits_at_one_kilohertz(design: Design) -> None:
     """Through the file's positions, velocities and accelerations, a quintic passes no limit at 1 kHz."""
     motion, limits = design.motion, design.robot.limits
@@ -126,6 +128,7 @@ def pinocchio_columns(robot: Robot, q: np.ndarray, dq: np.ndarray, ddq: np.ndarr
     return np.column_stack(columns)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "friction"), [(n, "coulomb-viscous") for n in NAMES] + [("er3a", "polynomial")])
 def test_quality_from_the_file(name: str, friction: str, designed, tmp_path: Path) -> None:
     """The stated condition numbers follow from the CSV alone, by pinocchio and tanh friction."""

@@ -23,6 +23,7 @@ MODEL = oed.ModelOptions(friction="coulomb-viscous")
 OTHERS = pytest.mark.parametrize("name", ["bspline", "fourier-polynomial"])
 
 
+@pytest.mark.slow
 @OTHERS
 def test_all_limits_at_once(name):
     """With tight torque, collisions and a tool box, the whole experiment keeps everything, as its own samples show."""
@@ -47,6 +48,7 @@ def test_all_limits_at_once(name):
     np.testing.assert_allclose(part.q[:half], part.q[half:], atol=1e-9)
 
 
+@pytest.mark.slow
 @OTHERS
 def test_limits_hold_between_the_samples(name):
     """On a grid 40 times as fine as the file no joint limit is passed."""
@@ -61,6 +63,7 @@ def test_limits_hold_between_the_samples(name):
         assert np.all(np.abs(values) <= bound)
 
 
+@pytest.mark.slow
 @OTHERS
 def test_file_and_report(name, tmp_path):
     """A saved design names its family, reads back the same, and has a report."""
@@ -82,6 +85,7 @@ def test_file_and_report(name, tmp_path):
     assert "excitation" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_robot_by_its_name():
     """A catalogue name is enough."""
     design = oed.design("er3a", model=MODEL, search=SEARCH, trajectory=oed.TrajectoryOptions(periods=1))
@@ -104,6 +108,7 @@ class Power(oed.StateLimit):
         return casadi.sumsqr(dq) / self.bound + self.shift
 
 
+@pytest.mark.slow
 def test_own_limit_of_motion_decides_and_is_reported():
     """An own limit is used up by the optimised part, kept by the whole experiment, and stated with its margin."""
     limit = Power(bound=4.0)

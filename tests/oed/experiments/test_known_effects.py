@@ -117,6 +117,7 @@ def tight(robot: Robot) -> Robot:
     return replace(robot, limits=replace(robot.limits, torque=np.array([np.inf, 170.0, np.inf, *[np.inf] * 3])))
 
 
+@pytest.mark.slow
 def test_the_motion_keeps_the_limit_with_the_spring(tight: Robot, tmp_path) -> None:
     """Designed with the spring, the motion keeps the limit by pinocchio and the formula; without, it does not.
 

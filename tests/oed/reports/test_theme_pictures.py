@@ -23,6 +23,7 @@ from robots.common.errors import InputError
 from robots.limits import Limits, Margin
 
 
+@pytest.mark.slow
 def test_all_pictures_are_drawn_by_both_libraries(case: Any, tmp_path: Path) -> None:
     """Robots of one, six and seven joints, gaps in the torque and a prismatic joint included, can be drawn."""
     for picture in case.pictures():

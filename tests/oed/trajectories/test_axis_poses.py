@@ -75,6 +75,7 @@ def test_the_fewest_joints_move_and_least():
     np.testing.assert_allclose(np.abs(straight), [0, 0, 0, 0, np.pi / 2, 0], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_an_inclined_base_and_narrow_limits_are_taken_into_account():
     """With gravity at an odd angle the wrist still aligns; limits that forbid it leave the angle they must."""
     robot = load_robot("er3a")

@@ -137,6 +137,7 @@ def test_sines_of_vectors_are_done_without(fresh, needs_compiler, function, expe
         np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_two_processes_may_build_the_same(fresh, needs_compiler, monkeypatch, tmp_path):
     """Processes that build the same function at once all get a whole library."""
     path, _ = compiled.compiler()

@@ -67,6 +67,7 @@ def test_no_sampled_points_are_closer(segments):
     assert (ours >= sampled - 0.06).all()  # points are up to 36 mm apart, on both
 
 
+@pytest.mark.slow
 def test_boxes_are_as_far_as_coal_says(segments):
     """The distance of 2,000 segments to boxes of any place is coal's."""
     random = np.random.default_rng(2)

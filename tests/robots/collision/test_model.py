@@ -43,6 +43,7 @@ def test_clearances_are_coals(model, poses):
     assert 0.005 < (~free).mean() < 0.9
 
 
+@pytest.mark.slow
 def test_smooth_clearances_are_a_little_smaller(model, poses):
     """Of free pairs the smooth clearance is at most the exact one and at least that less the smoothing."""
     exact, (smooth, _) = model.clearance(poses), model.smooth_clearance(poses)

@@ -208,6 +208,7 @@ for name in ("broken_effect", "nothing"):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_an_installed_package_offers_every_kind(tmp_path):
     """All groups are read: members of a package are found by name, without an import by the user."""
     info = tmp_path / "plant_room-2.0.dist-info"

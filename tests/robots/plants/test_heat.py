@@ -39,6 +39,7 @@ def plant_of(robot: Robot, **options: object) -> Plant:
     return replace(nominal_plant(robot, sensors=still), heat=plant_heat(robot, **options))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_friction_falls_as_an_independent_integration_says(er3a: Robot) -> None:
     """Torque lost to heat in five minutes equals that of the two balances integrated by scipy, within 0.1 %."""
     plant, motion = plant_of(er3a, joints={2: JOINT}), swing(er3a, 5.0)

@@ -31,6 +31,7 @@ def test_robots_of_the_catalogue(name, catalogue_robot, twin, states):
     agree(robot, twin, states(robot, 50))
 
 
+@pytest.mark.slow
 @settings(max_examples=80, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10_000), n=st.integers(1, 8))
 def test_any_chain(seed, n, random_robot, twin, states):

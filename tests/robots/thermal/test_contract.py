@@ -106,6 +106,7 @@ def test_the_ambient_temperature_is_felt(model: ThermalModel) -> None:
     np.testing.assert_allclose(difference, 10.0, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_any_motion_is_followed(model: ThermalModel) -> None:
     """A motion of strokes and pauses gives the temperatures of its momentary power, within the stated error."""
     t = np.arange(0.0, 600.0, 0.02)
@@ -135,6 +136,7 @@ def test_any_motion_is_followed(model: ThermalModel) -> None:
     assert path.energy[-1] == pytest.approx(np.trapezoid(path.power, t), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_repeated_cycles_may_be_averaged(model: ThermalModel) -> None:
     """One step a cycle gives what the momentary power gives, within the stated error (eq. 129)."""
     t = np.arange(0.0, 4.0, 0.02)

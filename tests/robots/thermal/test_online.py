@@ -30,6 +30,7 @@ def motion(period: float, end: float) -> tuple[np.ndarray, np.ndarray]:
     return t, np.where((t % 100.0) < 70.0, 3.0 * np.sin(2 * np.pi * t / 4.0), 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period", [0.02, 0.1, 0.5])
 def test_algorithm_one_follows_the_simulation(model: ThermalModel, period: float) -> None:
     """At any sample time the estimate is that of the offline simulation."""
@@ -60,6 +61,7 @@ def test_a_long_period_is_stable(model: ThermalModel) -> None:
     assert np.all(np.diff(seen) > -1.0)
 
 
+@pytest.mark.slow
 def test_an_unknown_temperature_is_found(model: ThermalModel) -> None:
     """After a restart of a warm robot the observer finds the temperature from measured friction within minutes."""
     rng = np.random.default_rng(3)

@@ -32,6 +32,7 @@ def test_a_sign_is_as_wide_as_the_friction_turns_round(
     assert np.all(np.abs(np.log(scales / width)) < np.log(2.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [1.0, 0.03])
 def test_friction_that_turns_round_at_once_leaves_nothing(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable, share: float

@@ -55,6 +55,7 @@ def test_a_standing_joint_does_not_make_another_motion_absurd(arm: Robot, arm_lo
     assert np.all(np.sqrt((error**2).mean(axis=0)) < 4 * np.sqrt((other.tau**2).mean(axis=0)))
 
 
+@pytest.mark.slow
 def test_what_a_description_lacks_is_not_taken_for_noise(arm: Robot, arm_log: Callable[..., Log]) -> None:
     """Links fifty times as heavy as described, as under rotors that no file tells of: what is left is the noise.
 

@@ -22,6 +22,7 @@ from robots.terms.effects import Situation, situation
 from robots.terms.effects.time_delay import lateness
 
 
+@pytest.mark.slow
 def test_a_scale_that_changes_at_one_moment_is_not_called_heat(arm: Robot, arm_log: Callable[..., Log]) -> None:
     """Four per cent more of one joint's torque from 11 s on: unexplained, with the joint, the share and the moment."""
     log = arm_log(torque_noise=0.02)

@@ -88,6 +88,7 @@ def test_a_period_with_which_the_motion_repeats_is_none() -> None:
     assert PeriodicTorque().grid(_moved(RATES, pause=3600.0), None) == ()
 
 
+@pytest.mark.slow
 def test_friction_of_a_while_is_unexplained_with_its_time(arm: Robot, arm_log: Callable[..., Log]) -> None:
     """A brake that drags on joint 2 from 8 s for 4 s: the joint, how much, from when and for how long."""
     log = arm_log(torque_noise=0.02)

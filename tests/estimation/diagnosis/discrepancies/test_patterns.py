@@ -76,6 +76,7 @@ def _lag_of_gauge(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
     return size * np.array(shown)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stranger", "share", "pattern"),
     [

@@ -53,6 +53,7 @@ def test_logs_whose_pauses_nobody_noted_may_be_of_several_days(swept: Situation)
         assert SessionFriction().grid(pair, None) == ((),)
 
 
+@pytest.mark.slow
 def test_colder_gears_on_the_second_day_are_told_once(arm: Robot, arm_log: Callable[..., Log]) -> None:
     """Three twentieths more friction on both joints: unexplained, on the robot as a whole, with the share."""
     first, second = arm_log(torque_noise=0.02), arm_log(seed=1, motion_seed=1, torque_noise=0.02)

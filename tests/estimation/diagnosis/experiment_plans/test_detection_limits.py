@@ -61,6 +61,7 @@ def planned(ur10):
     return problem, measure(problem, hypotheses)
 
 
+@pytest.mark.slow
 def test_an_effect_of_the_limits_size_has_the_energy_to_be_found(planned):
     """A torque of the detectable size, projected and white, has the energy that the false-alarm level asks for."""
     problem, entries = planned
@@ -106,6 +107,7 @@ def test_what_the_base_model_absorbs_is_hidden(planned):
     assert first.to_dict()["detectable"] is None
 
 
+@pytest.mark.slow
 def test_limits_are_ordered_and_fall_with_the_noise(planned, ur10):
     """Naming asks for at least what finding asks for; with a quarter of the noise, a quarter of the size shows."""
     problem, entries = planned
@@ -119,6 +121,7 @@ def test_limits_are_ordered_and_fall_with_the_noise(planned, ur10):
             assert b.detectable == pytest.approx(a.detectable / 4, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_limits_grow_as_the_root_of_the_time(ur10):
     """Of a fourfold time, effects half as large show, but for what more tries cost."""
     model = default_model(ur10, velocity_scale=2e-3)

@@ -80,6 +80,7 @@ def test_motions_stay_where_the_robot_has_been(kind, problem):
             assert np.abs(ends).max() < 0.01 * room.speed.max()
 
 
+@pytest.mark.slow
 def test_a_payload_tells_a_torque_constant(problem):
     """A wrong torque constant and a turned encoder are told apart by a known payload, as the literature has it."""
     causes = [
@@ -96,6 +97,7 @@ def test_a_payload_tells_a_torque_constant(problem):
     assert max(p.resolves for p in plan.ranking if p.kind not in ("payload", "second_base_pose")) < 0.5
 
 
+@pytest.mark.slow
 def test_heat_is_not_told_by_going_on_at_once(problem):
     """A joint that lost friction by heat has not cooled where the same motion follows at once: a pause must."""
     end = float(problem.recording.t[-1])
@@ -123,6 +125,7 @@ def test_heat_of_the_logs_goes_on_in_the_experiment(problem):
     assert np.trace(cold) < 0.7 * np.trace(warm)
 
 
+@pytest.mark.slow
 def test_levels_of_the_logs_are_not_those_of_experiments_to_come(problem):
     """Logs with noise levels of their own say nothing of how noisy an experiment of more parts will be."""
     louder = replace(problem, whitening=replace(problem.whitening, levels=np.full((1, problem.n), 0.5)))
@@ -135,6 +138,7 @@ def test_levels_of_the_logs_are_not_those_of_experiments_to_come(problem):
     assert plan.resolves > 0.9
 
 
+@pytest.mark.slow
 def test_the_least_trouble_is_proposed_where_several_would_do(problem):
     """Causes that any motion tells apart need only be repeated, not a payload or a tilted base."""
     causes = [
@@ -144,6 +148,7 @@ def test_the_least_trouble_is_proposed_where_several_would_do(problem):
     assert plan_next(problem, causes).kind == "repeat"
 
 
+@pytest.mark.slow
 def test_what_to_play_is_told(problem):
     """A payload's experiment: the logged motion, once without and once with it, as files of their own would have it."""
     causes = [_guess(problem, "torque_constant_error", 4, (), 0.02), _guess(problem, "encoder_offset", 4, (), 0.02)]
@@ -165,6 +170,7 @@ def test_what_is_nearly_sure_goes_after_what_is(problem):
     assert enough.rank < nearly.rank
 
 
+@pytest.mark.slow
 def test_what_once_does_not_tell_is_made_several_times(problem):
     """Of an effect that hardly shows, motions are repeated until the chance is enough, and told as it is then."""
     names = (("stribeck", (0.05, 1.0)), ("presliding_hysteresis", (0.003,)))
@@ -190,6 +196,7 @@ def test_a_payload_is_mounted_once_however_often_the_motion_is_made(problem):
     assert repeat_stages(stages, 1) == stages
 
 
+@pytest.mark.slow
 def test_where_two_causes_stay_alike_the_others_are_told_apart(problem):
     """A torque constant twice is never told from itself; what tells most of the rest comes first, and that is said."""
     error = _guess(problem, "torque_constant_error", 2, (), 0.01)
@@ -217,6 +224,7 @@ def test_one_cause_needs_no_experiment(problem):
     assert plan_next(problem, [_guess(problem, "stribeck", 4, (0.05, 1.0), 0.02)]) is None
 
 
+@pytest.mark.slow
 def test_the_plan_is_plain_data(problem):
     """The plan as data is what a diagnosis file holds."""
     causes = [
@@ -273,6 +281,7 @@ def test_a_tilted_base_counts_with_the_parameters_that_it_shows(problem):
     assert np.all(level < 1e-6 * np.sqrt(np.diag(total)[own]))
 
 
+@pytest.mark.slow
 def test_a_base_that_stands_otherwise_stays_there(problem):
     """Without a pose of its own an experiment is made where the last log was; a second pose tilts from there."""
     wall = np.array([-9.81, 0.0, 0.0])

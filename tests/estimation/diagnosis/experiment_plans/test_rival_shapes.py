@@ -42,6 +42,7 @@ def _cause(problem: Problem, name: str, shape: tuple[float, ...], size: float) -
     )
 
 
+@pytest.mark.slow
 def test_the_chance_is_that_of_the_form_that_imitates_best(problem: Problem) -> None:
     """Friction that breaks away otherwise imitates a grease that thins; dense trials find no much lower chance."""
     thinning = _cause(problem, "shear_thinning", (0.3,), 8.0)
@@ -64,6 +65,7 @@ def test_the_chance_is_that_of_the_form_that_imitates_best(problem: Problem) -> 
     assert told < least + 0.2
 
 
+@pytest.mark.slow
 def test_a_plan_counts_with_such_forms(problem: Problem) -> None:
     """What it promises is no more than of causes that keep the shapes in which they were fitted."""
     causes = [_cause(problem, "shear_thinning", (0.3,), 8.0), _cause(problem, "stribeck", (0.2, 2.0), 8.0)]

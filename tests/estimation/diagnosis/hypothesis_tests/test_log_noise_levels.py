@@ -82,6 +82,7 @@ def test_logs_have_levels_of_their_own():
     assert white[:half].std(axis=0) == pytest.approx(white[half:].std(axis=0), rel=0.15)
 
 
+@pytest.mark.slow
 def test_a_hand_that_moved_the_arm_is_found(data):
     """Of three runs of a pendulum one was moved by hand under gravity compensation: it is named, and its time told."""
     folder = data("simple_pendulum_dfki")
@@ -99,6 +100,7 @@ def test_a_hand_that_moved_the_arm_is_found(data):
     assert finding.gain.nrmse_after < 0.6 * finding.gain.nrmse_before
 
 
+@pytest.mark.slow
 def test_logs_that_contradict_each_other_are_not_passed_over(data):
     """Two short runs that no model fitted to one predicts in the other get a word on that, whatever the verdict."""
     folder = data("simple_pendulum_dfki")

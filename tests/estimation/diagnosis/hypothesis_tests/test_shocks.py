@@ -24,6 +24,7 @@ COARSE = 1e-4
 MOMENT, DURATION, PUSH = 6.0, 0.3, 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "tails", "push", "found"),
     [(3, 3.0, 0.0, []), (5, 3.0, 0.0, []), (3, None, PUSH, ["external_contact"])],
@@ -60,6 +61,7 @@ def test_a_shock_is_found_where_it_is_and_as_large_as_it_is(rows: int) -> None:
     assert sizes.max() == pytest.approx(7.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_shock_of_one_joint_is_a_glitch_however_unlikely(arm: Robot, arm_log: Callable[..., Log]) -> None:
     """A single innovation of eighty standard errors in normal noise, of which nothing else in the log comes near."""
     log = arm_log()

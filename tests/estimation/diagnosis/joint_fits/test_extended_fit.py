@@ -73,6 +73,7 @@ def test_what_a_log_leaves_open_has_no_interval(
     assert estimable.sum() == {"payload_change": 4, "torque_sensor_drift": 2, "friction_step": 2}[name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effect", "joint", "known", "size"),
     [("friction_step", 1, (), (0.5, 0.3)), ("payload_change", None, (1.0,), (0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0))],

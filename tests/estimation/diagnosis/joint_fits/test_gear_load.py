@@ -96,6 +96,7 @@ def test_the_load_is_what_base_model_and_spring_have_together(
     assert errors[1] > 0.1
 
 
+@pytest.mark.slow
 def test_the_model_is_what_was_fitted_with_a_load_that_the_gear_bears(
     recording: Recording, pose_arm: Callable[..., Problem], tmp_path: Path
 ) -> None:

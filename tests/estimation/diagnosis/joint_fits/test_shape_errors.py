@@ -30,6 +30,7 @@ SPEED, EXPONENT = 0.25, 1.5
 BOUND = 3.84  # of twice the logarithm of the likelihood ratio: 95 %
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1.6, 2.5])
 def test_a_velocity_is_as_uncertain_as_its_exponent_lets_it_be(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], size: float
@@ -107,6 +108,7 @@ def test_a_moment_while_the_drive_is_at_its_limit_may_be_anywhere_there(
         assert widen_change_times(problem, there, [there], [0.01]) == [0.01]
 
 
+@pytest.mark.slow
 def test_a_moment_while_the_arm_stands_may_be_anywhere_there(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
@@ -128,6 +130,7 @@ def test_a_moment_while_the_arm_stands_may_be_anywhere_there(
     assert widen_change_times(problem, before, [], [0.01, 0.02, 0.03, 0.0]) == [0.01, 0.02, 0.03, 0.0]
 
 
+@pytest.mark.slow
 def test_a_change_between_two_logs_may_have_come_at_any_time_there(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:

@@ -189,6 +189,7 @@ def test_torque_between_samples_is_not_trusted_beside_a_reversal(arm: Robot, fou
     assert _beside(Log(t=shaken, q=spline(shaken), tau=np.ones_like(motion.q)), arm) >= 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("counts", [2.0**17, 2.0**20, 2.0**24])
 @pytest.mark.parametrize(("friction", "loop"), [(0.0, 1.0), (0.03, 12.0), (0.3, 12.0), (1.0, 20.0), (3.0, 30.0)])
 def test_positions_beside_reversals_tell_how_well_those_are_known(

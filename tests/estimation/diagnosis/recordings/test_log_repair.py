@@ -73,6 +73,7 @@ def test_a_log_is_cut_at_its_gaps(arm: Robot, log: Log) -> None:
     assert len(repair_log(arm, _holed(log, (6.0, 6.05)), "Log 1").logs) == 1
 
 
+@pytest.mark.slow
 def test_faults_of_a_recording_are_no_effects(arm: Robot, log: Log) -> None:
     """Garbled rows and a gap leave a verdict of none and the errors of a sound log; unchecked rows spoil them.
 
@@ -89,6 +90,7 @@ def test_faults_of_a_recording_are_no_effects(arm: Robot, log: Log) -> None:
     assert taken.baseline[1] > 3 * sound.baseline[1]
 
 
+@pytest.mark.slow
 def test_stretches_of_a_log_are_told_as_one_log(arm: Robot, log: Log) -> None:
     """Who gives one log of unseen data has not given two."""
     half = len(log) // 2

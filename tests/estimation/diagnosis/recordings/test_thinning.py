@@ -128,6 +128,7 @@ def test_rows_at_reversals_fit_where_signs_are_those_of_all_samples(arm: Robot, 
     assert left[1] > 10.0 * left[0]
 
 
+@pytest.mark.slow
 def test_presliding_of_a_thinned_log_is_found(
     arm: Robot, arm_log: Callable[..., Log], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -146,6 +147,7 @@ def test_presliding_of_a_thinned_log_is_found(
     assert [(f.effect, f.joint) for f in found.findings] == [("presliding_hysteresis", 2)]
 
 
+@pytest.mark.slow
 def test_torque_that_is_cut_off_in_a_thinned_log_is_found(
     arm: Robot, arm_log: Callable[..., Log], monkeypatch: pytest.MonkeyPatch
 ) -> None:

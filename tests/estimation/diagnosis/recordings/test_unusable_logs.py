@@ -38,6 +38,7 @@ def _found(arm: Robot, logs: Sequence[Log]) -> dict[int, float]:
     return find_unusable_logs(base_parameters(arm, "polynomial", (0.001,) * arm.n), build_recording(arm, logs))
 
 
+@pytest.mark.slow
 def test_only_a_log_that_no_parameters_explain_is_hopeless(arm: Robot, logs: list[Log]) -> None:
     """A torque that rings on both joints is; that of one joint alone, or of good logs, is not."""
     assert not _found(arm, logs)
@@ -53,6 +54,7 @@ def test_where_all_are_hopeless_none_is_left_out(arm: Robot, logs: list[Log]) ->
     assert not _found(arm, [_ringing(log, [0, 1]) for log in logs])
 
 
+@pytest.mark.slow
 def test_a_diagnosis_says_what_it_left_out(arm: Robot, logs: list[Log]) -> None:
     """Given in any order, the other two are diagnosed as if the third were not there."""
     spoiled = diagnose(arm, [_ringing(logs[2], [0, 1]), logs[0], logs[1]], candidates=["stribeck"])

@@ -74,6 +74,7 @@ def test_rows_beside_reversals_and_the_ends_of_rests_are_not_calm(recording: Rec
     np.testing.assert_array_equal(known.far_from_reversals(3), ~disturbed[::3])
 
 
+@pytest.mark.slow
 def test_reversals_of_one_motion_in_several_logs_are_of_one_kind(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable[..., Motion], pose_arm: Callable[..., Problem]
 ) -> None:

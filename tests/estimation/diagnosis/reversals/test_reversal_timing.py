@@ -69,6 +69,7 @@ def _timed(robot: Robot, log: Log) -> ReversalTiming:
     return timing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "late"), [(1006, True), (1011, True), (1011, False)])
 def test_torque_that_is_late_is_told_by_each_joints_reversals(cases: Callable, seed: int, late: bool) -> None:
     """Within four of their errors, and by all of them within three: one in a thousand true ones would fail.
@@ -88,6 +89,7 @@ def test_torque_that_is_late_is_told_by_each_joints_reversals(cases: Callable, s
     assert weights.sum() ** -0.5 < 5e-4
 
 
+@pytest.mark.slow
 def test_a_delay_is_named_that_only_reversals_tell(cases: Callable) -> None:
     """A third of a sample: rows beside reversals do not count, for nobody knows when these joints turn round."""
     case, robot, log = cases(1006, True)
@@ -104,6 +106,7 @@ def test_a_delay_is_named_that_only_reversals_tell(cases: Callable) -> None:
     assert "impulses at velocity reversals" in note
 
 
+@pytest.mark.slow
 def test_positions_that_say_too_little_of_reversals_say_nothing(cases: Callable) -> None:
     """Of logs whose positions are not at the rows, of few reversals, and of a joint without friction."""
     _, robot, log = cases(1006, True)
@@ -214,6 +217,7 @@ def test_null_logs_meet_reversals_whose_lags_are_noise(pose_arm: Callable[..., P
     assert np.var(after - before) == pytest.approx(np.sum(errors**-2.0), rel=0.2)
 
 
+@pytest.mark.slow
 def test_reversals_of_a_thinned_log_are_timed_by_all_its_samples(
     cases: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -92,6 +92,7 @@ def test_a_form_that_fits_worse_is_not_listed(
     assert equivalent_shapes(problem, [stribeck], 0) == []
 
 
+@pytest.mark.slow
 def test_a_tilt_is_told_beside_the_first_axis_own_moments() -> None:
     """Moments that a search went without bend the angles: with them free, the angles are within 3 standard errors.
 

@@ -70,6 +70,7 @@ def test_the_stiffness_of_a_gear_is_measured(arm: Robot, arm_plant: Callable, fo
     assert np.std(windup.after) < 0.2 * np.std(windup.before)
 
 
+@pytest.mark.slow
 def test_stiff_gears_raise_no_alarm(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:
     """Of 30 robots with late, eccentric and noisy encoders behind stiff gears at most two are called elastic.
 
@@ -82,6 +83,7 @@ def test_stiff_gears_raise_no_alarm(arm: Robot, arm_plant: Callable, fourier_mot
     assert alarms <= 2
 
 
+@pytest.mark.slow
 def test_intervals_hold(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:
     """Of 20 short logs the 95 % interval of the compliance holds the true one in 16 or more.
 
@@ -110,6 +112,7 @@ def twisted(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> Diagno
     return diagnose(arm, logs[0], held_out=logs[1], candidates=("stribeck", "spring"), friction="coulomb-viscous")
 
 
+@pytest.mark.slow
 def test_a_diagnosis_says_what_the_encoders_measured(twisted: Diagnosis, tmp_path: object) -> None:
     """It names the elastic gear with the gain on the held-out log, extends the model by it, and is read again."""
     assert twisted.verdict == "named"

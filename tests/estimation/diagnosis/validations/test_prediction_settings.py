@@ -19,6 +19,7 @@ from robots.signals import Log
 from robots.terms import FrictionPolynomial
 
 
+@pytest.mark.slow
 def test_a_model_predicts_unseen_motion_about_as_well_as_any_smoothing_lets_it(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable
 ) -> None:
@@ -44,6 +45,7 @@ def test_a_model_predicts_unseen_motion_about_as_well_as_any_smoothing_lets_it(
     assert again.provenance["cutoff_hz"] == pytest.approx(model.provenance["cutoff_hz"], rel=0.3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("held_out", [True, False])
 def test_its_band_holds_most_errors_on_other_unseen_motions(
     arm: Robot, arm_log: Callable[..., Log], held_out: bool
@@ -63,6 +65,7 @@ def test_its_band_holds_most_errors_on_other_unseen_motions(
     assert np.allclose(covered, 0.95, atol=0.03) if held_out else covered == [None, None]
 
 
+@pytest.mark.slow
 def test_heat_of_the_logs_before_counts_in_its_errors(arm: Robot, arm_log: Callable[..., Log]) -> None:
     """A joint that loses friction by its heat: the error on what follows is that of the joint as it was left, warm."""
     first, other = (arm_log(torque_noise=0.02, motion_seed=k, seed=k) for k in range(2))
@@ -84,6 +87,7 @@ def test_heat_of_the_logs_before_counts_in_its_errors(arm: Robot, arm_log: Calla
     assert warm[1] > 1.05 * cold[1]
 
 
+@pytest.mark.slow
 def test_its_band_grows_as_errors_do_on_parts_left_out(arm: Robot, arm_log: Callable[..., Log]) -> None:
     """By the joints' own factors, and never narrower than the errors of the fit."""
     log = arm_log(torque_noise=0.05)
@@ -97,6 +101,7 @@ def test_its_band_grows_as_errors_do_on_parts_left_out(arm: Robot, arm_log: Call
     assert with_band(model, [log], [], plain).provenance["band95"] == pytest.approx(seen.tolist())
 
 
+@pytest.mark.slow
 def test_friction_turns_round_as_sharply_as_all_rows_say(arm: Robot, arm_log: Callable[..., Log]) -> None:
     """A sign that is too gradual or too sharp gets its sharpness back from rows about reversals, and predicts better.
 

@@ -21,6 +21,7 @@ def planned(run: Callable[..., Any], robot: Path, experiment: Path, tmp_path: Pa
     return out
 
 
+@pytest.mark.slow
 def test_a_campaign_is_written_whole(run: Callable[..., Any], robot: Path, experiment: Path, planned: Path) -> None:
     """The folder has campaign.json, the report and one CSV a stage; it is not overwritten without --force."""
     assert {path.name for path in planned.iterdir()} == {
@@ -59,6 +60,7 @@ def test_a_campaign_and_its_stages_play(run: Callable[..., Any], robot: Path, pl
         assert run(*line).code == 0
 
 
+@pytest.mark.slow
 def test_without_a_design_a_quick_one_is_made(run: Callable[..., Any], robot: Path, tmp_path: Path) -> None:
     """Without --design the excitation comes from a quick search, and the summary says so."""
     done = run("campaign", "--robot", robot, "--cycles", 1, "--out", tmp_path / "campaign", "--workers", 1)

@@ -59,6 +59,7 @@ def done(robot: Path, logs: Path, tmp_path_factory: pytest.TempPathFactory) -> P
     return out
 
 
+@pytest.mark.slow
 def test_a_hidden_damage_is_named(done: Path, experiment: Path) -> None:
     """The file names the damage that the plant had, its joint and its time, and the gain on the unseen log."""
     data = json.loads((done / "diagnosis.json").read_text())
@@ -82,6 +83,7 @@ def test_its_files_are_of_use(done: Path) -> None:
     assert "smallest effect size" in page
 
 
+@pytest.mark.slow
 def test_limits_before_any_experiment(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     """With --limits, a trajectory alone tells what it could show, and what it could not."""
     line = ("diagnose", "--limits", "--robot", robot, "--trajectory", experiment / "trajectory.csv", "--out", tmp_path)
@@ -99,6 +101,7 @@ def test_limits_before_any_experiment(run, robot: Path, experiment: Path, tmp_pa
     assert changed["stribeck", 2]["detectable"] == pytest.approx(5 * limits["stribeck", 2]["detectable"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_limits_by_an_identified_model(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     """An identified model stands in for the description."""
     line = ["diagnose", "--limits", "--robot", robot, "--trajectory", experiment / "trajectory.csv"]
@@ -107,6 +110,7 @@ def test_limits_by_an_identified_model(run, robot: Path, experiment: Path, tmp_p
     assert any(np.isfinite(limit["detectable"] or np.inf) for limit in result.data["limits"])
 
 
+@pytest.mark.slow
 def test_an_extended_model_is_a_model_like_any_other(
     run, done: Path, logs: Path, robot: Path, experiment: Path, tmp_path: Path
 ) -> None:
@@ -173,6 +177,7 @@ def test_bad_use_is_told(arguments, message, run, robot: Path, tmp_path: Path) -
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_logs_with_clocks_of_their_own(data: Callable[[str], Path], run: Callable[..., Any], tmp_path: Path) -> None:
     """Logs that overlap are put one after the other as --own-clocks does, and that is said; one log twice is refused.
 

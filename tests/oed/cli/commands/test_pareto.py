@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 
+
+@pytest.mark.slow
 def test_front_is_written(run, robot: Path, tmp_path: Path) -> None:
     """The command writes the front, a page, and a folder per design, and prints what it wrote."""
     out = tmp_path / "front"

@@ -75,6 +75,7 @@ def done(robot: Path, logs: Path, tmp_path_factory: pytest.TempPathFactory) -> P
     return out
 
 
+@pytest.mark.slow
 def test_the_model_predicts_cold_and_warm(done: Path, robot: Path, logs: Path) -> None:
     """model.json is a model like any other, with a thermal model a joint that has the true time constants."""
     data = json.loads((done / "model.json").read_text())
@@ -136,6 +137,7 @@ def test_results_are_not_overwritten(run: Callable[..., Any], done: Path, robot:
     assert "--force" in ended.err or "exists" in ended.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -35,6 +35,7 @@ def result(robot, given):
     return retime(robot, given)
 
 
+@pytest.mark.slow
 def test_it_is_faster_within_all_limits(result, robot, given):
     """A slow motion becomes faster, and the margins, measured anew, are positive."""
     assert result.success

@@ -49,6 +49,7 @@ def pinocchio_torque(robot, motion):
     return rigid + friction + robot.rotor_inertia * motion.ddq
 
 
+@pytest.mark.slow
 def test_the_torque_limit_decides(er3a):
     """Where the free design would pass the torque limit, the limited one stays below 90 % of it, by pinocchio."""
     weak = weaker(er3a, 0.35)
@@ -63,6 +64,7 @@ def test_the_torque_limit_decides(er3a):
     assert not kept.violated
 
 
+@pytest.mark.slow
 def test_the_rms_torque_decides(er3a):
     """Where the free design is too hard on a motor in the mean, the limited one is not, by pinocchio."""
     free = design(er3a, periods=3)
@@ -92,6 +94,7 @@ def test_a_limit_below_gravity_is_told_first(er3a):
         design(weaker(er3a, 0.05))
 
 
+@pytest.mark.slow
 def test_clearance_decides_and_is_proved(er3a):
     """A design that watches collisions keeps its clearance at all times; without, the same seed collides."""
     model = collision_model(er3a)
@@ -107,6 +110,7 @@ def test_clearance_decides_and_is_proved(er3a):
     assert kept.success
 
 
+@pytest.mark.slow
 def test_strokes_that_would_collide_are_left_out_or_free():
     """With strokes the whole experiment is still free; joints without a stroke are named."""
     robot = load_robot("panda")
@@ -117,6 +121,7 @@ def test_strokes_that_would_collide_are_left_out_or_free():
     assert stroked.isdisjoint(kept.strokes_left_out)
 
 
+@pytest.mark.slow
 def test_a_home_in_collision_is_refused(er3a):
     """A start pose that the user states and that collides is told with the pair and the depth."""
     motion = design(er3a).motion
@@ -126,6 +131,7 @@ def test_a_home_in_collision_is_refused(er3a):
         design(er3a, collision=True, home=home)
 
 
+@pytest.mark.slow
 def test_a_second_experiment_adds_what_the_first_lacks(er3a):
     """After a model that knows all but one joint's friction, D-optimality gains more from that joint's motion."""
     first = design(er3a, criterion="d")
@@ -154,6 +160,7 @@ def test_options_out_of_range_are_refused(er3a, options, message):
         design(er3a, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scaling", ["nominal", "unit"])
 def test_scaling_is_reported_beside_the_plain_numbers(er3a, scaling):
     """A scaled design says both: the plain regressor's numbers and those that it was optimised for."""
@@ -163,6 +170,7 @@ def test_scaling_is_reported_beside_the_plain_numbers(er3a, scaling):
     assert made.islands[0].final == pytest.approx(made.qualities[1].value("cond"), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_essential_parameters_only(er3a, tmp_path):
     """With a share stated, columns whose torque is below it are left out, and what is left is easier to tell apart."""
     whole, part = design(er3a), design(er3a, essential=0.02)

@@ -29,6 +29,7 @@ def file_of(design: Design, folder: Path) -> bytes:
     return (folder / "trajectory.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_same_seed_same_file(robot_named, tiny, brief, tmp_path: Path) -> None:
     """The same seed gives the same file byte for byte, in this process and in two others; another seed does not."""
     effort = replace(tiny, islands=2)
@@ -43,6 +44,7 @@ def test_same_seed_same_file(robot_named, tiny, brief, tmp_path: Path) -> None:
     assert run("other", workers=1, seed=1) != here
 
 
+@pytest.mark.slow
 def test_any_executor(make_robot, tiny, brief, tmp_path: Path) -> None:
     """An executor of the user's runs the searches, with the same result."""
     robot, effort = make_robot("RR", "two"), replace(tiny, islands=2)
@@ -52,6 +54,7 @@ def test_any_executor(make_robot, tiny, brief, tmp_path: Path) -> None:
     assert file_of(found, tmp_path / "a") == file_of(flat.design(robot, workers=1, **options), tmp_path / "b")
 
 
+@pytest.mark.slow
 def test_time_limit(robot_named) -> None:
     """A time limit stops a long search early; the design says so, and is a good one all the same."""
     start = time.monotonic()
@@ -73,6 +76,7 @@ def test_no_time_at_all(make_robot) -> None:
     assert design.islands[0].iterations == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cond", "d", "a", "e", "cond-d"])
 def test_better_than_chance(name: str, designed) -> None:
     """By each criterion the design beats the best of its random starts, by a good part."""
@@ -161,6 +165,7 @@ def test_interrupt_keeps_the_best(make_robot) -> None:
         flat.design(robot, criterion=Interrupting(), **options)
 
 
+@pytest.mark.slow
 def test_interrupt(tmp_path: Path) -> None:
     """Ctrl-C during the search ends the command with code 130, one line, and the files of the best design so far."""
     command = [sys.executable, "-W", "ignore", "-c", "from oed.cli import main; main()", "design", "--robot", "er3a"]
@@ -202,6 +207,7 @@ class Listener:
         self.finished += 1
 
 
+@pytest.mark.slow
 def test_progress(make_robot, brief) -> None:
     """The bar hears of every local solution, never backwards, with the best value in the criterion's own sense."""
     heard, effort = Listener(), Effort(islands=2, starts=4, screened=10, hops=6, finish_samples=100)
@@ -223,6 +229,7 @@ def test_effort_out_of_range(wrong: dict) -> None:
         Effort(**wrong)
 
 
+@pytest.mark.slow
 def test_quick_effort_reaches_the_reference() -> None:
     """Even with quick effort, er3a reaches 28 over 52 columns and 180 over 64, unscaled, in SI units."""
     for friction, bound in REFERENCE.items():

@@ -63,6 +63,7 @@ def test_stopped_within_the_limits(solver: Solver, problem: FourierProblem, star
         assert problem.cost(solved.z) < problem.cost(start)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rival", "worse"),
     [(Ipopt(tolerance=1e-6), 0.1), (Slsqp(tolerance=1e-6), 0.3)],

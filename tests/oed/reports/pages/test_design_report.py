@@ -51,6 +51,7 @@ def html(design: Design) -> str:
     return render(design_page(design))
 
 
+@pytest.mark.slow
 def test_stands_alone(html: str) -> None:
     """The page loads nothing: no address, no linked script, style, picture or font."""
     assert not re.findall(r"""(?:src|href)\s*=\s*["'](?!#|data:)""", html.split("<script")[0])
@@ -99,6 +100,7 @@ def test_a_passed_limit_is_bad_news(design: Design) -> None:
     assert design_page(design).status == "good"
 
 
+@pytest.mark.slow
 def test_pictures_on_request(design: Design, tmp_path: Path) -> None:
     """With PNG each picture is a file; without, the page is alone."""
     with ResultFolder(tmp_path / "plain") as folder:

@@ -147,6 +147,7 @@ def test_the_error_told_is_that_of_a_joint_with_a_finding(view):
     assert page.facts[1].label == "Error of joint 1, held-out data"
 
 
+@pytest.mark.slow
 def test_what_has_no_name_is_not_told_to_need_no_experiment(view):
     """Findings without a name leave the cause open: the page says how to look for it."""
     named, unexplained = (

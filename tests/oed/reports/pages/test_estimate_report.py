@@ -47,6 +47,7 @@ def html(estimate: Estimate) -> str:
     return render(estimate_page(estimate))
 
 
+@pytest.mark.slow
 def test_tells_every_parameter(estimate: Estimate, html: str) -> None:
     """Each parameter has its value, its standard error and its unit on the page; an undetermined one says so."""
     model = estimate.model
@@ -90,6 +91,7 @@ def test_stands_alone(html: str) -> None:
     assert "https://" not in html
 
 
+@pytest.mark.slow
 def test_pictures_on_request(estimate: Estimate, tmp_path: Path) -> None:
     """With PNG each picture is a file beside the page."""
     with ResultFolder(tmp_path / "out") as folder:

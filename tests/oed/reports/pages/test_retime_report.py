@@ -44,6 +44,7 @@ def test_warns_of_assumed_values(case: SimpleNamespace) -> None:
     assert any("limits.jerk" in warning for warning in case.page.warnings)
 
 
+@pytest.mark.slow
 def test_stands_alone(case: SimpleNamespace) -> None:
     """The page loads nothing from anywhere."""
     html = render(case.page)

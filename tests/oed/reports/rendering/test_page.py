@@ -79,6 +79,7 @@ def full(six: Any) -> str:
     )
 
 
+@pytest.mark.slow
 def test_page_is_well_formed(full: str) -> None:
     """Every element is closed in order, every identifier is used once, and every reference has its target."""
     outline = parse(full)

@@ -56,6 +56,7 @@ def test_places_of_panels() -> None:
     assert [picture.is_lowest(index) for index in range(5)] == [False, False, True, True, True]
 
 
+@pytest.mark.slow
 def test_importing_reports_does_not_wait_for_drawing_libraries() -> None:
     """plotly, matplotlib and jinja2 are imported when something is drawn, not before."""
     code = "import sys, oed.reports; print(sorted({'plotly', 'matplotlib', 'jinja2'} & set(sys.modules)))"

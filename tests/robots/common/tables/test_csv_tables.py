@@ -179,6 +179,7 @@ def test_cause_of_a_refused_cell_is_kept(tmp_path):
     assert isinstance(refused(csv(tmp_path, "t,q1\n0,1\n1,abc\n")).__cause__, pa.ArrowException)
 
 
+@pytest.mark.slow
 def test_fault_deep_in_a_long_file_has_its_line(tmp_path):
     """A bad cell beyond the first blocks of the parser is found with its line."""
     rows = [f"{index},{index * 0.1!r},{'0.123456789' * 3}" for index in range(600_000)]

@@ -65,6 +65,7 @@ def test_heat_is_kept_and_lost(seen, time_constant):
     np.testing.assert_allclose(got, np.concatenate([first, second]), atol=1e-3 * first.max())
 
 
+@pytest.mark.slow
 def test_a_warm_housing_keeps_heat_through_a_pause(seen):
     """Gear and housing of two heat nodes: their two exponentials give the gear's heat, in a log and after a pause."""
     even = 0.02 * np.arange(3000)
