@@ -234,8 +234,8 @@ def _dynamics(
         turned = 1.0 - 2.0 * np.eye(robot.n)
         gains = np.array([fit_all(moments.scaled(turned[j]), spread).cost - whole.cost for j in range(robot.n)])
     sharp = looked.sharp or rows
-    told = [j for j, fit in enumerate(fits) if fit is not None and unexplained[j] < HOPELESS]
-    quick = {j: (fits[j] if sharp is rows else None) or sharp.fit(j) for j in told}
+    explained = [j for j, fit in enumerate(fits) if fit is not None and unexplained[j] < HOPELESS]
+    quick = {j: (fits[j] if sharp is rows else None) or sharp.fit(j) for j in explained}
     delays = estimate_delays(sharp, quick, period, looked.sharp_cutoff, unexplained)
     findings = check_signs(robot, rows, fits, physics, gains, prefix)
     if prefix == "tau":

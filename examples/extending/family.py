@@ -1,4 +1,4 @@
-"""A trajectory family of one's own: smooth bumps, each of which moves a joint for a part of the time.
+"""A trajectory family of one's own: smooth bumps; each moves a joint for a part of the time.
 
 Run it with ``python family.py``.
 """

@@ -75,11 +75,11 @@ def fit_stages(planner: Planner, programme: Programme, excitation: Stage | None)
         needed = (cycle - left) * period
         warm_up_time += left
         if warm_up_time * period < LEAST_WARM_UP * programme.warm_up:
-            told = (
+            reason = (
                 f"excitation takes {excitation.duration:.1f} s and friction {chosen.duration:.1f} s, which leaves "
                 f"{max(warm_up_time, 0) * period:.1f} s for the warm-up of {programme.warm_up:g} s"
             )
-            raise _too_short(programme.cycle_time, told, needed)
+            raise _too_short(programme.cycle_time, reason, needed)
         notes.append(
             f"The warm-up was shortened from {programme.warm_up:g} s to {warm_up_time * period:.1f} s as well."
         )

@@ -139,7 +139,7 @@ def name_of(member: object) -> str:
     """Gives the name that a member carries.
 
     Raises:
-        InputError: none.
+        InputError: a member without a name.
     """
     name = getattr(member, "name", None)
     if not isinstance(name, str) or not name:

@@ -75,12 +75,12 @@ def inflate_conflicting_prior(pull: GaussianPrior, gram: Array, cross: Array, st
     """
     root = np.linalg.cholesky(pull.precision / strength)
     inverse = solve_triangular(root, np.eye(len(root)), lower=True)
-    told, ways = np.linalg.eigh(inverse @ gram @ inverse.T)
-    told = np.maximum(told, 0.0)
+    information, ways = np.linalg.eigh(inverse @ gram @ inverse.T)
+    information = np.maximum(information, 0.0)
     aim = ways.T @ inverse @ (cross - gram @ pull.target)
-    weights = np.ones(len(told))
+    weights = np.ones(len(information))
     for _ in range(CONFLICT_ROUNDS):
-        off = aim / (told + strength * weights)
+        off = aim / (information + strength * weights)
         weights = 1.0 / np.maximum(1.0, (off / CONFLICT_SIGMAS) ** 2)
     turned = root @ ways
     return GaussianPrior(strength * (turned * weights) @ turned.T, pull.target)
@@ -102,8 +102,8 @@ def solve_least_squares(gram: Array, cross: Array) -> Array:
 
 def explained_chi2(gram: Array, cross: Array, pull: GaussianPrior) -> float:
     """Squared torque that such a fit explains, less what the pull costs it."""
-    told = _root(gram, pull).T @ _aim(cross, pull)
-    return float(told @ told - pull.target @ pull.precision @ pull.target)
+    projected = _root(gram, pull).T @ _aim(cross, pull)
+    return float(projected @ projected - pull.target @ pull.precision @ pull.target)
 
 
 def _aim(cross: Array, pull: GaussianPrior) -> Array:

@@ -56,7 +56,7 @@ class Limit:
             effect: of the joint where it shows most); infinite where no size shows.
         at_worst: that size of the kind of it (its time constants, speeds, travels) that shows least, of those that a
             scan tries; infinite where one of them shows at no size. `detectable` is of a kind in the middle.
-        attributable: smallest that is also told from every rival; infinite where none is.
+        attributable: smallest that is also distinguished from every rival; infinite where none is.
         toughest: the rival that is hardest to tell from it; None without.
         visible: share of its energy that the base model does not absorb.
         note: why no size shows, or what stays open; or empty.

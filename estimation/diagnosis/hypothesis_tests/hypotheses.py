@@ -69,6 +69,6 @@ def _finite(X: Array) -> Array:
 
 def acting(columns: Array) -> NDArray[np.bool_]:
     """Marks columns (N, ...) that are not zero throughout: a few rows tell it, nearly always."""
-    told = np.asarray(columns[:: len(columns) // GLANCE + 1].any(axis=0))
-    told[~told] = columns[:, ~told].any(axis=0)
-    return told
+    nonzero = np.asarray(columns[:: len(columns) // GLANCE + 1].any(axis=0))
+    nonzero[~nonzero] = columns[:, ~nonzero].any(axis=0)
+    return nonzero

@@ -64,15 +64,15 @@ def per_joint_evidence(
         gram[k], cross[k] = float(np.ravel(own.gram)[0]), float(np.ravel(own.cross)[0])
         late = problem.reversal_time_error(j)
         if late.any() and gram[k] > 0:
-            told = score(problem, problem.split(group, np.ones(1), late > 0), accepted).gram.sum(axis=1)
-            told = np.maximum(told, 0.0)
-            # What is told by the balance of impulses has its error already.
+            energies = score(problem, problem.split(group, np.ones(1), late > 0), accepted).gram.sum(axis=1)
+            energies = np.maximum(energies, 0.0)
+            # The evidence of the balance of impulses contains its error already.
             timed = 0.0 if group.reversal_columns is None else float(np.sum(group.reversal_columns**2))
-            if told.sum() > 0:
+            if energies.sum() > 0:
                 # What each of them has of the column's squares weighs its moment.
                 squares = np.where(late > 0, group.columns[0][:, 0], 0.0) ** 2
                 usual = np.sum(squares * late**2) / max(float(np.sum(squares)), 1e-300)
-                sure[k] = (told[0] / (1.0 + usual * told[0]) + told[1] + timed) / (told.sum() + timed)
+                sure[k] = (energies[0] / (1.0 + usual * energies[0]) + energies[1] + timed) / (energies.sum() + timed)
     apart = ASIDE**2 * explained[list(joints)] / np.where(gram > 0, gram, np.inf)
     return PerJointEvidence(gram, cross, sure, apart)
 
@@ -91,7 +91,7 @@ def shared_coefficient_gain(gram: Array, cross: Array, apart: Array | None = Non
         return float(cross[0] ** 2 / gram[0])
     everyone = np.ones((1, len(gram)), dtype=bool)
     sets = np.vstack([everyone, ~np.eye(len(gram), dtype=bool)]) if len(gram) > 2 else everyone
-    # Formulas may be as good as told, too: joints that agree are not asked to be apart.
+    # Formulas may be that exact, too: joints that agree need not differ.
     errors = [np.zeros(len(gram)), *([] if apart is None else [apart])]
     return max(_over_scatter(gram[chosen], cross[chosen], own[chosen]) for chosen in sets for own in errors)
 

@@ -43,8 +43,8 @@ def profile_gain(problem: Problem, member: FittedEffect) -> float:
     rows = np.array([PASSED * counted[a:b].sum() for a, b in pairwise(edges)])
     fitted = problem.weighted_base_columns.shape[2] * rows / max(rows.sum(), 1e-300)
     before, after = (np.array([x[a:b].sum() for a, b in pairwise(edges)]) for x in squares)
-    told = (rows > 2 * fitted) & (after > 0)
-    return float(np.sum((rows - fitted)[told] * np.log(before[told] / after[told])))
+    usable = (rows > 2 * fitted) & (after > 0)
+    return float(np.sum((rows - fitted)[usable] * np.log(before[usable] / after[usable])))
 
 
 __all__ = ["profile_gain"]

@@ -190,8 +190,8 @@ class Problem:
         timed = None
         if self.timing is not None and effect is not None and effect.lags and effect.whole_robot:
             timed = self.timing.column(joints)
-            told = float(np.sum(timed**2))
-            raw, gram = np.where(np.isfinite(raw), raw + told, raw), gram + told
+            energy = float(np.sum(timed**2))
+            raw, gram = np.where(np.isfinite(raw), raw + energy, raw), gram + energy
             cross += float(timed[:, 0] @ self.timing.residual)
         high = [np.asfortranarray(part, dtype=np.float32) for part in above]
         small = [np.asfortranarray(part) for part in white]

@@ -54,8 +54,8 @@ class FittedEffect:
         birge_ratio: of what each joint says of a coefficient that all have alike, or rows beside reversals and others,
             as a variance over that of the noise and of the formula (Birge ratio, one at least): the gain counts for so
             much less.
-        motion_error_chi2: of the gain so counted, what errors of the motion may make: another cause would owe it to
-            them, too, but whether there is one at all is told by the rest.
+        motion_error_chi2: part of that gain which errors of the motion may cause. It counts when causes are compared,
+            and does not count as evidence that there is a cause.
     """
 
     hypothesis: Hypothesis
@@ -75,10 +75,10 @@ class FittedEffect:
     def local_bic_gain(self, rows: int) -> float:
         """Does what `bic_gain` does, to say whether it is there at all, not whether another is there instead.
 
-        What acts for a moment is told by the rows of that moment: the other ones are not data of its parameters.
+        A transient effect is measured by the rows in which it acts: the others are no data for its parameters.
         """
-        told = self._acting_rows() if self.hypothesis.effect.transient else np.inf
-        return self._penalised_gain(min(rows * len(self.group.joints), told)) - self.motion_error_chi2
+        acting_rows = self._acting_rows() if self.hypothesis.effect.transient else np.inf
+        return self._penalised_gain(min(rows * len(self.group.joints), acting_rows)) - self.motion_error_chi2
 
     def _penalised_gain(self, rows: float) -> float:
         prior = RARE if self.hypothesis.effect.rare else 0.0
@@ -207,13 +207,13 @@ def clip_shape(shape: Sequence[float], bounds: Sequence[tuple[float, float]]) ->
 
 def _with_scatter(problem: Problem, member: FittedEffect, accepted: Accepted) -> FittedEffect:
     """Says how much less its gain counts where joints differ in what they share (Birge 1932), or tell by reversals."""
-    told = per_joint_evidence(problem, member.hypothesis, member.shape, accepted)
-    if not (acts := told.gram > 0).any():
+    evidence = per_joint_evidence(problem, member.hypothesis, member.shape, accepted)
+    if not (acts := evidence.gram > 0).any():
         return member
-    told = told.subset(acts)
-    agreed = told.gain()
-    scatter = max(1.0, float(told.cross.sum() ** 2 / told.gram.sum()) / agreed)
-    return replace(member, birge_ratio=scatter, motion_error_chi2=max(0.0, agreed - told.gain(surely=True)))
+    evidence = evidence.subset(acts)
+    agreed = evidence.gain()
+    scatter = max(1.0, float(evidence.cross.sum() ** 2 / evidence.gram.sum()) / agreed)
+    return replace(member, birge_ratio=scatter, motion_error_chi2=max(0.0, agreed - evidence.gain(surely=True)))
 
 
 def _reversal_scatter(problem: Problem, member: FittedEffect, accepted: Accepted) -> float:
@@ -227,11 +227,11 @@ def _reversal_scatter(problem: Problem, member: FittedEffect, accepted: Accepted
     expected = parts.gram.sum(axis=1)
     if (expected <= 0).any():
         return 1.0
-    told = parts.cross / expected
-    if (1.0 - 2.0 * told[0]) / (parts.gram[0, 0] / expected[0] ** 2 + FORMULA**2) > ABSENT:
+    sizes = parts.cross / expected
+    if (1.0 - 2.0 * sizes[0]) / (parts.gram[0, 0] / expected[0] ** 2 + FORMULA**2) > ABSENT:
         return np.inf
     difference = np.array([1.0, -1.0]) / expected
-    return max(1.0, float((told[0] - told[1]) ** 2 / (difference @ parts.gram @ difference + FORMULA**2)) / AGREES)
+    return max(1.0, float((sizes[0] - sizes[1]) ** 2 / (difference @ parts.gram @ difference + FORMULA**2)) / AGREES)
 
 
 def _spacing(grid: Sequence[tuple[float, ...]], k: int, start: tuple[float, ...]) -> float:

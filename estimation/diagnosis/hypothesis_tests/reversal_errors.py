@@ -31,6 +31,6 @@ def gain_from_reversal_errors(problem: Problem, joint: int, group: Group, gain: 
     cross = own.cross - (between * other.cross / allowed)[:, 0]
     # Directions that the error of the moments explains wholly tell nothing.
     values, vectors = np.linalg.eigh(gram)
-    told = values > 1e-9 * max(float(np.trace(own.gram)), 1e-300)
-    left = float(np.sum((vectors[:, told].T @ cross) ** 2 / values[told]))
+    determined = values > 1e-9 * max(float(np.trace(own.gram)), 1e-300)
+    left = float(np.sum((vectors[:, determined].T @ cross) ** 2 / values[determined]))
     return max(gain - left, 0.0)

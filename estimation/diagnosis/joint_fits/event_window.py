@@ -13,7 +13,7 @@ from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
 from estimation.diagnosis.hypothesis_tests.time_windows import best_window
 from robots.common.parallel import threaded
 
-# A window that is told to some hundredths of a second leaves less than this share of the gain to a finer search.
+# A window that is known to some hundredths of a second leaves less than this share of the gain to a finer search.
 NEAR = 0.1
 
 
@@ -22,8 +22,8 @@ def open_event_edges(
 ) -> list[float]:
     """Makes errors of shape parameters infinite where the data say that the effect goes on beyond them.
 
-    A push on an elbow while the arm moves is no pulse of constant torques: such a pulse is told where it is largest,
-    and its edges, however sharp they are, are not the push's.
+    A push on an elbow while the arm moves is no pulse of constant torques: such a pulse is estimated where it is
+    largest, and its edges, however sharp they are, are not the push's.
 
     Args:
         problem: the data.

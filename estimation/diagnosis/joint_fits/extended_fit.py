@@ -60,21 +60,21 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
     base = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
     blocks, slices, deviations = [base], [], []
     at = base.shape[2]
-    told: list[FittedEffect] = []
+    fitted_members: list[FittedEffect] = []
     for i, member in enumerate(members):
         rest = [m for k, m in enumerate(members) if k != i]
         # How far it may be is asked from the middle of a pause, not from the end of it that the search came to.
         member = spread_over_pauses(problem, member, rest)
         steps = shape_errors(problem, member, accept(problem, tuple(m.group for m in rest)))
         steps = open_event_edges(problem, member, rest, widen_change_times(problem, member, rest, steps))
-        told.append(member)
+        fitted_members.append(member)
         X = dense(problem, member.hypothesis, member.shape)
         slopes = [_slope(problem, member, k, abs(step)) for k, step in enumerate(steps)]
         blocks += [X, *slopes]
         slices.append((at, X.shape[2], len(member.shape)))
         deviations.append(steps)
         at += X.shape[2] + len(member.shape)
-    members, columns = told, np.concatenate(blocks, axis=2)
+    members, columns = fitted_members, np.concatenate(blocks, axis=2)
     fast, kicks = np.zeros((2, columns.shape[2]), dtype=bool)
     for member, (start, size, shapes) in zip(members, slices, strict=True):
         rows, effect = slice(start, start + size + shapes), member.hypothesis.effect
@@ -167,11 +167,11 @@ def dense(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) ->
 
 def reversal_columns(members: Sequence[FittedEffect], starts: Sequence[int], shape: tuple[int, int]) -> Array:
     """What each joint's reversals tell beside the rows (n, p) of members whose columns start at these."""
-    told = np.zeros(shape)
+    rows = np.zeros(shape)
     for member, start in zip(members, starts, strict=True):
         if member.group.reversal_columns is not None:
-            told[:, start : start + member.group.size] = member.group.reversal_columns
-    return told
+            rows[:, start : start + member.group.size] = member.group.reversal_columns
+    return rows
 
 
 def _slope(problem: Problem, member: FittedEffect, k: int, step: float) -> Array:

@@ -63,9 +63,9 @@ def find_gear_load(problem: Problem, members: Sequence[FittedEffect], values: Ar
     ways: list[LoadPath] = ["effects", "preloads"] if any(w.effect.preloads for w in weights) else ["effects"]
     bearings = [ExtraGearLoad(way, weights) for way in ways]
     state = problem.baseline.situation(problem.recording, values[: problem.baseline.base.size])
-    borne = bearings[0].on(state).extra_load
-    assert borne is not None
-    size, other = (np.sqrt(np.mean(torque**2, axis=0)) for torque in (borne, state.load))
+    extra = bearings[0].on(state).extra_load
+    assert extra is not None
+    size, other = (np.sqrt(np.mean(torque**2, axis=0)) for torque in (extra, state.load))
     felt = set((np.flatnonzero(size > FELT * other) + 1).tolist())
     on_them = [m for m in members if m.hypothesis.joint in felt and not m.hypothesis.effect.loads_gear]
     if not on_them:
@@ -74,8 +74,8 @@ def find_gear_load(problem: Problem, members: Sequence[FittedEffect], values: Ar
     best, most = GearLoad(bearings[0]), before
     for bearing in bearings:
         now = replace(problem, situation=bearing.on(state), extra_load=bearing)
-        for told in _alternatives(now, members, on_them):
-            worth = _set_bic_gain(now, told)
+        for alternative in _alternatives(now, members, on_them):
+            worth = _set_bic_gain(now, alternative)
             if worth > most + (0.0 if best.improves_fit else MIN_BIC_GAIN):
                 best, most = GearLoad(bearing, improves_fit=True), worth
     return best

@@ -88,7 +88,7 @@ class _Search:
             more += [dense(now, member.hypothesis, member.shape), by_shape]
             own += [member.coefficients, np.asarray(member.shape)[loose]]
         columns = np.concatenate([self.fit.full, *more], axis=2)
-        # Nuisance and other effects are read as they are: what distorts is told by the base model's torque.
+        # Nuisance and other effects are read as they are: the nonlinearity is estimated from the base model's torque.
         columns[:, :, : self.problem.baseline.base.size] *= passes[:, :, None]
         left = self.problem.recording.tau - self.fit.full @ values - self._distortion(now, members)
         return solve_map(*self.fit.normal(left + columns @ np.concatenate(own), columns), self.problem.prior)

@@ -32,7 +32,7 @@ def with_total_torque(problem: Problem, members: Sequence[FittedEffect], hypothe
     """Lets effects that act on all of the torque know what it is: base model and other members, fitted together.
 
     What makes all of the torque late knows that of the other members as they are. Where no log shows by itself that
-    samples are useless as measurements, no more is told: what is cut off elsewhere is little of all.
+    samples are useless as measurements, no more is estimated: what is clipped elsewhere is a small part.
 
     Args:
         problem: the data.

@@ -154,7 +154,7 @@ def _levelling(
 
     An autoregressive process has the noise of unknown accelerations, which grows with the fourth power of the
     frequency, but roughly. Where a motion repeats, noise is what is at its harmonics: an encoder rounds each repetition
-    alike, and what repeats is all that an effect of the motion is told from.
+    alike, and only what repeats identifies an effect of the motion.
     """
     rate = 1 / (recording.step * wide.stride)
     low, high = ((1 - TRANSITION / 2) * f for f in (cutoff, wide.bands[joint].cutoff))

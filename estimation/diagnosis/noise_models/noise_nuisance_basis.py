@@ -51,9 +51,9 @@ class NuisanceProjection:
         result = [piece * rows for piece, rows in zip(pieces, self.measured, strict=True)]
         pieces = [piece.copy() for piece in result]
         for j, own in enumerate(self.pieces):
-            told = sum(X.T @ piece[:, j] for X, piece in zip(own, pieces, strict=True))
+            fitted = sum(X.T @ piece[:, j] for X, piece in zip(own, pieces, strict=True))
             for X, piece in zip(own, result, strict=True):
-                piece[:, j] -= X @ told
+                piece[:, j] -= X @ fitted
         return result
 
     def kept(self, size: int, counts: Array) -> Array:

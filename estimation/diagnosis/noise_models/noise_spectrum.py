@@ -71,7 +71,7 @@ def fit_noise_process(
         window: the lowest frequency [Hz], and the highest of each joint (n,).
         beside: what was taken out of the pieces.
         period: of the motion [s]; None where it does not repeat.
-        colour: how it is told.
+        colour: settings of the estimate.
     """
     rows, joints = sum(map(len, pieces)), pieces[0].shape[1]
     longest = np.minimum(colour.memory / step, counts / colour.rows)

@@ -35,7 +35,7 @@ FASTEST = 260.0  # [Hz] sampling beyond which no effect of the catalogue gains
 # At its ends a log knows its derivatives less well, for nothing is known beyond: so many periods of the cut-off are
 # lost, and no more than a share of the log.
 LOST, MOST_LOST = 4.0, 0.02
-SHORTEST = 5.0  # [s] of log below which nothing can be told
+SHORTEST = 5.0  # [s] of log below which nothing can be estimated
 # A step is so many whole periods, but for this share of one.
 WHOLE = 1e-3
 # A mean over repetitions is taken where it knows frequencies higher by this factor than a single pass.

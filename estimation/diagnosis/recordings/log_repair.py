@@ -19,8 +19,8 @@ from robots.signals import Log
 
 Array = NDArray[np.float64]
 
-# What an effect may look like to the quick fit of the gate, or what a diagnosis says itself, with its own reason.
-TOLD = frozenset(
+# Findings of the gate that an effect may cause, or that the diagnosis reports itself, with the reason.
+TOLERATED = frozenset(
     {
         "badly_excited",
         "jump",
@@ -35,7 +35,7 @@ TOLD = frozenset(
 )
 # Warnings of what a diagnosis looks at more closely.
 OWN = frozenset({"badly_excited", "clipped", "delay", "hardly_moves", "poorly_explained", "unit_of_torque"})
-# A stretch between gaps that is shorter than this [s] tells nothing that its ends do not spoil.
+# A stretch between gaps that is shorter than this [s] is left out: filters err at its ends.
 SHORTEST = 2.0
 
 _BY_FIT = " (from a quick fit of rigid body and friction)"
@@ -72,11 +72,11 @@ def repair_log(robot: Robot, log: Log, which: str) -> RepairedLog:
     gate = check_log(robot, log)
     sizes = [f for f in gate.findings if f.name == "unit_of_torque" and f.joint is not None]
     strange = 2 * len(sizes) >= max(robot.n, 3)
-    told = TOLD - {"unit_of_torque"} if strange else TOLD
-    replace(gate, findings=tuple(f for f in gate.findings if f.name not in told)).raise_if_refused()
+    tolerated = TOLERATED - {"unit_of_torque"} if strange else TOLERATED
+    replace(gate, findings=tuple(f for f in gate.findings if f.name not in tolerated)).raise_if_refused()
     notes = [_SIZES.format(which, len(sizes), robot.n, _range([f.value for f in sizes]))] if strange else []
     notes += [
-        f"{which}{_BY_FIT if finding.name in TOLD else ''}: {finding}."
+        f"{which}{_BY_FIT if finding.name in TOLERATED else ''}: {finding}."
         for finding in gate.findings
         if _is_reported(finding)
     ]

@@ -102,7 +102,7 @@ class Spectra:
         noise = between_rows(positions.fresh_t, drawn, np.minimum(positions.t, positions.fresh_t[-1]), positions.period)
         f, density = _density(noise[:, 0], positions.period)
         density = np.mean([density, *(_density(column, positions.period)[1] for column in noise.T[1:])], axis=0)
-        # The slowest are not told: their power is divided by next to nothing.
+        # The slowest are not determined: their power is divided by nearly zero.
         slow = density[(f > SLOW[0] / positions.period) & (f < SLOW[1] / positions.period)]
         return Spectra(positions.period, f, density / float(np.median(slow)))
 

@@ -9,7 +9,7 @@ from robots.base_parameters import BaseParameters
 
 # A log of whose squared torque a fit to it alone leaves more than this share, on every joint, tells nothing of the arm.
 LEFT = 0.5
-# Rows of a log that are looked at, and how many numbers a parameter needs to be told.
+# Rows of a log that are looked at, and how many numbers determine a parameter.
 ROWS, ENOUGH = 2000, 3
 
 

@@ -219,10 +219,10 @@ def beside_larger(slight: FittedEffect | None, members: Sequence[FittedEffect]) 
     """Reports a significant candidate that the formula error of a finding can explain."""
     if slight is None:
         return ()
-    told = [(slight.gain_on([j]) / m.gain_on([j]), m, j) for m in members for j in slight.group.joints if _acts(m, j)]
-    if not told:
+    shares = [(slight.gain_on([j]) / m.gain_on([j]), m, j) for m in members for j in slight.group.joints if _acts(m, j)]
+    if not shares:
         return ()
-    share, member, j = min(told, key=lambda each: each[0])
+    share, member, j = min(shares, key=lambda each: each[0])
     if slight.hypothesis.effect.shared_coefficient:
         return (_NOT_ALIKE.format(slight.hypothesis.label, member.hypothesis.label),)
     if share >= 1.0:

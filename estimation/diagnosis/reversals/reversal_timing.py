@@ -24,7 +24,7 @@ from estimation.diagnosis.reversals.reversal_impulses import (
 Array = NDArray[np.float64]
 
 ROUNDS = 3
-# Kinds of reversals without which their scatter is not told.
+# Least number of kinds of reversals that determines their scatter.
 FEWEST_KINDS = 3
 # A mean differs from what each reversal did by more than its own scatter says: its edges, its moments.
 LARGER = 1.15
@@ -38,7 +38,8 @@ QUIET = (1.25, 1.4)
 KNOWN, WITHIN = 1e-3, 0.75
 # A joint whose rows at reversals count is timed by impulses where those tell it so much better than its rows may.
 BETTER = 0.5
-# Directions of the fit below this share of a usual one are not told; forces beside the gap are those from here on [s].
+# Directions of the fit below this share of a usual one are not determined; forces beside the gap are those from here on
+# [s].
 FAINT, BESIDE = 1e-9, 1e-3
 # Times about reversals [s] that are fitted, and must be understood.
 ABOUT = 0.2
@@ -196,9 +197,9 @@ def _fit_impulse(recording: Recording, j: int, turns: Reversals, force: Array) -
     for _ in range(ROUNDS):
         columns, nearest, away = impulse_columns(recording, turns, at, tables)
         counted = away * step <= ABOUT
-        told = counted & (away * step > gap)
-        design = np.concatenate([columns[0][counted] / loud, columns[2][told] / noise])
-        data = np.concatenate([rest[counted] / loud, force[told] / noise])
+        beyond_gap = counted & (away * step > gap)
+        design = np.concatenate([columns[0][counted] / loud, columns[2][beyond_gap] / noise])
+        data = np.concatenate([rest[counted] / loud, force[beyond_gap] / noise])
         gram = design.T @ design
         inverse = np.linalg.inv(gram + FAINT * np.trace(gram) / len(gram) * np.eye(len(gram)))
         coefficients = inverse @ (design.T @ data)
@@ -209,7 +210,7 @@ def _fit_impulse(recording: Recording, j: int, turns: Reversals, force: Array) -
         return None
     # Each kind of reversal by its own sums: what it says beyond noise that comes anew at each sample counts, too.
     sums = np.zeros((turns.kind.max() + 1, len(gram)))
-    np.add.at(sums, turns.kind[np.concatenate([nearest[counted], nearest[told]])], design * left[:, None])
+    np.add.at(sums, turns.kind[np.concatenate([nearest[counted], nearest[beyond_gap]])], design * left[:, None])
     kinds = len(np.unique(turns.kind))
     covariance = inverse + inverse @ (sums.T @ sums) @ inverse * kinds / max(kinds - 1, 1)
     _, speed, acceleration = tables[0].at(np.array([-gap - BESIDE, -gap, 0.0, gap, gap + BESIDE]))

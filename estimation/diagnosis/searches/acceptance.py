@@ -103,15 +103,15 @@ def delay_supported_away_from_impacts(
     if not beside.any():
         return True
     accepted = accept(problem, tuple(m.group for m in members))
-    told = []
+    per_joint = []
     for j, X in zip(*problem.columns_of(candidate.hypothesis, candidate.shape), strict=True):
         group = problem.group((j,), (X,), effect=candidate.hypothesis.effect)
         parts = score(problem, problem.split(group, np.ones(1), beside), accepted)
         if parts.gram[0, 0] > 0:
             # Whatever it is beside the kicks.
             onto = parts.gram[1, 0] / parts.gram[0, 0]
-            told.append((parts.gram[1, 1] - onto * parts.gram[0, 1], parts.cross[1] - onto * parts.cross[0]))
-    gram, cross = np.array([each for each in told if each[0] > 0]).reshape(-1, 2).T
+            per_joint.append((parts.gram[1, 1] - onto * parts.gram[0, 1], parts.cross[1] - onto * parts.cross[0]))
+    gram, cross = np.array([each for each in per_joint if each[0] > 0]).reshape(-1, 2).T
     if not len(gram):
         return False
     whole = float(candidate.coefficients[0])
@@ -125,12 +125,16 @@ def _joints_agree(problem: Problem, candidate: FittedEffect, members: Sequence[F
     if not delay_supported_away_from_impacts(problem, candidate, members):
         return False
     beside = accept(problem, tuple(m.group for m in members))
-    told = per_joint_evidence(problem, candidate.hypothesis, candidate.shape, beside)
+    evidence = per_joint_evidence(problem, candidate.hypothesis, candidate.shape, beside)
     others = [
         max((m.gain_on([j]) for m in members if m.hypothesis.joint == j + 1), default=0.0)
         for j in candidate.group.joints
     ]
-    told = told.subset((told.gram > 0) & (told.certain_share * told.cross**2 >= told.gram * others))
-    if not len(told.gram):
+    evidence = evidence.subset(
+        (evidence.gram > 0) & (evidence.certain_share * evidence.cross**2 >= evidence.gram * others)
+    )
+    if not len(evidence.gram):
         return False
-    return told.gain(surely=True) - candidate.degrees * float(np.log(problem.rows * len(told.gram))) > MIN_BIC_GAIN
+    return (
+        evidence.gain(surely=True) - candidate.degrees * float(np.log(problem.rows * len(evidence.gram))) > MIN_BIC_GAIN
+    )

@@ -77,7 +77,7 @@ class RefitResult:
 def refit(problem: Problem, members: Sequence[FittedEffect]) -> RefitResult:
     """Fits base model and effects together.
 
-    Torque that was cut off draws the base model towards what is left of it, and how much was cut is then told by that.
+    Clipped torque biases the base model towards the clipped value, and the estimated clipping then follows that model.
     So the base model is fitted without such rows first, then to the torque as it is cut; and the cut beside it. What
     distorts a reading is fitted beside it at once.
     """

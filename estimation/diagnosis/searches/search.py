@@ -123,8 +123,8 @@ def search(
         # A delay made the sign of friction look less sharp than it is.
         blurred = any(found.effect.hypothesis.effect.smooths_friction_sign for found in last.selection.found)
     assert last is not None
-    told = with_rivals(last.searched_problem, last.entries, last.selection, np.random.default_rng(seed))
-    return replace(last, selection=told)
+    with_alternatives = with_rivals(last.searched_problem, last.entries, last.selection, np.random.default_rng(seed))
+    return replace(last, selection=with_alternatives)
 
 
 def _trust_reversal_rows(base: BaseParameters, recording: Recording) -> Recording:

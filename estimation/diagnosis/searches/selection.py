@@ -105,22 +105,24 @@ def select(
         refined = refine_candidates(problem, screen_candidates(problem, result, members), accepted, known)
         chance = {member.hypothesis: chances.get(member.hypothesis, 1.0) for member in refined}
         able = [m for m in refined if chance[m.hypothesis] <= false_alarm and m.hypothesis not in spurned]
-        told = [m for m in able if is_accepted(problem, m, chance[m.hypothesis], members, false_alarm)]
-        told = [m for m in told if not m.hypothesis.effect.transient or exceeds_single_shock(problem, m, accepted)]
-        if not told:
+        candidates = [m for m in able if is_accepted(problem, m, chance[m.hypothesis], members, false_alarm)]
+        candidates = [
+            m for m in candidates if not m.hypothesis.effect.transient or exceeds_single_shock(problem, m, accepted)
+        ]
+        if not candidates:
             break
         # What is sure is on joints where no other acts, and so none leaves anything.
-        sure_alone = is_certain(problem, told[0], chance[told[0].hypothesis], members, false_alarm)
-        if not (sure_alone or exceeds_leakage(problem, told[0], members)):
-            if (formed := _refit_with_candidate(problem, told[0], members)) is None:
-                slight = told[0]
+        sure_alone = is_certain(problem, candidates[0], chance[candidates[0].hypothesis], members, false_alarm)
+        if not (sure_alone or exceeds_leakage(problem, candidates[0], members)):
+            if (formed := _refit_with_candidate(problem, candidates[0], members)) is None:
+                slight = candidates[0]
                 break
-            *members, told[0] = formed
+            *members, candidates[0] = formed
             accepted = accept(problem, tuple(member.group for member in members))
-        told[0] = refit_event_window(problem, told[0], accepted)
-        members.append(told[0])
-        p_values.append(chance[told[0].hypothesis])
-        won[told[0].hypothesis] = told[0].gain
+        candidates[0] = refit_event_window(problem, candidates[0], accepted)
+        members.append(candidates[0])
+        p_values.append(chance[candidates[0].hypothesis])
+        won[candidates[0].hypothesis] = candidates[0].gain
         # What is known of the torque now may come near what the log shows.
         more, sure = _visible_in_torque(problem, entries, false_alarm, rng, members)
         seen |= {member.hypothesis for member in more}
@@ -137,8 +139,8 @@ def select(
         spurned |= {m.hypothesis for m, own in zip(members, held, strict=True) if not own}
         members, p_values = list(compress(members, held)), list(compress(p_values, held))
         now = {member.hypothesis for member in members}
-        if told[0].hypothesis not in now:
-            spurned.add(told[0].hypothesis)
+        if candidates[0].hypothesis not in now:
+            spurned.add(candidates[0].hypothesis)
         elif now in visited:
             break
         visited.append(now)
@@ -167,7 +169,7 @@ def with_rivals(
     What was seen in the torque as logged has no rivals, whatever else explains as little of it.
     """
     members = [found.effect for found in selection.found]
-    told = []
+    effects = []
     for i, found in enumerate(selection.found):
         rivals: list[tuple[FittedEffect, float]] = []
         if found.effect.hypothesis not in selection.visible_in_torque:
@@ -181,8 +183,8 @@ def with_rivals(
                 rival for rival in refine_candidates(problem, rest, beside) if rival.gain >= NEAR * found.effect.gain
             ]
             rivals = [(rival, reference - rival.bic_gain(problem.rows)) for rival in able]
-        told.append(replace(found, rivals=tuple(rivals)))
-    return replace(selection, found=tuple(told))
+        effects.append(replace(found, rivals=tuple(rivals)))
+    return replace(selection, found=tuple(effects))
 
 
 def _visible_in_torque(

@@ -38,8 +38,8 @@ def equivalent_shapes(problem: Problem, members: Sequence[FittedEffect], i: int)
 def complete_effects(problem: Problem, founds: Sequence[SelectedEffect]) -> tuple[SelectedEffect, ...]:
     """Gives what was found with all that its effect has once it is there, where it is worth that.
 
-    A search pays for each coefficient, and goes without those that are hardly told; values without them are told as
-    surer than they are, and off by what those would have been.
+    The search leaves out coefficients that are hardly determined. Without them the others are biased, and their stated
+    errors are too small.
     """
     members = [found.effect for found in founds]
     whole = []

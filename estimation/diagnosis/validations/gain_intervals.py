@@ -232,13 +232,13 @@ def _growth(
 
     Errors beyond those of the noise, which a base model that is wrong makes, count as noise.
     """
-    told = []
+    gains = []
     for chosen in chosen_by:
         own, place = pull.columns(chosen), np.ix_(chosen, chosen)
         both = fit[0][place] + more[0][place], fit[1][chosen] + more[1][chosen]
-        told.append(explained_chi2(*both, own) - explained_chi2(fit[0][place], fit[1][chosen], own))
-    noise = problem.whitening.row_weight * max(1.0, (square - told[-1]) / max(int(counts.sum()), 1))
-    return (told[-1] - np.array(told)) / noise
+        gains.append(explained_chi2(*both, own) - explained_chi2(fit[0][place], fit[1][chosen], own))
+    noise = problem.whitening.row_weight * max(1.0, (square - gains[-1]) / max(int(counts.sum()), 1))
+    return (gains[-1] - np.array(gains)) / noise
 
 
 def model_columns(base: int, effects: Sequence[Array]) -> list[NDArray[np.intp]]:

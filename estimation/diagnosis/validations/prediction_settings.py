@@ -31,9 +31,8 @@ FEWEST = 50
 def with_best_cutoff(model: Model, problem: Problem, logs: Sequence[Log]) -> Model:
     """States the cut-off of the motion with which a model predicts its own logs best.
 
-    A diagnosis knows of each joint up to which frequency its torque is told by positions, and weighs by that. A
-    prediction has one smoothing: with the highest of all cut-offs the encoders' noise on a heavy joint is most of its
-    error, with the lowest a quick joint's friction turns round late.
+    The diagnosis has a cut-off per joint. A prediction has one for all: with the highest, encoder noise dominates the
+    error of a heavy joint; with the lowest, the friction of a fast joint reverses late.
 
     Args:
         model: whose provenance gets the cut-off [Hz].
@@ -107,8 +106,8 @@ def _with_scales(model: Model, scales: Array) -> Model:
 def _misfit(model: Model, log: Log, before: Sequence[Log]) -> float:
     """Mean over the joints of the logarithm of a prediction's error over the torque's spread."""
     spread = _predicted(model, log, before).relative_spread
-    told = spread[np.isfinite(spread) & (spread > 0)]
-    return float(np.mean(np.log(told))) if len(told) else 0.0
+    errors = spread[np.isfinite(spread) & (spread > 0)]
+    return float(np.mean(np.log(errors))) if len(errors) else 0.0
 
 
 def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen: HeldOutErrors) -> Model:

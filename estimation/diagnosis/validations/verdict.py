@@ -128,7 +128,7 @@ def _plausible_rivals(problem: Problem, found: SelectedEffect) -> SelectedEffect
 def _plausible_form(problem: Problem, found: SelectedEffect, named: Sequence[FittedEffect]) -> SelectedEffect | None:
     """Gives what was found as a machine may have it: as fitted, or in a likely form that is worth it; None if neither.
 
-    A delay beside which another friction acts at reversals, which it delays too, may be told later or sooner by them.
+    A delay may be biased where another friction effect acts at reversals: it delays that one, too.
     """
     own = found.effect
     if _is_plausible(problem, own):
@@ -267,7 +267,7 @@ def _better_than_one_cause(
     free, _ = free_functions(problem, whole, [], false_alarm, rng)
     single = all(member.hypothesis.joint is not None for member in named)
     reached = {j for member in named for j in member.group.joints}
-    # On the names' joints alone, a cause of all joints is told no better than they are, and machines have it less.
+    # On the names' joints alone, a cause of all joints explains no more than they do, and is rarer in machines.
     here = single and bool(free) and free[0].gain - free[0].gain_on(sorted(reached)) < LEAST
     return has_better_bic(problem, named, [], free[:1], -LEAST if here else 0.0)
 

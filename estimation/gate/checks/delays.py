@@ -136,7 +136,7 @@ def _refined(rows: Rows, fit: JointFit, joint: int, search: _Search) -> Delay:
 
 def delay_findings(delays: list[Delay | None], period: float) -> list[Finding]:
     """Judges the delays (n,): one finding where the joints agree, else one per joint."""
-    told = {
+    significant = {
         joint: delay
         for joint, delay in enumerate(delays, start=1)
         if delay is not None
@@ -159,7 +159,7 @@ def delay_findings(delays: list[Delay | None], period: float) -> list[Finding]:
         )
         if alike and abs(mean) > max(LONG * period, SURE * error):
             return [_finding(mean, error, None, period, len(known))]
-    return [_finding(delay.value, delay.error, joint, period, 1) for joint, delay in told.items()]
+    return [_finding(delay.value, delay.error, joint, period, 1) for joint, delay in significant.items()]
 
 
 def _shared(long: Delay, delays: list[Delay | None]) -> bool:

@@ -33,7 +33,7 @@ def check_excitation(
         unexplained: error on left-out stretches over the torque's standard deviation (n,).
         name: prefix of the torques.
     """
-    told = unexplained < HOPELESS
+    explained = unexplained < HOPELESS
     findings = []
     for joint, (found, error) in enumerate(zip(physics, unexplained, strict=True), start=1):
         if found is not None and POOR <= error < HOPELESS and (error <= WEAK or found.information >= FAINTLY):
@@ -44,14 +44,14 @@ def check_excitation(
         findings.append(
             Finding(
                 name="badly_excited",
-                severity="warning" if told.any() else "refuse",
+                severity="warning" if explained.any() else "refuse",
                 text=(
                     f"{title} is badly excited: on held-out data the error is {100 * error:.3g} % of the torque's "
                     f"standard deviation, and its inertia and friction differ from zero by at most "
                     f"{found.information:.2g} standard errors"
                 ),
                 action="its parameters are not determined; record faster motions of this joint with larger torques"
-                if told.any()
+                if explained.any()
                 else "check units, signs and order of the joints, and that the log belongs to this robot",
                 value=100 * float(error),
                 unit="%",

@@ -198,8 +198,8 @@ class RetimedExperiment:
                 Quality(part=q["part"], samples=q["samples"], singular_values=tuple(q["singular_values_Y"]))
                 for q in data["quality"]
             )
-            told = data["retiming"]
-            usage = _usage(told["usage"])
+            retiming = data["retiming"]
+            usage = _usage(retiming["usage"])
             if usage is None:
                 raise KeyError("usage")
             return cls(
@@ -210,16 +210,16 @@ class RetimedExperiment:
                 after=after,
                 retimed=Retimed(
                     motion=read_trajectory(Path(folder) / TRAJECTORY)[0],
-                    method=told["method"],
-                    duration_before=told["duration_before"],
-                    duration_after=told["duration_after"],
+                    method=retiming["method"],
+                    duration_before=retiming["duration_before"],
+                    duration_after=retiming["duration_after"],
                     usage=usage,
-                    usage_before=_usage(told["usage_before"]),
-                    deviation=told["path_deviation"],
-                    stops=told["stops"],
+                    usage_before=_usage(retiming["usage_before"]),
+                    deviation=retiming["path_deviation"],
+                    stops=retiming["stops"],
                 ),
-                torque_before=TorqueUse.from_dict(told["torque_before"]),
-                torque_after=TorqueUse.from_dict(told["torque_after"]),
+                torque_before=TorqueUse.from_dict(retiming["torque_before"]),
+                torque_after=TorqueUse.from_dict(retiming["torque_after"]),
                 margins=tuple(
                     Margin(**{**margin, "limit": np.inf if margin["limit"] is None else margin["limit"]})
                     for margin in data["smallest_margins"]

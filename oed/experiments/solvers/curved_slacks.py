@@ -47,7 +47,7 @@ class CurvedSlacks:
         return len(self._at[0]) + len(self._kept[1])
 
     def values(self, z: Array) -> tuple[Array, bool]:
-        """Evaluates the rows' slacks, and tells whether all other limits hold."""
+        """Evaluates the rows' slacks; the flag says whether all other limits hold."""
         if not self._problem.curved:
             return np.zeros(0), True
         single, averaged = self._slacks(z)
@@ -55,7 +55,7 @@ class CurvedSlacks:
         return np.concatenate([averaged, single[self._at]]), others
 
     def choose(self, z: Array, near: float = 0.0) -> bool:
-        """Makes rows of the limits that come near their bound at z, at each peak; tells whether there are new ones."""
+        """Makes rows of the limits that come near their bound at z, at each peak; true if there are new ones."""
         if not self._problem.pointwise:
             return False
         single, _ = self._slacks(z)

@@ -75,7 +75,7 @@ class Slacks:
         self._linear, self._curved = linear, curved
 
     def values(self, z: Array) -> tuple[Array, bool]:
-        """Evaluates the rows' slacks (m,), and tells whether all limits that are no rows hold."""
+        """Evaluates the rows' slacks (m,), with a flag: all limits that are no rows hold."""
         linear = self._linear.values(z)
         curved, others = self._curved.values(z)
         return np.concatenate([linear, curved]), others

@@ -168,13 +168,13 @@ def _experiment(kind: str, times: int) -> str:
 def _findings(diagnosis: Diagnosis, trace: Trace) -> tuple[FindingView, ...]:
     """Collects the findings with their curves: in the torque, outside the model, and from joint encoders."""
     count, last = len(trace.coordinate), len(diagnosis.findings) - len(trace.windups)
-    told = [_finding(f, trace, x) for f, x in zip(diagnosis.findings[:count], trace.coordinate, strict=True)]
-    told += [_finding(f, trace, trace.t) for f in diagnosis.findings[count:last]]
+    views = [_finding(f, trace, x) for f, x in zip(diagnosis.findings[:count], trace.coordinate, strict=True)]
+    views += [_finding(f, trace, trace.t) for f in diagnosis.findings[count:last]]
     for finding, (load, before, after) in zip(diagnosis.findings[last:], trace.windups, strict=True):
         assert finding.joint is not None
         view = _finding(finding, trace, trace.t)
         length = length_unit(diagnosis.model.robot, finding.joint - 1)
-        told.append(
+        views.append(
             replace(
                 view,
                 label=finding.coordinate,
@@ -185,7 +185,7 @@ def _findings(diagnosis: Diagnosis, trace: Trace) -> tuple[FindingView, ...]:
                 unit=f"m{length}",
             )
         )
-    return tuple(told)
+    return tuple(views)
 
 
 def _finding(finding: Finding, trace: Trace, coordinate: Array) -> FindingView:

@@ -89,7 +89,7 @@ class Family(ABC):
         return np.inf
 
     def regressor_times(self, samples: int) -> Array:
-        """Times (M,) [s] at which the regressor counts, half a step off the ends: at rest a row tells nothing."""
+        """Times (M,) [s] at which the regressor counts, half a step off the ends: at rest a row has no information."""
         return (np.arange(samples) + 0.5) / samples * self.duration
 
     def limit_times(self, samples: int) -> Array:

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from oed.trajectories.base import Array, Kinematics
-from oed.trajectories.families.base import Family
-from oed.trajectories.families.sizes import check_size
+from oed.trajectories.families.harmonic import HarmonicFamily
 from oed.trajectories.fourier import FourierSeries, fourier_basis, rest_basis
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fourier(Family):
+class Fourier(HarmonicFamily):
     """Fourier series that start and end at rest (thesis eq. 78 to 80), K = 2 N - 1 (`rest_basis`).
 
     Attributes:
@@ -30,26 +29,10 @@ class Fourier(Family):
     name: ClassVar[str] = "fourier"
     kind: ClassVar[str] = "fourier"
 
-    harmonics: int = 5
-    base_frequency: float = 0.1
-
-    def __post_init__(self) -> None:
-        check_size(self.harmonics, self.base_frequency)
-
-    @classmethod
-    def of_size(cls, harmonics: int, base_frequency: float) -> Self:
-        """Builds the series."""
-        return cls(harmonics=harmonics, base_frequency=base_frequency)
-
     @property
     def size(self) -> int:
         """2 N - 1."""
         return 2 * self.harmonics - 1
-
-    @property
-    def duration(self) -> float:
-        """One period [s]."""
-        return 1 / self.base_frequency
 
     @cached_property
     def _rest(self) -> Array:
@@ -86,7 +69,3 @@ class Fourier(Family):
     def shares(self, samples: int) -> tuple[float, ...]:
         """Four times cos(pi N / M) (Ehlich and Zeller 1964)."""
         return (float(np.cos(np.pi * self.harmonics / samples)),) * 4
-
-    def scale(self, half: Array, velocity: Array) -> Array:
-        """Half the range for the offset, half the velocity limit for each wave."""
-        return np.column_stack([half, np.repeat((velocity / 2)[:, None], self.size - 1, axis=1)])

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from oed.trajectories.base import Array, Kinematics
-from oed.trajectories.families.base import Family
-from oed.trajectories.families.sizes import check_size
+from oed.trajectories.families.harmonic import HarmonicFamily
 from oed.trajectories.fourier import fourier_basis
 
 
 @dataclass(frozen=True, kw_only=True)
-class FourierPolynomial(Family):
+class FourierPolynomial(HarmonicFamily):
     """The modified Fourier series: its waves, brought to rest at both ends by a polynomial of degree five.
 
     With f_i the series of thesis eq. 78 without its offset, and p_i the quintic that six conditions fix::
@@ -34,26 +33,10 @@ class FourierPolynomial(Family):
 
     name: ClassVar[str] = "fourier-polynomial"
 
-    harmonics: int = 5
-    base_frequency: float = 0.1
-
-    def __post_init__(self) -> None:
-        check_size(self.harmonics, self.base_frequency)
-
-    @classmethod
-    def of_size(cls, harmonics: int, base_frequency: float) -> Self:
-        """Builds the series with its polynomial."""
-        return cls(harmonics=harmonics, base_frequency=base_frequency)
-
     @property
     def size(self) -> int:
         """2 N + 1."""
         return 2 * self.harmonics + 1
-
-    @property
-    def duration(self) -> float:
-        """T [s]."""
-        return 1 / self.base_frequency
 
     def basis(self, t: ArrayLike) -> Kinematics:
         """Evaluates f - h for each wave f, with h the quintic of its value, slope and curvature at both ends."""
@@ -75,10 +58,6 @@ class FourierPolynomial(Family):
         for matrix in matrices[:3]:
             matrix[still, 1:] = 0.0
         return Kinematics(*matrices)
-
-    def scale(self, half: Array, velocity: Array) -> Array:
-        """Half the range for the offset, half the velocity limit for each wave."""
-        return np.column_stack([half, np.repeat((velocity / 2)[:, None], self.size - 1, axis=1)])
 
 
 def _hermite(x: Array) -> list[Array]:

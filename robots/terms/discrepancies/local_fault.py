@@ -99,7 +99,7 @@ class LocalFault(Placed):
         q = (situation.q[:, joint - 1] - low) / reach
         turned = own * situation.sign[:, joint - 1] if self.odd else own
         place = np.minimum((q * BINS).astype(int), BINS - 1)
-        told = np.bincount(place, weights=turned, minlength=BINS)
+        binned = np.bincount(place, weights=turned, minlength=BINS)
         rows = np.bincount(place, weights=own != 0, minlength=BINS)
         middles = (np.arange(BINS) + 0.5) / BINS * reach + low
         centres, widths = np.array(grid).T
@@ -107,7 +107,7 @@ class LocalFault(Placed):
         # A constant level is part of the joint's offset; a spot shows only by its difference from it.
         seen = spots - (spots @ rows / max(rows.sum(), 1.0))[:, None]
         size = np.sqrt(np.maximum(seen**2 @ rows, 1e-12))
-        return tuple(grid[i] for i in np.argsort(-np.abs(seen @ told) / size)[:count])
+        return tuple(grid[i] for i in np.argsort(-np.abs(seen @ binned) / size)[:count])
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque per unit of its peak (N, 1)."""

@@ -40,10 +40,10 @@ class Step(Sudden):
         X = self.columns(situation, joint, (-np.inf,))
         seen = (residual != 0)[:, :, None] * X
         products = np.einsum("tjk,tj->tk", X, residual)
-        told, size = (np.cumsum(x[::-1], axis=0)[::-1] for x in (products, np.einsum("tjk,tjk->tk", seen, seen)))
+        sums, size = (np.cumsum(x[::-1], axis=0)[::-1] for x in (products, np.einsum("tjk,tjk->tk", seen, seen)))
         rows = np.searchsorted(situation.t, np.ravel(grid))
         # The data after the last candidate times are too short for a fit.
-        scores = np.sum(told[rows] ** 2 / np.maximum(size[rows], LEAST * size[:1] + 1e-300), axis=1)
+        scores = np.sum(sums[rows] ** 2 / np.maximum(size[rows], LEAST * size[:1] + 1e-300), axis=1)
         return tuple(grid[i] for i in best_apart(scores, count, APART))
 
 

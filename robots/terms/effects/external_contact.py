@@ -64,12 +64,12 @@ class ExternalContact(Effect):
     def described(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[Coefficient, ...]:
         """Describes what each joint feels at the peak, or force and moment on the flange, or force and place."""
         if on_body(shape):
-            told = [Coefficient(name, "N") for name in WRENCH[:3]] + [Coefficient(name, "N m") for name in PLACED]
+            named = [Coefficient(name, "N") for name in WRENCH[:3]] + [Coefficient(name, "N m") for name in PLACED]
         elif on_the_flange(shape):
-            told = [Coefficient(name, "N" if "force" in name else "N m") for name in WRENCH]
+            named = [Coefficient(name, "N" if "force" in name else "N m") for name in WRENCH]
         else:
-            told = [Coefficient(f"peak_on_joint_{j + 1}", force_unit(robot, j)) for j in range(robot.n)]
-        return (*told, *(Coefficient("", "") for _ in range(_count(robot.n) - len(told))))
+            named = [Coefficient(f"peak_on_joint_{j + 1}", force_unit(robot, j)) for j in range(robot.n)]
+        return (*named, *(Coefficient("", "") for _ in range(_count(robot.n) - len(named))))
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Whether joints before the most loaded one are loaded as well.
@@ -79,8 +79,8 @@ class ExternalContact(Effect):
         """
         size = np.abs(coefficients[: robot.n])
         most = int(np.argmax(size))
-        told = not on_the_flange(shape) and not on_body(shape)
-        alone = told and most >= 2 and bool((size[:most] < ALONE * size[most]).all())
+        pulse_only = not on_the_flange(shape) and not on_body(shape)
+        alone = pulse_only and most >= 2 and bool((size[:most] < ALONE * size[most]).all())
         return not alone and super().is_plausible(robot, joint, coefficients, shape)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
@@ -188,9 +188,9 @@ class ExternalContact(Effect):
             push, turn = (float(np.linalg.norm(part)) for part in (coefficients[:3], coefficients[3:6]))
             sizes = (("force", push, "N"), ("moment", turn, "N m"))
             least = NONE * max(push, turn)
-            told = [f"a {word} of {size:.3g} {unit}" for word, size, unit in sizes if size > least]
+            parts = [f"a {word} of {size:.3g} {unit}" for word, size, unit in sizes if size > least]
             return (
-                f"Something pushed the flange {when}, with {' and '.join(told)}, constant (mean values, along the "
+                f"Something pushed the flange {when}, with {' and '.join(parts)}, constant (mean values, along the "
                 f"base's "
                 "axes; the signs are those of the arm's reaction)."
             )

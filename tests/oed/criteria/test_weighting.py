@@ -111,6 +111,6 @@ def test_a_prior_is_the_inverse_covariance():
 
 
 def test_a_prior_of_another_robot_is_refused():
-    """A model that no parameter in common tells nothing."""
+    """A model without a common parameter has no information."""
     with pytest.raises(InputError, match="no parameter in common"):
         Prior(names=("a",), covariance=np.eye(1), noise=np.ones(1)).information(("b",))

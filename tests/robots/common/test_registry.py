@@ -156,9 +156,9 @@ def test_the_rest_works_beside_failing_entry_points(installed):
     with pytest.warns(ExtensionWarning) as caught:
         names = list(shapes)
     assert names == ["square", "triangle"]
-    told = [str(warning.message) for warning in caught]
-    assert len(told) == 5
-    assert any("'square' exists already" in text for text in told)
+    messages = [str(warning.message) for warning in caught]
+    assert len(messages) == 5
+    assert any("'square' exists already" in text for text in messages)
     assert list(shapes) == names
 
 
@@ -233,5 +233,5 @@ def test_an_installed_package_offers_every_kind(tmp_path):
     assert refused in lines[4]
     assert lines[5].startswith("unknown effect 'nothing'")
     assert "tight_hose" in lines[5]
-    # It was told as an error already: listing all names does not tell it again.
+    # It was reported as an error already: listing all names does not repeat it.
     assert "ExtensionWarning" not in ran.stderr

@@ -23,8 +23,8 @@ def test_a_slow_gain_of_all_joints_is_within_its_columns(swept: Situation) -> No
     values = np.linalg.lstsq(rows, target, rcond=None)[0]
     size = np.ptp(gain) * np.abs(swept.torque).max()
     np.testing.assert_allclose(rows @ values, target, atol=0.1 * size)
-    told = GainDrift().describe(None, values[:-1])
-    assert float(told.split("over the logs is ")[1].split(" %")[0]) == pytest.approx(100 * np.ptp(gain), rel=0.1)
+    sentence = GainDrift().describe(None, values[:-1])
+    assert float(sentence.split("over the logs is ")[1].split(" %")[0]) == pytest.approx(100 * np.ptp(gain), rel=0.1)
 
 
 def test_one_or_two_joints_share_nothing(arm: Robot) -> None:

@@ -50,8 +50,8 @@ def test_clocks_that_part_are_a_delay_that_grows() -> None:
     X = ClockDrift().columns(seen, None)
     steady = lateness(seen, 1e-3)[:, :, None]
     values = np.linalg.lstsq(np.concatenate([X, steady], axis=2).reshape(-1, 4), target.ravel(), rcond=None)[0]
-    told = ClockDrift().describe(None, values[:-1])
-    assert float(told.split("about ")[1].split(" ms")[0]) == pytest.approx(2.0, rel=0.2)
+    sentence = ClockDrift().describe(None, values[:-1])
+    assert float(sentence.split("about ")[1].split(" ms")[0]) == pytest.approx(2.0, rel=0.2)
 
 
 def test_both_are_found_by_their_names_and_know_only_time(arm: Robot) -> None:

@@ -28,8 +28,8 @@ def test_a_tank_that_empties_is_within_its_columns(swept: Situation) -> None:
     rows = X.reshape(-1, X.shape[2])
     values = np.linalg.lstsq(rows, extra.ravel(), rcond=None)[0]
     np.testing.assert_allclose(rows @ values, extra.ravel(), atol=0.08 * np.abs(extra).max())
-    told = PayloadDrift().describe(None, values[:-4])
-    assert float(told.split("empties: by ")[1].split(" kg")[0]) == pytest.approx(np.ptp(lost), rel=0.1)
+    sentence = PayloadDrift().describe(None, values[:-4])
+    assert float(sentence.split("empties: by ")[1].split(" kg")[0]) == pytest.approx(np.ptp(lost), rel=0.1)
 
 
 def test_it_is_of_a_whole_robot_and_goes_by_time(arm: Robot) -> None:

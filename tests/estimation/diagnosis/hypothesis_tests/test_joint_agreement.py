@@ -71,8 +71,8 @@ def test_reversals_tell_a_delay_no_better_than_their_moments_are_known() -> None
             reversal_time_error=np.full(motion.q.shape, moment),
         )
         seen: Problem = replace(problem, recording=known)
-        told = per_joint_evidence(seen, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accept(seen, ()))
-        return told.gram, told.certain_share
+        evidence = per_joint_evidence(seen, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accept(seen, ()))
+        return evidence.gram, evidence.certain_share
 
     everywhere, nowhere = np.ones(motion.q.shape, dtype=bool), np.zeros(motion.q.shape, dtype=bool)
     gram, sure = measured(everywhere, 1e-4)
@@ -106,8 +106,10 @@ def test_what_other_effects_explain_on_a_joint_makes_its_own_coefficient_doubtfu
     friction = problem.measured(Hypothesis(EFFECTS["stribeck"], 2), (0.3, 1.0))
     root = 1.0 / np.sqrt(friction.gram)
     accepted = Accepted((friction,), root, np.array([100.0]), np.zeros((1, 0)))
-    told = per_joint_evidence(problem, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accepted)
-    np.testing.assert_array_equal(told.formula_variance[[0, 2, 3, 4, 5]], 0.0)
+    evidence = per_joint_evidence(problem, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accepted)
+    np.testing.assert_array_equal(evidence.formula_variance[[0, 2, 3, 4, 5]], 0.0)
     coefficients = root.T @ accepted.cross
     torque = friction.columns[0].astype(float) @ coefficients
-    assert told.formula_variance[1] == pytest.approx((0.05**2) * float(torque @ torque) / told.gram[1], rel=1e-4)
+    assert evidence.formula_variance[1] == pytest.approx(
+        (0.05**2) * float(torque @ torque) / evidence.gram[1], rel=1e-4
+    )

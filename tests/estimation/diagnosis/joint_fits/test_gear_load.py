@@ -67,10 +67,10 @@ def test_a_friction_by_the_load_is_asked_for_with_the_spring_that_the_gear_bears
     """With a load that lacks the spring, friction was told by the position; with it, a share of the load does more."""
     problem = pose_arm(recording, draws=2)
     found = _members(problem, SPRING, BY_PLACE)
-    told = find_gear_load(problem, found, fit_jointly(problem, found)[0])
-    assert told.improves_fit
-    assert told.extra_load is not None
-    (weight,) = told.extra_load.sources
+    load_found = find_gear_load(problem, found, fit_jointly(problem, found)[0])
+    assert load_found.improves_fit
+    assert load_found.extra_load is not None
+    (weight,) = load_found.extra_load.sources
     assert (weight.effect.name, weight.joint, weight.shape) == ("spring", 1, found[0].shape)
 
 
@@ -84,13 +84,13 @@ def test_the_load_is_what_base_model_and_spring_have_together(
     problem = pose_arm(recording, draws=2)
     found = _members(problem, SPRING, BY_LOAD)
     values = fit_jointly(problem, found)[0]
-    told = find_gear_load(problem, found, values)
-    assert told.extra_load is not None
+    load_found = find_gear_load(problem, found, values)
+    assert load_found.extra_load is not None
     alone = problem.baseline.situation(recording, values[: problem.baseline.base.size])
     motion = Motion(recording.t, recording.q, recording.dq, recording.ddq)
     true = pinocchio_torque(arm, motion)[:, 0] + _pull(recording.q[:, 0])
     # A pull that is the same at all angles is the offset's.
-    errors = [load[:, 0] - true for load in (told.extra_load.on(alone).load, alone.load)]
+    errors = [load[:, 0] - true for load in (load_found.extra_load.on(alone).load, alone.load)]
     errors = [float(np.std(error) / true.std()) for error in errors]
     assert errors[0] < 0.02
     assert errors[1] > 0.1
@@ -153,9 +153,9 @@ def test_nothing_is_borne_of_what_no_gear_feels(recording: Recording, pose_arm: 
     (friction,) = _members(problem, BY_LOAD)
     assert find_gear_load(problem, [friction], fit_jointly(problem, [friction])[0]) is NO_GEAR_LOAD
     (spring,) = _members(problem, SPRING)
-    told = find_gear_load(problem, [spring], fit_jointly(problem, [spring])[0])
-    assert told.extra_load is not None
-    assert not told.improves_fit
+    load_found = find_gear_load(problem, [spring], fit_jointly(problem, [spring])[0])
+    assert load_found.extra_load is not None
+    assert not load_found.improves_fit
 
 
 def test_a_spring_that_preloads_its_gear_has_the_offset(recording: Recording, pose_arm: Callable[..., Problem]) -> None:

@@ -144,16 +144,16 @@ def test_found_beside_it_a_ripple_is_taken_off(recording: Recording, pose_arm: C
 
 def test_the_extended_model_knows_it_as_well(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """What is above the band makes the standard errors of coefficients smaller, by as much as in a score or more."""
-    told, extended = [], []
+    energies, extended = [], []
     for wider in (None, WIDER):
         problem = pose_arm(_rippled(recording), wider=wider)
         member = refine(problem, RIPPLE, SHAPE, accept(problem, ()), effort=0)
-        told.append(np.sqrt(np.sum(score(problem, member.group, accept(problem, ())).root ** 2, axis=0)))
+        energies.append(np.sqrt(np.sum(score(problem, member.group, accept(problem, ())).root ** 2, axis=0)))
         extension = fit_extended(problem, [member], {}).model.extensions[0]
         extended.append(np.sqrt(np.diag(extension.covariance)[:4]))
-    assert np.all(told[1] < 0.5 * told[0])
+    assert np.all(energies[1] < 0.5 * energies[0])
     # They count what is not known of the shape, too, which is less above the band.
-    assert np.all(extended[1] / extended[0] < 1.4 * told[1] / told[0])
+    assert np.all(extended[1] / extended[0] < 1.4 * energies[1] / energies[0])
 
 
 @pytest.mark.parametrize("cut_off", [0, 30])
@@ -170,13 +170,13 @@ def test_noise_that_repeats_with_the_motion_tells_less(
     noise = np.random.default_rng(3).standard_normal((5 * period, 2))
     rows = slice(0, 5 * period - cut_off)
     cycle = Cycle(0, rows.stop, period * clean.step, 5)
-    told = []
+    energies = []
     for repeated in (np.tile(noise[:period], (5, 1)), noise) if same else (noise, noise[::-1]):
         log = cut_recording(clean, rows)
         problem = pose_arm(replace(log, tau=log.tau + NOISE * repeated[rows], cycles=(cycle,)), wider=WIDER)
         assert problem.high_band is not None
-        told.append(float(np.sum(problem.high_band.columns(np.cos(SHAPE[0] * log.q[:, :1]), 0) ** 2)))
-    assert told[1] / told[0] == pytest.approx(5.0 if same else 1.0, rel=0.5)
+        energies.append(float(np.sum(problem.high_band.columns(np.cos(SHAPE[0] * log.q[:, :1]), 0) ** 2)))
+    assert energies[1] / energies[0] == pytest.approx(5.0 if same else 1.0, rel=0.5)
 
 
 @pytest.mark.parametrize("periods", [0.0, 2.95])
@@ -252,5 +252,5 @@ def test_a_vibration_above_the_band_is_told(recording: Recording, pose_arm: Call
     # as strong. What is left is more than any noise explains, eight functions having 8 of that on average.
     assert 35.0 < gains[1] < energy
     coefficients = found.bounded(np.full(8, -np.inf), np.full(8, np.inf))[1]
-    told = problem.situation, 1, (frequency,)
-    assert np.corrcoef(Pattern("vibration").local(*told) @ coefficients, wave)[0, 1] > 0.9
+    energies = problem.situation, 1, (frequency,)
+    assert np.corrcoef(Pattern("vibration").local(*energies) @ coefficients, wave)[0, 1] > 0.9

@@ -72,8 +72,8 @@ def test_forms_of_a_spring_that_fit_alike_are_listed(
     for form in (forms[0], forms[-1]):
         fit = fit_extended(problem, [form], {})
         values = fit.values[: there.base.size]
-        told = there.regressor @ values + extension_torque(fit.model.extensions, there.situation(wide, values))
-        errors.append(np.sqrt(np.mean((wide.tau[:, 0] + _balancer(wide.q[:, 0]) - told[:, 0]) ** 2)))
+        completed = there.regressor @ values + extension_torque(fit.model.extensions, there.situation(wide, values))
+        errors.append(np.sqrt(np.mean((wide.tau[:, 0] + _balancer(wide.q[:, 0]) - completed[:, 0]) ** 2)))
     assert errors[0] < errors[1]
 
 
@@ -108,16 +108,16 @@ def test_a_tilt_is_told_beside_the_first_axis_own_moments() -> None:
     angles, moments = np.array([0.012, -0.008]), (6.0, -4.0)
     posed = _Tilted(problem, tilt, np.kron([1.0, *moments], angles), rng.normal(size=6))
     plain = refine(posed, tilt, (0.0, 0.0), _nothing(), effort=0)  # type: ignore[arg-type]
-    (told,) = complete_effects(posed, [SelectedEffect(plain, 1e-9, ())])  # type: ignore[arg-type]
+    (completed,) = complete_effects(posed, [SelectedEffect(plain, 1e-9, ())])  # type: ignore[arg-type]
     assert plain.shape == (0.0, 0.0)
     # With the moments free the angles are known as those beside four columns of them are.
     errors = np.sqrt(np.diag(np.linalg.pinv(posed.gram, rcond=1e-10, hermitian=True))[:2])
-    assert np.all(np.abs(told.effect.coefficients - angles) < 3 * errors)
+    assert np.all(np.abs(completed.effect.coefficients - angles) < 3 * errors)
     assert np.any(np.abs(plain.coefficients - angles) > 3 * errors)
     # The search for the moments has come as far as the true ones are.
     true = refine(posed, tilt, moments, _nothing(), effort=0)  # type: ignore[arg-type]
-    assert told.effect.gain > true.gain - 0.1
-    assert told.effect.gain > plain.gain + 10.0
+    assert completed.effect.gain > true.gain - 0.1
+    assert completed.effect.gain > plain.gain + 10.0
     # What is hardly there is not worth two more parameters.
     posed = _Tilted(problem, tilt, 0.02 * np.kron([1.0, *moments], angles), 0.02 * rng.normal(size=6))
     plain = refine(posed, tilt, (0.0, 0.0), _nothing(), effort=0)  # type: ignore[arg-type]

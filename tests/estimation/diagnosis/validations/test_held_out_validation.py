@@ -16,7 +16,7 @@ from estimation.diagnosis.validations.held_out_validation import (
     MINOR_SHARE,
     REJECT_RMSE_RATIO,
 )
-from tests.estimation.diagnosis.borne_out_bench import (
+from tests.estimation.diagnosis.held_out_bench import (
     FREE,
     HARMS,
     HELPS,
@@ -30,9 +30,9 @@ from tests.estimation.diagnosis.borne_out_bench import (
     TILT,
     Shown,
     bench_with,
-    borne,
     label_of,
     member_of,
+    validated,
 )
 
 
@@ -53,10 +53,10 @@ def test_heat_before_the_unseen_data_is_not_held_against_a_cause(rise: float, ke
     warm = member_of("thermal_friction", 2)
     bench = bench_with()
     bench.shows[warm.hypothesis.label] = Shown(-0.004, -0.001, rise, kept=kept)
-    result = borne(bench, SelectedEffect(warm, 1e-9, ()))
+    result = validated(bench, SelectedEffect(warm, 1e-9, ()))
     assert (result.effects == (warm,)) is stays
     assert bool(result.notes) is not stays
-    rival = borne(bench, SelectedEffect(warm, 1e-9, ((STRIBECK, 1.0),))).effects
+    rival = validated(bench, SelectedEffect(warm, 1e-9, ((STRIBECK, 1.0),))).effects
     assert rival == ((warm,) if rise < MAX_RMSE_RATIO else (STRIBECK,))
 
 
@@ -65,11 +65,11 @@ def test_another_form_of_a_cause_goes_before_a_rival() -> None:
     rival, levers = (PRESLIDING, 2.0), [replace(SPRING, shape=(0.35, centre)) for centre in (0.0, 1.0, 2.0)]
     bench = bench_with(spring=HARMS)
     bench.shows |= {label_of(levers[0]): HARMS, label_of(levers[1]): HELPS, label_of(levers[2]): HELPS}
-    result = borne(bench, SelectedEffect(SPRING, 1e-9, (rival,)), forms=levers)
+    result = validated(bench, SelectedEffect(SPRING, 1e-9, (rival,)), forms=levers)
     assert result.findings[0].effect is result.effects[0] is levers[1]
     assert (result.findings[0].p_value, result.findings[0].rivals, result.notes) == (1e-9, (rival,), ())
     bench.shows |= {label_of(lever): HARMS for lever in levers}
-    assert borne(bench, SelectedEffect(SPRING, 1e-9, (rival,)), forms=levers).effects[0] is PRESLIDING
+    assert validated(bench, SelectedEffect(SPRING, 1e-9, (rival,)), forms=levers).effects[0] is PRESLIDING
 
 
 def test_a_form_that_does_no_harm_goes_after_a_rival_that_helps() -> None:
@@ -77,18 +77,18 @@ def test_a_form_that_does_no_harm_goes_after_a_rival_that_helps() -> None:
     rival, levers = (PRESLIDING, 2.0), [replace(SPRING, shape=(0.35, centre)) for centre in (0.0, 1.0)]
     bench = bench_with(spring=HARMS, presliding_hysteresis=HARMS)
     bench.shows |= {label_of(levers[0]): HARMS, label_of(levers[1]): IDLE}
-    result = borne(bench, SelectedEffect(SPRING, 1e-9, (rival,)), forms=levers)
+    result = validated(bench, SelectedEffect(SPRING, 1e-9, (rival,)), forms=levers)
     assert result.effects == (levers[1],)
     assert result.notes == ()
     bench.shows[label_of(PRESLIDING)] = HELPS
-    assert borne(bench, SelectedEffect(SPRING, 1e-9, (rival,)), forms=levers).effects == (PRESLIDING,)
+    assert validated(bench, SelectedEffect(SPRING, 1e-9, (rival,)), forms=levers).effects == (PRESLIDING,)
 
 
 def test_what_helps_stays_as_it_was_found() -> None:
     """Names and free functions that unseen data bear out, or do not speak against, are kept in order."""
     founds = (SelectedEffect(SPRING, 1e-9, ((TILT, 3.0),)), SelectedEffect(STRIBECK, 1e-5, ()))
     bench = bench_with(stribeck=IDLE)
-    result = borne(bench, *founds, free=[FREE], p_values=[1e-4])
+    result = validated(bench, *founds, free=[FREE], p_values=[1e-4])
     assert result.findings == founds
     assert result.effects == (SPRING, STRIBECK, FREE)
     assert result.p_values == (1e-9, 1e-5, 1e-4)
@@ -99,7 +99,7 @@ def test_what_helps_stays_as_it_was_found() -> None:
 
 def test_a_name_that_surely_harms_is_left_out_with_a_note() -> None:
     """Without a rival only the others stay, measured anew without it."""
-    result = borne(bench_with(spring=HARMS), SelectedEffect(SPRING, 1e-9, ()), SelectedEffect(STRIBECK, 1e-5, ()))
+    result = validated(bench_with(spring=HARMS), SelectedEffect(SPRING, 1e-9, ()), SelectedEffect(STRIBECK, 1e-5, ()))
     assert result.effects == (STRIBECK,)
     assert [found.effect for found in result.findings] == [STRIBECK]
     assert result.p_values == (1e-5,)
@@ -131,7 +131,7 @@ def test_a_faint_free_function_that_unseen_data_deny_is_noise(
     bench = bench_with()
     bench.shows[free.hypothesis.label] = HARMS
     founds = (SelectedEffect(STRIBECK, 1e-5, ()),) if named else ()
-    result = borne(bench, *founds, free=[free], p_values=[p_value])
+    result = validated(bench, *founds, free=[free], p_values=[p_value])
     assert [member for member, *_ in result.rejected_discrepancies] == ([free] if told else [])
     assert not result.refuted
     assert len(result.notes) == 1
@@ -143,7 +143,9 @@ def test_what_a_refuted_name_was_for_is_told_as_unexplained(shown: Shown) -> Non
     free = member_of("pattern:load:0:odd", 2)
     bench = bench_with(spring=HARMS)
     bench.shows[free.hypothesis.label] = shown
-    result = borne(bench, SelectedEffect(SPRING, 1e-9, ()), SelectedEffect(STRIBECK, 1e-5, ()), unnamed=(free, 1e-7))
+    result = validated(
+        bench, SelectedEffect(SPRING, 1e-9, ()), SelectedEffect(STRIBECK, 1e-5, ()), unnamed=(free, 1e-7)
+    )
     assert [found.effect for found in result.findings] == [STRIBECK]
     assert result.effects == ((STRIBECK, free) if shown is HELPS else (STRIBECK,))
     assert result.p_values == ((1e-5, 1e-7) if shown is HELPS else (1e-5,))
@@ -169,7 +171,7 @@ def test_what_a_refuted_name_was_for_is_told_as_unexplained(shown: Shown) -> Non
 )
 def test_reasons_to_leave_a_name_out(shown: Shown, stays: bool) -> None:
     """Errors a twentieth larger, less than a fifth of the gain kept, a joint that goes astray."""
-    result = borne(bench_with(spring=shown), SelectedEffect(SPRING, 1e-9, ()), held_out=False)
+    result = validated(bench_with(spring=shown), SelectedEffect(SPRING, 1e-9, ()), held_out=False)
     assert bool(result.effects) is stays
     assert bool(result.notes) is not stays
 
@@ -179,14 +181,14 @@ def test_what_comes_and_goes_need_not_last_on_other_stretches() -> None:
     step = member_of("friction_step", 2)
     bench = bench_with()
     bench.shows[step.hypothesis.label] = Shown(kept=0.0)
-    assert borne(bench, SelectedEffect(step, 1e-9, ()), held_out=False).effects == (step,)
+    assert validated(bench, SelectedEffect(step, 1e-9, ()), held_out=False).effects == (step,)
 
 
 def test_a_close_rival_that_helps_takes_the_place() -> None:
     """It keeps place and p-value, and the rivals after it, counted from it; the note names both."""
     rivals = ((STRIBECK, 2.0), (TILT, 5.0), (PRESLIDING, CLOSE_RIVAL_BIC + 1.0))
     bench = bench_with(spring=HARMS, stribeck=HARMS)
-    result = borne(bench, SelectedEffect(SPRING, 1e-9, rivals), free=[FREE], p_values=[1e-4])
+    result = validated(bench, SelectedEffect(SPRING, 1e-9, rivals), free=[FREE], p_values=[1e-4])
     assert result.effects == (TILT, FREE)
     assert result.p_values == (1e-9, 1e-4)
     (found,) = result.findings
@@ -194,7 +196,7 @@ def test_a_close_rival_that_helps_takes_the_place() -> None:
     (note,) = result.notes
     assert "spring of joint 2" in note
     assert "base_tilt" in note
-    first = borne(bench_with(spring=HARMS), SelectedEffect(SPRING, 1e-9, rivals)).findings[0]
+    first = validated(bench_with(spring=HARMS), SelectedEffect(SPRING, 1e-9, rivals)).findings[0]
     assert first.effect is STRIBECK
     assert first.rivals == ((TILT, 3.0),)
 
@@ -202,7 +204,7 @@ def test_a_close_rival_that_helps_takes_the_place() -> None:
 @pytest.mark.parametrize("shown", [HARMS, IDLE, Shown(kept=0.1), Shown(rise=1.1)])
 def test_a_rival_that_is_not_borne_out_takes_no_place(shown: Shown) -> None:
     """One that harms too, or that may as well not help, is no better name."""
-    result = borne(
+    result = validated(
         bench_with(spring=HARMS, stribeck=shown), SelectedEffect(SPRING, 1e-9, ((STRIBECK, 1.0),)), held_out=False
     )
     assert (result.findings, result.effects, result.p_values) == ((), (), ())
@@ -213,7 +215,7 @@ def test_a_rival_that_is_not_borne_out_takes_no_place(shown: Shown) -> None:
 def test_a_rival_that_fits_far_worse_takes_no_place() -> None:
     """Were it to help, the data of the fit still speak against it."""
     bench = bench_with(spring=HARMS)
-    assert borne(bench, SelectedEffect(SPRING, 1e-9, ((STRIBECK, CLOSE_RIVAL_BIC),))).effects == ()
+    assert validated(bench, SelectedEffect(SPRING, 1e-9, ((STRIBECK, CLOSE_RIVAL_BIC),))).effects == ()
     assert all(LABELS["stribeck"] not in asked for asked in bench.asked)
 
 
@@ -221,7 +223,7 @@ def test_the_surest_goes_first_and_others_are_measured_anew() -> None:
     """A name that harms only beside another that is no cause stays, once that is gone."""
     bench = bench_with(spring=HARMS)
     bench.beside[LABELS["stribeck"], LABELS["spring"]] = Shown(-0.002, -0.0005, 1.0)
-    result = borne(bench, SelectedEffect(STRIBECK, 1e-9, ()), SelectedEffect(SPRING, 1e-5, ()))
+    result = validated(bench, SelectedEffect(STRIBECK, 1e-9, ()), SelectedEffect(SPRING, 1e-5, ()))
     assert result.effects == (STRIBECK,)
     assert len(result.notes) == 1
     assert "spring" in result.notes[0]
@@ -230,7 +232,7 @@ def test_the_surest_goes_first_and_others_are_measured_anew() -> None:
 def test_a_free_function_that_errs_is_told_and_no_part_of_the_model() -> None:
     """It is handed on with p-value and gain, for that something is unexplained is as true as before."""
     bench = bench_with(load=HARMS)
-    result = borne(bench, SelectedEffect(SPRING, 1e-9, ()), free=[FREE, SWING], p_values=[1e-4, 1e-3])
+    result = validated(bench, SelectedEffect(SPRING, 1e-9, ()), free=[FREE, SWING], p_values=[1e-4, 1e-3])
     assert result.effects == (SPRING, SWING)
     assert result.p_values == (1e-9, 1e-3)
     ((member, p_value, gain),) = result.rejected_discrepancies
@@ -242,10 +244,10 @@ def test_a_free_function_that_errs_is_told_and_no_part_of_the_model() -> None:
 def test_a_free_function_that_brings_nothing_beside_others_is_no_part_of_the_model() -> None:
     """It claims no cause, and what it adds to the unseen error is no gain; all that was found by itself stays."""
     slightly = Shown(-0.003, 0.001, 1.0)
-    result = borne(bench_with(load=slightly), SelectedEffect(SPRING, 1e-9, ()), free=[FREE], p_values=[1e-4])
+    result = validated(bench_with(load=slightly), SelectedEffect(SPRING, 1e-9, ()), free=[FREE], p_values=[1e-4])
     assert result.effects == (SPRING,)
     assert [member for member, *_ in result.rejected_discrepancies] == [FREE]
-    alone = borne(bench_with(load=slightly), free=[FREE], p_values=[1e-7])
+    alone = validated(bench_with(load=slightly), free=[FREE], p_values=[1e-7])
     assert alone.effects == (FREE,)
 
 
@@ -259,14 +261,14 @@ def test_free_functions_that_harm_together_are_left_out_until_they_do_not(extra:
     bench = bench_with(load=Shown(-0.001, 0.0015, 1.0))
     bench.shows[other.hypothesis.label] = Shown(-0.001, 0.003, 1.0)
     bench.extra[3] = extra
-    result = borne(bench, free=[FREE, other], p_values=[1e-7, 1e-7])
+    result = validated(bench, free=[FREE, other], p_values=[1e-7, 1e-7])
     assert result.effects == ((FREE, other) if kept == 2 else (other,))
     assert [member for member, *_ in result.rejected_discrepancies] == ([] if kept == 2 else [FREE])
 
 
 def test_what_errs_on_all_joints_is_told_of_the_whole_robot() -> None:
     """What swings at the flange has no joint to name."""
-    result = borne(bench_with(swinging=HARMS), free=[SWING], p_values=[1e-10])
+    result = validated(bench_with(swinging=HARMS), free=[SWING], p_values=[1e-10])
     assert [member for member, _, _ in result.rejected_discrepancies] == [SWING]
     assert result.notes[0].startswith("Part of the residual of the whole robot is unexplained")
 
@@ -274,11 +276,11 @@ def test_what_errs_on_all_joints_is_told_of_the_whole_robot() -> None:
 def test_a_passing_effect_is_not_judged_on_other_logs() -> None:
     """A push belongs to the log in which it came: other logs say nothing of it, stretches left out do."""
     found = SelectedEffect(PUSH, 1e-9, ((STRIBECK, 1.0),))
-    assert borne(bench_with(external_contact=HARMS), found).effects == (PUSH,)
-    assert borne(bench_with(external_contact=HARMS), found, held_out=False).effects == (STRIBECK,)
+    assert validated(bench_with(external_contact=HARMS), found).effects == (PUSH,)
+    assert validated(bench_with(external_contact=HARMS), found, held_out=False).effects == (STRIBECK,)
     # For the same reason other logs cannot make it take another's place.
     bench = bench_with(stribeck=HARMS, external_contact=HARMS)
-    assert borne(bench, SelectedEffect(STRIBECK, 1e-9, ((PUSH, 1.0),))).effects == ()
+    assert validated(bench, SelectedEffect(STRIBECK, 1e-9, ((PUSH, 1.0),))).effects == ()
 
 
 @pytest.mark.parametrize(("shown", "stays"), [(HELPS, True), (IDLE, True), (HARMS, False)])
@@ -286,12 +288,14 @@ def test_a_faint_name_needs_unseen_data_that_speak_for_it(shown: Shown, stays: b
     """What hardly stood out is noise unless its gain is positive, sure or not; what clearly did is refuted surely."""
     slightly = Shown(-0.003, 0.002, 1.001)
     for said, faint, kept in ((shown, False, stays), (slightly, False, True), (slightly, True, False)):
-        result = borne(bench_with(spring=said), SelectedEffect(SPRING, 1e-3, ()), faint=[SPRING] if faint else [])
+        result = validated(bench_with(spring=said), SelectedEffect(SPRING, 1e-3, ()), faint=[SPRING] if faint else [])
         assert (result.effects == (SPRING,)) is kept
         assert [member for member, *_ in result.refuted] == ([] if kept or faint else [SPRING])
         assert bool(result.notes) is (not kept)
     # A push is over when the unseen log begins.
-    assert borne(bench_with(external_contact=slightly), SelectedEffect(PUSH, 1e-3, ()), faint=[PUSH]).effects == (PUSH,)
+    assert validated(bench_with(external_contact=slightly), SelectedEffect(PUSH, 1e-3, ()), faint=[PUSH]).effects == (
+        PUSH,
+    )
 
 
 @pytest.mark.parametrize(
@@ -311,7 +315,7 @@ def test_a_name_that_is_slight_beside_another_needs_unseen_data_that_speak_for_i
     bench = bench_with(stribeck=shown)
     for own, kept in ((0.9 * MINOR_BIC_GAIN, stays), (1.1 * MINOR_BIC_GAIN, True)):
         worths = {SPRING: strength * own / MINOR_SHARE, STRIBECK: own}
-        result = borne(bench, SelectedEffect(SPRING, 1e-9, ()), SelectedEffect(STRIBECK, 1e-9, ()), worths=worths)
+        result = validated(bench, SelectedEffect(SPRING, 1e-9, ()), SelectedEffect(STRIBECK, 1e-9, ()), worths=worths)
         assert result.effects == ((SPRING, STRIBECK) if kept else (SPRING,))
 
 
@@ -319,30 +323,30 @@ def test_a_name_that_is_slight_beside_another_needs_unseen_data_that_speak_for_i
 def test_unseen_data_speak_against_a_cause_by_a_share_of_its_gain(speaks: float, stays: bool) -> None:
     """Where the base model errs on them, too, a true cause may bring a little less than nothing there, surely so."""
     bench = bench_with(spring=Shown(-0.004, -0.001, 1.02, speaks=speaks))
-    assert (borne(bench, SelectedEffect(SPRING, 1e-9, ())).effects == (SPRING,)) is stays
+    assert (validated(bench, SelectedEffect(SPRING, 1e-9, ())).effects == (SPRING,)) is stays
 
 
 @pytest.mark.parametrize(("speaks", "stays"), [(0.6, True), (MIN_RETAINED_GAIN - 0.1, False), (-0.5, False)])
 def test_a_name_that_unseen_rows_speak_for_stays_whatever_base_parameters_do_there(speaks: float, stays: bool) -> None:
     """An error a sixth larger on faster motion, to which friction's polynomial is carried on, is no word against it."""
     bench = bench_with(spring=Shown(-0.008, -0.0002, 1.17, speaks=speaks))
-    assert bool(borne(bench, SelectedEffect(SPRING, 1e-9, ())).findings) is stays
+    assert bool(validated(bench, SelectedEffect(SPRING, 1e-9, ())).findings) is stays
 
 
 def test_a_name_that_ruins_unseen_data_is_left_out_whatever_rows_say() -> None:
     """A spring that was a ripple: unseen rows speak for it, and beyond the fitted positions it errs by a fifth more."""
     ruins = Shown(low=-0.018, high=0.004, rise=1.23, speaks=0.46)
-    assert borne(bench_with(spring=ruins), SelectedEffect(SPRING, 1e-9, ())).effects == ()
+    assert validated(bench_with(spring=ruins), SelectedEffect(SPRING, 1e-9, ())).effects == ()
     for shown in (Shown(low=-0.004, high=0.001, rise=1.1, speaks=0.46), Shown(low=0.001, rise=1.23, speaks=0.46)):
-        assert borne(bench_with(spring=shown), SelectedEffect(SPRING, 1e-9, ())).effects == (SPRING,)
+        assert validated(bench_with(spring=shown), SelectedEffect(SPRING, 1e-9, ())).effects == (SPRING,)
 
 
 def test_a_name_that_unseen_rows_plainly_speak_for_stays() -> None:
     """Where base parameters of other logs err by more than it brings, what all logs say together counts."""
     plain = Shown(low=-0.003, high=0.001, rise=1.02, kept=-0.4, speaks=0.48)
-    assert borne(bench_with(spring=plain), SelectedEffect(SPRING, 1e-9, ()), held_out=False).effects == (SPRING,)
+    assert validated(bench_with(spring=plain), SelectedEffect(SPRING, 1e-9, ()), held_out=False).effects == (SPRING,)
     for shown in (Shown(low=-0.003, high=0.001, rise=1.02, kept=-0.4, speaks=0.25),):
-        assert borne(bench_with(spring=shown), SelectedEffect(SPRING, 1e-9, ()), held_out=False).effects == ()
+        assert validated(bench_with(spring=shown), SelectedEffect(SPRING, 1e-9, ()), held_out=False).effects == ()
 
 
 def test_what_was_undone_before_the_unseen_data_stays() -> None:
@@ -351,12 +355,12 @@ def test_what_was_undone_before_the_unseen_data_stays() -> None:
     bench = bench_with()
     bench.shows["payload_change"] = HARMS
     bench.without["payload_change"] = HELPS
-    result = borne(bench, SelectedEffect(payload, 1e-9, ()))
+    result = validated(bench, SelectedEffect(payload, 1e-9, ()))
     assert result.effects == (payload,)
     (note,) = result.notes
     assert "absent from the held-out data" in note
     bench.without["payload_change"] = IDLE
-    assert borne(bench, SelectedEffect(payload, 1e-9, ())).effects == ()
+    assert validated(bench, SelectedEffect(payload, 1e-9, ())).effects == ()
     # A spring does not come and go.
     bench.shows["spring of joint 2"], bench.without["spring of joint 2"] = HARMS, HELPS
-    assert borne(bench, SelectedEffect(SPRING, 1e-9, ())).effects == ()
+    assert validated(bench, SelectedEffect(SPRING, 1e-9, ())).effects == ()

@@ -119,7 +119,7 @@ def test_slacks_and_their_slopes(problem: FourierProblem, start: np.ndarray) -> 
 
 @pytest.fixture(scope="module")
 def limited() -> FourierProblem:
-    """The UR10 with limits of torque and of its clearance to itself, both of which its design meets."""
+    """The UR10 with limits of torque and self-clearance; its design reaches both."""
     robot = load_robot("ur10")
     base = find_base_parameters(default_model(robot, friction="coulomb-viscous", velocity_scale=0.02))
     limits = usable_limits(robot.limits)

@@ -111,7 +111,7 @@ def bench_with(**shows: Shown) -> Bench:
     )
 
 
-def borne(
+def validated(
     bench: Bench,
     *founds: SelectedEffect,
     free: Sequence[FittedEffect] = (),
