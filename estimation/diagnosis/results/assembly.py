@@ -186,8 +186,7 @@ def _unnamed(
     own = member.hypothesis.joint
     wanted = [h for h in all_hypotheses(robot, list(all_patterns(robot))) if own is None or h.joint == own]
     entries = measure(inputs.problem, wanted)
-    rng = np.random.default_rng(inputs.seed + 4)
-    return strongest_pattern(inputs.problem, entries, beside, inputs.false_alarm, rng)
+    return strongest_pattern(inputs.problem, entries, beside, inputs.false_alarm)
 
 
 _LOST = (
