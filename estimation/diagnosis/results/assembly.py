@@ -86,7 +86,7 @@ def assemble(robot: Robot, inputs: DiagnosisInputs) -> Diagnosis:
         lambda members, absent: measure_held_out(robot, problem, members, inputs.held_out, inputs.seed + 3, absent),
         partial(_is_beyond, inputs),
         partial(equivalent_shapes, problem),
-        lambda member: member.local_bic_gain(problem.rows),
+        lambda member: member.local_bic_gain,
         partial(_unnamed, robot, inputs),
     )
     members, selected, seen = held.effects, held.findings, held.measured

@@ -169,14 +169,14 @@ def with_rivals(problem: Problem, entries: Sequence[Entry], selection: Selection
         if found.effect.hypothesis not in selection.visible_in_torque:
             # It was found by what it is worth: a moment's cause has not all rows to pay for, in sight of others either.
             beside, own = accept_all_but(problem, members, i), found.effect
-            reference = max(own.bic_gain(problem.rows), own.local_bic_gain(problem.rows))
+            reference = max(own.bic_gain, own.local_bic_gain)
             result = scan(problem, entries, beside)
             near = screen_candidates(problem, result, [*members[:i], *members[i + 1 :]], reference)
             rest = [o for o in near if o.hypothesis != found.effect.hypothesis]
             able = [
                 rival for rival in refine_candidates(problem, rest, beside) if rival.gain >= NEAR * found.effect.gain
             ]
-            rivals = [(rival, reference - rival.bic_gain(problem.rows)) for rival in able]
+            rivals = [(rival, reference - rival.bic_gain) for rival in able]
         effects.append(replace(found, rivals=tuple(rivals)))
     return replace(selection, found=tuple(effects))
 

@@ -19,7 +19,7 @@ from estimation.diagnosis.validations.comparison import (
     is_outperformed,
     retains_gain,
 )
-from estimation.diagnosis.validations.free_functions import LEAST, excess_chi2, free_functions
+from estimation.diagnosis.validations.free_functions import LEAST, free_functions
 from robots.terms.discrepancies.local_fault import LocalFault
 from robots.terms.discrepancies.patterns import is_of_time, is_plain
 
@@ -61,7 +61,7 @@ def decide_verdict(
     """
     named = [found.effect for found in selection.found]
     left, p_values = free_functions(problem, patterns, named, false_alarm, alone=True)
-    explained, rest = selection.accepted.gain, sum(map(excess_chi2, left))
+    explained, rest = selection.accepted.gain, sum((m.excess_chi2 for m in left))
     share = explained / (explained + rest) if explained + rest > 0 else 1.0
     able = [_plausible_form(problem, found, named) for found in selection.found]
     named = [member if found is None else found.effect for member, found in zip(named, able, strict=True)]
@@ -82,7 +82,7 @@ def decide_verdict(
             again = {member.hypothesis: member for member in named}
             kept = tuple(replace(f, effect=again[f.effect.hypothesis]) for f in kept if f.effect.hypothesis in again)
     # What acts on all joints at once goes before names of single joints that explain less than it does.
-    whole = max((excess_chi2(m) for m in left if m.hypothesis.joint is None), default=0.0) if share < ENOUGH else 0.0
+    whole = max((m.excess_chi2 for m in left if m.hypothesis.joint is None), default=0.0) if share < ENOUGH else 0.0
     kept = tuple(f for f in kept if f.effect.hypothesis.joint not in lost and f.effect.gain > whole)
     members = left if share < ENOUGH else []
     while len(kept) < len(named):
@@ -90,7 +90,9 @@ def decide_verdict(
         beside = [found.effect for found in kept]
         members, p_values = free_functions(problem, patterns, beside, false_alarm, alone=True)
         # What is unexplained reaches other joints: names that explain less than it does are not to be trusted.
-        strong = tuple(found for found in kept if found.effect.gain > max(map(excess_chi2, members), default=0.0))
+        strong = tuple(
+            found for found in kept if found.effect.gain > max((m.excess_chi2 for m in members), default=0.0)
+        )
         if len(strong) == len(kept):
             break
         kept = strong
@@ -133,9 +135,7 @@ def _plausible_form(problem: Problem, found: SelectedEffect, named: Sequence[Fit
     for known in effect.likely(problem.state_for(effect), joint, own.shape, own.coefficients):
         shape = tuple(was if value is None else value for value, was in zip(known, own.shape, strict=True))
         member = refine(problem, own.hypothesis, shape, beside, effort=0)
-        if _is_plausible(problem, member) and member.local_bic_gain(problem.rows) > max(
-            LEAST, STAYS * own.local_bic_gain(problem.rows)
-        ):
+        if _is_plausible(problem, member) and member.local_bic_gain > max(LEAST, STAYS * own.local_bic_gain):
             return replace(found, effect=member)
     return None
 
@@ -160,15 +160,15 @@ def _explains_joint(
     gain = accept(problem, tuple(m.group for m in (*others, *own))).gain
     gain -= accept(problem, tuple(m.group for m in others)).gain
     degrees = sum(member.degrees for member in own)
-    rest = sum(excess_chi2(member) for member in left if member.hypothesis.joint == joint)
+    rest = sum(member.excess_chi2 for member in left if member.hypothesis.joint == joint)
     here = [entry for entry in patterns if entry.hypothesis.joint == joint]
     free, _ = free_functions(problem, here, others, false_alarm)
-    if gain - degrees < ENOUGH * max(gain - degrees + rest, sum(map(excess_chi2, free))):
+    if gain - degrees < ENOUGH * max(gain - degrees + rest, sum((m.excess_chi2 for m in free))):
         return False
     if is_outperformed(problem, gain, degrees, free):
         return False
     # Free functions that are as many as the names claim as many causes, and have more freedom to follow each.
-    as_many = len(free) >= len(own) and gain - degrees > AS_MUCH * sum(map(excess_chi2, free))
+    as_many = len(free) >= len(own) and gain - degrees > AS_MUCH * sum((m.excess_chi2 for m in free))
     if len(own) > 1 and not as_many and not has_better_bic(problem, own, others, free, LEAST):
         return False
     if len(own) == 1:
@@ -176,16 +176,12 @@ def _explains_joint(
         waves = own[0].hypothesis.effect.oscillates_over_range
         spots = [entry for entry in here if waves and isinstance(entry.hypothesis.effect, LocalFault)]
         free = free_functions(problem, spots, others, false_alarm)[0] if spots else []
-        if free and free[0].degrees < degrees and excess_chi2(free[0]) > NEARLY * (gain - degrees):
+        if free and free[0].degrees < degrees and free[0].excess_chi2 > NEARLY * (gain - degrees):
             return False
         # Nor is anything what another place, or a position that counts less and less, explains more of, and better.
         plain = [entry for entry in here if is_plain(entry.hypothesis.effect)]
         free, _ = free_functions(problem, plain, others, false_alarm)
-        if (
-            free
-            and excess_chi2(free[0]) > gain - degrees + LEAST
-            and not has_better_bic(problem, own, others, free[:1])
-        ):
+        if free and free[0].excess_chi2 > gain - degrees + LEAST and not has_better_bic(problem, own, others, free[:1]):
             return False
     if any(member.hypothesis.effect.transient for member in own):
         # What comes and goes follows nearly any torque: functions of the motion that do so with less refute it.
@@ -244,7 +240,7 @@ def _outperforms_free_functions(
         return False
     plain = [entry for entry in patterns if is_plain(entry.hypothesis.effect) and entry.hypothesis.joint is None]
     free = free_functions(problem, plain, others, false_alarm)[0] if plain else []
-    return not free or excess_chi2(free[0]) <= own.gain - own.degrees + LEAST
+    return not free or free[0].excess_chi2 <= own.gain - own.degrees + LEAST
 
 
 def _better_than_one_cause(
@@ -278,7 +274,7 @@ def _is_robust(
     others = _others(kept, found)
     free, _ = free_functions(problem, patterns, others, false_alarm, alone=True)
     own = found.effect
-    each = [excess_chi2(member) / max(excess_chi2(own), 1e-300) for member in free]
+    each = [member.excess_chi2 / max(own.excess_chi2, 1e-300) for member in free]
     if sum(each) < NEARLY and max(each, default=0.0) < HALF and has_better_bic(problem, [own], others, free):
         return True
     return retains_gain(problem, [own], [*others, *free])
