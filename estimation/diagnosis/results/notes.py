@@ -13,7 +13,7 @@ from estimation.diagnosis.findings import Finding
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.recordings.recording import cut_recording
-from estimation.diagnosis.validations.decision import Change, ChangedFinding
+from estimation.diagnosis.validations.changes import Change, ChangedFinding
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
 from robots.terms.base import force_unit
 from robots.terms.discrepancies.patterns import PREFIX
