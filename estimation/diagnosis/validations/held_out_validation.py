@@ -7,33 +7,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, MIN_BIC_GAIN
+from estimation.diagnosis.calibration import (
+    CLOSE_RIVAL_BIC,
+    CONTRADICTION_SHARE,
+    FREE_P_VALUE,
+    MAX_FREE_RMSE_RATIO,
+    MAX_RMSE_RATIO,
+    MIN_BIC_GAIN,
+    MIN_RETAINED_GAIN,
+    MIN_SUPPORT,
+    MIN_SUPPORT_CHI2,
+    MINOR_BIC_GAIN,
+    MINOR_SHARE,
+    OSCILLATION_P_VALUE,
+    REJECT_RMSE_RATIO,
+)
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations.changes import Change, ChangedFinding
-from estimation.diagnosis.validations.free_functions import SURE
 from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
 from estimation.diagnosis.validations.name_comparison import ComparedNames
 from robots.terms.discrepancies.patterns import PREFIX, is_of_time, is_oscillation
 from robots.terms.effects import Effect
-
-MIN_RETAINED_GAIN = 0.2  # minimum share of an effect's gain that remains in cross-validation
-OSCILLATION_P_VALUE = 1e-5  # p-value above which an oscillation counts as noise if held-out data cannot test it
-MINOR_SHARE, MINOR_BIC_GAIN = (
-    0.1,
-    50.0,
-)  # an effect is minor below this share of the strongest BIC gain, and below this BIC gain
-CONTRADICTION_SHARE = 0.1  # share of an effect's gain by which held-out data must contradict it
-MAX_RMSE_RATIO = 1.05  # held-out error ratio above which an effect is rejected, significant or not
-REJECT_RMSE_RATIO = 1.2  # the same despite support by held-out rows: the formula does not hold in extrapolation
-MAX_FREE_RMSE_RATIO = 1.02  # held-out error ratio of a joint above which its free functions are rejected together
-MIN_SUPPORT, MIN_SUPPORT_CHI2 = (
-    0.4,
-    30.0,
-)  # relative and absolute chi2 growth by which held-out rows support an effect, whatever the error
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +212,7 @@ def _is_weak(free: Effect, p_value: float) -> bool:
 
     Held-out data cannot test functions of time.
     """
-    return not is_of_time(free) and p_value > (OSCILLATION_P_VALUE if is_oscillation(free) else SURE)
+    return not is_of_time(free) and p_value > (OSCILLATION_P_VALUE if is_oscillation(free) else FREE_P_VALUE)
 
 
 def _is_insignificant(

@@ -15,9 +15,10 @@ from estimation.diagnosis.calibration import (
     MIN_EXPLAINED_SHARE,
     MIN_RETAINED_CHI2,
     NEARLY_EXPLAINED_SHARE,
+    RARE_ODDS,
 )
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import RARE, FittedEffect, refine, set_bic_gain
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine, set_bic_gain
 from estimation.diagnosis.hypothesis_tests.scan import Entry
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
 from estimation.diagnosis.searches.selection import SelectedEffect, Selection
@@ -72,7 +73,9 @@ def compare_with_free_functions(
 
 def has_close_rivals(found: SelectedEffect) -> bool:
     """Whether another cause fits about as well; a rare one must do so by the data alone."""
-    return any(worse < (RARE if rival.hypothesis.effect.rare else CLOSE_RIVAL_BIC) for rival, worse in found.rivals)
+    return any(
+        worse < (RARE_ODDS if rival.hypothesis.effect.rare else CLOSE_RIVAL_BIC) for rival, worse in found.rivals
+    )
 
 
 def _share(explained: float, left: Sequence[FittedEffect]) -> float:

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.calibration import MIN_BIC_GAIN, RARE_ODDS
 from estimation.diagnosis.hypothesis_tests import refinement
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.joint_agreement import PerJointEvidence
-from estimation.diagnosis.hypothesis_tests.refinement import RARE, FittedEffect
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scan import Outcome
 from estimation.diagnosis.searches import acceptance
 from estimation.diagnosis.searches.acceptance import SURE, exceeds_leakage, is_certain, passes_bic
@@ -79,7 +79,7 @@ def test_a_rare_effect_has_to_explain_more() -> None:
     """Its odds are paid for beside its parameters."""
     columns = _boxes()[:1]
     difference = _member("stribeck", 1, columns).local_bic_gain - _member("load_stribeck", 1, columns).local_bic_gain
-    assert difference == pytest.approx(RARE)
+    assert difference == pytest.approx(RARE_ODDS)
 
 
 def test_a_push_leaves_other_rows_alone() -> None:

@@ -6,10 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
-from estimation.diagnosis.results.notes import state_change
-from estimation.diagnosis.searches.selection import SelectedEffect
-from estimation.diagnosis.validations.held_out_validation import (
+from estimation.diagnosis.calibration import (
+    CLOSE_RIVAL_BIC,
     CONTRADICTION_SHARE,
     MAX_RMSE_RATIO,
     MIN_RETAINED_GAIN,
@@ -17,6 +15,8 @@ from estimation.diagnosis.validations.held_out_validation import (
     MINOR_SHARE,
     REJECT_RMSE_RATIO,
 )
+from estimation.diagnosis.results.notes import state_change
+from estimation.diagnosis.searches.selection import SelectedEffect
 from tests.estimation.diagnosis.held_out_bench import (
     FREE,
     HARMS,

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, RARE_ODDS
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import RARE, FittedEffect
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations import name_comparison
 from robots.robot import Robot
@@ -79,8 +79,8 @@ def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
     [
         ("spring", CLOSE_RIVAL_BIC - 1.0, True),
         ("spring", CLOSE_RIVAL_BIC + 1.0, False),
-        ("load_heat", RARE - 1.0, True),  # as rare as it is, the data speak for it as much
-        ("load_heat", RARE + 1.0, False),
+        ("load_heat", RARE_ODDS - 1.0, True),  # as rare as it is, the data speak for it as much
+        ("load_heat", RARE_ODDS + 1.0, False),
     ],
 )
 def test_a_rare_rival_leaves_a_name_open_where_the_data_alone_speak_for_it(
