@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.finding import SEVERITIES, Finding, Severity
+from estimation.gate.measurements.timing import FEWEST
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.plain import all_finite, finite
 from robots.signals import Log
@@ -18,9 +19,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Fewer samples than this carry no derivatives.
-FEWEST = 20
-# Findings of a log that is in order and still does not determine what is asked for.
+# Findings on a log without a fault whose motion does not determine the parameters.
 NO_INFORMATION = frozenset({"badly_excited"})
 
 
@@ -120,7 +119,7 @@ class GateReport:
         kept = np.ones(len(log), dtype=bool)
         kept[self.spikes] = kept[self.stale] = False
         parts = [np.arange(first, stop)[kept[first:stop]] for first, stop in self.parts]
-        logs = tuple(pick_rows(log, part) for part in parts if len(part) >= FEWEST)
+        logs = tuple(log.rows(part) for part in parts if len(part) >= FEWEST)
         if not logs:
             raise InputError("no part of the log is long enough", file=self.log or None, allowed=f"{FEWEST} rows")
         return logs
@@ -163,11 +162,6 @@ class GateReport:
         import html
 
         return f"<pre>{html.escape(self.summary())}</pre>"
-
-
-def pick_rows(log: Log, rows: NDArray[np.intp]) -> Log:
-    """Keeps some rows of a log, by their indices."""
-    return log.rows(rows)
 
 
 def worst_first(findings: list[Finding]) -> tuple[Finding, ...]:

@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 RIDGES = (1e-8, 1e-6, 1e-5, 1e-4, 1e-3)
 # Weights of the joints are set so many times from the residuals.
 ROUNDS = 3
+# A joint is not identified if its held-out error is above this share of the torque's standard deviation: hardly better
+# than a constant.
+HOPELESS = 0.9
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from estimation.gate.checks.delays import _remaining, _Search, estimate_delays
+from estimation.gate.quick_fits.delays import _remaining, _Search, estimate_delays
 from estimation.gate.quick_fits.excerpts import excerpts_of, stretch
 from estimation.gate.quick_fits.joint_fit import OWN, Rows
 from estimation.gate.quick_fits.rigid_body import joint_rows, rigid_body, used_columns

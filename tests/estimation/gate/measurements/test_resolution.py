@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimation.gate.checks.resolution import lattice_step
+from estimation.gate.measurements.resolution import lattice_step
 
 
 def test_a_value_beside_the_lattice_does_not_hide_its_step() -> None:
