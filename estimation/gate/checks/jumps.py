@@ -43,26 +43,27 @@ class Jumps(Check):
         """Reports the number of jumps and the largest of each joint."""
         recorded = context.recorded
         known = np.concatenate([recorded.spikes, recorded.spikes + 1, recorded.timing.gaps + 1])
+        # A lost message makes a longer step, and no jump.
+        periods = np.maximum(recorded.timing.steps / recorded.timing.period, 1.0)
         findings = []
         for joint, q in enumerate(recorded.columns.q):
             # The position of a joint that stands changes by single encoder steps.
             if recorded.standing[joint]:
                 continue
-            rows = np.setdiff1d(jump_rows(recorded.log.t, q), known)
+            rows = np.setdiff1d(jump_rows(periods, q), known)
             if len(rows):
                 findings.append(_finding(joint, q, rows, float(recorded.columns.travel[joint])))
         return findings
 
 
-def jump_rows(t: Array, q: Array) -> Rows:
+def jump_rows(periods: Array, q: Array) -> Rows:
     """Finds the rows of a position (N,) before which it jumps: by one large step, without large ones around it.
 
     Args:
-        t: time (N,) [s]; a lost message makes a longer step, and no jump.
+        periods: time steps (N - 1,) over their median, 1 at least.
         q: position (N,).
     """
-    duration = np.diff(t)
-    steps = np.abs(np.diff(q)) / np.maximum(duration / np.median(duration), 1.0)
+    steps = np.abs(np.diff(q)) / periods
     usual = float(np.quantile(steps[:: max(1, len(steps) // SAMPLES)], 0.99))
     large = steps > max(OUT * usual, SHARE * float(q.max() - q.min()))
     if not large.any() or large.mean() > USUAL:

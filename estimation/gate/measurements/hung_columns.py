@@ -74,11 +74,13 @@ def _longest_hang(prefix: str, joint: int, column: Array, moving: NDArray[np.boo
         return None
     # With a share p of equal neighbours, chance gives a run of log(N) / log(1/p) among N rows.
     chance = np.log(len(column)) / np.log(1.0 / max(share, 1.0 / len(column)))
-    usual = JUMP * float(np.quantile(steps[:: max(1, len(steps) // SAMPLES)], QUANTILE))
     # Rows in which the arm rests do not count.
     starts, stops = ends(held)
     passed = np.concatenate([[0], np.cumsum(moving)])
     long = passed[stops] - passed[starts] >= max(LONG * chance, FEWEST)
+    if not long.any():
+        return None
+    usual = JUMP * float(np.quantile(steps[:: max(1, len(steps) // SAMPLES)], QUANTILE))
     hung = [
         (int(stop - start), int(start))
         for start, stop in zip(starts[long], stops[long], strict=True)

@@ -38,18 +38,18 @@ def outlier_rows(values: Array, share: float, step: float, *, noisy: bool) -> Ro
         noisy: whether the column returns often, as a torque does; a position continues in its direction.
     """
     steps = np.diff(values)
-    before, after = steps[:-1], steps[1:]
-    back = np.where((before > 0) != (after > 0), np.minimum(np.abs(before), np.abs(after)), 0.0)
     # Percentiles rather than the range, which the outliers themselves would set.
     low, high = np.quantile(values[:: max(1, len(values) // SAMPLES)], (0.05, 0.95))
-    usual = back[:: max(1, len(back) // SAMPLES)]
+    usual = _returns(steps, np.arange(0, len(steps) - 1, max(1, (len(steps) - 1) // SAMPLES)))
     if noisy:
         usual = usual[usual > 0]
     noise = OUT * float(np.median(usual)) if len(usual) else 0.0
     level = max(noise, share * float(high - low), FLICKER * (step or _flicker(values)))
     if not level > 0:
         return np.empty(0, dtype=np.intp)
-    return np.flatnonzero(back > level) + 1
+    large = np.abs(steps) > level
+    rows = np.flatnonzero(large[:-1] & large[1:])
+    return rows[_returns(steps, rows) > 0] + 1
 
 
 def find_outliers(columns: Columns) -> dict[tuple[str, int], Rows]:
@@ -86,6 +86,12 @@ def isolated_rows(columns: Columns, outliers: dict[tuple[str, int], Rows]) -> Ro
     samples = columns.q.shape[1]
     rows = [found for found in outliers.values() if are_isolated(found, samples)]
     return np.unique(np.concatenate(rows)) if rows else np.empty(0, dtype=np.intp)
+
+
+def _returns(steps: Array, rows: Rows) -> Array:
+    """Gives the smaller of a step (N - 1,) and the next one if they have opposite signs, otherwise 0; at some rows."""
+    before, after = steps[rows], steps[rows + 1]
+    return np.where((before > 0) != (after > 0), np.minimum(np.abs(before), np.abs(after)), 0.0)
 
 
 def _flicker(values: Array) -> float:

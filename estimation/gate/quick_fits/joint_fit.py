@@ -197,7 +197,7 @@ class Rows:
             parts = {}
             for joint in joints:
                 own = self.joints[joint]
-                parts[joint] = [own.Y[rows].T @ own.Y[rows] for rows in self._folds]
+                parts[joint] = np.array([own.Y[rows].T @ own.Y[rows] for rows in self._folds])
                 energy[self._place(joint)] += own.scale**2 * sum(np.diag(part) for part in parts[joint])
             kept = np.flatnonzero(energy > 0)
             scale = np.sqrt(energy[kept] / len(self.q))
@@ -209,8 +209,8 @@ class Rows:
                 places[joint] = acts, np.searchsorted(kept, at[acts])
                 place = places[joint][1]
                 factor = self.joints[joint].scale[acts] / scale[place]
-                for k, part in enumerate(parts[joint]):
-                    gram[joint, k][np.ix_(place, place)] = part[np.ix_(acts, acts)] * factor[:, None] * factor
+                acting = parts[joint][:, acts[:, None], acts]
+                gram[joint][:, place[:, None], place] = acting * factor[:, None] * factor
             self._grams.clear()
             self._grams[joints] = gram, scale, places
         return self._grams[joints]
