@@ -25,13 +25,12 @@ class Speeds(Check):
         """Compares the largest smoothed speed of each joint with its limit."""
         limit = np.asarray(context.robot.limits.velocity)
         known = np.isfinite(limit) & (limit > 0)
-        excerpts = context.smoothed.excerpts
-        if not known.any() or not excerpts:
+        if not known.any():
             return []
-        peak = np.max([np.abs(part.dq).max(axis=0) for part in excerpts], axis=0)
+        peak = context.smoothed.peak_speeds
         ratio = np.where(known, peak / np.where(known, limit, 1.0), 0.0)
         worst = int(np.argmax(ratio))
-        if ratio[worst] < TOO_FAST:
+        if not ratio[worst] >= TOO_FAST:
             return []
         return [
             Finding(

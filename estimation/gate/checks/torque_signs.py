@@ -41,7 +41,7 @@ class TorqueSigns(Check):
     def run(self, context: Context) -> list[Finding]:
         """Looks at inertia and friction of each joint, then at the fit of all joints."""
         fitted, prefix = context.fitted, context.cleaned.columns.prefix
-        significances = [(0.0, 0.0) if found is None else found.ratios for found in fitted.physics]
+        significances = [(0.0, 0.0) if found is None else found.significances for found in fitted.physics]
         plausible = [inertia > SURE or friction > CLEAR for inertia, friction in significances]
         findings = []
         opposite: dict[int, bool] = {}  # joints with a torque of opposite sign, and whether that is certain

@@ -39,9 +39,9 @@ class Fitted:
     @cached_property
     def physics(self) -> tuple[JointPhysics | None, ...]:
         """Inertia and friction of each joint, from these fits (n)."""
-        felt = mean_inertias(self.robot, self.rows)
+        inertias = mean_inertias(self.robot, self.rows)
         return tuple(
-            None if fit is None else joint_physics(self.rows, fit, j, felt[j]) for j, fit in enumerate(self.fits)
+            None if fit is None else joint_physics(self.rows, fit, j, inertias[j]) for j, fit in enumerate(self.fits)
         )
 
     @cached_property

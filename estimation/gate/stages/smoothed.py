@@ -37,6 +37,13 @@ class Smoothed:
         return self.choice.excerpts
 
     @property
+    def peak_speeds(self) -> Array:
+        """Largest speed of each joint in the excerpts (n,) [rad/s or m/s], NaN without excerpts."""
+        if not self.excerpts:
+            return np.full(self._cleaned.robot.n, np.nan)
+        return np.asarray(np.max([np.abs(part.dq).max(axis=0) for part in self.excerpts], axis=0))
+
+    @property
     def rows(self) -> Rows | None:
         """The excerpts with the columns of the regressor; None without torque or with too few rows."""
         return self.choice.rows

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -49,6 +51,17 @@ def test_findings_of_equal_severity_have_a_fixed_order():
     checks = checks_in_order()
     assert [check.name for check in checks] == [name for stage in Stage for name in ORDER[stage]]
     assert len({(check.stage, check.order) for check in checks}) == len(checks)
+
+
+def test_the_page_on_logs_explains_each_finding():
+    """Each name of a finding of the built-in checks is in the table of the documentation."""
+    root = Path(__file__).parents[3]
+    named = re.compile(r'[ (]name="([a-z_]+)"(?: if .+ else "([a-z_]+)")?,')
+    sources = [path.read_text(encoding="utf-8") for path in (root / "estimation/gate/checks").glob("*.py")]
+    names = {name for source in sources for pair in named.findall(source) for name in pair if name}
+    page = (root / "docs/logs.md").read_text(encoding="utf-8")
+    assert len(names) > 25
+    assert {name for name in names if f"`{name}`" not in page} == set()
 
 
 @pytest.mark.parametrize("kind", checks_in_order(), ids=lambda kind: kind.name)
