@@ -69,7 +69,7 @@ def _compare(fit: JointFit, described: Array) -> tuple[float, float] | None:
     both = np.column_stack([expected, tau])
     both = both - own @ np.linalg.lstsq(own, both, rcond=None)[0]
     model, rest = both.T
-    if model @ model < REMAINS * (expected @ expected) or not rest @ rest > 0:
+    if not model @ model > REMAINS * (expected @ expected) or not rest @ rest > 0:
         return None
     product = model @ rest
     return float(product / (model @ model)), float(product / np.sqrt((model @ model) * (rest @ rest)))
