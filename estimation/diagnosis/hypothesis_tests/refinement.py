@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from estimation.diagnosis.hypothesis_tests.evidence import Evidence
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
@@ -68,21 +70,37 @@ class FittedEffect:
     birge_ratio: float = 1.0
     motion_error_chi2: float = 0.0
 
-    def bic_gain(self, rows: int) -> float:
-        """Gain less what its parameters are worth: Schwarz's criterion, larger is better."""
-        return self._penalised_gain(rows * len(self.group.joints))
-
-    def local_bic_gain(self, rows: int) -> float:
-        """Does what `bic_gain` does, to say whether it is there at all, not whether another is there instead.
-
-        A transient effect is measured by the rows in which it acts: the others are no data for its parameters.
-        """
-        acting_rows = self._acting_rows() if self.hypothesis.effect.transient else np.inf
-        return self._penalised_gain(min(rows * len(self.group.joints), acting_rows)) - self.motion_error_chi2
-
-    def _penalised_gain(self, rows: float) -> float:
+    @property
+    def evidence(self) -> Evidence:
+        """For it against other effects in its place."""
         prior = RARE if self.hypothesis.effect.rare else 0.0
-        return self.gain / self.birge_ratio - self.degrees * float(np.log(rows)) - prior
+        rows = len(self.group.columns[0]) * len(self.group.joints)
+        return Evidence(self.gain / self.birge_ratio, self.degrees, rows, prior)
+
+    @cached_property
+    def local_evidence(self) -> Evidence:
+        """For it against no effect at all.
+
+        A transient effect counts the rows in which it acts: the others are no data for its parameters.
+        """
+        known = self.evidence
+        rows = min(known.rows, self._acting_rows()) if self.hypothesis.effect.transient else known.rows
+        return replace(known, chi2=known.chi2 - self.motion_error_chi2, rows=rows)
+
+    @property
+    def bic_gain(self) -> float:
+        """Of `evidence`."""
+        return self.evidence.bic_gain
+
+    @property
+    def local_bic_gain(self) -> float:
+        """Of `local_evidence`."""
+        return self.local_evidence.bic_gain
+
+    @property
+    def excess_chi2(self) -> float:
+        """What it explains above as many columns of noise; not negative."""
+        return max(self.gain - self.degrees, 0.0)
 
     def _acting_rows(self) -> float:
         """Rows that the columns act on: (sum x^2)^2 / sum x^4, mean over columns, two at least."""
@@ -109,6 +127,13 @@ class FittedEffect:
         own, size = (np.abs(m.group.columns[m.group.joints.index(joint)] @ m.coefficients) for m in (self, other))
         acts = size > ACTS * size.max(initial=0.0)
         return float(np.sum(own[acts] ** 2) / max(np.sum(own**2), 1e-300))
+
+
+def set_bic_gain(problem: Problem, members: Sequence[FittedEffect], beside: Sequence[FittedEffect] = ()) -> float:
+    """BIC gain of members together, beside others that are in the model already."""
+    cost = sum(member.gain - member.bic_gain for member in members)
+    known = accept(problem, tuple(m.group for m in beside)).gain if beside else 0.0
+    return accept(problem, tuple(m.group for m in (*beside, *members))).gain - known - cost
 
 
 def accept_all_but(problem: Problem, members: Sequence[FittedEffect], i: int) -> Accepted:
@@ -139,8 +164,8 @@ def refine(
         result = score(problem, group, accepted)
         gain, coefficients = result.bounded(*hypothesis.coefficient_bounds(situation.robot, shape))
         member = FittedEffect(hypothesis, shape, group, gain, coefficients, result.degrees + fitted, result.visible)
-        worth = member.bic_gain(problem.rows)
-        if not best or worth > best[0].bic_gain(problem.rows):
+        worth = member.bic_gain
+        if not best or worth > best[0].bic_gain:
             best[:] = [member]
         # What is climbed has no step where a parameter that costs begins to count.
         return gain

@@ -47,10 +47,10 @@ def refit_event_window(problem: Problem, member: FittedEffect, beside: Accepted)
     windows = threaded(lambda shape: best_window(problem, hypothesis, shape, beside, (start, start + duration)), shapes)
     forms = [(own.gain, (own.start, own.duration, *shape[2:])) for own, shape in zip(windows, shapes, strict=True)]
     near = refine(problem, hypothesis, max(forms)[1], beside, effort=0)
-    if near.bic_gain(problem.rows) + NEAR * near.gain < member.bic_gain(problem.rows):
+    if near.bic_gain + NEAR * near.gain < member.bic_gain:
         return member
     best = refine(problem, hypothesis, near.shape, beside)
-    return best if best.bic_gain(problem.rows) > member.bic_gain(problem.rows) + MIN_BIC_GAIN else member
+    return best if best.bic_gain > member.bic_gain + MIN_BIC_GAIN else member
 
 
 def _open(problem: Problem, member: FittedEffect, beside: Accepted) -> set[int]:
@@ -60,4 +60,4 @@ def _open(problem: Problem, member: FittedEffect, beside: Accepted) -> set[int]:
         return set()
     rest = accept(problem, (member.group, *beside.groups))
     more = ((k, refine(problem, member.hypothesis, shape, rest, effort=0)) for k, shape in further)
-    return {k for k, form in more if form.local_bic_gain(problem.rows) > MIN_BIC_GAIN}
+    return {k for k, form in more if form.local_bic_gain > MIN_BIC_GAIN}

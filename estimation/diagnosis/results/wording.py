@@ -64,7 +64,7 @@ def word_finding(
         joint=joint,
         parameters=parameters,
         p_value=p_value,
-        delta_bic=member.local_bic_gain(problem.rows),
+        delta_bic=member.local_bic_gain,
         gain=gain,
         rivals=tuple(
             (h.name if h.joint in (joint, None) else f"{h.name} of joint {h.joint}", float(worse))

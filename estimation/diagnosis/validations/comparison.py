@@ -8,10 +8,9 @@ import numpy as np
 
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import RARE, FittedEffect
+from estimation.diagnosis.hypothesis_tests.refinement import RARE, FittedEffect, set_bic_gain
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
 from estimation.diagnosis.searches.selection import SelectedEffect
-from estimation.diagnosis.validations.free_functions import excess_chi2, set_bic_gain
 
 # Named effects that explain less than this share of what stands out of the noise, or of what free functions do in their
 # place, do not explain it; nor do those that fit worse than one of those and explain less than the second share of it.
@@ -27,7 +26,7 @@ def is_outperformed(problem: Problem, gain: float, degrees: int, free: Sequence[
     """
     if not free:
         return False
-    most, own = excess_chi2(free[0]), gain - degrees * float(np.log(problem.rows))
+    most, own = free[0].excess_chi2, gain - degrees * float(np.log(problem.rows))
     return gain - degrees < ENOUGH * most or (gain - degrees < NEARLY * most and own < set_bic_gain(problem, free[:1]))
 
 

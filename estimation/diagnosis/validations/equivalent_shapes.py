@@ -48,7 +48,7 @@ def complete_effects(problem: Problem, founds: Sequence[SelectedEffect]) -> tupl
         shape = own.hypothesis.effect.complete(problem.situation, own.hypothesis.joint, own.shape)
         if shape != own.shape:
             form = refine(problem, own.hypothesis, shape, accept_all_but(problem, members, i))
-            found = replace(found, effect=form) if form.local_bic_gain(problem.rows) > MIN_BIC_GAIN else found
+            found = replace(found, effect=form) if form.local_bic_gain > MIN_BIC_GAIN else found
         whole.append(found)
     return tuple(whole)
 

@@ -28,7 +28,6 @@ def free_functions(
     patterns: Sequence[Entry],
     named: Sequence[FittedEffect],
     false_alarm: float,
-    rng: np.random.Generator,
     *,
     alone: bool = False,
 ) -> tuple[list[FittedEffect], list[float]]:
@@ -40,18 +39,18 @@ def free_functions(
     p_values: list[float] = []
     while len(members) < MOST_PATTERNS:
         accepted = accept(problem, tuple(m.group for m in (*named, *members)))
-        result = scan(problem, patterns, accepted, rng)
+        result = scan(problem, patterns, accepted)
         if not result.outcomes:
             break
-        p = result.p_value(result.outcomes[0].evidence)
+        p = result.p_value(result.outcomes[0])
         if not p <= false_alarm:
             break
         near = [refine(problem, o.hypothesis, o.shape, accepted) for o in result.outcomes[:CONTENDERS] if o.degrees]
-        member = max(near, key=lambda m: m.bic_gain(problem.rows))
+        member = max(near, key=lambda m: m.bic_gain)
         before = (*named, *members)
-        if excess_chi2(member) < BEYOND * sum(m.gain_on(member.group.joints) for m in before):
+        if member.excess_chi2 < BEYOND * sum(m.gain_on(member.group.joints) for m in before):
             break
-        if member.bic_gain(problem.rows) < LEAST and (before or not alone or p > SURE):
+        if member.bic_gain < LEAST and (before or not alone or p > SURE):
             break
         members.append(member)
         p_values.append(p)
@@ -63,18 +62,7 @@ def strongest_pattern(
     patterns: Sequence[Entry],
     named: Sequence[FittedEffect],
     false_alarm: float,
-    rng: np.random.Generator,
 ) -> tuple[FittedEffect, float] | None:
     """Gives the free function that explains most beside names, and its p-value; None where noise explains as much."""
-    members, p_values = free_functions(problem, patterns, named, false_alarm, rng, alone=True)
+    members, p_values = free_functions(problem, patterns, named, false_alarm, alone=True)
     return (members[0], p_values[0]) if members else None
-
-
-def set_bic_gain(problem: Problem, free: Sequence[FittedEffect]) -> float:
-    """What functions explain together, each beside those before, less what their parameters are worth (Schwarz)."""
-    return sum(member.gain - member.degrees * float(np.log(problem.rows)) for member in free)
-
-
-def excess_chi2(member: FittedEffect) -> float:
-    """What a member explains more than as many columns of noise would."""
-    return max(member.gain - member.degrees, 0.0)
