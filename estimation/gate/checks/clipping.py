@@ -51,13 +51,17 @@ def _clipped(columns: Columns, joint: int) -> list[Finding]:
     if high == low:
         return []
     width = max(float(columns.signal_steps[joint]), WIDTH * (high - low))
-    moves = np.concatenate([[False], columns.q[joint, 1:] != columns.q[joint, :-1]])
+    fewest = max(CLIPPED_RUN, CLIPPED_SHARE * len(values))
     share, run, begins, at_limit = 0.0, 0, 0, []
     for extreme, side in ((high, 1.0), (low, -1.0)):
         distance = side * (extreme - values)
-        at = (distance < 0.5 * width) & moves
-        count = int(at.sum())
-        if count < CLIPPED_RUN or count < CLIPPED_SHARE * len(values):
+        at = distance < 0.5 * width
+        if np.count_nonzero(at) < fewest:
+            continue
+        moves = np.concatenate([[False], columns.q[joint, 1:] != columns.q[joint, :-1]])
+        at &= moves
+        count = int(np.count_nonzero(at))
+        if count < fewest:
             continue
         start, length = _longest_run(at)
         beside = int(((distance >= 0.5 * width) & (distance < 1.5 * width) & moves).sum())

@@ -22,6 +22,7 @@ LOCAL_JUMP, BESIDE = 10.0, 20
 COARSE = 0.5
 # Rows in motion for which a column must be constant, over the longest run that chance explains.
 LONG = 3.0
+HALF = FEWEST // 2  # rows
 
 
 @dataclass(frozen=True)
@@ -67,10 +68,13 @@ def cut_hangs(parts: Sequence[tuple[int, int]], hangs: Sequence[Hang]) -> tuple[
 
 
 def _longest_hang(prefix: str, joint: int, column: Array, moving: NDArray[np.bool_]) -> Hang | None:
-    steps = np.abs(np.diff(column))
-    held = steps == 0
+    held = column[1:] == column[:-1]
+    # A run of FEWEST rows contains two neighbours of every HALF-th row.
+    some = held[::HALF]
+    if not (some[1:] & some[:-1]).any():
+        return None
     share = float(held.mean())
-    if share > COARSE or not held.any():
+    if share > COARSE:
         return None
     # With a share p of equal neighbours, chance gives a run of log(N) / log(1/p) among N rows.
     chance = np.log(len(column)) / np.log(1.0 / max(share, 1.0 / len(column)))
@@ -80,6 +84,7 @@ def _longest_hang(prefix: str, joint: int, column: Array, moving: NDArray[np.boo
     long = passed[stops] - passed[starts] >= max(LONG * chance, FEWEST)
     if not long.any():
         return None
+    steps = np.abs(np.diff(column))
     usual = JUMP * float(np.quantile(steps[:: max(1, len(steps) // SAMPLES)], QUANTILE))
     hung = [
         (int(stop - start), int(start))

@@ -115,7 +115,7 @@ def _rounded(log: Log, steps: Array, period: float) -> CorrectedTimes | None:
     if np.abs(multiples - np.round(multiples)).max() > WHOLE:
         return None
     rows = np.arange(len(log))
-    even = np.polynomial.Polynomial.fit(rows, log.t, 1)(rows)
+    even = _line(log.t)
     error = float(np.abs(log.t - even).max())
     # Equal steps are uniform already, whatever their rounding.
     if not FINE * period < error <= resolution or not _fit_better(log, even, rows[1::2]):
@@ -123,6 +123,12 @@ def _rounded(log: Log, steps: Array, period: float) -> CorrectedTimes | None:
     return CorrectedTimes(
         even, np.zeros(0, dtype=np.intp), rounding=Rounding(resolution, period=float(even[1] - even[0]))
     )
+
+
+def _line(t: Array) -> Array:
+    """Gives the straight line (N,) through times (N,) by least squares."""
+    rows, times = np.arange(len(t)) - 0.5 * (len(t) - 1), t - t[0]
+    return np.asarray(t[0] + times.mean() + rows * (rows @ times) / (rows @ rows))
 
 
 def _fit_better(log: Log, even: Array, late: NDArray[np.intp]) -> bool:
