@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
+from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
 from estimation.gate.quick_fits.joint_fit import Rows
 from estimation.gate.quick_fits.whole_fit import RIDGES, Moments, fit_all
 from estimation.gate.stages.fitted import Fitted
@@ -23,8 +24,8 @@ Array = NDArray[np.float64]
 WELL = 0.1
 # Decrease of the held-out error (mean log) with the opposite sign of a joint, for a warning and for a refusal.
 BETTER, CERTAIN = 0.2, 0.5
-# Rows that decide, and rows and ridge that exclude most joints before: by less than half of `BETTER` on those.
-ROWS, FEW_ROWS, RIDGE = 1500, 500, 1e-5
+# Rows and ridge by which most joints are excluded before CHOICE_ROWS decide: by less than half of `BETTER`.
+FEW_ROWS, RIDGE = 500, 1e-5
 # Findings that make the fits too wrong to judge directions by them.
 WRONG_TORQUES = ("torque_sign", "negative_friction", "moved_by_others", "unit_of_torque")
 
@@ -40,11 +41,11 @@ class JointDirections(Check):
         """Reports the joint whose inversion decreases the error most."""
         if context.found(WRONG_TORQUES):
             return []
-        fits = _InvertedFits(context.fitted)
-        straight = np.ones(context.robot.n)
-        before = fits.cost(fits.moments(straight, ROWS))
+        before = context.smoothed.choice.cost
         if before < np.log(WELL):
             return []
+        fits = _InvertedFits(context.fitted)
+        straight = np.ones(context.robot.n)
         enough = fits.cost(fits.moments(straight, FEW_ROWS), (RIDGE,)) - BETTER / 2
         best, found = before - BETTER, None
         for joint in range(context.robot.n):
@@ -53,7 +54,7 @@ class JointDirections(Check):
             few = fits.moments(sign, FEW_ROWS)
             if min(fits.cost(few.scaled(torque_sign), (RIDGE,)) for torque_sign in (straight, sign)) > enough:
                 continue
-            inverted = fits.moments(sign, ROWS)
+            inverted = fits.moments(sign, CHOICE_ROWS)
             for torque_sign in (straight, sign):
                 after = fits.cost(inverted.scaled(torque_sign))
                 if after < best:

@@ -31,7 +31,8 @@ class SmoothedLog:
     Attributes:
         robot: with n joints.
         excerpts: at the chosen cut-off.
-        cost: mean log of the held-out torque error over its standard deviation, 0 without torque.
+        cost: mean log of the held-out torque error over its standard deviation, on some `CHOICE_ROWS` rows; 0 without
+            torque.
         can_be_fitted: whether there are torques, and enough rows.
         sharp_excerpts: at the cut-off for delays.
         sharp_cutoff: that cut-off [Hz].
