@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from estimation.diagnosis.calibration import ABSENT_CHI2, MAX_REVERSAL_CHI2, RARE_ODDS, REVERSAL_FORMULA_ERROR
 from estimation.diagnosis.hypothesis_tests.evidence import Evidence
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
@@ -31,14 +32,8 @@ WIDE = (101, 6.0)
 FACTOR, SHARE = 1.5, 0.04
 # An effect acts where its torque is more than this share of its largest.
 ACTS = 0.02
-# What an effect is beside reversals and elsewhere may differ by this share, for its formula is no better where it is
-# large, and by so many squared standard errors; at so much of twice the log of the odds that there is none elsewhere it
-# is none: one that is there has this in 2 % of logs at most.
-FORMULA, AGREES, ABSENT = 0.35, 2.0, 4.0
 # Friction that would turn round over a shorter way than any, by this factor, turns round at once: late, if anything.
 SHORT_TRAVEL_FACTOR = 1.05
-# Twice the log of the odds against an effect that robots seldom have.
-RARE = 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +68,7 @@ class FittedEffect:
     @property
     def evidence(self) -> Evidence:
         """For it against other effects in its place."""
-        prior = RARE if self.hypothesis.effect.rare else 0.0
+        prior = RARE_ODDS if self.hypothesis.effect.rare else 0.0
         rows = len(self.group.columns[0]) * len(self.group.joints)
         return Evidence(self.gain / self.birge_ratio, self.degrees, rows, prior)
 
@@ -253,10 +248,14 @@ def _reversal_scatter(problem: Problem, member: FittedEffect, accepted: Accepted
     if (expected <= 0).any():
         return 1.0
     sizes = parts.cross / expected
-    if (1.0 - 2.0 * sizes[0]) / (parts.gram[0, 0] / expected[0] ** 2 + FORMULA**2) > ABSENT:
+    if (1.0 - 2.0 * sizes[0]) / (parts.gram[0, 0] / expected[0] ** 2 + REVERSAL_FORMULA_ERROR**2) > ABSENT_CHI2:
         return np.inf
     difference = np.array([1.0, -1.0]) / expected
-    return max(1.0, float((sizes[0] - sizes[1]) ** 2 / (difference @ parts.gram @ difference + FORMULA**2)) / AGREES)
+    return max(
+        1.0,
+        float((sizes[0] - sizes[1]) ** 2 / (difference @ parts.gram @ difference + REVERSAL_FORMULA_ERROR**2))
+        / MAX_REVERSAL_CHI2,
+    )
 
 
 def _spacing(grid: Sequence[tuple[float, ...]], k: int, start: tuple[float, ...]) -> float:

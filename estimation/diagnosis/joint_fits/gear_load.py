@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.calibration import MIN_BIC_GAIN, MIN_GEAR_LOAD
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine, set_bic_gain
@@ -18,8 +18,6 @@ from robots.terms.effects import EFFECTS
 
 Array = NDArray[np.float64]
 
-# A joint feels what is borne that is more than this share of its own load.
-FELT = 0.01
 # What a friction by load may explain that was named otherwise for want of the load.
 BY_LOAD = EFFECTS["load_dependent_friction"]
 
@@ -66,7 +64,7 @@ def find_gear_load(problem: Problem, members: Sequence[FittedEffect], values: Ar
     extra = bearings[0].on(state).extra_load
     assert extra is not None
     size, other = (np.sqrt(np.mean(torque**2, axis=0)) for torque in (extra, state.load))
-    felt = set((np.flatnonzero(size > FELT * other) + 1).tolist())
+    felt = set((np.flatnonzero(size > MIN_GEAR_LOAD * other) + 1).tolist())
     on_them = [m for m in members if m.hypothesis.joint in felt and not m.hypothesis.effect.loads_gear]
     if not on_them:
         return GearLoad(bearings[0])

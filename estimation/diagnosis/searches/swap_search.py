@@ -16,7 +16,7 @@ from estimation.diagnosis.hypothesis_tests.refinement import (
     set_bic_gain,
 )
 from estimation.diagnosis.hypothesis_tests.scan import Entry, Outcome, scan
-from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
+from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from estimation.diagnosis.joint_fits.total_torque import with_total_torque
 from estimation.diagnosis.searches.acceptance import is_certain
 from estimation.diagnosis.searches.candidate_screening import screen_candidates

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.calibration import MIN_BIC_GAIN, RARE_ODDS
 from estimation.diagnosis.hypothesis_tests import refinement
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.joint_agreement import PerJointEvidence
-from estimation.diagnosis.hypothesis_tests.refinement import RARE, FittedEffect
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scan import Outcome
 from estimation.diagnosis.searches import acceptance
 from estimation.diagnosis.searches.acceptance import SURE, exceeds_leakage, is_certain, passes_bic
@@ -79,7 +79,7 @@ def test_a_rare_effect_has_to_explain_more() -> None:
     """Its odds are paid for beside its parameters."""
     columns = _boxes()[:1]
     difference = _member("stribeck", 1, columns).local_bic_gain - _member("load_stribeck", 1, columns).local_bic_gain
-    assert difference == pytest.approx(RARE)
+    assert difference == pytest.approx(RARE_ODDS)
 
 
 def test_a_push_leaves_other_rows_alone() -> None:
@@ -232,7 +232,7 @@ def test_a_search_starts_again_from_other_summits(far: bool, expected: float, mo
     group = replace(_member("stribeck", 1, (np.ones((ROWS, 1)),)).group)
 
     class _Shape(tuple):  # type: ignore[type-arg]
-        joints = group.joints
+        joints, columns = group.joints, (np.zeros((ROWS, 1)),)
 
     situation = SimpleNamespace(robot=None)
     problem = SimpleNamespace(state_for=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
@@ -271,7 +271,7 @@ def test_what_an_effect_is_whole_without_is_a_parameter_only_where_it_pays(
     monkeypatch.setattr(Hypothesis, "coefficient_bounds", lambda *_: ((-np.inf, np.inf),))
 
     class _Shape(tuple):  # type: ignore[type-arg]
-        joints = (0,)
+        joints, columns = (0,), (np.zeros((ROWS, 1)),)
 
     situation = SimpleNamespace(robot=None)
     problem = SimpleNamespace(state_for=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
@@ -295,7 +295,7 @@ def test_friction_that_turns_round_over_no_way_is_no_presliding(
     monkeypatch.setattr(Hypothesis, "coefficient_bounds", lambda *_: ((0.0, np.inf),))
 
     class _Shape(tuple):  # type: ignore[type-arg]
-        joints = (0,)
+        joints, columns = (0,), (np.zeros((ROWS, 1)),)
 
     situation = SimpleNamespace(robot=None)
     problem = SimpleNamespace(state_for=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
