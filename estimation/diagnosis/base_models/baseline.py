@@ -63,8 +63,7 @@ def base_parameters(
         robot: the robot.
         friction: `polynomial` or `coulomb-viscous`.
         scales: width of each joint's friction sign [rad/s or m/s].
-        gravities: gravity vectors (3,) [m/s2] under which the parameters must be identifiable together, besides that of
-            the description.
+        gravities: further gravity vectors (3,) [m/s2] under which the parameters must describe the torque.
 
     Returns:
         The base parameters.

@@ -233,11 +233,10 @@ def _passed(wide: Whitening, series: Array, joint: int, passing: Band) -> Array:
 
 
 def _counts(wide: Whitening, recording: Recording, joint: int, edge: int) -> Array:
-    """Returns weights of a joint's white rows (N',).
+    """Returns weights of a joint's white rows (N',), zero near rows in which its direction is unknown.
 
-    They are zero near rows in which its direction is unknown, and in the `edge` rows at the ends of a log, where the
-    filter sees the torque begin and end. The weights act after the filters, which would otherwise turn slow torque into
-    fast torque.
+    They are also zero in the `edge` rows at the ends of a log, where the filter sees the torque begin and end. The
+    weights act after the filters, which would otherwise turn slow torque into fast torque.
     """
     reach = int(np.ceil(0.5 / wide.bands[joint].cutoff / recording.step))
     parts = []

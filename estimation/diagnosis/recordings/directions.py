@@ -92,9 +92,11 @@ def find_directions(
 
     Rows near a reversal are unreliable, since Coulomb friction changes sign between samples. Where torque was sampled
     at the rows of the grid, these are the rows over which a jump of the acceleration spreads. Otherwise they are
-    `BESIDE` rows on either side. The sign is still known from the velocity if torque was sampled at these rows, the
-    velocity changes by more than `MIN_SHARP_SPEED_SIGMAS` errors per row, and it is itself larger than that. With a
-    fine encoder this holds for nearly all rows.
+    `BESIDE` rows on either side.
+
+    The velocity still determines the sign if torque was sampled at the rows and two conditions hold. It changes by more
+    than `MIN_SHARP_SPEED_SIGMAS` errors per row, and it is itself larger than that. With a fine encoder this holds for
+    nearly all rows.
 
     Args:
         dq: velocities (N, n) [rad/s or m/s].
