@@ -33,7 +33,7 @@ class Whitening:
         starts: first row of each log; the filters restart there.
         masked: rows of each joint that do not count.
         bands: usable band of each joint; all have the same decimation.
-        weights: weights of the white rows (N, n), lower for outliers; None for ones.
+        weights: weights of the white rows (M, n), lower for outliers and zero at rest; None for ones.
         levels: noise level of each log over `scale` (logs, n); None for ones.
     """
 
