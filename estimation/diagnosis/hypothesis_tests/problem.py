@@ -92,7 +92,7 @@ class Problem:
 
     @property
     def parameters_without_payload(self) -> Array:
-        """The base model's parameters (p,) without the payload that the first log may carry."""
+        """Parameters of the base model (p,) without the known payload of the first log."""
         return with_body(self.situation.model, self.situation.parameters, -self.recording.bodies[0])
 
     @cached_property
@@ -230,7 +230,7 @@ class Problem:
         return np.asfortranarray(self.residual, dtype=np.float32)
 
     def _products(self, joints: tuple[int, ...], white: Sequence[Small], count: int) -> tuple[Array, Array, Array]:
-        """Products of white columns (N, count k) with base model (count k, b), residual, each other (count, k, k)."""
+        """Multiplies white columns (N, count k) by base model (count k, b), residual, each other (count, k, k)."""
         total = white[0].shape[1]
         against, cross = np.zeros((total, self.weighted_base_columns.shape[2])), np.zeros(total)
         gram = np.zeros((count, total // count, total // count))
@@ -262,11 +262,11 @@ class Problem:
         return self.recording.far_from_reversals(self.whitening.stride)
 
     def reversal_time_error(self, joint: int) -> Array:
-        """Standard error [s] of a joint's reversal times due to its velocity error, in white rows (N,)."""
+        """Returns the error [s] of a joint's reversal times due to its velocity error, in white rows (N,)."""
         return self.recording.reversal_time_error_near(joint, self.whitening.stride)
 
     def _known(self, joints: tuple[int, ...], columns: Sequence[Array]) -> Array:
-        """Energy (k,) of whitened columns (N0, k) of some joints away from rows of unknown friction sign."""
+        """Returns the whitened energy (k,) of columns (N0, k) away from rows of unknown friction sign."""
         total = np.zeros(columns[0].shape[1])
         for j, X in zip(joints, columns, strict=True):
             apart = self.whitening.apply(X * self._distant_from[:, j, None], j)

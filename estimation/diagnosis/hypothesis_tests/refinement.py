@@ -93,7 +93,7 @@ class FittedEffect:
         return max(self.gain - self.degrees, 0.0)
 
     def _acting_rows(self) -> float:
-        """Effective number of rows (sum x^2)^2 / sum x^4, mean over columns, at least two."""
+        """Returns the effective number of rows (sum x^2)^2 / sum x^4, mean over columns, at least two."""
         whole = np.concatenate(self.group.columns).astype(float) ** 2
         square, fourth = whole.sum(axis=0), (whole**2).sum(axis=0)
         counts = square[fourth > 0] ** 2 / fourth[fourth > 0]

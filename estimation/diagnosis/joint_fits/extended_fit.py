@@ -189,7 +189,7 @@ def reversal_columns(members: Sequence[FittedEffect], starts: Sequence[int], sha
 
 
 def _slope(problem: Problem, member: FittedEffect, k: int, step: float) -> Array:
-    """Change of an effect's torque (N, n, 1) per standard error of a shape parameter."""
+    """Returns the change of an effect's torque (N, n, 1) per standard error of a shape parameter."""
     value = member.shape[k]
     h = step if np.isfinite(step) else 0.3 * abs(value)
     low, high = member.hypothesis.effect.bounds(problem.state_for(member.hypothesis.effect), member.hypothesis.joint)[k]
@@ -213,9 +213,10 @@ def _narrowed(covariance: Array, k: int, error: float) -> Array:
 
 
 def _covariance(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Covariance of minimum-norm least squares from the data alone, without the prior.
+    """Returns the covariance of minimum-norm least squares from the data alone, without the prior.
 
-    Also marks the coefficients (p,) that the data do not determine. Their variance there is that of the minimum norm.
+    Also returns a mask (p,) of the coefficients that the data do not determine. Their variance is that of the minimum
+    norm.
     """
     norms = np.linalg.norm(matrix, axis=0)
     norms[norms < NOTHING] = 1.0

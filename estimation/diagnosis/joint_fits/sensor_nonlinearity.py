@@ -50,11 +50,7 @@ def fit_sensor_nonlinearity(problem: Problem, members: Sequence[FittedEffect]) -
 
 
 class _Search:
-    """Gauss-Newton search.
-
-    The unknowns are base parameters, nuisance and coefficients of plain effects, then coefficients and shapes of
-    distortions.
-    """
+    """Gauss-Newton search for base parameters, nuisance, effect coefficients and distortions."""
 
     def __init__(self, problem: Problem, plain: Sequence[FittedEffect], wrong: Sequence[FittedEffect]) -> None:
         self.problem, self.wrong = problem, list(wrong)
@@ -125,7 +121,7 @@ class _Search:
         return np.sum([dense(now, m.hypothesis, m.shape) @ m.coefficients for m in members], axis=0)
 
     def _cost(self, values: Array, now: Problem, members: Sequence[FittedEffect]) -> float:
-        """Weighted sum of squares of residual, prior and reversal timing."""
+        """Returns the weighted sum of squares of residual, prior and reversal timing."""
         fit, problem, pull = self.fit, self.problem, self.problem.prior
         left = (problem.recording.tau - fit.full @ values - self._distortion(now, members)) * fit.weights
         off = values[: len(pull.target)] - pull.target

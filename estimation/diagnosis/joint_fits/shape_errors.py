@@ -21,8 +21,7 @@ Array = NDArray[np.float64]
 DROP = 2.0
 # A value is possible if the explained chi-square there is lower by less than this (95 %).
 OPEN = 3.84
-# The same for a change time: (1 - e^(-x / 2))^2 = 0.95, the distribution of its likelihood ratio (Hansen, Econometrica
-# 2000).
+# The same for a change time: (1 - e^(-x / 2))^2 = 0.95, the distribution of its likelihood ratio (Hansen 2000).
 CHANGED = 7.35
 # Steps of its profile in each direction: the first in standard errors, their growth, their largest number, and the
 # number of successive drops beyond twice that value at which it ends.
@@ -114,7 +113,7 @@ def _assumed(
 
 
 def _drop(problem: Problem, member: FittedEffect, k: int, others: Accepted, best: float, value: float) -> float:
-    """Decrease of the explained chi-square at another value of a shape parameter."""
+    """Returns the decrease of the explained chi-square at another value of a shape parameter."""
     return best - _gain(problem, member, with_value(member.shape, k, value), others)
 
 
@@ -288,7 +287,7 @@ def formula_errors(problem: Problem, member: FittedEffect, coefficients: Array) 
 
 
 def _gain(problem: Problem, member: FittedEffect, shape: tuple[float, ...], others: Accepted) -> float:
-    """Chi-square explained at a shape, with coefficients within the bounds for that shape."""
+    """Returns the chi-square explained at a shape, with coefficients within the bounds for that shape."""
     result = score(problem, problem.measured(member.hypothesis, shape), others)
     return result.bounded(*member.hypothesis.coefficient_bounds(problem.situation.robot, shape))[0]
 

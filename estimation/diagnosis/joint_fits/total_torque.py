@@ -96,7 +96,7 @@ def fit_clipped_torque(problem: Problem, members: Sequence[FittedEffect]) -> Pro
 
 
 def _lost(problem: Problem, members: Sequence[FittedEffect]) -> Array:
-    """Torque (N, n) removed by effects that act on the total torque."""
+    """Returns the torque (N, n) removed by effects that act on the total torque."""
     return np.sum([dense(problem, member.hypothesis, member.shape).sum(axis=2) for member in members], axis=0)
 
 
