@@ -118,6 +118,7 @@ _REJECTED = (
 def _parameters(
     robot: Robot, member: FittedEffect, fitted: ExtendedFit, i: int, known: NDArray[np.bool_]
 ) -> tuple[Parameter, ...]:
+    """Lists the coefficients and shape parameters of an effect with their 95 % intervals."""
     extension = fitted.model.extensions[i]
     effect = member.hypothesis.effect
     described: list[Coefficient | Shape] = [
@@ -162,6 +163,7 @@ def _stopped(shape: Shape, value: float) -> bool:
 
 
 def _opened(parameter: Parameter) -> Parameter:
+    """Marks a parameter as undetermined."""
     return replace(parameter, standard_error=float("nan"), ci95=(-np.inf, np.inf), determined=False)
 
 

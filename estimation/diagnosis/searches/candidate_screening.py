@@ -21,7 +21,7 @@ def screen_candidates(
 ) -> list[Outcome]:
     """Picks the hypotheses that are refined: those with a gain near the best on the grid, and not in the model.
 
-    A transient effect, or one with a moment, must also be able to reach the best BIC gain on the grid.
+    A transient effect, or one with a change time, must also be able to reach the best BIC gain on the grid.
 
     Args:
         problem: whitened data.

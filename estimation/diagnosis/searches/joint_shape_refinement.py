@@ -11,7 +11,7 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 
-ROUNDS = 8
+ROUNDS = 8  # largest number of rounds
 # Gain of chi2 by a round below which the refinement stops.
 TOLD = 1.0
 # Multiples of the step of a round that are tried, as long as the gain increases.

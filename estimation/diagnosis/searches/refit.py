@@ -166,5 +166,6 @@ def _unusable_rows(problem: Problem, member: FittedEffect) -> NDArray[np.bool_] 
 
 
 def _again(problem: Problem, members: Sequence[FittedEffect], k: int) -> FittedEffect:
+    """Refines one member beside the others, starting from its shape."""
     others = tuple(member.group for i, member in enumerate(members) if i != k)
     return refine(problem, members[k].hypothesis, members[k].shape, accept(problem, others))

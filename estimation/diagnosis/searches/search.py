@@ -33,8 +33,8 @@ from robots.common.progress import Progress
 from robots.terms.effects import Effect
 
 SEARCHES = 2  # largest number of searches
-# Largest number of fits of the base model alone. It is repeated while a joint's residual falls below this share of the
-# previous one.
+# Largest number of fits of the base model alone. The fit is repeated while a joint's residual falls below this share of
+# the previous one.
 ROUNDS, SETTLED = 4, 0.9
 # Least noise in these fits, as a share of the torque's standard deviation.
 QUIETEST = 0.05
@@ -108,7 +108,7 @@ def search(
         )
         if any(effect.independent_of_acceleration for effect in effects):
             wide = estimate_whitening(recording, settled.residual, fitted, inertia, MAX_HIGH_BAND_ERROR, spared)
-            # Uses the residual of the base model alone: fitted beside effects, it may differ much.
+            # A base model fitted beside effects may leave a very different residual than the base model alone.
             upper = build_high_band(recording, baseline, posed.base_residual, settled.residual, whitening.bands, wide)
             posed = replace(posed, high_band=upper)
         timing = measure_reversal_timing(recording, baseline, settled.values, *settled.without_delay())
@@ -191,6 +191,7 @@ def _searched(
     share: float,
     known: Mapping[Hypothesis, tuple[float, ...]],
 ) -> Search:
+    """Measures all hypotheses on a problem and selects effects."""
     entries = measure(problem, hypotheses, _scan_progress(bar, share, 0.2))
     give_back()
     advance = _note_progress(bar, share + 0.25)

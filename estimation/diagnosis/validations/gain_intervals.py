@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 PARTS = 5  # stretches into which a log is split
 RESAMPLES = 500  # bootstrap samples of an interval
 SURELY = 1.96  # standard errors of a contradiction
-BLOCK = 1.0  # shortest block [s]; a block also has at least five times the correlation time of the errors
+BLOCK = 1.0  # shortest block [s]; longer ones have five times the correlation time of the errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,8 @@ class HeldOutErrors:
         errors: per model the torque errors (M, n) [N m or N].
         counts: rows that count (M, n): those with a known friction sign.
         fitted: errors of fits that include these rows; None with separate held-out logs.
-        growth: per model the chi2 that its missing effects gain when the held-out rows are added to the fit (models,).
+        growth: per model the chi2 that its missing effects gain when the held-out rows are added to the fit
+            (models,); negative if the held-out rows contradict them.
     """
 
     how: str

@@ -33,7 +33,7 @@ class MeasuredCompliance:
     """Compliance of one gear, measured by its two encoders.
 
     Attributes:
-        finding: the finding; its gain is that of the gear deflection, relative to the standard deviation of that.
+        finding: the finding; its errors are those of the link position over the standard deviation of the deflection.
         extension: effect `joint_elasticity` with this compliance.
         coordinate: gear load (M,) [N m or N].
         before: link position, measured minus predicted with a rigid gear (M,) [rad or m].
@@ -138,6 +138,7 @@ def gear_deflection(recording: Recording, logs: Sequence[Log], joint: int, delay
 
 
 def _signals(now: Situation, measured: Array, joint: int, delay: float) -> _Signals:
+    """Evaluates the signals of one joint on the rows with a measured deflection."""
     j = joint - 1
     rows = np.isfinite(measured)
     q, dq, sign = (values[rows, j] for values in (now.q, now.dq, now.sign))

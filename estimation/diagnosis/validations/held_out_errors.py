@@ -201,6 +201,7 @@ def _joints(member: FittedEffect) -> list[int]:
 
 
 def _rise(unseen: HeldOutErrors, i: int, member: FittedEffect) -> float:
+    """Returns the error with a member over the error without it, on all joints on which it acts."""
     joints = list(member.group.joints)
     before, after = (float(np.sum(unseen.nrmse(model)[joints] ** 2)) for model in (i + 1, len(unseen.errors) - 1))
     return float(np.sqrt(after / max(before, 1e-300)))
@@ -215,6 +216,7 @@ def _on_logs(
     pull: GaussianPrior,
     gone: frozenset[int],
 ) -> tuple[HeldOutErrors, list[Situation], Recording, int, list[Array]]:
+    """Computes the errors on held-out logs, and the states and columns of the members there."""
     recording = problem.recording
     travel = np.max([np.ptp(recording.q[run], axis=0) for run in recording.runs], axis=0)
     other = subtract_known_payload(

@@ -43,7 +43,7 @@ def validate(
     by_reversals = {found.effect.hypothesis.name for found in whole.named if found.effect.group.by_reversals}
 
     def is_beyond(member: FittedEffect) -> bool:
-        """Whether held-out logs cannot test an effect, such as a contact that occurred in the fitted logs only."""
+        """Whether held-out data cannot test an effect: identified from reversals, or present in fitted logs only."""
         effect = member.hypothesis.effect
         if effect.name in by_reversals:
             return True
