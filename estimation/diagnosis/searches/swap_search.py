@@ -39,9 +39,9 @@ def refine_with_swaps(
     """Refines each member beside the others, replaces it by a better rival, and drops members without BIC gain.
 
     Effects that the torque shows by itself stay. A member with the same gain as at its last comparison is not compared
-    again, except with rivals that act on a joint of the newest member where it does not act itself. The newest member
-    may have explained there what such a rival would. The best of these rivals is also tried with the others refined
-    beside it.
+    again. Exceptions are rivals that act on a joint of the newest member on which the compared member does not act: the
+    newest member may have explained there what the rival would. The best of these rivals is also tried with the others
+    refined beside it.
 
     Args:
         problem: whitened data.
