@@ -12,7 +12,10 @@ def state_verdict(verdict: str, findings: Sequence[Finding]) -> str:
 
     Args:
         verdict: ``none``, ``named``, ``ambiguous`` or ``unexplained``.
-        findings: all of the diagnosis.
+        findings: all findings of the diagnosis.
+
+    Returns:
+        One line of text.
     """
     joints: dict[str, list[int]] = {}
     for finding in findings:
@@ -40,5 +43,5 @@ _VERDICTS = {
 
 
 def format_p_value(value: float) -> str:
-    """Writes a p-value with three decimals, or its bound."""
+    """Formats a p-value with three decimals, or as ``< 0.001``."""
     return f"{value:.3f}" if value >= 0.001 else "< 0.001"
