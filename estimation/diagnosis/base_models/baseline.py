@@ -30,7 +30,6 @@ ROUNDS = 3
 FAINT = 1e-7
 # A width is fitted if the rows that count contain this share of the squared derivative with respect to it.
 SHOWN = 1e-3
-CHUNK = 4096
 
 
 @dataclass(frozen=True, eq=False)

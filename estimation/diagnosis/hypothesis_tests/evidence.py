@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, RARE_ODDS
+
 
 @dataclass(frozen=True)
 class Evidence:
@@ -27,7 +29,12 @@ class Evidence:
         """Decrease of the Bayesian information criterion (Schwarz 1978); larger is better."""
         return self.chi2 - self.degrees * math.log(self.rows) - self.prior
 
-    @property
-    def excess(self) -> float:
-        """Chi-square minus its mean in pure noise; not negative."""
-        return max(self.chi2 - self.degrees, 0.0)
+
+def is_close_rival(rare: bool, worse: float) -> bool:
+    """Whether a rival fits about as well: by the data alone, without its prior penalty, if it is rare.
+
+    Args:
+        rare: whether robots seldom have the rival.
+        worse: by how much its BIC is worse.
+    """
+    return worse < (RARE_ODDS if rare else CLOSE_RIVAL_BIC)

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN, MIN_WINDOW_GAIN
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
 from estimation.diagnosis.hypothesis_tests.time_windows import best_window
 from robots.common.parallel import threaded

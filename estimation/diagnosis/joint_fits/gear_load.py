@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN, MIN_GEAR_LOAD
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, set_bic_gain
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine, set_bic_gain
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from robots.terms.effect_bases.gear_load import ExtraGearLoad, LoadPath, LoadSource
 from robots.terms.effects import EFFECTS

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, climb
+from estimation.diagnosis.hypothesis_tests.refinement import climb
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from robots.common.stretches import spans
 

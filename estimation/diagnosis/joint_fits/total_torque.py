@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
 from estimation.diagnosis.base_models.priors import solve_least_squares, solve_map
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.joint_fits.extended_fit import dense, reversal_columns
 from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short
 from estimation.diagnosis.recordings.recording import Recording

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from estimation.diagnosis.experiment_plans.detection_limits import Limit, summarise_limits
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
 from estimation.diagnosis.findings import Finding, list_parameters, read_finding
-from estimation.diagnosis.results.verdict_text import format_p_value, state_verdict
+from estimation.diagnosis.results.verdict_text import close_rivals, format_p_value, state_verdict
+from estimation.diagnosis.simulations.simulation_result import Simulation, read_simulation
 from estimation.diagnosis.validations.prediction_settings import all_row_errors
-from estimation.diagnosis.validations.simulation_result import Simulation, read_simulation
 from estimation.models.model import Model, load_model
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
@@ -133,8 +133,7 @@ class Diagnosis:
                 lines.append(f"    95 % intervals: {list_parameters(known)}")
             if open_ := [parameter.text for parameter in parameters if not parameter.determined]:
                 lines.append(f"    not well determined by these logs: {list_parameters(open_)}")
-            close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]
-            if close:
+            if close := close_rivals(finding):
                 lines.append(f"    cannot be distinguished from (BIC difference): {', '.join(close)}")
         before, after, every = (
             " ".join(f"{100 * value:.2f}" if np.isfinite(value) else "-" for value in errors)

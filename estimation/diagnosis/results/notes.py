@@ -18,8 +18,8 @@ from estimation.diagnosis.calibration import (
 from estimation.diagnosis.experiment_plans.detection_limits import STILL
 from estimation.diagnosis.experiment_plans.undetectable_springs import undetectable_springs
 from estimation.diagnosis.findings import Finding
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.recordings.recording import cut_recording
 from estimation.diagnosis.validations.changes import Change, ChangedFinding
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult

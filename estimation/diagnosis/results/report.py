@@ -26,11 +26,11 @@ from estimation.diagnosis.results.notes import (
 from estimation.diagnosis.results.wording import no_part, word_finding
 from estimation.diagnosis.searches.search import Search
 from estimation.diagnosis.searches.selection import SelectedEffect
+from estimation.diagnosis.simulations.held_out_simulation import simulate_held_out
 from estimation.diagnosis.validations.decision import Decision, Reason
 from estimation.diagnosis.validations.extended_model import ExtendedModel
 from estimation.diagnosis.validations.gain_intervals import HeldOutErrors
 from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance
-from estimation.diagnosis.validations.held_out_simulation import simulate_held_out
 from estimation.diagnosis.validations.held_out_validation import ValidatedFindings
 from estimation.diagnosis.validations.name_comparison import ComparedNames
 from estimation.diagnosis.validations.prediction_settings import all_row_errors

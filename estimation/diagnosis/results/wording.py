@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import MAX_RELATIVE_ERROR, MAX_TIME_ERROR
 from estimation.diagnosis.findings import Finding, Gain, Parameter
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.joint_fits.extended_fit import ExtendedFit
 from estimation.diagnosis.searches.selection import SelectedEffect
 from robots.robot import Robot

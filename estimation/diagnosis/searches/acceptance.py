@@ -8,12 +8,12 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence, shared_coefficient_gain
-from estimation.diagnosis.hypothesis_tests.log_noise_levels import profile_gain
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
 from estimation.diagnosis.hypothesis_tests.shocks import gain_beside_shock
+from estimation.diagnosis.searches.log_noise_levels import profile_gain
 
 # Time [s] before and after an impact of another effect in which the drives respond to it; share of the rows from which
 # such times no longer count as impacts; share of a delay that the other rows must show.

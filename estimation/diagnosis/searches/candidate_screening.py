@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimation.diagnosis.calibration import MAX_CANDIDATES, MIN_CANDIDATE_GAIN
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scan import Outcome, Scan
 from robots.terms.effects import Effect
 

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import MIN_BASE_CHANGE, MIN_EFFECT_CHANGE, MIN_NOISE_CHANGE, MIN_SLOW_NOISE_CHANGE
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.gear_load import NO_GEAR_LOAD, GearLoad, find_gear_load

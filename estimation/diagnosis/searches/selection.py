@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from itertools import compress
 
 from estimation.diagnosis.calibration import MAX_EFFECTS, MIN_CANDIDATE_GAIN
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, refine
-from estimation.diagnosis.hypothesis_tests.scan import Entry, Scan, measure, scan
-from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
+from estimation.diagnosis.hypothesis_tests.refinement import refine
+from estimation.diagnosis.hypothesis_tests.scan import Entry, measure, scan
+from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.event_window import refit_event_window
 from estimation.diagnosis.joint_fits.total_torque import with_total_torque
 from estimation.diagnosis.searches.acceptance import (
@@ -52,18 +53,12 @@ class Selection:
     Attributes:
         found: selected effects, the strongest first.
         visible_in_torque: effects that the logged torque shows by itself, such as clipping.
-        first: scan without effects.
-        last: scan beside the selected effects.
-        accepted: the selected effects, joined.
         strongest_unaccepted: next significant effect, which formula errors of the selected effects can explain; None
             without one.
     """
 
     found: tuple[SelectedEffect, ...]
     visible_in_torque: frozenset[Hypothesis]
-    first: Scan
-    last: Scan
-    accepted: Accepted
     strongest_unaccepted: FittedEffect | None = None
 
 
@@ -95,12 +90,10 @@ def select(
     spurned: set[Hypothesis] = set()
     visited = [seen]
     won: dict[Hypothesis, float] = {}
-    first: Scan | None = None
     slight: FittedEffect | None = None
     while True:
         accepted = accept(problem, tuple(member.group for member in members))
         result = scan(problem, entries, accepted)
-        first = first or result
         if len(members) == MAX_EFFECTS or not result.outcomes:
             break
         chances = {o.hypothesis: result.p_value(o) for o in result.outcomes}
@@ -161,9 +154,7 @@ def select(
         or is_accepted(problem, f.effect, f.p_value, [*members[:i], *members[i + 1 :]], false_alarm)
     ]
     order = sorted(kept, key=lambda f: -f.effect.gain)
-    last = result if members else first
-    joined = accept(problem, tuple(f.effect.group for f in order))
-    return Selection(tuple(order), frozenset(seen), first, last, joined, slight)
+    return Selection(tuple(order), frozenset(seen), slight)
 
 
 def with_rivals(problem: Problem, entries: Sequence[Entry], selection: Selection) -> Selection:

@@ -7,14 +7,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but, set_bic_gain
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import (
-    FittedEffect,
-    accept_all_but,
-    refine,
-    set_bic_gain,
-)
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry, Outcome, scan
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from estimation.diagnosis.joint_fits.total_torque import with_total_torque

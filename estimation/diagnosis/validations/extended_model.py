@@ -8,8 +8,8 @@ import numpy as np
 
 from estimation.diagnosis.base_models.prepared_logs import PreparedLogs
 from estimation.diagnosis.findings import Gain
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.joint_fits.extended_fit import ExtendedFit, fit_extended
 from estimation.diagnosis.validations.decision import Decision, Reason
 from estimation.diagnosis.validations.gear_compliance import EFFECT as ELASTICITY

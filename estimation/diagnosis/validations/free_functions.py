@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from estimation.diagnosis.calibration import FREE_P_VALUE, MAX_FREE_FUNCTIONS, MIN_BIC_GAIN, MIN_FREE_SHARE
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry, scan
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 
@@ -56,24 +57,3 @@ def free_functions(
         members.append(member)
         p_values.append(p)
     return members, p_values
-
-
-def strongest_pattern(
-    problem: Problem,
-    patterns: Sequence[Entry],
-    named: Sequence[FittedEffect],
-    false_alarm: float,
-) -> tuple[FittedEffect, float] | None:
-    """Returns the strongest free function beside named effects, and its p-value.
-
-    Args:
-        problem: whitened data.
-        patterns: candidate free functions, measured.
-        named: named effects in the model.
-        false_alarm: largest p-value of a free function.
-
-    Returns:
-        The free function and its p-value; None if none is significant.
-    """
-    members, p_values = free_functions(problem, patterns, named, false_alarm, alone=True)
-    return (members[0], p_values[0]) if members else None

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from estimation.diagnosis.base_models.payload_and_gravity import base_regressor, subtract_known_payload
 from estimation.diagnosis.calibration import MIN_JOINT_GAIN, ONE_LOG_ENERGY
 from estimation.diagnosis.findings import Gain
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.shrinkage import effects_prior
 from estimation.diagnosis.joint_fits.total_torque import effect_columns

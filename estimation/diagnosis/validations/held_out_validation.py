@@ -23,8 +23,8 @@ from estimation.diagnosis.calibration import (
     REJECT_RMSE_RATIO,
 )
 from estimation.diagnosis.findings import Gain
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations.changes import Change, ChangedFinding
 from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance

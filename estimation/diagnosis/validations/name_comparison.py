@@ -10,15 +10,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from estimation.diagnosis.calibration import (
-    CLOSE_RIVAL_BIC,
     MIN_BIC_GAIN,
     MIN_EXPLAINED_SHARE,
     MIN_RETAINED_CHI2,
     NEARLY_EXPLAINED_SHARE,
-    RARE_ODDS,
 )
+from estimation.diagnosis.hypothesis_tests.evidence import is_close_rival
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, set_bic_gain
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine, set_bic_gain
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
 from estimation.diagnosis.searches.selection import SelectedEffect, Selection
@@ -34,7 +34,7 @@ class ComparedNames:
         free_functions: functions that explain the rest, each measured beside those before it; empty if the named
             effects explain enough.
         p_values: p-values of the free functions.
-        explained: share of the significant residual that the selected effects explain.
+        explained: share of the significant residual that the named effects explain.
     """
 
     named: tuple[SelectedEffect, ...]
@@ -57,22 +57,22 @@ def compare_with_free_functions(
     Returns:
         The named effects that are kept, and the free functions for the rest.
     """
-    found = [found.effect for found in selection.found]
-    left, p_values = free_functions(problem, patterns, found, false_alarm, alone=True)
-    share = _share(selection.accepted.gain, left)
     kept = _plausible(problem, selection.found)
     while (worst := _outperformed(problem, kept, patterns, false_alarm)) is not None:
         kept.remove(worst)
-    if len(kept) < len(found):
-        left, p_values = free_functions(problem, patterns, [f.effect for f in kept], false_alarm, alone=True)
-    while _share(accept(problem, tuple(f.effect.group for f in kept)).gain, left) < MIN_EXPLAINED_SHARE:
+    while True:
+        names = [found.effect for found in kept]
+        left, p_values = free_functions(problem, patterns, names, false_alarm, alone=True)
+        explained = accept(problem, tuple(name.group for name in names)).gain
+        total = explained + sum(member.excess_chi2 for member in left)
+        share = explained / total if total > 0 else 1.0
+        if share >= MIN_EXPLAINED_SHARE:
+            return ComparedNames(tuple(kept), (), (), share)
         # An effect may have been selected for part of an unexplained error that acts on other joints, too.
         borrowed = [f for f in kept if not _retains_gain(problem, f.effect, [*_others(kept, f), *left])]
         if not borrowed:
             return ComparedNames(tuple(kept), tuple(left), tuple(p_values), share)
         kept.remove(min(borrowed, key=lambda f: f.effect.gain))
-        left, p_values = free_functions(problem, patterns, [f.effect for f in kept], false_alarm, alone=True)
-    return ComparedNames(tuple(kept), (), (), share)
 
 
 def has_close_rivals(found: SelectedEffect) -> bool:
@@ -81,15 +81,7 @@ def has_close_rivals(found: SelectedEffect) -> bool:
     Args:
         found: selected effect with its rivals.
     """
-    return any(
-        worse < (RARE_ODDS if rival.hypothesis.effect.rare else CLOSE_RIVAL_BIC) for rival, worse in found.rivals
-    )
-
-
-def _share(explained: float, left: Sequence[FittedEffect]) -> float:
-    """Returns the explained share of the significant residual, if these functions explain the rest."""
-    total = explained + sum(member.excess_chi2 for member in left)
-    return explained / total if total > 0 else 1.0
+    return any(is_close_rival(rival.hypothesis.effect.rare, worse) for rival, worse in found.rivals)
 
 
 def _others(kept: Sequence[SelectedEffect], found: SelectedEffect) -> list[FittedEffect]:

@@ -8,9 +8,9 @@ from functools import partial
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
 from estimation.diagnosis.base_models.prepared_logs import PreparedLogs
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scan import measure
 from estimation.diagnosis.recordings.recording import cut_recording
 from estimation.diagnosis.validations.equivalent_shapes import complete_effects, equivalent_shapes

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.findings import Finding, Gain, Parameter
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.results.wording import _parameters, _roughly, _stopped, _when, no_part
 from estimation.models.extension import Extension
 from robots.robot import Robot

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.recordings.recording import Recording, cut_recording
-from estimation.diagnosis.validations.simulation_result import Curves, Simulation
+from estimation.diagnosis.simulations.simulation_result import Curves, Simulation
 from robots.plants.closed_loop import Driven, Loop, Reference, Tangent, drive
 from robots.regressor import TorqueModel
 from robots.terms.discrepancies.patterns import PREFIX

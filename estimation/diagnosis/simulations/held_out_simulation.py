@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.priors import solve_map
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
-from estimation.diagnosis.validations.forward_simulation import FittedRobot, simulate_both
+from estimation.diagnosis.simulations.forward_simulation import FittedRobot, simulate_both
+from estimation.diagnosis.simulations.simulation_result import Simulation
 from estimation.diagnosis.validations.gain_intervals import model_columns
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult, found_in_one_log_only, split_runs
-from estimation.diagnosis.validations.simulation_result import Simulation
 
 Array = NDArray[np.float64]
 
