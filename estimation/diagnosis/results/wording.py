@@ -56,7 +56,8 @@ def word_finding(
     if joint is not None:
         units = {"force": force_unit(robot, joint - 1), "length": length_unit(robot, joint - 1)}
     parameters = _parameters(robot, member, fitted, i, known)
-    sentence = _when(hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units), parameters)
+    sentence = hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units)
+    sentence += _uncertain_times(parameters)
     if hypothesis.effect.undetermined_text and not known[: len(extension.coefficients)].any():
         sentence = hypothesis.effect.undetermined_text.format(joint=joint)
     pattern = hypothesis.name if hypothesis.name.startswith(PREFIX) else ""
@@ -79,18 +80,16 @@ def word_finding(
     )
 
 
-def _when(sentence: str, parameters: Sequence[Parameter]) -> str:
-    """Replaces an uncertain change time by its interval, and an uncertain push by its minimum duration."""
+def _uncertain_times(parameters: Sequence[Parameter]) -> str:
+    """States what the logs leave open of the time of a change or of a push; begins with a space, or is empty."""
+    text = ""
     for own in parameters:
         if own.name == "change_time" and not own.determined and np.isfinite(own.ci95).all():
-            between = f"between t = {own.ci95[0]:.1f} and {own.ci95[1]:.1f} s"
-            sentence = sentence.replace(f"at t = {own.value:.2f} s", between)
-    spell = {own.name: own for own in parameters if own.name in ("start", "duration")}
-    if len(spell) == 2 and not all(np.isfinite(own.ci95).all() for own in spell.values()):
-        start, duration = (spell[name].value for name in ("start", "duration"))
-        least = f"at least from t = {start:.1f} to {start + duration:.1f} s"
-        sentence = sentence.replace(f"from t = {start:.2f} s for {duration:.2g} s", least)
-    return sentence
+            text += f" The time of the change is uncertain: between t = {own.ci95[0]:.1f} and {own.ci95[1]:.1f} s."
+    times = [own for own in parameters if own.name in ("start", "duration")]
+    if len(times) == 2 and not all(np.isfinite(own.ci95).all() for own in times):
+        text += " It may have begun earlier or ended later."
+    return text
 
 
 def no_part(finding: Finding) -> Finding:
