@@ -1,8 +1,8 @@
 """Interface of effects beyond the base model.
 
-A term of `robots.terms` belongs to every robot's model. An effect is what a robot may have besides: it acts on one
-joint or on the whole robot, is linear in a few coefficients once its shape is given, and may depend on the past. The
-plant plays it, the diagnosis looks for it, an extended model carries it: all by the same columns.
+A term of `robots.terms` is part of every robot's model. An effect is an optional addition to it. It acts on one joint
+or on the whole robot, is linear in a few coefficients once its shape is given, and may depend on past motion. The
+plant, the diagnosis and an extended model all evaluate the same columns.
 """
 
 from __future__ import annotations
@@ -33,30 +33,31 @@ class Effect(ABC):
         whole_robot: whether it acts on the robot as a whole; its joint is then None.
         rare: whether it is considered last, because it resembles a common effect and is rare on robots.
         depends_on: ``state`` if the same motion always shows it, ``time`` if it starts, ends or builds up.
-        has_thermal_memory: whether the motion before a log still acts in it, through heat.
-        transient: whether it belongs to the logs in which it was found, and may be absent or different in others.
+        has_thermal_memory: whether motion before a log still influences it, through stored heat.
+        transient: whether it is specific to the logs in which it was found, and may be absent or different in others.
         shared_coefficient: whether all joints share one coefficient; the joints' estimates must then agree.
-        lags: whether its coefficient is a time, which reversals determine only as well as their own times are known.
+        lags: whether its coefficient is a delay. Reversals determine it only as accurately as their times are known.
         acts_at_reversals: whether it acts at velocity reversals; an error in the reversal's time resembles it.
-        acceleration_driven: whether changes of acceleration cause it. These are largest, and known least, at reversals.
+        acceleration_driven: whether changes of acceleration cause it. These are largest, and least accurately known,
+            at reversals.
         independent_of_acceleration: whether its torque does not depend on accelerations. It is then searched above
             their frequency band as well.
         needs_full_rate: whether its torque may change within a few samples, other than by the sign of a velocity. In
             thinned logs it is evaluated before the thinning.
-        exogenous: whether it causes the motion instead of depending on it; no base model is fitted to such data.
+        exogenous: whether it excites the arm but does not depend on its motion; no base model is fitted to such data.
         smooths_friction_sign: whether it makes friction change sign later or gradually. The sharpness of the sign is
             then fitted together with it.
-        oscillates_over_range: whether it rises and falls over the joint's range, as a local fault does once.
+        oscillates_over_range: whether it rises and falls several times over the joint's range.
         loads_gear: whether its torque loads the gears, so that load-dependent effects depend on it.
         preloads: whether its constant part is in the base model's offset.
         depends_on_gear_load: whether it depends on the load of the gears.
         acts_on_total_torque: whether it acts on the total torque, including other effects (`Situation.beyond`).
-        distorts: whether it distorts the torque reading of its joint as a function of that torque. The base model
-            follows such readings, so both are fitted together. A `StaticJointEffect`.
+        distorts: whether it distorts the torque reading of its joint as a function of that torque. The distortion
+            biases the base model, so both are fitted together. The effect must be a `StaticJointEffect`.
         undetermined_text: the finding's sentence if the logs determine none of its coefficients; empty by default.
         shapes: the parameters in which the columns are not linear.
         rivals: effects that resemble it, the closest first.
-        experiments: kinds of experiment that separate it from them, the best first.
+        experiments: kinds of experiment that separate it from its rivals, the best first.
     """
 
     name: ClassVar[str]
@@ -90,25 +91,29 @@ class Effect(ABC):
         """Describes the k linear coefficients, in the order of the columns."""
 
     def unused(self, shape: tuple[float, ...]) -> frozenset[int]:
-        """Gives the shape parameters without influence at these values."""
+        """Returns the indices of the shape parameters that have no influence at these values."""
         return frozenset()
 
     def described(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[Coefficient, ...]:
-        """Describes the coefficients at given shape values; an unused one has no name."""
+        """Describes the coefficients at given shape values; an unused coefficient has an empty name."""
         return self.parameters(robot, joint)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
-        """Gives the range of each coefficient at given shape values; by default as in `parameters`."""
+        """Returns the range of each coefficient at given shape values; by default that of `parameters`."""
         return tuple((coefficient.lower, coefficient.upper) for coefficient in self.parameters(robot, joint))
 
     def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
-        """Lists coefficients and shapes of the same quantity, with the standard deviation of their difference."""
+        """Lists pairs of a coefficient and a shape parameter that describe the same quantity.
+
+        Each entry is the coefficient's index, the shape parameter's index, and the standard deviation of their
+        difference.
+        """
         return ()
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
-        """Whether these values are physically plausible, for a shape if it is given.
+        """Returns whether these values are physically plausible, for a shape if it is given.
 
-        A value at its limit would be larger without the limit, and one below its least size is not significant.
+        A value at its limit is not: without the limit it would lie beyond. Nor is a value below its least size.
         """
         described = self.parameters(robot, joint)
         limits = [(c.lower, c.upper) for c in described]
@@ -125,7 +130,7 @@ class Effect(ABC):
         """Evaluates the torque per unit of each coefficient.
 
         Args:
-            situation: what the robot did (N samples).
+            situation: the motion and the base model's torque (N samples).
             joint: where the effect acts, counted from 1; None for the whole robot.
             shape: one value per entry of `shapes`.
 
@@ -165,7 +170,7 @@ class Effect(ABC):
         return tuple(points)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Gives the range in which each shape parameter is refined on these data; a point for a choice."""
+        """Returns the range in which each shape parameter is refined; a single point if it has only few choices."""
         return tuple(shape.choices[:1] * 2 if shape.choices else (shape.lower, shape.upper) for shape in self.shapes)  # type: ignore[misc]
 
     def likely(
@@ -173,8 +178,8 @@ class Effect(ABC):
     ) -> tuple[tuple[float | None, ...], ...]:
         """Lists usual design values near a refined shape, such as whole numbers of waves per turn.
 
-        Their parameters do not count as fitted, nor those that follow from the coefficients (k,). A parameter given as
-        None keeps its refined value and counts as fitted.
+        A parameter with a usual value, or with one that follows from the coefficients (k,), does not count as fitted.
+        A parameter given as None keeps its refined value and counts as fitted.
         """
         return ()
 
@@ -188,67 +193,72 @@ class Effect(ABC):
         return ()
 
     def open_edges(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
-        """Lists shapes in which the effect continues beyond a refined shape whose formula holds only locally.
+        """Lists neighbouring shapes that test whether an event starts earlier or ends later than its refined shape.
 
-        Each comes with the index of the shape parameter that is then undetermined.
+        It applies to effects whose formula holds only locally. Each shape comes with the index of the shape parameter
+        that is undetermined if the effect continues there.
         """
         return ()
 
     def sustained_shapes(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
-        """Lists shapes whose formula holds for the whole duration, if that of a refined shape holds only locally.
+        """Lists shapes whose formula holds for a long duration, for a refined shape whose formula holds only locally.
 
-        They assume a permanent effect; start and duration [s] are its first two shape parameters.
+        They cover all data. Start and duration [s] are their first two shape parameters.
         """
         return ()
 
     def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists shapes that a log may not distinguish; the most likely of them is used."""
+        """Lists shapes between which a log may not distinguish; the most likely one is used."""
         return ()
 
     def leakage(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
-        """Gives the fraction of the effect on a joint (from 0) that its formula may leave unexplained.
+        """Returns the fraction of the effect on a joint (from 0) that its formula may leave unexplained.
 
-        This remainder must not count as another effect, because formulas hold to some per cent only.
+        Formulas are accurate to some per cent only, so this remainder must not count as another effect.
         """
         return 0.08
 
     def acts_on(self, robot: Robot, joint: Place) -> tuple[int, ...]:
-        """Lists the joints, counted from 0, whose torque the effect can change: the rows of `columns` not all zero."""
+        """Lists the joints, counted from 0, whose torque the effect can change."""
         return tuple(range(robot.n))
 
     def propose(
         self, situation: Situation, joint: Place, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Lists the points of `grid` that are worth scanning on a residual (N, n), the best first.
+        """Lists the points of `grid` to scan on a residual, the best first.
 
-        The residual is weighted by the noise, so that its product with an effect's torque is the explained part per
-        unit [1/(N m) or 1/N]; zero where a joint rests.
+        By default these are all points. An effect with a fast way to rank them overrides this. The ranking is itself a
+        search, so a false-alarm control must repeat it on every null log.
 
-        All of them, unless the effect knows a fast way to rank them. The ranking is a search: a false-alarm control
-        must repeat it on every null log.
+        Args:
+            situation: the motion and the base model's torque (N samples).
+            joint: where the effect would act.
+            residual: (N, n) [1/(N m) or 1/N], weighted by the noise so that its product with an effect's torque
+                measures the explained part; zero where a joint rests.
+            count: the number of points to keep, if the effect ranks them.
         """
         return self.grid(situation, joint)
 
     def complete(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[float, ...]:
-        """Adds the optional shape parameters to a start of the search; the result may be reported without them."""
+        """Adds start values of the optional shape parameters to a shape; they may be dropped again after the search."""
         return shape
 
     def gate(self, situation: Situation, joint: Place, measured: Array) -> NDArray[np.bool_] | None:
-        """Flags the samples (N, n) that this effect makes useless as torque measurements; None for no such effect.
+        """Flags the samples (N, n) that this effect makes useless as torque measurements; None for most effects.
 
         Args:
-            situation: what the robot did.
+            situation: the motion and the base model's torque.
             joint: where the effect would act.
             measured: torque as logged (N, n) [N m or N].
         """
         return None
 
     def chance(self, situation: Situation, joint: Place, measured: Array) -> float:
-        """Gives the probability that the logged torque (N, n) shows this effect by chance; 1 for most effects."""
+        """Returns the probability that the logged torque (N, n) shows this effect by chance; 1 for most effects."""
         return 1.0
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the axis on which the effect shows in a picture: its label with unit, and the values (N,)."""
+        """Returns the horizontal axis of the effect's plot: its label with unit, and the values (N,)."""
         return "time [s]", situation.t
 
 
@@ -260,7 +270,7 @@ class JointEffect(Effect):
         """Evaluates the torque (N, k) of the joint per unit of each coefficient."""
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Places `local` into the joint's row."""
+        """Evaluates the torque (N, n, k): `local` in the joint's row, zero on all other joints."""
         assert joint is not None
         block = self.local(situation, joint, shape)
         X = np.zeros((len(situation), situation.robot.n, block.shape[1]))
@@ -268,7 +278,7 @@ class JointEffect(Effect):
         return X
 
     def acts_on(self, robot: Robot, joint: Place) -> tuple[int, ...]:
-        """Names the joint itself."""
+        """Returns the joint itself, counted from 0."""
         assert joint is not None
         return (joint - 1,)
 
