@@ -31,11 +31,11 @@ class LoadStribeck(StaticJointEffect):
     experiments: ClassVar[tuple[str, ...]] = ("payload", "sweep")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the share of the load."""
+        """Describes the break-away friction per load."""
         return (Coefficient("share_of_load", "1"),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists velocities, by factors of 3, up to half the fastest."""
+        """Lists Stribeck velocities, spaced by factors of about 3, up to half the largest speed."""
         assert joint is not None
         slow, top = moving_speed(situation, joint)
         if top == 0.0:
@@ -66,6 +66,6 @@ class LoadStribeck(StaticJointEffect):
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the velocity."""
+        """Returns the velocity."""
         assert joint is not None
         return f"velocity of joint {joint} [rad/s]", situation.dq[:, joint - 1]
