@@ -217,8 +217,8 @@ def _loop_error(ride: Ride, unforeseen: np.ndarray, inertia: np.ndarray) -> list
                 real = v - s
                 slow = (f2 + f3 * abs(real) + f4 * real * real) * real / m
                 x = c * v - s - h * (d + slow - w2 * (e + h * s / 2))
-                # Solve c v' + g tanh(v' / width) = x for the joint's new velocity v'. From the solution with a piecewise
-                # linear sign, Newton's steps converge from one side, because the curvature of tanh has one sign there.
+                # Solve c v' + g tanh(v' / width) = x for the joint's new velocity v'. From the solution with a linear
+                # ramp for tanh, Newton's steps converge from one side, because tanh has one sign of curvature there.
                 real = x / (c + g / width) if abs(x) <= c * width + g else (x - g if x > 0 else x + g) / c
                 if abs(real) < NEAR_STILL * width:
                     for _ in range(NEWTON_STEPS):
