@@ -1,4 +1,4 @@
-"""Stands for the measurement of which names unseen data bear out: members, and what is shown of them."""
+"""Replacement for held-out measurements in tests: effects, and the result that is measured for each."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from robots.terms.effects import EFFECTS
 
 @dataclass(frozen=True)
 class Shown:
-    """What unseen data say of a member: its gain's interval, its rise, shares kept and spoken for, its joint astray."""
+    """The held-out result of an effect: interval of its gain, RMSE ratio, retained gain, support, reliability of its joint."""
 
     low: float = 0.001
     high: float = 0.003
@@ -37,9 +37,9 @@ HELPS, IDLE, HARMS = Shown(), Shown(-0.001, 0.002, 1.0), Shown(-0.004, -0.001, 1
 
 @dataclass
 class Bench:
-    """Stands for the measurement: what each label shows, also beside certain others or gone, and what it was asked.
+    """Replacement for the measurement: results per label, also beside other effects or after removal, and a record of calls.
 
-    On some joints several members together have an extra error beyond what each brings beside the others.
+    On some joints, several effects together have an additional error.
     """
 
     shows: dict[str, Shown]
@@ -72,7 +72,7 @@ class Bench:
         )
 
     def _left(self, members: Sequence[FittedEffect], shown: Sequence[Shown], model: int) -> np.ndarray:
-        """Errors of the base model (0) and of all members together (-1) on each of eight joints."""
+        """Returns the errors of the base model (0) and of all effects together (-1) on each of eight joints."""
         error = np.full(8, 0.03)
         for member, what in zip(members, shown, strict=True) if model else ():
             if member.hypothesis.joint is not None:
@@ -83,12 +83,12 @@ class Bench:
 
 
 def label_of(member: FittedEffect) -> str:
-    """What a bench knows a member by: its hypothesis, and its shape if it has one."""
+    """Returns the label by which a bench identifies an effect: its hypothesis, and its shape if it has one."""
     return member.hypothesis.label + (f" {member.shape}" if member.shape else "")
 
 
 def member_of(name: str, joint: int | None) -> FittedEffect:
-    """A member by the name of its effect or pattern, which nothing was fitted to."""
+    """Builds an unfitted effect by the name of a catalogue effect or pattern."""
     effect = EFFECTS.get(name) or build_pattern(name)
     assert effect is not None
     return FittedEffect(Hypothesis(effect, joint), (), None, 100.0, np.zeros(1), 1, 1.0)  # type: ignore[arg-type]
@@ -105,7 +105,7 @@ LABELS = {m.hypothesis.name: m.hypothesis.label for m in (SPRING, STRIBECK, PRES
 
 
 def bench_with(**shows: Shown) -> Bench:
-    """Members by the names of their effects; what is not listed helps."""
+    """Builds a bench with results by the effects' names; all others help."""
     return Bench(
         {label: shows.get(name.split(":")[1] if ":" in name else name, HELPS) for name, label in LABELS.items()}
     )
@@ -122,7 +122,7 @@ def validated(
     worths: Mapping[FittedEffect, float] | None = None,
     unnamed: tuple[FittedEffect, float] | None = None,
 ) -> ValidatedFindings:
-    """What unseen data as a bench shows them bear out of names and free functions."""
+    """Validates named effects and free functions on the held-out results of a bench."""
     compared = ComparedNames(founds, tuple(free), tuple(p_values), 1.0)
     for found in founds:
         for member in (found.effect, *(rival for rival, _ in found.rivals)):

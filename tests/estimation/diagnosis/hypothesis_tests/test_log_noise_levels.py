@@ -1,4 +1,4 @@
-"""Specification of gains where logs differ in noise, and of the hand that moved a pendulum."""
+"""Tests of gains when logs differ in noise, and of hand guiding on a real pendulum."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STEP = 0.004
 
 
 def test_the_profile_is_that_of_least_squares_with_a_level_for_each_log():
-    """Twice the log-likelihood ratio is sum N_r log(E_r / E_r'), residuals by least squares written out."""
+    """The profile gain is sum N_r log(E_r / E_r') with the squared residuals of each log from plain least squares."""
     rng = np.random.default_rng(0)
     runs = (slice(0, 400), slice(400, 1000))
     base = np.linalg.qr(rng.standard_normal((1000, 5)))[0]
@@ -52,7 +52,7 @@ def test_the_profile_is_that_of_least_squares_with_a_level_for_each_log():
 
 
 def test_logs_have_levels_of_their_own():
-    """A log with a tenth of the noise is white, of unit level, as the others are."""
+    """A log with a tenth of the noise is whitened to unit level like the others."""
     rng = np.random.default_rng(1)
     rows = 5000
     residual = rng.standard_normal((2 * rows, 2)) * [1.0, 3.0]
@@ -84,7 +84,7 @@ def test_logs_have_levels_of_their_own():
 
 @pytest.mark.slow
 def test_a_hand_that_moved_the_arm_is_found(data):
-    """Of three runs of a pendulum one was moved by hand under gravity compensation: it is named, and its time told."""
+    """In three runs of a pendulum, hand guiding in the third is named, with its time."""
     folder = data("simple_pendulum_dfki")
     logs = on_one_clock([read_log(folder / f"{name}.parquet") for name in ("ddp", "dircol", "gravity_comp")])
     said = diagnose(load_robot(folder / "simple_pendulum.urdf"), logs)
@@ -102,7 +102,7 @@ def test_a_hand_that_moved_the_arm_is_found(data):
 
 @pytest.mark.slow
 def test_logs_that_contradict_each_other_are_not_passed_over(data):
-    """Two short runs that no model fitted to one predicts in the other get a word on that, whatever the verdict."""
+    """Two short runs that contradict each other give a note, whatever the verdict."""
     folder = data("simple_pendulum_dfki")
     logs = on_one_clock([read_log(folder / f"{name}.parquet") for name in ("dircol", "gravity_comp")])
     said = diagnose(load_robot(folder / "simple_pendulum.urdf"), logs)
