@@ -22,7 +22,7 @@ from robots.terms.effects import EFFECTS
 
 @dataclass(frozen=True)
 class Shown:
-    """The held-out result of an effect: interval of its gain, RMSE ratio, retained gain, support, reliability of its joint."""
+    """Held-out result of an effect: interval of its gain, RMSE ratio, retained gain, support, reliability of its joint."""
 
     low: float = 0.001
     high: float = 0.003
@@ -37,9 +37,10 @@ HELPS, IDLE, HARMS = Shown(), Shown(-0.001, 0.002, 1.0), Shown(-0.004, -0.001, 1
 
 @dataclass
 class Bench:
-    """Replacement for the measurement: results per label, also beside other effects or after removal, and a record of calls.
+    """Replacement for the measurement: the result of each label, and a record of the calls.
 
-    On some joints, several effects together have an additional error.
+    The result may differ beside certain other effects, or after removal. On some joints, several effects together have
+    an additional error.
     """
 
     shows: dict[str, Shown]

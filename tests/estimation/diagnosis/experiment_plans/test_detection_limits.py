@@ -77,7 +77,7 @@ def test_an_effect_of_the_limits_size_has_the_energy_to_be_found(planned):
 
 
 def test_the_worst_limit_is_enough_for_each_kind_of_an_effect(planned, ur10):
-    """At the size `at_worst` each exponent of a saturation has at least the required energy, and one has exactly that."""
+    """At the size `at_worst` each exponent of a saturation has at least the required energy; one has exactly that."""
     problem, _ = planned
     effect = EFFECTS["torque_constant_saturation"]
     entries = measure(problem, [Hypothesis(effect, joint) for joint in effect.joints(ur10)])

@@ -150,7 +150,7 @@ def test_the_least_trouble_is_proposed_where_several_would_do(problem):
 
 @pytest.mark.slow
 def test_what_to_play_is_told(problem):
-    """A payload's experiment: the logged motion, once without and once with it, as files of their own would have it."""
+    """For an experiment with a payload the runs are the logged motion, first without and then with the payload."""
     causes = [_guess(problem, "torque_constant_error", 4, (), 0.02), _guess(problem, "encoder_offset", 4, (), 0.02)]
     plan = plan_next(problem, causes)
     assert len(plan.motions) == 1
@@ -198,7 +198,7 @@ def test_a_payload_is_mounted_once_however_often_the_motion_is_made(problem):
 
 @pytest.mark.slow
 def test_where_two_causes_stay_alike_the_others_are_told_apart(problem):
-    """If two causes cannot be separated, the experiment that best separates the others is proposed, and this is stated."""
+    """If two causes cannot be separated, the plan separates the others as well as possible and states this."""
     error = _guess(problem, "torque_constant_error", 2, (), 0.01)
     other = _guess(problem, "torque_constant_error", 3, (), 0.01)
     plan = plan_next(problem, [error, other, error])

@@ -53,7 +53,7 @@ def test_what_one_joint_alone_tells_is_no_common_coefficient() -> None:
 
 
 def test_reversals_tell_a_delay_no_better_than_their_moments_are_known() -> None:
-    """Information g from reversals, whose times have the error m, is reduced to 1 / (1 / g + m^2); other rows count in full."""
+    """Information g from reversals with time error m is reduced to 1 / (1 / g + m^2); other rows count in full."""
     robot = load_robot("ur10")
     t = 0.004 * np.arange(3000)
     phase = 2 * np.pi * 0.3 * t[:, None] * (1 + 0.1 * np.arange(6))

@@ -53,7 +53,7 @@ def test_a_contact_is_paid_for_by_the_rows_it_acts_on(size: float) -> None:
 
 
 def test_a_lasting_effect_is_paid_for_by_all_rows_of_its_joints() -> None:
-    """A permanent effect with the same columns has the penalty log(N joints), because rows with zeros are evidence, too."""
+    """A permanent effect with the same columns has the penalty log(N joints), because rows with zeros count, too."""
     assert _price(_member("base_tilt", None, _boxes())) == pytest.approx(np.log(2 * ROWS))
     assert _price(_member("spring", 1, _boxes()[:1])) == pytest.approx(np.log(ROWS))
 
@@ -260,7 +260,7 @@ class _More(Stribeck):
 def test_what_an_effect_is_whole_without_is_a_parameter_only_where_it_pays(
     brings: float, place: float, more: float, degrees: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An optional shape parameter is fitted if its gain exceeds the penalty ln 5000 = 8.5, else it keeps its default."""
+    """An optional shape parameter is fitted if its gain exceeds the penalty ln 5000 = 8.5, else it stays at its default."""
 
     def score(problem: object, shape: tuple[float, ...], accepted: object) -> SimpleNamespace:
         top = -1.0 + shape[1] * (np.log10(0.03) + 1.0)
