@@ -260,7 +260,7 @@ class _More(Stribeck):
 def test_what_an_effect_is_whole_without_is_a_parameter_only_where_it_pays(
     brings: float, place: float, more: float, degrees: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An optional shape parameter is fitted if its gain exceeds the penalty ln 5000 = 8.5, else it stays at its default."""
+    """An optional shape parameter is fitted if its gain exceeds the penalty ln 5000 = 8.5, else it is unused."""
 
     def score(problem: object, shape: tuple[float, ...], accepted: object) -> SimpleNamespace:
         top = -1.0 + shape[1] * (np.log10(0.03) + 1.0)

@@ -69,7 +69,7 @@ def test_a_push_at_the_log_s_end_and_what_is_no_push_have_their_errors(
 def test_a_push_on_a_moving_arm_is_told_from_its_first_to_its_last_moment(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], begin: float, end: float
 ) -> None:
-    """A constant force on the last body, found as a short pulse, gets its full window by the formula for a moving arm."""
+    """A constant force on a moving arm, found as a short pulse, gets its full window by the body's Jacobian."""
     recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     first, last = recording.t[[int(share * len(recording)) for share in (begin, end)]]
     problem = pose_arm(recording)

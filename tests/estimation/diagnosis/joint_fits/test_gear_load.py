@@ -100,7 +100,7 @@ def test_the_load_is_what_base_model_and_spring_have_together(
 def test_the_model_is_what_was_fitted_with_a_load_that_the_gear_bears(
     recording: Recording, pose_arm: Callable[..., Problem], tmp_path: Path
 ) -> None:
-    """The model's torque, also after saving, is that of base model, spring and friction, with the true friction share."""
+    """The model's torque, also after saving, is that of base model, spring and friction; the share is the true one."""
     problem = pose_arm(recording)
     found = _members(problem, SPRING, BY_LOAD)
     values, left, full = fit_jointly(problem, found)

@@ -1,4 +1,4 @@
-"""Specification of what a finding says of its parameters and of its place."""
+"""Tests of the texts and intervals of a finding's parameters."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from robots.terms.effects import EFFECTS
 def test_a_fifth_of_a_value_or_of_a_second(
     effect: str, shape: int, value: float, interval: tuple[float, float], roughly: bool
 ) -> None:
-    """A nonlinear parameter is known roughly where its interval is wider, a moment by the clock."""
+    """A nonlinear parameter is rough if its interval exceeds a fifth of its value; for a time, 0.2 s."""
     assert _roughly(EFFECTS[effect].shapes[shape], value, interval) is roughly
 
 
@@ -51,12 +51,12 @@ def test_a_fifth_of_a_value_or_of_a_second(
     ],
 )
 def test_a_size_at_its_bound_is_not_determined(effect: str, shape: int, value: float, stopped: bool) -> None:
-    """However narrow its interval is, cut at the bound as it is."""
+    """A size at its bound is not determined, for any interval."""
     assert _stopped(EFFECTS[effect].shapes[shape], value) is stopped
 
 
 def test_an_interval_holds_what_machines_may_have(arm: Robot) -> None:
-    """What the data leave open below zero is no stiffness; a value that is rough stays so, however little is left."""
+    """Intervals are cut at physical bounds, and a rough value stays rough after that."""
     hypothesis = Hypothesis(EFFECTS["stribeck"], 1)
     member = FittedEffect(hypothesis, (0.05, 1.0), None, 100.0, np.array([7.9]), 3, 1.0)  # type: ignore[arg-type]
     extension = Extension(
@@ -75,7 +75,7 @@ def test_an_interval_holds_what_machines_may_have(arm: Robot) -> None:
 
 @pytest.mark.parametrize(("error", "told"), [(0.02, True), (0.3, False)])
 def test_levers_that_are_perhaps_none_have_no_dead_centre(arm: Robot, error: float, told: bool) -> None:
-    """An angle is told, however narrow its interval, where the ratio beside it is surely more than zero."""
+    """A dead centre is determined only if the lever ratio is significantly above zero."""
     coefficients = np.array([400.0, -300.0, 0.0, 900.0])
     member = FittedEffect(Hypothesis(EFFECTS["spring"], 1), (0.3, -2.9), None, 100.0, coefficients, 6, 1.0)  # type: ignore[arg-type]
     covariance = np.diag([4.0, 3.0, 0.0, 9.0, error, 0.1]) ** 2
@@ -90,7 +90,7 @@ def test_levers_that_are_perhaps_none_have_no_dead_centre(arm: Robot, error: flo
 
 
 def test_what_is_no_part_of_the_model_says_so() -> None:
-    """A free function that errs, and a name that unseen data refuted: neither may be taken for a cause."""
+    """A rejected finding is reported as unexplained, and its text says that the model does not contain it."""
     finding = Finding(
         effect="joint_elasticity",
         joint=2,
@@ -110,12 +110,12 @@ def test_what_is_no_part_of_the_model_says_so() -> None:
 
 
 def finding_of(pattern: str, finding: Finding) -> Finding:
-    """The same as an unexplained pattern."""
+    """Returns the finding as an unexplained pattern."""
     return replace(finding, effect="unexplained", pattern=pattern)
 
 
 def test_a_gain_elsewhere_is_told_with_its_joints() -> None:
-    """What is wrong with one joint and shows on others is told on those; on its own it needs no word."""
+    """A gain on other joints than the finding's own is stated with these joints."""
     gain = Gain(nrmse_before=0.02, nrmse_after=0.01, ci95=(0.0, 0.02))
     bare: Any = {"effect": "encoder_offset", "parameters": (), "p_value": 0.0, "delta_bic": 9.0, "rivals": ()}
     bare |= {"sentence": "", "visible": 1.0}
@@ -138,14 +138,14 @@ def test_a_gain_elsewhere_is_told_with_its_joints() -> None:
     ],
 )
 def test_what_warms_up_gains_no_friction(arm: Robot, effect: str, falls: tuple[float, float], believed: bool) -> None:
-    """One kind of friction may rise while the other falls; where it rises at all speeds, it is no heat."""
+    """Coulomb or viscous friction may rise with heat, but not the total friction at all speeds."""
     shape = tuple(400.0 if own.name == "time_constant" else 0.0 for own in EFFECTS[effect].shapes)
     fast = replace(arm, limits=replace(arm.limits, velocity=np.full(arm.n, 10.0)))
     assert EFFECTS[effect].is_plausible(fast, 1, np.array(falls), shape) is believed
 
 
 def test_a_change_is_told_at_its_time_or_between_two() -> None:
-    """As well as the interval says."""
+    """A change time that is not determined is stated as an interval."""
     sentence = "The payload grew by 0.2 kg at t = 210.37 s."
     sure = Parameter(
         name="change_time", value=210.37, unit="s", standard_error=0.01, ci95=(210.3, 210.4), determined=True
@@ -157,7 +157,7 @@ def test_a_change_is_told_at_its_time_or_between_two() -> None:
 
 
 def test_a_push_whose_edges_are_not_told_lasted_at_least_so_long() -> None:
-    """Where one of start and duration may be anything; both within an interval are told as they are."""
+    """A contact whose start or duration has no interval is stated as lasting at least from start to end."""
     sentence = "Something pushed the arm from t = 43.04 s for 4 s: joint 1 felt 1.26 N m."
     start = Parameter(name="start", value=43.04, unit="s", standard_error=0.03, ci95=(42.9, 43.1), determined=True)
     duration = replace(start, name="duration", value=3.95, ci95=(3.6, 4.4))
