@@ -22,7 +22,7 @@ from robots.terms.effects import EFFECTS
 
 @dataclass(frozen=True)
 class Shown:
-    """Held-out result of an effect: its gain's interval, RMSE ratio, retained gain, support, and an unreliable joint."""
+    """Held-out result of an effect: its gain's interval, RMSE ratio, retained gain, support, unreliable joint."""
 
     low: float = 0.001
     high: float = 0.003

@@ -50,7 +50,10 @@ def stepped(arm: Robot, hidden: Callable[..., tuple[Log, Log]]) -> tuple[Diagnos
 
 @pytest.mark.slow
 def test_a_log_without_effects_has_nothing_found(arm: Robot, hidden: Callable[..., tuple[Log, Log]]) -> None:
-    """Without an effect the verdict is `none`, and the extended model is the base model; a false alarm has a chance of 1 %."""
+    """Without an effect the verdict is `none`, with the base model as the extended model.
+
+    A false alarm has a chance of 1 %.
+    """
     log, _ = hidden(None)
     result = diagnose(arm, log, candidates=SOME)
     assert result.verdict == "none"

@@ -177,7 +177,7 @@ def test_what_only_a_tilt_shows_of_an_upright_axis_is_no_spring(upright: Robot, 
 
 @pytest.mark.slow
 def test_unseen_logs_may_stand_as_none_before(upright: Robot, build: Build) -> None:
-    """A model fitted on a level base predicts a tilted one, with the description's values for what only a tilt shows."""
+    """A model fitted on a level base predicts a tilted one, with the description's values where only a tilt shows."""
     result = diagnose(upright, build(0), held_out=build(1, TILTED), candidates=SOME, friction=SIMPLE)
     assert result.verdict == "none"
     assert np.all(np.array(result.baseline) < 0.05)

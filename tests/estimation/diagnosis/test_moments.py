@@ -97,7 +97,7 @@ def test_joints_must_agree_on_a_delay(recording: Recording, posed: Callable) -> 
 def test_a_shape_left_as_assumed_may_be_where_the_likelihood_has_its_top(
     top: float, farthest: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The error of a shape parameter with its assumed value reaches all values whose gain is within 3.84 of the best."""
+    """The error of a shape value that was assumed reaches all values whose gain is within 3.84 of the best."""
 
     def gain(problem: object, member: object, shape: tuple[float, ...], others: object) -> float:
         return 30.0 - ((shape[0] - top) / 0.1) ** 2

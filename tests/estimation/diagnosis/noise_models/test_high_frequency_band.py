@@ -82,7 +82,7 @@ def test_a_ripple_tells_its_energy_over_the_noise(recording: Recording, pose_arm
 def test_the_slope_has_the_products_of_an_effect_with_the_residual(
     recording: Recording, pose_arm: Callable[..., Problem], name: str
 ) -> None:
-    """The score gradient gives the products of an effect's columns with the whitened residual, in and above the band."""
+    """The score gradient gives the products of an effect's columns with the whitened residual, also above the band."""
     problem = pose_arm(_rippled(recording), wider=MAX_HIGH_BAND_ERROR)
     hypothesis, shape = (RIPPLE, SHAPE) if name == "torque_ripple" else (Hypothesis(EFFECTS[name], 1), ())
     slope = problem.score_gradient_for(hypothesis.effect)

@@ -38,7 +38,7 @@ def test_rows_at_rest_explain_an_error_that_is_far_larger_with_them() -> None:
 
 
 def test_a_name_of_which_nothing_is_determined_is_no_more_than_likely() -> None:
-    """A finding without any determined parameter and without a significant gain is noted as the most likely cause only."""
+    """A finding without a determined parameter or a significant gain is noted as the most likely cause only."""
 
     def finding(effect: str, *determined: bool) -> Finding:
         parameters = tuple(
