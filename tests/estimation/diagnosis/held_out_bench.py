@@ -128,7 +128,7 @@ def validated(
     for found in founds:
         for member in (found.effect, *(rival for rival, _ in found.rivals)):
             worth = (worths or {}).get(member, 1.0 if member in faint else 100.0)
-            # Nothing was fitted: what is computed once from a fit is put in its place.
+            # Nothing was fitted, so the cached evidence is set directly.
             vars(member)["local_evidence"] = Evidence(worth, 0, 1.0)
 
     def beyond(member: FittedEffect) -> bool:

@@ -22,7 +22,7 @@ from robots.robot import Robot
 from robots.signals import Log
 
 SOME = ("asymmetric_friction", "friction_step", "load_dependent_friction", "stribeck", "spring", "payload_change")
-# The arm has no more: higher powers, hardly told apart by one motion, would blur the errors on another.
+# The arm has no higher powers; one motion hardly determines them, and they would add errors on another.
 SIMPLE = "coulomb-viscous"
 
 
@@ -91,7 +91,7 @@ def test_the_extended_model_predicts_an_unseen_log_as_its_file_does(
     assert whole.predicted == pytest.approx(predict(result.model, unseen).predicted)
     alone = predict(replace(model, extensions=()), unseen)
     assert whole.nrmse[1] < alone.nrmse[1]
-    # What is said of the unseen log is what a prediction of it comes to, rows about reversals included.
+    # The stated held-out error is that of a prediction, including rows near reversals.
     np.testing.assert_allclose(result.every_row, whole.nrmse, rtol=1e-9)
     np.testing.assert_allclose(result.extended, whole.nrmse, rtol=0.15)
     assert " ".join(f"{100 * value:.2f}" for value in whole.nrmse) in result.summary()
@@ -217,7 +217,7 @@ def test_unseen_motion_that_is_faster_than_friction_was_fitted_for_is_said(
     assert note.startswith("Joints 1, 2: up to 2.0 times")
     assert told(SIMPLE, unseen) == []
     assert told("polynomial", simulate(plant, replace(motion, t=2 * half + 100.0), seed=2)) == []
-    # One with a gap is two stretches.
+    # A log with a gap counts as two stretches.
     kept = np.abs(unseen.t - unseen.t.mean()) > 0.5
     torn = replace(unseen, t=unseen.t[kept], q=unseen.q[kept], tau=unseen.tau[kept])
     (note,) = told("polynomial", torn)

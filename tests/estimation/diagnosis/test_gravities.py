@@ -75,7 +75,7 @@ def test_each_log_is_evaluated_as_its_base_stood(upright: Robot, build: Build, p
         rotors = upright.rotor_inertia * motion.ddq
         assert now.rigid[run] == pytest.approx(full + rotors, abs=size)
         own = [i for i, column in enumerate(base.columns) if column.term == "rigid_body"]
-        # Of several rotors some are grouped with their links.
+        # Some rotors are grouped with their links.
         rigid = np.where([c.term in ("rigid_body", "rotor_inertia") for c in base.model.columns], parameters, 0.0)
         grouped = base.from_standard(rigid)
         assert baseline.regressor[run] @ grouped == pytest.approx(bare + rotors, abs=size)
@@ -91,7 +91,7 @@ def test_each_log_is_evaluated_as_its_base_stood(upright: Robot, build: Build, p
             gravity_fields=(light.gravities[recording.runs.index(run)],),
         )
         states = (part.q, part.dq, part.ddq)
-        # The plant has friction besides, and the mass; without bodies it would differ by the payload's torque.
+        # The plant also has friction and the payload.
         carried = plant.payload_torque(part, states)
         assert carried == pytest.approx(full - bare, abs=size)
         assert plant.base(part, states) - carried == pytest.approx(baseline.regressor[run] @ values, abs=1e-6)
@@ -133,7 +133,7 @@ def test_the_extended_model_predicts_on_the_base_as_described_and_as_tilted(
     assert {"mPx_1", "mPy_1"} <= set(model.names)
     gain = (1.0, 1.04, 1.0)
     for log in (build(3, gain=gain), build(4, TILTED, gain=gain), build(5, TILTED, MASS, gain=gain)):
-        # Noise is 0.02 N m of some 2 to 15; the rest is what smoothing leaves at reversals.
+        # Noise is 0.02 N m of some 2 to 15 N m; the rest are smoothing errors at reversals.
         assert np.all(predict(model, log).nrmse < 0.03)
 
 
@@ -171,7 +171,7 @@ def test_what_only_a_tilt_shows_of_an_upright_axis_is_no_spring(upright: Robot, 
     assert finding.effect == "base_tilt"
     told = {parameter.name: parameter.value for parameter in finding.parameters}
     assert (told["tilt_1"], told["tilt_2"]) == pytest.approx(askew[:2], abs=3e-3)
-    # The waist's own moments, and those of 6 kg on its lever.
+    # The first moments of the waist, and those of 6 kg on its lever.
     assert (told["own_moment_1"], told["own_moment_2"]) == pytest.approx((0.3 + 0.1 * 6, 0.2), abs=0.15)
 
 

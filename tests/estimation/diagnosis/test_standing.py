@@ -73,7 +73,7 @@ def test_an_unseen_log_of_one_joint_is_judged_by_that(arm: Robot, arm_log: Calla
     recording = build_recording(arm, [alone(0, 100.0)], travel=np.array([1.0, 1.0]))
     assert recording.sign_unknown[:, 1].all()
     assert found.baseline[0] < 0.05
-    assert np.isnan(found.baseline[1])  # nobody has seen its model err
+    assert np.isnan(found.baseline[1])  # its error is unknown
 
 
 def test_the_gate_asks_nothing_of_a_joint_that_stands(arm: Robot, alone: Callable[..., Log]) -> None:
@@ -110,7 +110,7 @@ def test_limits_say_that_a_push_in_a_rest_is_not_seen(arm: Robot, arm_log: Calla
     """Limits of transient effects have a note if the arm rests for some time."""
     log = arm_log(torque_noise=0.02)
     halves = np.linspace(0.0, len(log.t) - 1.0, len(log.t))
-    # Three seconds of rest in the middle, at the place where the motion is.
+    # Three seconds of rest in the middle of the motion.
     at = np.clip(np.where(halves < len(log.t) / 2, halves, np.maximum(halves - 750, len(log.t) / 2)), 0, None).astype(
         int
     )

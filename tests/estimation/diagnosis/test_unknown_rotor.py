@@ -39,7 +39,7 @@ def test_friction_by_the_load_tells_the_rotor_that_loads_no_gear(
         low, high = told[name].ci95
         assert low < truth < high
     assert told["rotor_inertia"].value == pytest.approx(0.2, rel=0.2)
-    # What is described is known.
+    # A described rotor counts as known.
     known = diagnose(arm, replace(log, tau=tau), candidates=candidates, friction="coulomb-viscous").findings
     assert [(f.effect, f.joint) for f in known] == [("load_dependent_friction", 1)]
     assert {p.name: p.value for p in known[0].parameters}["rotor_inertia"] == 0.0

@@ -51,7 +51,7 @@ def test_a_standing_joint_does_not_make_another_motion_absurd(arm: Robot, arm_lo
     scale = 0.02 * recording.tau.std(axis=0)
     values = fit_values(baseline, scale, recording.sign_unknown, recording.tau, base_model_prior(baseline, recording))
     error = other.tau - baseline.base.torque(other.q, other.dq, other.ddq, values)
-    # Wrong by its own size is what the pull allows: three times for friction, which holds where joints are fast.
+    # The prior allows errors of the torque's own size, and for friction of three times that, at high speed.
     assert np.all(np.sqrt((error**2).mean(axis=0)) < 4 * np.sqrt((other.tau**2).mean(axis=0)))
 
 

@@ -53,7 +53,7 @@ def _model(robot: Robot) -> pin.Model:
     for joint, body in zip(robot.chain.joints, _bodies(robot.n), strict=True):
         placement = pin.SE3(np.asarray(joint.rotation), np.asarray(joint.translation))
         parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(np.asarray(joint.axis)), placement, joint.name)
-        # pinocchio counts xx, xy, yy, xz, yz, zz.
+        # pinocchio orders the inertia as xx, xy, yy, xz, yz, zz.
         inertia = pin.Inertia.FromDynamicParameters(body[[0, 1, 2, 3, 4, 5, 7, 6, 8, 9]])
         model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
     return model
@@ -71,7 +71,7 @@ def test_the_columns_are_gravity_on_a_base_that_its_weight_has_turned(robot: Rob
     for k, q in enumerate(state.q):
         weight = sum(inertia.mass for inertia in model.inertias) * np.array([0, 0, -9.81])
         moment = np.cross(pin.centerOfMass(model, data, q), weight)[:2]
-        # In axes that turn with the base, gravity turns the other way.
+        # In the frame of the rotated base, gravity rotates in the opposite direction.
         turned = Rotation.from_rotvec([*(compliance @ moment), 0.0]).inv().apply([0, 0, -9.81])
         level = pin.computeGeneralizedGravity(model, data, q).copy()
         model.gravity.linear = turned
@@ -91,7 +91,7 @@ def test_what_the_first_link_adds_goes_round_with_it(robot: Robot, state: Situat
     values[_rigid(state.model)[:10]] = 0.0
     without = situation(state.model, values, state.t, state.q, state.dq, state.ddq)
     poorer = BaseCompliance().columns(without, None)
-    # Of bolts alike about both axes, on the joints behind the link: gravity askew turns the first one too.
+    # With equal compliances, and without the first joint, on which a tilted base acts, too.
     lost = (whole - poorer)[:, 1:, :2].sum(axis=2).ravel()
     own = poorer[:, 1:, 3:].reshape(-1, 2)
     rest = lost - own @ np.linalg.lstsq(own, lost, rcond=None)[0]
@@ -107,5 +107,5 @@ def test_it_is_told_in_words_and_read_from_its_name(robot: Robot) -> None:
     assert units[0] == ("compliance_1", "rad/(N m)")
     assert units[-1] == ("own_2", "rad")
     assert "0.29 deg per 1000 N m" in effect.describe(None, np.array([5e-6, 1e-6, 0.0, 0.3, 0.2]))
-    # No base leans against its load.
+    # A base cannot tilt against its load.
     assert "under the robot's weight" not in effect.describe(None, np.array([-5e-6, 1e-6, 0.0, 0.3, 0.2]))

@@ -22,7 +22,7 @@ def test_a_tank_that_empties_is_within_its_columns(swept: Situation) -> None:
     kilogramme = torque_of_mass(swept.robot, 1.0, COM, swept.q, swept.dq, swept.ddq)
     lost = 2.0 * np.exp(-t / 6.0)
     extra = kilogramme * lost[:, None]
-    # The base model has a payload that stays.
+    # The base model contains a constant payload.
     stays = swept.sensitivity("tool")[:, :, :4]
     X = np.concatenate([PayloadDrift().columns(swept, None), stays], axis=2)
     rows = X.reshape(-1, X.shape[2])

@@ -142,7 +142,7 @@ def test_a_joint_at_rest_is_told(ur10):
     limits = {limit.joint: limit for limit in find_limits(problem, entries) if limit.effect == "stribeck"}
     assert limits[4].note == "joint hardly moves"
     assert np.isfinite(limits[5].detectable)
-    # Of a joint that moves nobody is told that it does not.
+    # The note on rest is not given for a joint that moves.
     assert limits[1].note == "not excited by this motion"
 
 

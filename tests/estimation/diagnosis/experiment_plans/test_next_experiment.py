@@ -264,7 +264,7 @@ def test_the_experiment_starts_from_the_arm_itself(problem):
     room = motion_range(problem.situation.robot, problem.recording)
     stages = MAKERS["payload"](room, 3, 0)
     expected, found = (Grams(some, causes).of(stages) for some in (problem, laden))
-    # The parameters were added and taken off again: rounding of sums.
+    # The payload's parameters were added and subtracted, so sums are rounded.
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 
 

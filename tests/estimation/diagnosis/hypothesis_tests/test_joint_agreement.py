@@ -91,7 +91,7 @@ def test_a_joint_whose_other_effects_formula_may_hide_it_need_not_agree() -> Non
     whole = float(cross.sum() ** 2 / gram.sum())
     assert shared_coefficient_gain(gram, cross, apart) > 0.9 * whole
     assert shared_coefficient_gain(gram, cross) < 0.3 * whole
-    # What such joints alone tell is no delay either.
+    # An estimate on these joints only is no delay either.
     alone = gram * np.array([0.0, 0.0, 1.0, 1.0])
     assert shared_coefficient_gain(gram, alone, apart) < 0.02 * float(alone.sum() ** 2 / gram.sum())
 

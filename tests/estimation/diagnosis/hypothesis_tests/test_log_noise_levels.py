@@ -47,7 +47,7 @@ def test_the_profile_is_that_of_least_squares_with_a_level_for_each_log():
         k * np.log((without[r] ** 2).sum() / (after[r] ** 2).sum()) for k, r in zip(counted, runs, strict=True)
     )
     assert profile_gain(problem, member) == pytest.approx(expected, rel=1e-5)
-    # In units of one noise for both logs the same effect is as good as nothing beside the first log's.
+    # With one noise level for both logs, the gain would be negligible.
     assert expected > 1000
 
 
@@ -78,7 +78,7 @@ def test_logs_have_levels_of_their_own():
     assert whitening.levels[0] / whitening.levels[1] == pytest.approx([10.0, 10.0], rel=0.15)
     white = replace(whitening, weights=None).all(residual)
     half = len(white) // 2
-    # Some 1600 frequencies of the band in each: their mean power scatters by 2.5 %.
+    # Each has some 1600 frequencies in the band: the standard error of their mean power is 2.5 %.
     assert white[:half].std(axis=0) == pytest.approx(white[half:].std(axis=0), rel=0.15)
 
 
@@ -92,7 +92,7 @@ def test_a_hand_that_moved_the_arm_is_found(data):
     (finding,) = said.findings
     assert finding.effect == "hand_guiding"
     times = {parameter.name: parameter.value for parameter in finding.parameters}
-    # The hand was there during the third run, and moved it in most of that.
+    # The hand acted during most of the third run.
     assert times["start"] > logs[1].t[-1]
     assert times["end"] <= logs[2].t[-1] + 1.0
     assert times["end"] - times["start"] > 0.7 * logs[2].duration

@@ -28,7 +28,7 @@ def test_an_effect_of_the_detectable_energy_is_found_as_often_as_said(degrees, t
     found = (
         ((mean + random.standard_normal((DRAWS, degrees))) ** 2).sum(axis=1) > chi2.isf(0.01 / tries, degrees)
     ).mean()
-    # Five standard errors of a share of 20,000 draws: it fails wrongly once in two million.
+    # Five standard errors of a fraction of 20,000 draws: the test fails by chance once in two million.
     assert found == pytest.approx(POWER, abs=5 * np.sqrt(POWER * (1 - POWER) / DRAWS))
 
 
@@ -45,7 +45,7 @@ def test_a_rival_falls_out_as_often_as_said(margin):
     a, b = np.array([1.0, 0.0, 0.0]), np.array([0.6, 0.8, 0.0])
     left = energy / (1 - (a @ b) ** 2)
     y = np.sqrt(left) * a + random.standard_normal((DRAWS, 3))
-    # Twice the log-likelihood ratio with the true coefficient known: the noise of the fit cancels between the two.
+    # Twice the log-likelihood ratio for the true coefficient; the noise of the fit cancels between both models.
     difference = (y @ a) ** 2 - (y @ b) ** 2
     assert (difference > margin).mean() == pytest.approx(POWER, abs=0.02)  # normal to second order in 1 / energy
     assert chance_to_resolve(energy, margin) == pytest.approx(POWER, abs=1e-9)

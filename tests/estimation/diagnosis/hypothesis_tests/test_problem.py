@@ -35,7 +35,7 @@ def _written_out(problem: Problem, extra: np.ndarray) -> tuple[float, float]:
         white = np.einsum("jk,njb->nkb", root, problem.whitening.all(columns))
         flat = white.reshape(len(tau), -1)
         norms = np.linalg.norm(flat, axis=0)
-        # Of what acts in rows of unknown direction alone, rounding is left: another one on another machine.
+        # Columns that act only in rows with an unknown sign are rounding errors, which differ between machines.
         flat = flat[:, norms > 1e-6] / norms[norms > 1e-6]
         left.append(float(np.sum((tau - flat @ np.linalg.lstsq(flat, tau, rcond=1e-9)[0]) ** 2)))
     return left[0], left[1]
@@ -56,7 +56,7 @@ def test_a_score_is_the_fall_of_the_squared_residual(problem: Problem, name: str
         dense[:, j] = part
     before, after = _written_out(problem, dense)
     assert problem.energy == pytest.approx(before, rel=1e-6)
-    # Columns are kept in single precision, and directions that hardly show are left out.
+    # Columns are stored in single precision, and directions with almost no energy are left out.
     assert result.gain == pytest.approx(before - after, abs=0.02 * (before - after) + 0.3)
 
 

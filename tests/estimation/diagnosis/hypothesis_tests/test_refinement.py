@@ -116,7 +116,7 @@ def test_a_contact_that_cannot_win_is_not_searched() -> None:
     situation = SimpleNamespace(t=np.array([0.0, 60.0]), robot=SimpleNamespace(n=2))
     problem = SimpleNamespace(rows=ROWS, situation=situation, state_for=lambda effect: situation)
     best = outcome("asymmetric_friction", 1, 400.0, 3)
-    # Of 6 coefficients; the moment, the duration and the hardness of a push are fitted too.
+    # Six coefficients; start, duration and hardness of a contact are fitted, too.
     weak, strong = (outcome("external_contact", None, gain, 6) for gain in (215.0, 250.0))
     lasting = outcome("stribeck", 1, 180.0, 1)
 
@@ -152,11 +152,11 @@ def test_what_a_log_shows_by_itself_is_no_leftover() -> None:
     ("beside", "chance", "gain", "sure"),
     [
         ((), 0.5, 25.0, True),
-        ((1,), 0.5, 25.0, False),  # where another acts, its formula may leave as much
+        ((1,), 0.5, 25.0, False),  # the other effect's formula error on this joint may be as large
         ((2,), 0.5, 25.0, True),
         ((2,), 2.0, 25.0, False),  # by chance that often
         ((2,), 0.5, 10.0, False),  # not worth its parameters
-        ((2, None), 0.5, 25.0, False),  # a push is felt by all joints
+        ((2, None), 0.5, 25.0, False),  # a contact acts on all joints
     ],
 )
 def test_what_is_far_from_chance_is_sure_on_a_joint_of_its_own(
@@ -179,10 +179,10 @@ def test_what_is_far_from_chance_is_sure_on_a_joint_of_its_own(
 @pytest.mark.parametrize(
     ("gains", "other", "counts"),
     [
-        ((500.0, 1.0), 1000.0, False),  # what the other effect left, and nothing else
-        ((500.0, 80.0), 1000.0, True),  # the second joint tells it by itself
+        ((500.0, 1.0), 1000.0, False),  # only what the other effect leaves on its joint
+        ((500.0, 80.0), 1000.0, True),  # the second joint alone supports it
         ((500.0, 400.0), 100.0, True),  # both do
-        ((500.0, 1.0), 0.0, False),  # the joints are at odds
+        ((500.0, 1.0), 0.0, False),  # the joints contradict each other
     ],
 )
 def test_what_all_joints_share_is_told_by_those_without_a_stronger_effect(
@@ -214,7 +214,7 @@ class _Summits(Stribeck):
         return ()
 
     def other_optima(self, *_: object) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        # Too far from the other summit, and near it.
+        # One start is too far from the other optimum, and one is near it.
         return (((0.02,), (0.0013,)),) if self.far else ()
 
 

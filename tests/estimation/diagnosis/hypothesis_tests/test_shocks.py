@@ -16,11 +16,11 @@ from estimation.diagnosis.noise_models.frequency_bands import low_pass
 from robots.robot import Robot
 from robots.signals import Log
 
-# The noise's memory from sample to sample, and its standard deviation [N m].
+# Correlation of the noise between consecutive samples (two values), and its standard deviation [N m].
 MEMORY, SHORT, NOISE = 0.97, 0.85, np.array([0.1, 0.05])
-# Encoders as coarse as this [rad] leave a band of some hertz, in which a shock is a bump of several rows.
+# Encoder resolution [rad] that leaves a band of some hertz, in which a shock covers several rows.
 COARSE = 1e-4
-# A push of the elbow: its moment, duration [s] and peak [N m].
+# A push on the elbow: its time [s], duration [s] and peak [N m].
 MOMENT, DURATION, PUSH = 6.0, 0.3, 0.5
 
 

@@ -88,7 +88,7 @@ def test_a_push_on_a_moving_arm_is_told_from_its_first_to_its_last_moment(
     assert found.shape[0] == pytest.approx(first, abs=0.1)
     assert found.shape[0] + found.shape[1] == pytest.approx(last, abs=0.1)
     assert found.gain > pulse.gain
-    # It is of that form now, and no other effect has one.
+    # It already has the formula for a moving arm, and other effects have none.
     assert refit_event_window(problem, found, beside) is found
     step = refine(problem, STEP, (first,), beside, effort=0)
     assert refit_event_window(problem, step, beside) is step

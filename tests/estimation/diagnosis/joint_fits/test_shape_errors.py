@@ -150,7 +150,7 @@ def test_a_change_between_two_logs_may_have_come_at_any_time_there(
         assert 1.96 * error == pytest.approx((begins - ends) / 2, abs=0.02)
     before = replace(step, shape=(ends - 1.0,))
     assert spread_over_pauses(problem, before, []) is before
-    # A push has its own beginning and end.
+    # A contact has its own start and end.
     push = refine(
         problem, Hypothesis(EFFECTS["external_contact"], None), (begins, 1.0, 0.5, 0.0, 0.0), accept(problem, ())
     )

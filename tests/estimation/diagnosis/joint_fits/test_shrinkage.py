@@ -30,7 +30,7 @@ def test_the_energy_makes_the_data_likeliest() -> None:
     base, X = rng.standard_normal((300, 4)), rng.standard_normal((300, 3)) * [1.0, 5.0, 0.2]
     y = X @ [0.4, -0.05, 1.0] + base @ [3.0, 1.0, -2.0, 0.5] + rng.standard_normal(300)
     precision = shrinkage_precision(_score(X, base, y))
-    Q = np.linalg.qr(base, mode="complete")[0][:, 4:]  # what the base model leaves
+    Q = np.linalg.qr(base, mode="complete")[0][:, 4:]  # complement of the base model
     beside, rest = Q.T @ X, Q.T @ y
 
     def likelihood(scale: float) -> float:
@@ -40,7 +40,7 @@ def test_the_energy_makes_the_data_likeliest() -> None:
     best = likelihood(1.0)
     assert best > likelihood(0.8)
     assert best > likelihood(1.25)
-    # Every column may make a torque of the same energy.
+    # The prior energy of the torque is the same for all columns.
     assert precision / (X**2).sum(axis=0) == pytest.approx(np.full(3, precision[0] / (X[:, 0] ** 2).sum()))
 
 
@@ -61,7 +61,7 @@ def test_what_is_well_measured_stays_and_what_two_columns_share_is_shared() -> N
     assert fit(alone, True) == pytest.approx(fit(alone, False), rel=0.01)
     both = np.column_stack([x, twin])
     free, kept = fit(both, False), fit(both, True)
-    assert np.abs(free).max() > 3.0  # chance alone, for each is to be a half of one
+    assert np.abs(free).max() > 3.0  # by chance; each should be 0.5
     assert kept == pytest.approx([0.5, 0.5], abs=0.1)
 
 

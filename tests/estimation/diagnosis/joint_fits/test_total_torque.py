@@ -62,7 +62,7 @@ def test_all_of_the_torque_is_known_beside_what_cuts_it_off(hidden: tuple[Proble
     assert error(sharp.total_torque_state.whole[:, 0]) < 0.03 * most
     assert error(rough.total_torque_state.whole[:, 0]) < 0.1 * most
     assert error(problem.situation.torque[:, 0]) > 0.3 * most
-    # All of what is beyond the limit is lost, and the limit is that of the log.
+    # All torque beyond the limit is lost, and the limit is that of the log.
     again = refine(sharp, CLIPPING, clipping.shape, accept(problem, (other.group,)))
     assert again.shape == (limit,)
     assert again.coefficients[0] == pytest.approx(1.0, abs=0.05)

@@ -119,7 +119,7 @@ def test_the_band_passes_slow_signals_and_stops_fast_ones() -> None:
     for frequency, factor in ((0.7 * band.cutoff, 1.0), (1.15 * band.cutoff, 0.0)):
         wave = np.sin(2 * np.pi * frequency * t)
         passed = band.passed(wave)[50:-50]
-        # The Kaiser window of shape 6 leaves ripples of 63 dB.
+        # The Kaiser window of shape 6 has ripples of -63 dB.
         assert np.abs(passed - factor * wave[:: band.stride][50:-50]).max() < 2e-3
 
 
@@ -133,14 +133,14 @@ def test_filtering_columns_together_is_filtering_each() -> None:
     half = len(band.taps) // 2
     for column, result in zip(columns.T, together.T, strict=True):
         full = np.convolve(column, band.taps)
-        # The first rows feel what the filter puts before the log.
+        # The first rows depend on how the filter extends the log.
         lead = full[half % band.stride :: band.stride]
         first = half // band.stride
         expected = np.convolve(lead, after)[first : first + len(result)]
         assert result == pytest.approx(expected, abs=1e-12 * max(np.abs(column).max(), 1e-300))
         assert result == pytest.approx(band.passed(column, after), abs=1e-12 * np.abs(column).max())
     assert not together[:, 2].any()
-    # A number so small that one over it is none: the cube of a joint's position that stands at zero.
+    # A subnormal number, whose inverse overflows, such as the cube of a position near zero.
     tiny = band.passed(np.stack([columns[:, 0], np.full(1000, 7e-314)], axis=1), single=True)
     assert tiny[:, 0] == pytest.approx(band.passed(columns[:, 0]), abs=1e-5)
     assert not tiny[:, 1].any()
@@ -157,6 +157,6 @@ def test_kicks_drown_where_their_torque_is_below_the_noise() -> None:
     residual = np.random.default_rng(0).standard_normal((10_000, 2)) * [3.0, 0.5]
     slow = 100.0 * np.sin(0.5 * STEP * np.arange(10_000))[:, None]
     recording = replace(recording_of(), reversal_acceleration_error=np.array([0.9 * 3.0 / 20.0, 1.1 * 0.5 / 2.0]))
-    # 10 000 samples tell the noise to 1 %.
+    # With 10,000 samples the noise level is known to 1 %.
     assert quiet_joints(recording, residual + slow, np.diag([20.0, 2.0])).tolist() == [True, False]
     assert quiet_joints(recording, 2.0 * residual + slow, np.diag([20.0, 2.0])).tolist() == [True, True]

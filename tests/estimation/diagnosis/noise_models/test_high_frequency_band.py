@@ -28,7 +28,7 @@ from robots.terms.effects import EFFECTS
 RIPPLE = Hypothesis(EFFECTS["torque_ripple"], 1)
 SHAPE = (150.0, 0.0, 0.0)
 NOISE = 0.1  # of the torque, white [N m]
-SIZE = 0.02  # of the ripple, a fifth of it
+SIZE = 0.02  # amplitude of the ripple, a fifth of the noise
 SHAKEN = 17.3  # [Hz]
 
 
@@ -89,7 +89,7 @@ def test_the_slope_has_the_products_of_an_effect_with_the_residual(
     joints, columns = problem.columns_of(hypothesis, shape)
     products = np.sum([part.T @ slope[:, j] for j, part in zip(joints, columns, strict=True)], axis=0)
     group = problem.measured(hypothesis, shape)
-    # The first rows of a log are filtered another way.
+    # The first rows of a log are filtered differently.
     np.testing.assert_allclose(products, group.cross, atol=0.05 * np.sqrt(np.diag(group.gram)).max())
     if hypothesis is RIPPLE:
         assert abs(group.cross[0]) > 4 * np.sqrt(group.gram[0, 0])
@@ -116,9 +116,9 @@ def test_what_shakes_the_arm_is_no_inertia(arm: Robot, recording: Recording, pos
         accept(problem, ()),
     )
     assert found.shape[0] == pytest.approx(SHAKEN, abs=0.01)
-    # As if nothing but noise were about it: by the wave's own energy, over that of the noise.
+    # The gain is the wave's own energy over that of the noise.
     assert found.gain == pytest.approx(SIZE**2 * np.sum(known**2), rel=0.3)
-    assert found.gain > 30.0  # noise does as much once in 10,000
+    assert found.gain > 30.0  # noise exceeds this once in 10,000
 
 
 def test_only_fast_effects_are_measured_there(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
@@ -150,7 +150,7 @@ def test_the_extended_model_knows_it_as_well(recording: Recording, pose_arm: Cal
         extension = fit_extended(problem, [member], {}).model.extensions[0]
         extended.append(np.sqrt(np.diag(extension.covariance)[:4]))
     assert np.all(energies[1] < 0.5 * energies[0])
-    # They count what is not known of the shape, too, which is less above the band.
+    # Standard errors include the uncertainty of the shape, which is smaller with the rows above the band.
     assert np.all(extended[1] / extended[0] < 1.4 * energies[1] / energies[0])
 
 
@@ -248,8 +248,8 @@ def test_a_vibration_above_the_band_is_told(recording: Recording, pose_arm: Call
         gains.append(found.gain)
     energy = len(recording) * size**2 / 2 / NOISE**2
     assert gains[0] < 20.0
-    # A log of 20 s is too short to tell a line from the noise about it, of which it then is a part: that is a few times
-    # as strong. What is left is more than any noise explains, eight functions having 8 of that on average.
+    # In a log of 20 s the line counts partly as noise, whose level is then a few times as high. The gain is still
+    # significant: for pure noise the mean of eight functions' gain is 8.
     assert 35.0 < gains[1] < energy
     coefficients = found.bounded(np.full(8, -np.inf), np.full(8, np.inf))[1]
     energies = problem.situation, 1, (frequency,)

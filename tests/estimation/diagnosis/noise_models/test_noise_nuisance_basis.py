@@ -22,7 +22,7 @@ from robots.robot import Robot
 from robots.signals import Motion
 
 SLOW = np.array([0.3, 1.0, 1.5, 2.0, 3.0])  # [Hz]
-NOISE = 0.1  # [N m], of samples that remember .8 of the last
+NOISE = 0.1  # [N m], with a correlation of 0.8 between consecutive samples
 
 
 def _moves(seed: int) -> Motion:

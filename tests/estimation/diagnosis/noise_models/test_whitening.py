@@ -91,7 +91,7 @@ def test_kicks_at_reversals_and_times_at_rest_do_not_change_the_level() -> None:
     for start in range(100, 10_000, 200):
         unsure[start : start + 6, 0] = True
         residual[start : start + 6, 0] += 50 * noise[:, 0].std()
-    unsure[10_000:18_000] = True  # both joints stand for two fifths of the time, held by brakes
+    unsure[10_000:18_000] = True  # both joints rest for two fifths of the time, held by brakes
     residual[10_000:18_000] = 0.0
     whitening = estimate_whitening(recording_of(20_000, unsure=unsure), residual, 0, np.eye(2))
     stride = whitening.stride
@@ -146,7 +146,7 @@ def test_where_in_a_gap_friction_turns_round_does_not_matter() -> None:
     whitening = estimate_whitening(recording_of(unsure=unsure), noise_of(10_000), 0, np.eye(2))
     early, late = (np.where(np.arange(10_000) < turn, -1.0, 1.0) for turn in (3002, 3013))
     assert whitening.apply(early, 0) == pytest.approx(whitening.apply(late, 0), abs=1e-12)
-    # But not where the direction is known.
+    # Where the sign is known, its row matters.
     assert np.abs(whitening.apply(early, 1) - whitening.apply(late, 1)).max() > 0.1
 
 

@@ -135,7 +135,7 @@ def test_rows_beside_a_reversal_count_of_joints_that_are_trusted_alone(arm: Robo
         (2.0**20, 1.0, 3.0),
         (2.0**26, 1.0, 3.0),
         (2.0**17, 1.0, 20.0),
-        # A loop of 12 Hz leaves next to nothing of a kick at the few Hz where this motion ends: it hides in the noise.
+        # With a loop of 12 Hz, a jump has almost no energy at the few hertz where this motion's spectrum ends.
         (2.0**17, 12.0, 20.0),
     ],
 )

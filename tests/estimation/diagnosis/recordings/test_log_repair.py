@@ -55,9 +55,9 @@ def test_rows_that_stick_out_lie_between_their_neighbours(arm: Robot, log: Log) 
         np.testing.assert_array_equal(getattr(found, name)[others], getattr(log, name)[others])
     for row in rows:
         np.testing.assert_allclose(found.tau[row, 1], 0.5 * (log.tau[row - 1, 1] + log.tau[row + 1, 1]))
-        # The other joint's torque was right.
+        # The other joint's torque does not change.
         assert found.tau[row, 0] == log.tau[row, 0]
-    # A cubic errs by h^4 q'''' / 24, an even smaller number than 4 ms squared by the acceleration.
+    # The error of a cubic is h^4 q'''' / 24, which is below the acceleration times the squared 4 ms.
     np.testing.assert_allclose(found.q[3000], log.q[3000], atol=2e-5)
     assert any("Log 1: joint 2" in note and "1201" in note for note in notes)
 
@@ -69,7 +69,7 @@ def test_a_log_is_cut_at_its_gaps(arm: Robot, log: Log) -> None:
     np.testing.assert_allclose(spans, [(0.0, 6.0), (11.0, log.duration)], atol=0.0041)
     assert "from 0 to 6 s" in result.logs[0].name
     assert any("gap" in note for note in result.notes)
-    # A network that hiccups is no gap.
+    # A short loss of messages is no gap.
     assert len(repair_log(arm, _holed(log, (6.0, 6.05)), "Log 1").logs) == 1
 
 

@@ -77,6 +77,6 @@ def test_the_noise_of_the_mean_over_repetitions_is_told(period: float, rounded: 
     cycle = find_cycle(counted, STEP)
     assert cycle is not None
     _, _, density = project_on_harmonics(counted, STEP, cycle)
-    # Where repetitions begin between samples each is rounded anew.
+    # If repetitions begin between samples, each is rounded differently.
     repeats = 1 if rounded and period == 10.0 else cycle.count
     assert density == pytest.approx(2 * STEP * (counted - q).var(axis=0) / repeats, rel=1 / 3)

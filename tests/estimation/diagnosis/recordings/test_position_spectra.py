@@ -35,7 +35,7 @@ def test_lost_rows_and_jitter_make_no_motion_of_noise(lost: float, jitter: float
     positions = _logged(lost, jitter)
     spectrum = Spectra.of(positions).of_positions(positions.q[:, 0])
     assert 8.0 < spectrum.cutoff() < 16.0
-    # White noise of a standard deviation has 2 s^2 T up to half of the rate; fewer rows have as much up to less.
+    # White noise with standard deviation s has the density 2 s^2 T up to half of the sample rate.
     assert spectrum.floor == pytest.approx(2 * NOISE**2 * PERIOD / (1 - lost), rel=0.3, abs=0.0)
 
 
@@ -53,7 +53,7 @@ def test_between_two_samples_a_joint_may_have_turned_round() -> None:
     spread = known.spread(np.array([-1, 1, 1, 1, -1, -1, 2, -1]))
     assert np.flatnonzero(spread.sign_unknown[:, 0]).tolist() == [1, 2, 3]
     assert np.flatnonzero(spread.sign_unknown[:, 1]).tolist() == [5]
-    # What is told by the velocity must have been sampled.
+    # A sign from the velocity counts in sampled rows only.
     assert np.flatnonzero(spread.sign_known_from_velocity[:, 0]).tolist() == [2]
     assert known.spread(np.full(8, -1)) is known
 

@@ -27,9 +27,9 @@ from robots.terms.effects import EFFECTS
         ("load_dependent_friction", 0, 0.8, (0.7, 0.9), False),
         ("friction_step", 0, 2000.0, (1999.9, 2000.1), False),
         ("friction_step", 0, 2.0, (1.7, 2.3), True),
-        # A dead centre is a place: a fifth of one near zero is nothing.
+        # A dead centre is a position, so its size is not relative to zero.
         ("spring", 1, 0.01, (-0.1, 0.1), False),
-        # Of what the data say nothing, the error itself tells.
+        # An infinite interval is stated elsewhere.
         ("thermal_friction", 0, 113.0, (-np.inf, np.inf), False),
     ],
 )
@@ -46,8 +46,8 @@ def test_a_fifth_of_a_value_or_of_a_second(
         ("presliding_hysteresis", 0, 0.2, True),
         ("presliding_hysteresis", 0, 1e-5, True),
         ("presliding_hysteresis", 0, 0.19, False),
-        ("backlash", 1, 0.3, False),  # what it is where nothing is said
-        ("torque_constant_saturation", 0, 1.0, False),  # a power, and no size
+        ("backlash", 1, 0.3, False),  # the default value
+        ("torque_constant_saturation", 0, 1.0, False),  # an exponent, not a size
     ],
 )
 def test_a_size_at_its_bound_is_not_determined(effect: str, shape: int, value: float, stopped: bool) -> None:
@@ -131,9 +131,9 @@ def test_a_gain_elsewhere_is_told_with_its_joints() -> None:
     ("falls", "believed"),
     [
         ((3.0, 1.0), True),
-        ((-1.0, 2.0), True),  # slow motion rubs more, fast motion less
+        ((-1.0, 2.0), True),  # more friction at low speed, less at high speed
         ((-3.3, -1.6), False),
-        ((-3.3, 0.2), False),  # more at all speeds of a joint of 10 rad/s
+        ((-3.3, 0.2), False),  # more friction at all speeds of a joint of 10 rad/s
         ((3.3, -0.2), True),
     ],
 )

@@ -56,7 +56,7 @@ def _sized(problem: Problem, member: FittedEffect, sizes: np.ndarray) -> Problem
         white[:, j] = sizes * (part @ member.coefficients)
     own = white @ problem.whitening.precision
     base = sum(problem.weighted_base_columns[j].T @ white[:, j] for j in range(problem.n))
-    # Less what the base model takes of it: <Q, r> is zero for a residual.
+    # Subtract the projection on the base model, because <Q, r> is zero for a residual.
     return replace(problem, residual=own - np.einsum("jnb,b->nj", problem.weighted_base_columns, base))
 
 
@@ -135,7 +135,7 @@ def test_a_delay_must_be_told_aside_from_the_kicks_of_a_play(problem: Problem, a
     late = FittedEffect(lag, at, group, 1e4, np.array([50.0 / np.sqrt(group.gram[0, 0])]), 1, 1.0)
     data = _sized(problem, late, np.where(near, 1.0, aside))
     assert delay_supported_away_from_impacts(data, late, [play]) is told
-    # Beside nothing that kicks nothing is asked.
+    # Without an effect that causes impacts, no support is required.
     assert delay_supported_away_from_impacts(data, late, [])
 
 
@@ -151,11 +151,11 @@ def test_above_the_bands_play_counts_in_calm_rows(problem: Problem) -> None:
     assert not upper.far_from_reversals.all()
 
     def left(columns: np.ndarray) -> float:
-        """What columns have outside calm rows that no combination of the base model's has there."""
+        """Computes the fraction of columns near reversals that no combination of base columns there explains."""
         there, base = columns[~upper.far_from_reversals], own.base[~upper.far_from_reversals]
         return float(np.linalg.norm(there - base @ np.linalg.lstsq(base, there)[0]) / np.linalg.norm(there))
 
-    # The base model's share, which is orthogonal to what it was taken from, is all that is there.
+    # Near reversals only the projection on the base model is left.
     assert left(calm) < 1e-9
     assert left(whole) > 0.1
 

@@ -84,7 +84,7 @@ def test_torque_that_is_late_is_told_by_each_joints_reversals(cases: Callable, s
     assert np.abs(away).max() < 4.0
     weights = timing.errors[told] ** -2
     assert abs(weights @ (timing.lags - delay)[told]) < 3.0 * np.sqrt(weights.sum())
-    # Half a millisecond at the worst, where a sample is four.
+    # The error is at most 0.5 ms, with a sample period of 4 ms.
     assert weights.sum() ** -0.5 < 5e-4
 
 
@@ -98,7 +98,7 @@ def test_a_delay_is_named_that_only_reversals_tell(cases: Callable) -> None:
     (delay,) = (p for p in finding.parameters if p.name == "delay")
     assert delay.ci95[0] < case.effects[0].amount < delay.ci95[1]
     assert delay.ci95[1] - delay.ci95[0] < 1.5e-3
-    # Beside the delay that was found first it is told as well as alone.
+    # The estimate is the same beside the delay that was found first.
     timing = _timed(robot, log)
     assert delay.value == pytest.approx(np.average(timing.lags, weights=timing.errors**-2.0), abs=2e-4)
     (note,) = (note for note in diagnosis.notes if "time_delay" in note)
@@ -135,16 +135,16 @@ def test_a_table_is_the_motion_of_a_force_that_a_loop_undoes(cutoff: float, step
     table = ImpulseResponse.of(cutoff, step, edges)
     dx = table.x[1] - table.x[0]
     position, velocity, acceleration = table.values
-    # Where a force begins, differences are off by what it does in one of them.
+    # At the start of a force, the error of finite differences is one step's change.
     off = dx * np.abs(acceleration).max()
     assert np.gradient(position, dx, axis=0)[1:-1] == pytest.approx(velocity[1:-1], abs=off)
     summed = np.cumsum(acceleration, axis=0) * dx
     assert summed - summed[0] == pytest.approx(velocity - velocity[0], abs=2.0 * off)
     assert len(edges) >= 4
     assert acceleration.shape[1] == 2 * (len(edges) - 1) - 2
-    # Between its points a table is straight.
+    # The table is interpolated linearly.
     assert table.at(table.x[5:6] + dx / 2)[0] == pytest.approx((position[5:6] + position[6:7]) / 2)
-    # Its spectrum is that of the whole force, less what passes.
+    # Its spectrum has little energy in the band that passes.
     f = np.fft.rfftfreq(len(table.x), dx)
     power = np.abs(np.fft.rfft(position, axis=0)) ** 2
     slow = low_pass_gain(f, cutoff) > 0.99
@@ -193,7 +193,7 @@ def test_what_reversals_tell_counts_as_one_row_for_each_joint(
     delay = Hypothesis(EFFECTS["time_delay"], None)
     told = [per_joint_evidence(p, delay, (2e-3,), accept(p, ())) for p in (plain, problem)]
     assert told[1].gram - told[0].gram == pytest.approx([4e6, 0.0], abs=1e-3 * told[0].gram.max())
-    # The coefficient that is fitted, and the pull on it, are those of rows and reversals together.
+    # The fitted coefficient, and the prior on it, are those of rows and reversals together.
     member = refine(problem, delay, (2e-3,), accept(problem, ()))
     rows = score(plain, plain.measured(delay, member.shape), accept(plain, ()))
     both = float((rows.cross + 2e-3 * 4e6)[0] / (rows.gram[0, 0] + 4e6))
@@ -219,7 +219,7 @@ def test_reversals_of_a_thinned_log_are_timed_by_all_its_samples(
     assert told.sum() >= 3
     assert np.abs((thinned.lags - case.effects[0].amount) / thinned.errors)[told].max() < 4.0
     both = told & np.isfinite(plain.errors)
-    # The base model is another, fitted to half of the rows: how sharp its signs are is another chance of the noise.
+    # The base model is fitted to half of the rows, so the width of its sign may differ by chance.
     assert np.all(np.abs(thinned.lags - plain.lags)[both] < np.hypot(plain.errors, thinned.errors)[both])
     monkeypatch.setattr(log_reading, "MOST_FINE", 10_000)
     assert build_recording(robot, [log]).full_rate is None

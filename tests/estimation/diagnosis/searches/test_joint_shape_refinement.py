@@ -44,7 +44,7 @@ def test_together_they_leave_the_valley_in_which_one_does_what_the_other_should(
     assert iron.shape[0] == pytest.approx(2.0, abs=0.2)
     both = accept(problem, (load.group, iron.group)).gain
     assert both > accept(problem, (alone.group, second.group)).gain
-    # One that shares its joint with none stays as it is.
+    # An effect that is alone on its joint does not change.
     assert refine_shapes_jointly(problem, [alone]) == [alone]
 
 

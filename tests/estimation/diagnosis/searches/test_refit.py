@@ -45,7 +45,7 @@ def test_torque_that_is_cut_off_does_not_draw_the_base_model(
     whole = pose_arm(recording)
 
     def error(torque: np.ndarray) -> float:
-        """Root mean square difference from the fit to the whole torque where it was cut off [N m]."""
+        """Computes the RMS difference [N m] in clipped rows from the base model fitted to unclipped torque."""
         return float(np.sqrt(np.mean((torque - whole.situation.torque[:, 0])[cut] ** 2)))
 
     assert error(fitted) > 1.0
@@ -89,7 +89,7 @@ def test_a_search_is_done_again_where_the_slow_part_of_the_noise_is_smaller(
     known = problem.whitening
 
     def less(power: float) -> Whitening:
-        """The same noise but for what the first joint has at rest."""
+        """Returns the noise model with a given power of the first joint at zero frequency, relative to the known one."""
         first = known.coefficients[0]
         gain = (1.0 - first.sum()) / np.sqrt(power)
         return replace(known, coefficients=(first + (1.0 - first.sum() - gain) / len(first), *known.coefficients[1:]))

@@ -67,7 +67,7 @@ def test_forms_of_a_spring_that_fit_alike_are_listed(
     forms = equivalent_shapes(problem, [plain], 0)
     assert len(forms) >= 2
     assert all(form.gain > plain.gain - MAX_SHAPE_CHI2 and form.shape != plain.shape for form in forms)
-    # The likeliest is the one that with the arm as described says most of the angles that were not seen.
+    # The likeliest shape, with the arm as described, predicts the unseen positions best.
     there = build_baseline(problem.baseline.base, wide)
     errors = []
     for form in (forms[0], forms[-1]):
@@ -111,15 +111,15 @@ def test_a_tilt_is_told_beside_the_first_axis_own_moments() -> None:
     plain = refine(posed, tilt, (0.0, 0.0), _nothing(), effort=0)  # type: ignore[arg-type]
     (completed,) = complete_effects(posed, [SelectedEffect(plain, 1e-9, ())])  # type: ignore[arg-type]
     assert plain.shape == (0.0, 0.0)
-    # With the moments free the angles are known as those beside four columns of them are.
+    # Standard errors of the angles beside the four columns of the moments.
     errors = np.sqrt(np.diag(np.linalg.pinv(posed.gram, rcond=1e-10, hermitian=True))[:2])
     assert np.all(np.abs(completed.effect.coefficients - angles) < 3 * errors)
     assert np.any(np.abs(plain.coefficients - angles) > 3 * errors)
-    # The search for the moments has come as far as the true ones are.
+    # The search for the moments reaches the gain of the true ones.
     true = refine(posed, tilt, moments, _nothing(), effort=0)  # type: ignore[arg-type]
     assert completed.effect.gain > true.gain - 0.1
     assert completed.effect.gain > plain.gain + 10.0
-    # What is hardly there is not worth two more parameters.
+    # A small tilt is not worth two more parameters.
     posed = _Tilted(problem, tilt, 0.02 * np.kron([1.0, *moments], angles), 0.02 * rng.normal(size=6))
     plain = refine(posed, tilt, (0.0, 0.0), _nothing(), effort=0)  # type: ignore[arg-type]
     assert complete_effects(posed, [SelectedEffect(plain, 1e-9, ())])[0].effect is plain  # type: ignore[arg-type]

@@ -71,7 +71,7 @@ def test_what_is_kept_of_a_gain_is_its_share_of_the_fit_s() -> None:
     errors = [0.30, 0.30, 0.28]
     assert _of_sizes(errors, [0.20, 0.20, 0.15]).retained_share(1, [0]) == pytest.approx(0.4)
     assert _of_sizes(errors, None).retained_share(1, [0]) == 1.0
-    # A fit that hardly gains says nothing of what should be left.
+    # A small gain in the fit gives no reference for the retained gain.
     assert _of_sizes(errors, [0.20, 0.20, 0.195]).retained_share(1, [0]) == 1.0
 
 

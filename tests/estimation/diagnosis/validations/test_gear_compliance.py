@@ -29,7 +29,7 @@ def with_encoders(log: Log, compliance: np.ndarray, seed: int) -> Log:
     t, q = log.t, log.q
     dq = np.gradient(q, t, axis=0)
     friction = np.array([2.0, 1.0]) * np.tanh(dq / 1e-3) + np.array([1.5, 0.8]) * dq
-    # The load of the gear is the drive's torque less what friction and rotor take of it.
+    # The gear load is the drive's torque minus friction and rotor torque.
     load = log.tau - friction - np.array([0.2, 0.1]) * np.gradient(dq, t, axis=0)
     link = q - compliance * load - MOTION / 2 * np.sign(dq) * (compliance > 0)
     late = CubicSpline(t, link)(t - DELAY)
@@ -60,7 +60,7 @@ def test_the_stiffness_of_a_gear_is_measured(arm: Robot, arm_plant: Callable, fo
     for name, truth in (("compliance", COMPLIANCE), ("encoder_delay", DELAY), ("lost_motion", MOTION)):
         assert abs(values[name].value - truth) < 3.5 * values[name].standard_error, name
         assert values[name].determined, name
-    # 3 % of the compliance, by 40 s of a load of 15 N m RMS against some 30 urad of noise.
+    # Accurate to 3 %: 40 s with a load of 15 N m RMS and a noise of some 30 urad.
     assert values["compliance"].value == pytest.approx(COMPLIANCE, rel=0.03)
     assert finding.gain.ci95[0] > 0
     assert finding.gain.nrmse_after < 0.2 * finding.gain.nrmse_before

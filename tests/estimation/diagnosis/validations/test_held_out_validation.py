@@ -158,17 +158,17 @@ def test_what_a_refuted_name_was_for_is_told_as_unexplained(shown: Shown) -> Non
 @pytest.mark.parametrize(
     ("shown", "stays"),
     [
-        (Shown(-0.002, 0.001, MAX_RMSE_RATIO + 0.01), False),  # much larger errors, if not surely
+        (Shown(-0.002, 0.001, MAX_RMSE_RATIO + 0.01), False),  # much larger errors, though not significantly
         (Shown(-0.002, 0.001, MAX_RMSE_RATIO - 0.01), True),
-        (Shown(kept=MIN_RETAINED_GAIN - 0.01), False),  # it fits the rows that it was fitted to, and few others
+        (Shown(kept=MIN_RETAINED_GAIN - 0.01), False),  # it fits only the rows of its fit
         (Shown(kept=MIN_RETAINED_GAIN + 0.01), True),
         (
             Shown(kept=MIN_RETAINED_GAIN - 0.1, speaks=MIN_RETAINED_GAIN + 0.01),
             True,
-        ),  # what the base model errs by hides what rows say
+        ),  # errors of the base model hide the support of the rows
         (Shown(kept=MIN_RETAINED_GAIN - 0.1, speaks=MIN_RETAINED_GAIN - 0.01), False),
         (Shown(-0.001, 0.003, kept=MIN_RETAINED_GAIN - 0.1, speaks=MIN_RETAINED_GAIN + 0.01), False),
-        (Shown(astray=True), False),  # a joint whose base model the logs do not tell
+        (Shown(astray=True), False),  # a joint whose base model is not determined
     ],
 )
 def test_reasons_to_leave_a_name_out(shown: Shown, stays: bool) -> None:
@@ -277,7 +277,7 @@ def test_a_passing_effect_is_not_judged_on_other_logs() -> None:
     found = SelectedEffect(PUSH, 1e-9, ((STRIBECK, 1.0),))
     assert validated(bench_with(external_contact=HARMS), found).effects == (PUSH,)
     assert validated(bench_with(external_contact=HARMS), found, held_out=False).effects == (STRIBECK,)
-    # For the same reason other logs cannot make it take another's place.
+    # For the same reason it cannot replace another finding by other logs.
     bench = bench_with(stribeck=HARMS, external_contact=HARMS)
     assert validated(bench, SelectedEffect(STRIBECK, 1e-9, ((PUSH, 1.0),))).effects == ()
 
@@ -291,7 +291,7 @@ def test_a_faint_name_needs_unseen_data_that_speak_for_it(shown: Shown, stays: b
         assert (result.effects == (SPRING,)) is kept
         assert [member for member, *_ in result.refuted] == ([] if kept or faint else [SPRING])
         assert bool(result.changes) is (not kept)
-    # A push is over when the unseen log begins.
+    # A contact has ended before the held-out log begins.
     assert validated(bench_with(external_contact=slightly), SelectedEffect(PUSH, 1e-3, ()), faint=[PUSH]).effects == (
         PUSH,
     )
@@ -363,6 +363,6 @@ def test_what_was_undone_before_the_unseen_data_stays() -> None:
     assert "absent from the held-out data" in note
     bench.without["payload_change"] = IDLE
     assert validated(bench, SelectedEffect(payload, 1e-9, ())).effects == ()
-    # A spring does not come and go.
+    # A spring is permanent.
     bench.shows["spring of joint 2"], bench.without["spring of joint 2"] = HARMS, HELPS
     assert validated(bench, SelectedEffect(SPRING, 1e-9, ())).effects == ()

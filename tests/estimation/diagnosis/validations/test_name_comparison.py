@@ -57,10 +57,10 @@ def _compared(
     ("gain", "degrees", "stands"),
     [
         (500.0, 6, True),  # as much, with more parameters
-        (545.0, 4, True),  # more, but formulas are true to some per cent only
-        (600.0, 6, False),  # clearly more, and worth its parameters
-        (600.0, 30, True),  # clearly more, for far more parameters
-        (900.0, 90, False),  # whatever it costs, the name leaves a third of it
+        (545.0, 4, True),  # more, but within the formula error
+        (600.0, 6, False),  # clearly more, with a better BIC
+        (600.0, 30, True),  # clearly more, but with far more parameters
+        (900.0, 90, False),  # at any number of parameters, because the finding leaves a third
     ],
 )
 def test_a_name_stands_where_no_function_in_its_place_is_clearly_better(

@@ -46,9 +46,9 @@ def test_a_value_at_the_edge_of_what_machines_have_is_no_name(
 @pytest.mark.parametrize(
     ("worth", "believed", "kept"),
     [
-        (90.0, True, True),  # with reversals as late as all else it explains nearly as much: a machine may have that
-        (60.0, True, False),  # without its torn reversals it is another effect
-        (90.0, False, False),  # that form is no machine's either
+        (90.0, True, True),  # with equal delays it explains nearly as much, which is plausible
+        (60.0, True, False),  # with equal delays it explains far less
+        (90.0, False, False),  # the usual shape is not plausible either
     ],
 )
 def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
@@ -79,7 +79,7 @@ def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
     [
         ("spring", CLOSE_RIVAL_BIC - 1.0, True),
         ("spring", CLOSE_RIVAL_BIC + 1.0, False),
-        ("load_heat", RARE_ODDS - 1.0, True),  # as rare as it is, the data speak for it as much
+        ("load_heat", RARE_ODDS - 1.0, True),  # within the penalty of a rare effect
         ("load_heat", RARE_ODDS + 1.0, False),
     ],
 )

@@ -119,6 +119,6 @@ def test_friction_turns_round_as_sharply_as_all_rows_say(arm: Robot, arm_log: Ca
         assert again.provenance["velocity_scales"] == pytest.approx([1e-3, 1e-3], rel=0.5)
         before, after = predict(wrong, other).nrmse, predict(again, other).nrmse
         assert np.all(after <= before)
-        # Friction is most of the second joint's torque, a little of the first's.
+        # Friction is most of the second joint's torque, but little of the first joint's.
         assert before[1] > worse * after[1]
     assert model.provenance["velocity_scales"] == pytest.approx([1e-3, 1e-3], rel=0.5)

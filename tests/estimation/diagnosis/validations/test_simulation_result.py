@@ -117,7 +117,7 @@ def test_the_arm_moves_as_an_independent_solver_says(
     motion = fourier_motion(arm, 3, duration=8.0)
     log = simulate(arm_plant(velocity_scale=width, torque_noise=0.0, encoder_counts=0.0), motion)
     t = np.asarray(motion.t)
-    # A driving torque that nothing explains, smooth, so that both solvers see the same.
+    # An unexplained driving torque, smooth, so that both solvers see the same.
     torque = log.tau + 0.6 * np.sin(2 * np.pi * 0.7 * t)[:, None] * [1.0, -0.5]
     model = default_model(arm, friction="coulomb-viscous", velocity_scale=width)
     base = find_base_parameters(model)
@@ -130,7 +130,7 @@ def test_the_arm_moves_as_an_independent_solver_says(
     loop = Loop(bandwidth=3.0)
     simulation = simulate_both(before, after, whole, rows, loop)
     assert simulation.note == ""
-    # The loop is laid out for each joint's own mean inertia: the same as the simulation's, by its definition.
+    # The loop's gains are for each joint's mean inertia, as in the simulation.
     c2, s2 = np.cos(whole.q[:, 1]), np.sin(whole.q[:, 1])
     inertia = np.array([0.3 + 0.32 + 0.1 + 0.8 * np.mean(0.3 * c2 - 0.1 * s2) + 0.2, 0.2])
     stiffness, damping = loop.gains(inertia)
