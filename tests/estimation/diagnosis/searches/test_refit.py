@@ -89,7 +89,7 @@ def test_a_search_is_done_again_where_the_slow_part_of_the_noise_is_smaller(
     known = problem.whitening
 
     def less(power: float) -> Whitening:
-        """Returns the noise model with a given power of the first joint at zero frequency, relative to the known one."""
+        """Returns the noise model with a given power of the first joint at zero frequency, over the known power."""
         first = known.coefficients[0]
         gain = (1.0 - first.sum()) / np.sqrt(power)
         return replace(known, coefficients=(first + (1.0 - first.sum() - gain) / len(first), *known.coefficients[1:]))
