@@ -107,7 +107,7 @@ def lateness(situation: Situation, shift: float) -> Array:
 
     Args:
         situation: the motion and the base model's torque (N samples).
-        shift: delay of the difference quotient [s]; one of at most `SMALL` is replaced by `SMALL`.
+        shift: delay of the difference quotient [s]; `SMALL` is used if its size is below that.
 
     Returns:
         (N, n) [N m/s or N/s].
@@ -143,7 +143,7 @@ def _before(t: Array, step: float) -> Array:
 def _past(situation: Situation, smooth: Array) -> list[tuple[Callable[[Array], Array], Callable[[Array], Array]]]:
     """Interpolates each log's torque without friction, and its velocities, between the samples.
 
-    Velocities are interpolated by cubics without overshoot, which would cause false reversals next to standstill.
+    Velocities are interpolated by cubics without overshoot, which next to standstill would be a false reversal.
     """
     result = []
     for run in situation.runs:

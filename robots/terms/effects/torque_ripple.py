@@ -41,8 +41,8 @@ class TorqueRipple(StaticJointEffect):
 
     l is the load [N m or N], which increases the ripple of a gear. The ripple of a motor's torque constant is
     proportional to the motor's torque instead, which includes friction. `friction_share` is 0 for the first and 1 for
-    the second. p = q - dq T is the position a time T earlier, because a delay of the logged torque shifts the phase of
-    a ripple of 50 Hz and more.
+    the second. p = q - dq T is the position a time T earlier. It matters for a ripple of 50 Hz and more, whose phase a
+    delay of the logged torque shifts.
 
     All orders that the data resolve are searched, also without a known gear. Below an order of 2.5, or two waves over
     the joint's range, ripple resembles gravity and springs.
