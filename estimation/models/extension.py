@@ -13,6 +13,7 @@ from robots.common.errors import InputError
 from robots.common.plain import all_finite, finite
 from robots.robot import Robot
 from robots.terms.discrepancies.patterns import build_pattern
+from robots.terms.effect_bases.capabilities import AtReversals, Reading
 from robots.terms.effect_bases.gear_load import ExtraGearLoad, LoadPath, LoadSource, with_gear_load
 from robots.terms.effects import EFFECTS, Effect
 from robots.terms.situations.situation import Situation
@@ -185,7 +186,7 @@ def extension_torque(
 
 
 def _stage(effect: Effect) -> int:
-    return 2 if effect.acts_on_total_torque else int(effect.smooths_friction_sign)
+    return 2 if effect.reading is Reading.CUTS else int(effect.at_reversals is AtReversals.LATE)
 
 
 def _described(effect: Effect, robot: Robot, joint: int | None, shape: tuple[float, ...]) -> list[tuple[str, str]]:

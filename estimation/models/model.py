@@ -21,6 +21,7 @@ from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms import Column, build_term, describe_term
+from robots.terms.effect_bases.capabilities import Persistence, Reading
 from robots.terms.effect_bases.gear_load import ExtraGearLoad
 from robots.terms.situations.flange_body import with_body
 from robots.terms.situations.joining import join_situations
@@ -100,7 +101,7 @@ class Model:
     @property
     def keeps_heat(self) -> bool:
         """Whether what came before a motion acts in it still."""
-        return any(extension.source.has_thermal_memory for extension in self.extensions)
+        return any(extension.source.persistence is Persistence.HEAT for extension in self.extensions)
 
     def torque(
         self,
@@ -150,7 +151,7 @@ class Model:
                 join_situations([*earlier, situation(model, known, *arrays)], self.torque_model), since=self.since
             )
 
-        cut = any(extension.source.acts_on_total_torque for extension in self.extensions)
+        cut = any(extension.source.reading is Reading.CUTS for extension in self.extensions)
         extended = extension_torque(self.extensions, state(felt), state(parameters) if cut else None, self.bearing)
         return own + extended[-len(own) :]
 

@@ -21,6 +21,7 @@ from robots.common.errors import InputError
 from robots.common.plain import all_finite, finite
 from robots.common.tables.table_files import write_table
 from robots.signals import Log, Motion
+from robots.terms.effect_bases.capabilities import Persistence
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -222,7 +223,7 @@ def clock_shift(model: Model, log: Log) -> tuple[float, str]:
 
     Time-dependent effects refer to the clock of the logs of the model's fit (`clock_shift_between`).
     """
-    if not any(extension.source.depends_on == "time" for extension in model.extensions):
+    if not any(extension.source.persistence is not Persistence.STATE for extension in model.extensions):
         return 0.0, ""
     return clock_shift_between(model.provenance.get("logs", ()), log)
 

@@ -1,4 +1,4 @@
-"""Physical effects, one a file, each used by simulator, design, estimation and diagnosis alike."""
+"""Physical effects, one per file, each used by the simulator, the design, the estimation and the diagnosis."""
 
 from __future__ import annotations
 
@@ -20,15 +20,18 @@ TERMS: Registry[type[Term]] = Registry(
 
 
 def describe_term(term: Term) -> dict[str, Any]:
-    """Writes a term as plain data, for a model file."""
+    """Converts a term to plain data for a model file."""
     return {"name": term.name} | {item.name: getattr(term, item.name) for item in fields(term)}  # type: ignore[arg-type]
 
 
 def build_term(description: Mapping[str, Any]) -> Term:
-    """Reads what `describe_term` wrote.
+    """Builds a term from the output of `describe_term`.
+
+    Args:
+        description: the term's name and settings.
 
     Raises:
-        InputError: an unknown term, or settings that it does not have.
+        InputError: the term is unknown, or does not have one of the settings.
     """
     settings = dict(description)
     name = settings.pop("name", None)

@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """One column of the regressor, that is one parameter.
+    """One column of the regressor, which belongs to one parameter.
 
     Attributes:
         name: the parameter's name, unique in a model, such as ``mPx_2``.
         symbol: the name without the joint, such as ``mPx``.
-        joint: the joint or link it belongs to, counted from 1.
+        joint: the parameter's joint or link, counted from 1.
         unit: its unit, such as ``kg m``.
-        term: the name of the term that brings it.
+        term: the name of its term.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Term(ABC):
 
     @abstractmethod
     def regressor(self, robot: Robot, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX) -> casadi.SX:
-        """Builds Y, symbolic.
+        """Builds the symbolic regressor Y.
 
         Args:
             robot: the robot with n joints.
@@ -58,21 +58,28 @@ class Term(ABC):
 
     @abstractmethod
     def nominal(self, robot: Robot) -> NDArray[np.float64]:
-        """Gives the robot description's value of each parameter (k,), NaN where it states none."""
+        """Returns the robot description's value of each parameter (k,), NaN where it states none."""
 
 
 def force_unit(robot: Robot, joint: int) -> str:
-    """Gives the unit of a joint's generalised force; `joint` counts from 0."""
+    """Returns the unit of a joint's generalised force; `joint` counts from 0."""
     return "N m" if robot.chain.joints[joint].kind == "revolute" else "N"
 
 
 def length_unit(robot: Robot, joint: int) -> str:
-    """Gives the unit of a joint's position; `joint` counts from 0."""
+    """Returns the unit of a joint's position; `joint` counts from 0."""
     return "rad" if robot.chain.joints[joint].kind == "revolute" else "m"
 
 
 def joint_columns(robot: Robot, term: str, symbol: str, units: list[str]) -> tuple[Column, ...]:
-    """Describes one parameter per joint, `units` giving the unit of each joint's."""
+    """Describes one parameter per joint.
+
+    Args:
+        robot: the robot with n joints.
+        term: the name of the term.
+        symbol: the parameter's name without the joint.
+        units: its unit on each joint (n,).
+    """
     return tuple(
         Column(name=f"{symbol}_{joint}", symbol=symbol, joint=joint, unit=units[joint - 1], term=term)
         for joint in range(1, robot.n + 1)

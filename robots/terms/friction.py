@@ -1,4 +1,4 @@
-"""Joint friction: what a friction term is, and the polynomial of the velocity (thesis eq. 35)."""
+"""Joint friction: the interface of friction terms, and the polynomial in the velocity (thesis eq. 35)."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ POLYNOMIAL = (1, 2, 3, 4)
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionTerm(Term):
-    """Friction of each joint by its own velocity: tau_j = row(dq_j) pi_j, alike on all joints.
+    """Friction of each joint as a function of its own velocity: tau_j = row(dq_j) pi_j, the same on all joints.
 
-    A member is a frozen dataclass that gives `name`, `units`, `row` and, where a description states values, `nominal`.
+    A subclass is a frozen dataclass with `name`, `units`, `row` and, if a description states values, `nominal`.
 
     Attributes:
-        velocity_scale: with a value v0 > 0 [rad/s or m/s], sign(dq) is tanh(dq / v0): differentiable, as a design
-            needs it, and finite in slope where a log's velocity is known to v0 only. With 0 it is the sign. One for
-            all joints, or one each.
+        velocity_scale: v0 [rad/s or m/s], one value for all joints or one per joint. With v0 > 0, sign(dq) is
+            tanh(dq / v0). That is differentiable, as a design requires, and has a finite slope if a log's velocity is
+            known to v0 only. With 0 it is the sharp sign.
 
     Raises:
-        InputError: a negative scale.
+        InputError: the scale is negative.
     """
 
     velocity_scale: float | tuple[float, ...] = 0.0
@@ -43,11 +43,11 @@ class FrictionTerm(Term):
 
     @abstractmethod
     def units(self, force: str, length: str) -> dict[str, str]:
-        """Gives the unit of each parameter of one joint, by its symbol, in the order of the columns.
+        """Returns the unit of each parameter of one joint, by its symbol, in the order of the columns.
 
         Args:
-            force: of the joint, ``N m`` or ``N``.
-            length: of its position, ``rad`` or ``m``.
+            force: unit of the joint's torque, ``N m`` or ``N``.
+            length: unit of its position, ``rad`` or ``m``.
         """
 
     @abstractmethod
@@ -55,13 +55,13 @@ class FrictionTerm(Term):
         """Builds the columns (1, k) of one joint.
 
         Args:
-            dq: its velocity.
-            sign: sign(dq), smoothed to `velocity_scale`.
-            scale: that scale of this joint; 0 where the sign is sharp.
+            dq: its velocity [rad/s or m/s].
+            sign: sign(dq), smoothed by the joint's velocity scale.
+            scale: the joint's velocity scale [rad/s or m/s]; 0 for the sharp sign.
         """
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
-        """Describes the parameters of joint 1, then of joint 2, and so on."""
+        """Describes the parameters joint by joint."""
         return tuple(
             Column(name=f"{symbol}_{joint + 1}", symbol=symbol, joint=joint + 1, unit=unit, term=self.name)
             for joint in range(robot.n)
@@ -72,7 +72,7 @@ class FrictionTerm(Term):
         """Builds Y (n, k n), block diagonal.
 
         Raises:
-            InputError: velocity scales for another number of joints.
+            InputError: the number of velocity scales is not the number of joints.
         """
         scales = self.velocity_scale if isinstance(self.velocity_scale, tuple) else (self.velocity_scale,) * robot.n
         if len(scales) != robot.n:
@@ -84,7 +84,7 @@ class FrictionTerm(Term):
         return casadi.diagcat(*rows)
 
     def nominal(self, robot: Robot) -> NDArray[np.float64]:
-        """Gives no values (k n,): a description states those of the polynomial."""
+        """Returns NaN for all parameters (k n,), because a description states only those of the polynomial."""
         return np.full(len(self.columns(robot)), np.nan)
 
 
@@ -93,7 +93,7 @@ class FrictionPolynomial(FrictionTerm):
     """tau_f = f1 sign(dq) + f2 dq + f3 dq |dq| + f4 dq^3, on each joint.
 
     Attributes:
-        powers: which of f1..f4 are there: (1, 2) is Coulomb and viscous friction.
+        powers: which of f1..f4 the model has; (1, 2) is Coulomb and viscous friction.
         velocity_scale: see `FrictionTerm`.
     """
 
@@ -105,7 +105,7 @@ class FrictionPolynomial(FrictionTerm):
         """Checks the powers and the scale.
 
         Raises:
-            InputError: an unknown or repeated power, or a negative scale.
+            InputError: a power is unknown or repeated, or the scale is negative.
         """
         known = all(power in POLYNOMIAL for power in self.powers)
         if not self.powers or not known or len(set(self.powers)) < len(self.powers):
@@ -113,16 +113,16 @@ class FrictionPolynomial(FrictionTerm):
         super().__post_init__()
 
     def units(self, force: str, length: str) -> dict[str, str]:
-        """Gives the units of f1.. of one joint."""
+        """Returns the units of one joint's coefficients f1 to f4, for the powers that the model has."""
         every = {1: force, 2: f"{force} s/{length}", 3: f"{force} s2/{length}2", 4: f"{force} s3/{length}3"}
         return {f"f{power}": every[power] for power in self.powers}
 
     def row(self, dq: casadi.SX, sign: casadi.SX, scale: float) -> casadi.SX:
-        """Builds the chosen powers (1, k)."""
+        """Builds the columns of the chosen powers (1, k)."""
         shapes = {1: sign, 2: dq, 3: dq * casadi.fabs(dq), 4: dq**3}
         return casadi.horzcat(*(shapes[power] for power in self.powers))
 
     def nominal(self, robot: Robot) -> NDArray[np.float64]:
-        """Gives the described coefficients (k n,)."""
+        """Returns the coefficients of the robot's description (k n,)."""
         indices = [power - 1 for power in self.powers]
         return np.asarray(robot.friction, dtype=float)[:, indices].reshape(-1)

@@ -1,4 +1,4 @@
-"""Rigid links in a serial chain: the Newton-Euler recursion, linear in ten parameters a link."""
+"""Rigid-body dynamics of a serial chain by the Newton-Euler recursion, linear in ten parameters per link."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class RigidBody(Term):
     name: str = "rigid_body"
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
-        """Describes m, mPx, mPy, mPz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz of link 1, then of link 2, and so on."""
+        """Describes m, mPx, mPy, mPz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz, link by link."""
         return tuple(
             Column(name=f"{symbol}_{link}", symbol=symbol, joint=link, unit=unit, term=self.name)
             for link in range(1, robot.n + 1)
@@ -39,17 +39,17 @@ class RigidBody(Term):
         )
 
     def regressor(self, robot: Robot, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX) -> casadi.SX:
-        """Builds Y (n, 10 n): joint k feels the links from k outwards, so Y is block upper triangular."""
+        """Builds Y (n, 10 n): only links from k outwards load joint k, so Y is block upper triangular."""
         return _rows(robot)(q, dq, ddq)
 
     def nominal(self, robot: Robot) -> NDArray[np.float64]:
-        """Gives the described inertial parameters, link after link (10 n,)."""
+        """Returns the inertial parameters of the robot's description, link by link (10 n,)."""
         return np.asarray(robot.inertia, dtype=float).reshape(-1)
 
 
 @lru_cache(maxsize=8)
 def _rows(robot: Robot) -> casadi.Function:
-    """Builds the recursion once for all models of a robot, which ask for it with symbols of their own."""
+    """Builds the recursion as a function, once for all models of a robot."""
     q, dq, ddq = (casadi.SX.sym(name, robot.n) for name in ("q", "dq", "ddq"))
     chain = robot.chain
     rotations, translations = zip(
@@ -58,7 +58,7 @@ def _rows(robot: Robot) -> casadi.Function:
     blocks = _link_wrenches(chain.joints, rotations, translations, chain.gravity, dq, ddq)
     Y = casadi.SX(chain.n, 10 * chain.n)
     for link, block in enumerate(blocks):
-        wrench = block  # (6, 10): force, then moment, of the link on its parent, in the frame it stands in
+        wrench = block  # (6, 10): force, then moment, of the link on its parent, in the frame of link k
         for k in range(link, -1, -1):
             joint = chain.joints[k]
             part = wrench[3:, :] if joint.kind == "revolute" else wrench[:3, :]
@@ -78,7 +78,7 @@ def _link_wrenches(
     dq: casadi.SX,
     ddq: casadi.SX,
 ) -> list[casadi.SX]:
-    """Forward recursion (eq. 4 to 7): per link the (6, 10) map from its parameters to its inertial wrench (eq. 23)."""
+    """Builds per link the map (6, 10) from parameters to inertial wrench by forward recursion (eq. 4 to 7, 23)."""
     omega, alpha = casadi.SX(3, 1), casadi.SX(3, 1)
     acceleration = casadi.SX(-cleaned(np.asarray(gravity, dtype=float)))
     blocks = []

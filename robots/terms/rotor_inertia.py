@@ -1,4 +1,4 @@
-"""The rotor's inertia, seen at the joint."""
+"""Rotor inertia, referred to the joint."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class RotorInertia(Term):
     """tau_m = Im ddq on each joint, Im the motor's inertia times its gear ratio squared (thesis eq. 37).
 
-    The rotor's gyroscopic torque on the links before it is left out, as in the thesis: it is smaller by the gear
+    The rotor's gyroscopic torque on the preceding links is neglected, as in the thesis. It is smaller by the gear
     ratio.
     """
 
@@ -35,5 +35,5 @@ class RotorInertia(Term):
         return casadi.diag(ddq)
 
     def nominal(self, robot: Robot) -> NDArray[np.float64]:
-        """Gives the described inertias (n,)."""
+        """Returns the rotor inertias of the robot's description (n,)."""
         return np.asarray(robot.rotor_inertia, dtype=float)

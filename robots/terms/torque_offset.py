@@ -1,4 +1,4 @@
-"""A constant torque on each joint: a sensor's or current loop's zero, or unlike Coulomb friction both ways."""
+"""A constant torque per joint: the zero of a sensor or current loop, or direction-dependent Coulomb friction."""
 
 from __future__ import annotations
 
@@ -30,5 +30,5 @@ class TorqueOffset(Term):
         return casadi.SX.eye(robot.n)
 
     def nominal(self, robot: Robot) -> NDArray[np.float64]:
-        """Gives zeros (n,): a description states no offset."""
+        """Returns zeros (n,), because a description states no offset."""
         return np.zeros(robot.n)

@@ -1,4 +1,4 @@
-"""A plant that shares no code with what it judges: numpy, scipy and pinocchio alone.
+"""An independent plant for tests: it uses only numpy, scipy and pinocchio, and no code of the packages under test.
 
-`cases.draw_case` hides effects in logs of t, q and tau; its effects are formulated otherwise than a catalogue's.
+`cases.draw_case` hides effects in logs of t, q and tau. Their formulas differ from those of the effect catalogue.
 """

@@ -1,4 +1,7 @@
-"""Cases drawn from one seed: a robot, its motions, and effects hidden in its logs at a stated visible size."""
+"""Random cases: a robot, its motions, and effects hidden in its logs with a given visible size.
+
+The visible size of an effect is the RMS of its torque that the base model cannot fit, over the joint's torque RMS.
+"""
 
 from __future__ import annotations
 
@@ -16,24 +19,27 @@ from tests.truth.noise import Noise, draw_noise
 from tests.truth.plant import Record, open_loop, parts_links, play, projection_of
 from tests.truth.references import Reference, draw_aperiodic, draw_moves, draw_periodic
 
-SEARCH_STEP = 0.008
-SEARCHES = 12
-CLOSE = 0.02
-AGREED = 0.1
-ROUNDS = 5
-TOO_FAINT = 1.4
-AWAY = 0.25
-EVERY = 2
+SEARCH_STEP = 0.008  # sample period [s] of the open-loop rides in the search for an effect's amount
+SEARCHES = 12  # largest number of steps of that search
+CLOSE = 0.02  # relative error of the visible size at which it ends
+AGREED = 0.1  # relative error of the visible size that is accepted in the closed loop
+ROUNDS = 5  # largest number of closed-loop corrections
+TOO_FAINT = 1.4  # ratio of wanted to visible size above which a case is refused
+AWAY = 0.25  # distance from the joint range, as a fraction of it, at which the loop counts as unstable
+EVERY = 2  # step between the rows that projections use
 MOTION = ("q_true", "v_true", "a_true", "sign")
 
 
 class Hidden(Exception):
-    """An effect that cannot reach the wanted visible size with plausible values."""
+    """Raised if an effect cannot reach the wanted visible size with plausible values."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """One blind case: what happened, and what the logs of it are."""
+    """One case: the robot, its true effects, and its logs.
+
+    ``training`` is the number of logs to diagnose, and ``size`` the visible size that was asked for.
+    """
 
     seed: int
     machine: Machine
@@ -46,16 +52,16 @@ class Case:
 
     @property
     def logs(self) -> tuple[Record, ...]:
-        """Logs to diagnose."""
+        """The logs to diagnose."""
         return self.records[: self.training]
 
     @property
     def unseen(self) -> tuple[Record, ...]:
-        """Logs of other motions, to measure a gain on."""
+        """Held-out logs of other motions."""
         return self.records[self.training :]
 
     def visible(self) -> list[float]:
-        """The share of its torque's RMS that each effect shows beyond the base model, in the logs as they became."""
+        """Computes the visible size of each effect in the logs to diagnose, on the joint where it is largest."""
         level = self.level()
         stack = [np.concatenate([getattr(r, key)[::EVERY] for r in self.logs]) for key in MOTION]
         projection = Projection(base_regressor(self.machine.known, *stack), level)
@@ -63,7 +69,7 @@ class Case:
         return [float(projection.visible(part).max()) for part in parts]
 
     def level(self) -> np.ndarray:
-        """RMS of each joint's torque (n,) without noise."""
+        """Computes each joint's torque RMS without noise (n,) [N m]."""
         return np.sqrt(np.concatenate([r.clean for r in self.logs]).__pow__(2).mean(axis=0))
 
 
@@ -85,21 +91,25 @@ def draw_case(
     """Draws a case.
 
     Args:
-        seed: everything follows from it.
-        hide: classes of effects to hide, or how many of the known ones to draw, or "stranger".
-        size: visible size of each, as a share of its joint's torque RMS.
-        kind: robot; drawn where None.
-        joint: joint of the (first) effect; drawn where None.
-        periodic: kind of motion; drawn where None.
-        duration: length of the log [s].
-        unseen: length of the log of another motion [s]; 0 for none.
-        noise_level: torque noise, as a share of the torque's RMS.
-        noise_memory: range of the correlation of one sample of the noise's coloured half with the next.
-        stream: another case of the same seed.
-        moves: moves with pauses between instead of motion throughout.
+        seed: seed of all random numbers.
+        hide: classes of effects to hide, or the number of catalogue effects to draw, or "stranger" for one effect
+            outside the catalogue.
+        size: visible size of each effect, as a fraction of its joint's torque RMS.
+        kind: name of the robot; drawn if None.
+        joint: joint of the (first) effect, from 1; drawn if None.
+        periodic: whether the motion is periodic; drawn if None.
+        duration: length of the log to diagnose [s].
+        unseen: length of the held-out log of another motion [s]; 0 for none.
+        noise_level: torque noise, as a fraction of the torque RMS.
+        noise_memory: range of the correlation between consecutive samples of the coloured half of the noise.
+        stream: number of the case among those of the same seed.
+        moves: whether the motion consists of moves with pauses between them.
+
+    Returns:
+        The case.
 
     Raises:
-        Hidden: when no effect that is asked for can reach the size.
+        Hidden: an effect cannot reach the size, or the position loop is unstable with it.
     """
     rng = np.random.default_rng([seed, stream] if stream else seed)
     machine = draw_machine(kind or KINDS[int(rng.integers(len(KINDS)))], rng)
@@ -148,7 +158,7 @@ def draw_case(
         )
         if any(_runs_away(machine, record) for record in case.records):
             raise Hidden("the loop runs away from its reference")
-        # A closed loop moves more sharply than its reference, which some effects show more in.
+        # The closed loop accelerates more than its reference, so some effects show more than in open loop.
         shares = case.visible()
         if any(share <= 0 for share in shares):
             raise Hidden("nothing of it shows once the loop is closed")
@@ -165,13 +175,13 @@ def draw_case(
 
 
 def _runs_away(machine: Machine, record: Record) -> bool:
-    """Whether a joint is farther from its range than `AWAY` of it: nothing has the size then that was asked for."""
+    """Returns whether a joint leaves its range by more than `AWAY` of it, because the position loop is unstable."""
     reach = AWAY * (machine.upper - machine.lower)
     return bool(np.any((record.q < machine.lower - reach) | (record.q > machine.upper + reach)))
 
 
 def write_log(record: Record, path: Path) -> None:
-    """Writes what a user has: t, q and tau as CSV."""
+    """Writes t, q and tau as CSV, which is all that a user has."""
     n = record.q.shape[1]
     header = ",".join(["t", *(f"q{j + 1}" for j in range(n)), *(f"tau{j + 1}" for j in range(n))])
     table = np.column_stack([record.t, record.q, record.tau])
@@ -195,10 +205,7 @@ def _amount(
     level: np.ndarray,
     projection: Projection,
 ) -> float | None:
-    """Finds the amount that shows the wanted size, by secants in the logarithms; None beyond the plausible.
-
-    An effect on one joint must show on that joint.
-    """
+    """Finds the amount with the wanted visible size by the secant method in logarithms; None if none is plausible."""
     row = level[effect.joint - 1] if effect.joint else level.max()
     amount = 0.02 * row if np.isinf(effect.largest) else 0.01 * effect.largest
     tried: list[tuple[float, float]] = []
@@ -209,7 +216,7 @@ def _amount(
         if abs(share / size - 1) < CLOSE:
             return amount
         if share <= 0 or (share < size and amount >= effect.largest):
-            # The closed loop moves more sharply, and shows more of a gear that gives way.
+            # The closed loop accelerates more, so an elastic or loose gear shows more there.
             return amount if parts_links(effect) and share > size / 5 else None
         tried.append((np.log(amount), np.log(share)))
         power = effect.power

@@ -1,4 +1,4 @@
-"""What a user of the robot has: its maker's description, as a URDF with a YAML file beside it."""
+"""The robot's description that a user has: a URDF and a YAML file."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from tests.truth.machines import Machine
 
 
 def write_description(machine: Machine, folder: Path, *, drives: bool = True) -> Path:
-    """Writes ``NAME.urdf`` and ``NAME.yaml`` of the robot as described, not as it is.
+    """Writes ``NAME.urdf`` and ``NAME.yaml`` of the described robot, which differs from the true one.
 
     Args:
         machine: the robot.
         folder: an existing folder.
-        drives: with gear ratios and rotor inertias, which a URDF cannot state.
+        drives: whether to state gear ratios and rotor inertias, which a URDF cannot state.
 
     Returns:
         The path of the YAML file.
@@ -34,7 +34,7 @@ def write_description(machine: Machine, folder: Path, *, drives: bool = True) ->
 
 
 def urdf_of(model: pin.Model, name: str) -> str:
-    """Writes a chain of revolute joints as URDF, each axis as pinocchio's own joint has it."""
+    """Writes a chain of revolute joints as URDF text, with the axes of pinocchio's joints."""
     rows = [f'<robot name="{name}">', '  <link name="base"/>']
     data = model.createData()
     for joint in range(1, model.njoints):

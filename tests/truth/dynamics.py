@@ -1,4 +1,4 @@
-"""Rigid-body torque of many samples, and what a base model of rigid body and friction can absorb of a torque."""
+"""Rigid-body torque of many samples, and the projection of torques off a base model of rigid body and friction."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import eigh
 
-# Directions of the regressor's Gram matrix below this share of the largest are not excited.
+# Fraction of the largest eigenvalue of the regressor's Gram matrix below which a direction counts as not excited.
 FAINT = 1e-12
 
 
 def rigid_torque(model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """Inverse dynamics (N, n) by recursive Newton-Euler."""
+    """Computes the inverse dynamics (N, n) [N m] by the recursive Newton-Euler algorithm."""
     data = model.createData()
     torque = np.empty_like(q)
     for k in range(len(q)):
@@ -20,21 +20,21 @@ def rigid_torque(model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray) 
 
 
 def with_gravity(model: pin.Model, gravity: np.ndarray) -> pin.Model:
-    """A copy of the model in another field of gravity [m/s2]."""
+    """Returns a copy of the model under another gravity (3,) [m/s2]."""
     copy = pin.Model(model)
     copy.gravity.linear = np.asarray(gravity, dtype=float)
     return copy
 
 
 def with_tool(model: pin.Model, tool: pin.Inertia) -> pin.Model:
-    """A copy of the model with one more rigid body on the last link."""
+    """Returns a copy of the model with an additional rigid body on the last link."""
     copy = pin.Model(model)
     copy.inertias[copy.njoints - 1] += tool
     return copy
 
 
 def massless(model: pin.Model) -> pin.Model:
-    """A copy of the model whose links weigh nothing."""
+    """Returns a copy of the model whose links have no mass."""
     copy = pin.Model(model)
     for joint in range(1, copy.njoints):
         copy.inertias[joint] = pin.Inertia.Zero()
@@ -42,7 +42,7 @@ def massless(model: pin.Model) -> pin.Model:
 
 
 def point_force_torque(model: pin.Model, q: np.ndarray, joint: int, point: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Joint torque (N, n) that balances a force (N, 3), in base axes, on a point of the link behind a joint."""
+    """Computes the joint torque (N, n) that balances a force (N, 3), in base axes, on a point of a joint's link."""
     data = model.createData()
     torque = np.zeros_like(q)
     for k in np.flatnonzero(np.any(force, axis=1)):
@@ -68,7 +68,7 @@ def base_regressor(model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray
 
 
 class Projection:
-    """Projects torques off a base regressor, joints weighted by one over their torque's RMS."""
+    """Projection of torques off a base regressor, with joints weighted by the inverse of their torque RMS."""
 
     def __init__(self, Y: np.ndarray, level: np.ndarray) -> None:
         self.level = level
@@ -81,14 +81,14 @@ class Projection:
         self.inverse = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
 
     def fit(self, torque: np.ndarray) -> np.ndarray:
-        """Least-squares parameters (p,) of a torque (N, n)."""
+        """Estimates the least-squares parameters (p,) of a torque (N, n)."""
         flat = self.Y.reshape(-1, self.Y.shape[2]) / self.scale
         return (self.inverse @ (flat.T @ (torque / self.level).reshape(-1))) / self.scale
 
     def rest(self, torque: np.ndarray) -> np.ndarray:
-        """What is left of a torque (N, n) beside the base model, in the torque's own unit."""
+        """Computes the residual of a torque (N, n) after the fit of the base model, in the torque's unit."""
         return torque - (self.Y @ self.fit(torque)) * self.level
 
     def visible(self, torque: np.ndarray) -> np.ndarray:
-        """RMS per joint (n,) of what is left, as a share of the joint's torque RMS."""
+        """Computes the residual's RMS per joint (n,), as a fraction of the joint's torque RMS."""
         return np.sqrt((self.rest(torque) ** 2).mean(axis=0)) / self.level

@@ -1,4 +1,4 @@
-"""Further experiments on the robot of a case: the same effects and states, on the same clock."""
+"""Further experiments on the robot of a case, with the same effects, states and clock."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class Stage:
     Args:
         t: time (N,) [s].
         q: positions (N, n) [rad].
-        pause: rest before it [s].
-        payload: mass of a point that is hung on the last link for it, 0.1 m along that link's z axis [kg].
-        gravity: (3,) field of gravity in the frame of a base that was tilted for it [m/s2].
+        pause: rest before the motion [s].
+        payload: point mass on the last link during the motion, 0.1 m along that link's z axis [kg].
+        gravity: gravity (3,) in the frame of the base if it is tilted for the motion [m/s2]; else None.
     """
 
     t: np.ndarray
@@ -39,10 +39,10 @@ class Stage:
 
 @dataclass(frozen=True, kw_only=True)
 class KnownChange(Effect):
-    """A payload and a field of gravity that the user sets between two times.
+    """A payload and a tilt of the base that the user sets between two times.
 
-    A base that is askew on its mount stays so when it is tilted: the true field is `turn` (3, 3) times the one that the
-    user knows, and the payload hangs in it too.
+    An unknown tilt of the base on its mount remains when the mount is tilted. True gravity is therefore the rotation
+    `turn` (3, 3) times the gravity that the user knows. It also acts on the payload.
     """
 
     stage: Stage
@@ -71,7 +71,7 @@ class KnownChange(Effect):
 
 
 def follow_up(case: Case, stages: Sequence[Stage]) -> tuple[Record, ...]:
-    """Plays an experiment after a case's logs, which come out as they were; returns the new logs alone."""
+    """Simulates an experiment after a case's logs, which do not change, and returns only the new logs."""
     references = list(case.references[: case.training])
     clock = sum(reference.duration for reference in references) + PAUSE * (len(references) - 1)
     pauses = [PAUSE] * (len(references) - 1)
@@ -93,7 +93,7 @@ def follow_up(case: Case, stages: Sequence[Stage]) -> tuple[Record, ...]:
 
 
 def tabulated(t: np.ndarray, q: np.ndarray) -> Reference:
-    """A motion through samples, as a quintic spline; the robot stands still before and after."""
+    """Builds a reference through samples t (N,) [s], q (N, n) [rad] as a quintic spline, at rest before and after."""
     clock = np.asarray(t, dtype=float) - t[0]
     curve = Spline(curve=make_interp_spline(clock, q, k=5), start=0.0, end=float(clock[-1]))
     return Reference(duration=float(clock[-1]), period=None, kind="tabulated", curve=curve)

@@ -1,4 +1,4 @@
-"""The robots of the truth: pinocchio models, what is known of them, and how far the truth is from it."""
+"""Robots for tests: true pinocchio models, and the described models that a user knows."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import pinocchio as pin
 
 CATALOG = Path(__file__).parents[2] / "robots" / "catalog"
 KINDS = ("ur10", "panda", "heavy", "er3a")
-CAD_ERROR = 0.08
-DRIVE_ERROR = 0.15
+CAD_ERROR = 0.08  # largest relative error of described masses, centres of mass and second moments
+DRIVE_ERROR = 0.15  # largest relative error of described rotor inertias
 PANDA_HAND = ("panda_finger_joint1", "panda_finger_joint2")
-LARGEST_ANGLE = 3.0
+LARGEST_ANGLE = 3.0  # position limit [rad] of joints with a larger range
 
 
 @dataclass(frozen=True, kw_only=True)
 class Machine:
-    """A robot as it is (``model``, ``rotor``, ``friction``) and as its maker describes it (``known``, ``known_rotor``).
+    """The true robot (``model``, ``rotor``, ``friction``) and its description (``known``, ``known_rotor``).
 
-    Units are SI; friction (n, 4) holds f1..f4 of f1 sign v + f2 v + f3 v|v| + f4 v^3, the sign being tanh(v / v0).
+    Units are SI. Friction (n, 4) holds f1..f4 of f1 sign v + f2 v + f3 v|v| + f4 v^3, with sign v = tanh(v / v0).
     """
 
     name: str
@@ -50,7 +50,7 @@ class Machine:
 
 @dataclass(frozen=True, kw_only=True)
 class _Frame:
-    """Numbers of one kind of robot before anything is drawn."""
+    """Nominal values of one kind of robot."""
 
     model: pin.Model
     gear: np.ndarray
@@ -62,7 +62,7 @@ class _Frame:
 
 
 def draw_machine(kind: str, rng: np.random.Generator) -> Machine:
-    """Draws a robot whose masses, centres and inertias are off its description by up to 8 %, its drives by 15 %."""
+    """Draws a robot whose link parameters differ from its description by up to 8 %, and rotor inertias by 15 %."""
     frame = _FRAMES[kind]()
     n = frame.model.nv
     true = perturbed(frame.model, rng)
@@ -88,7 +88,7 @@ def draw_machine(kind: str, rng: np.random.Generator) -> Machine:
         upper=np.minimum(np.asarray(frame.model.upperPositionLimit), LARGEST_ANGLE),
         speed=speed,
         acceleration=frame.acceleration,
-        # A position loop of 10 to 30 1/s around a velocity loop of 20 to 60 Hz, as drives of industrial robots have.
+        # A natural frequency of 8 to 20 Hz, as of position loops of 10 to 30 1/s around velocity loops of 20 to 60 Hz.
         bandwidth=2 * np.pi * rng.uniform(8.0, 20.0, n),
         damping=float(rng.uniform(1.0, 1.8)),
         feedforward=float(rng.choice([0.0, 1.0], p=[0.3, 0.7])),
@@ -97,13 +97,13 @@ def draw_machine(kind: str, rng: np.random.Generator) -> Machine:
 
 
 def perturbed(model: pin.Model, rng: np.random.Generator) -> pin.Model:
-    """Draws a copy of a model with other masses, centres of mass and inertias, each body still a possible one."""
+    """Draws a copy of a model with other masses, centres of mass and inertias, which are physically consistent."""
     copy = pin.Model(model)
     for joint in range(1, model.njoints):
         body = model.inertias[joint]
         shift = rng.uniform(-CAD_ERROR, CAD_ERROR, 3) * np.abs(body.lever) + rng.uniform(-1, 1, 3) * 2e-3
         moments, axes = np.linalg.eigh(body.inertia)
-        # Three second moments of mass, scaled one by one, keep the triangle inequality of the principal moments.
+        # Scaling the three second moments of mass keeps the triangle inequality of the principal moments of inertia.
         second = np.maximum(moments.sum() / 2 - moments, 1e-9) * rng.uniform(1 - CAD_ERROR, 1 + CAD_ERROR, 3)
         inertia = axes @ np.diag(second.sum() - second) @ axes.T
         mass = body.mass * rng.uniform(1 - CAD_ERROR, 1 + CAD_ERROR)
@@ -139,7 +139,7 @@ def _panda() -> _Frame:
     )
 
 
-# Placement xyz rpy of each joint about z, then mass, centre of mass and inertia about it (Ixx Ixy Ixz Iyy Iyz Izz).
+# Per joint (about z): placement xyz and rpy, mass, centre of mass, and inertia about it (Ixx Ixy Ixz Iyy Iyz Izz).
 _HALF = np.pi / 2
 _ER3A = (
     (

@@ -1,4 +1,4 @@
-"""Torque noise as drives have it: half coloured, half white, now and then heavy-tailed, alike on all joints."""
+"""Measurement noise: torque noise, half of it coloured, sometimes heavy-tailed, and encoder quantisation."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from scipy.signal import lfilter
 
 @dataclass(frozen=True, kw_only=True)
 class Noise:
-    """Noise of each joint as a share of its torque's RMS.
+    """Noise of torques and positions.
 
     Args:
-        level: the share.
-        memory: correlation of one sample of the coloured half with the next (n,).
+        level: RMS of the torque noise as a fraction of each joint's torque RMS.
+        memory: correlation between consecutive samples of the coloured half (n,).
         tails: degrees of freedom of Student's t, or None for a normal distribution.
         common: correlation between joints.
-        counts: encoder counts per turn of the joint.
+        counts: encoder counts per turn of the joint (n,).
     """
 
     level: float
@@ -27,7 +27,7 @@ class Noise:
     counts: np.ndarray
 
     def torque(self, samples: int, size: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Draws noise (N, n) for joints whose torque has RMS ``size`` (n,)."""
+        """Draws torque noise (N, n) for joints with the torque RMS ``size`` (n,) [N m]."""
         n = len(size)
         white, driven = self._draw(rng, samples, n), self._draw(rng, samples + 200, n)
         coloured = np.empty_like(driven)
@@ -45,7 +45,7 @@ class Noise:
         return np.sqrt(1 - self.common) * own + np.sqrt(self.common) * shared
 
     def position(self, q: np.ndarray) -> np.ndarray:
-        """Positions as the encoders count them."""
+        """Returns positions (N, n) [rad] quantised by the encoders."""
         count = 2 * np.pi / self.counts
         return np.round(q / count) * count
 
@@ -58,9 +58,10 @@ def draw_noise(
     level: float = 0.025,
     memory: tuple[float, float] = (0.7, 0.95),
 ) -> Noise:
-    """Draws a noise: memory in a range, t with 5 degrees of freedom in a fifth, correlation up to .3.
+    """Draws a noise: memory within a range, heavy tails in a fifth of all cases, correlation of joints up to 0.3.
 
-    The encoder has 2^17 to 2^20 counts, per turn of the joint in half of all robots and of the motor in the others.
+    Heavy tails are Student's t with 5 degrees of freedom. Encoders have 2^17 to 2^20 counts per turn, of the motor in
+    half of all cases and of the joint in the others.
     """
     counts = np.full(n, 2.0 ** rng.integers(17, 21))
     if rng.random() < 0.5:

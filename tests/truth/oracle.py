@@ -1,4 +1,4 @@
-"""The gain that a case's true effects would bring on its unseen logs, their own formulas being known."""
+"""Largest possible gain of a case: that of its true effects, with their own formulas, on its held-out logs."""
 
 from __future__ import annotations
 
@@ -14,20 +14,21 @@ from tests.truth.dynamics import Projection, base_regressor
 from tests.truth.plant import Record, measure
 from tests.truth.ride import Ride
 
-STEP = 0.002
-CUT_OFFS = (10.0, 20.0, 40.0, 80.0)
-ORDER = 4
-APPROACHES = 3
-BESIDE = 5
+STEP = 0.002  # sample period [s] of the motion from logged positions
+CUT_OFFS = (10.0, 20.0, 40.0, 80.0)  # [Hz]
+ORDER = 4  # order of the low-pass
+APPROACHES = 3  # fixed-point iterations for effects on the motion itself
+BESIDE = 5  # rows on each side of a reversal that do not count
 
 
 @dataclass(frozen=True, kw_only=True)
 class Oracle:
-    """Mean squared errors (n,) on a case's unseen logs, of least squares on its logs.
+    """Mean squared errors (n,) [(N m)^2] on a case's held-out logs, after least squares on the logs to diagnose.
 
-    The base model's columns are those of the motion as it was. ``after`` has each effect's own torque along that motion
-    as one column more; ``as_measured`` along the motion that the logged positions tell, which is all that any model of
-    the effect could be given: low-passed without lag, at the cut-off that fits the logs best. None where not asked for.
+    ``before`` is that of the base model, evaluated on the true motion. ``after`` has the torque of each true effect on
+    that motion as an additional column. ``as_measured`` has the effects' torque on the motion from logged positions
+    instead, which is all that a model can use. These positions are low-passed without lag, at the cut-off that fits
+    the logs best. It is None if it was not asked for.
     """
 
     before: np.ndarray
@@ -36,13 +37,16 @@ class Oracle:
 
 
 def ask_oracle(case: Case, counted: Sequence[np.ndarray] | None = None, *, logged: bool = False) -> Oracle:
-    """Measures what a case's true effects bring, their own formulas being known.
+    """Measures the gain of a case's true effects with their own formulas.
 
     Args:
-        case: with unseen logs.
-        counted: rows (N, n) of each unseen log that count; by default all but those beside a joint's reversal: from
-            a log nobody knows which sign its friction has there.
-        logged: whether to ask along the logged positions, too: that is most of the work.
+        case: a case with held-out logs.
+        counted: rows (N, n) of each held-out log that count. By default all rows except those next to a joint's
+            reversal, because a log does not show the sign of friction there.
+        logged: whether to evaluate the effects on the logged positions, too, which takes most of the time.
+
+    Returns:
+        The mean squared errors.
     """
     chosen = counted or [_away_from_reversals(record.v_true) for record in case.unseen]
     counts = np.concatenate([rows[::EVERY] for rows in chosen])
@@ -56,7 +60,7 @@ def ask_oracle(case: Case, counted: Sequence[np.ndarray] | None = None, *, logge
     training, others = slice(len(y) - len(counts)), slice(len(y) - len(counts), None)
 
     def errors(columns: np.ndarray) -> tuple[float, np.ndarray]:
-        """The weighted sum of squares on the logs, and the mean squares (n,) on the unseen ones."""
+        """Computes the weighted sum of squares on the logs, and the mean squares (n,) on the held-out logs."""
         squares = (y - columns @ Projection(columns[training], level).fit(y[training])) ** 2
         unseen = (squares[others] * counts).sum(axis=0) / counts.sum(axis=0)
         return float((squares[training] / level**2).sum()), unseen
@@ -74,7 +78,7 @@ def ask_oracle(case: Case, counted: Sequence[np.ndarray] | None = None, *, logge
 
 
 def _away_from_reversals(v: np.ndarray) -> np.ndarray:
-    """Marks rows (N, n) more than `BESIDE` samples from a change of direction."""
+    """Flags rows (N, n) more than `BESIDE` samples from a reversal."""
     turned = np.zeros(v.shape, dtype=bool)
     turned[1:] = np.sign(v[1:]) != np.sign(v[:-1])
     counted = np.cumsum(np.vstack([np.zeros((1, v.shape[1])), turned]), axis=0)
@@ -83,7 +87,7 @@ def _away_from_reversals(v: np.ndarray) -> np.ndarray:
 
 
 def _parts_as_measured(case: Case, cut_off: float) -> np.ndarray:
-    """What each effect adds (N, n, effects) along the motion that the logged positions tell."""
+    """Computes the torque of each effect (N, n, effects) on the motion from the logged positions."""
     times, motions, starts, count = [], [], [], 0
     for record in case.records:
         period = float(record.t[1] - record.t[0])
@@ -98,7 +102,7 @@ def _parts_as_measured(case: Case, cut_off: float) -> np.ndarray:
     seen = [np.concatenate(values) for values in zip(*motions, strict=True)]
     motion = list(seen)
     for _ in range(APPROACHES):
-        # An effect that parts what is logged from what moves does so from what moves: found by going back and forth.
+        # An effect on the logged positions depends on the true motion, which a fixed-point iteration finds.
         ride = Ride(machine=case.machine, t=t, starts=tuple(starts), q=motion[0], v=motion[1], a=motion[2])
         _, wrong = measure(ride, case.effects)
         logged = [own + error for own, error in zip((ride.q, ride.v, ride.a), wrong, strict=True)]

@@ -1,4 +1,4 @@
-"""Robots under position control that follow references, with whatever effects they have: logs of t, q and tau."""
+"""Simulation of robots under position control, with any effects, which gives logs of t, q and tau."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from tests.truth.noise import Noise
 from tests.truth.references import Reference
 from tests.truth.ride import Ride, friction_of
 
-CONTROL_STEP = 0.001
-LOG_EVERY = 4
-LEAD = 1.0
-PAUSE = 20.0
-SMOOTHING = 0.012
-NEAR_STILL = 6.0
+CONTROL_STEP = 0.001  # [s]
+LOG_EVERY = 4  # control steps per logged sample
+LEAD = 1.0  # time [s] before each log in which the loop settles
+PAUSE = 20.0  # default pause between logs [s]
+SMOOTHING = 0.012  # low-pass of the loop's error [s] if an effect moves links relative to their motors
+NEAR_STILL = 6.0  # velocity, in widths of the smooth sign, below which Newton steps are needed
 NEWTON_STEPS = 6
 
 
 @dataclass(frozen=True, kw_only=True)
 class Record:
-    """One log as a user gets it, and beside it what only the truth knows.
+    """One log (``t, q, tau``), and true signals that a user does not have.
 
-    ``clean`` is the torque without noise and ``parts`` what each effect adds to it; ``q_true, v_true, a_true`` are the
-    logged positions without quantisation and their derivatives.
+    ``clean`` is the torque without noise, and ``parts`` are the effects' contributions to it. ``q_true, v_true,
+    a_true`` are the logged positions without quantisation and their derivatives. ``sign`` is the smooth velocity sign.
     """
 
     t: np.ndarray
@@ -53,7 +53,7 @@ def play(
     *,
     pause: float | Sequence[float] = PAUSE,
 ) -> list[Record]:
-    """Plays references one after the other, with pauses [s] at rest between them, on one clock."""
+    """Simulates references one after the other on one clock, with pauses [s] at rest between them."""
     pauses = np.broadcast_to(np.asarray(pause, dtype=float), (len(references) - 1,))
     durations = [reference.duration for reference in references]
     clocks = np.concatenate([[0.0], np.cumsum(durations[:-1] + pauses)]).tolist()
@@ -84,9 +84,10 @@ def play(
 
 
 def measure(ride: Ride, effects: Sequence[Effect]) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Torque as the drives would log it without noise, and the error of the logged motion; fills ``ride.parts``.
+    """Computes the logged torque without noise (N, n), and the error of the logged motion.
 
-    An effect's part is what it adds to the torque that the base model asks for the logged motion.
+    It also fills ``ride.parts``. An effect's part is its contribution to the logged torque beyond the base model's
+    torque for the logged motion.
     """
     machine, ride.parts, ride.carried = ride.machine, [], _carried(ride, effects)
     shares, apart = [], np.zeros_like(ride.q)
@@ -123,14 +124,14 @@ def _carried(ride: Ride, effects: Sequence[Effect]) -> np.ndarray | None:
 
 
 def parts_links(effect: Effect) -> bool:
-    """Whether an effect parts links from motors."""
+    """Returns whether an effect moves links relative to their motors."""
     return type(effect).part is not Effect.part
 
 
 def open_loop(
     machine: Machine, references: Sequence[Reference], effects: Sequence[Effect], *, pause: float = PAUSE, step: float
 ) -> Ride:
-    """A ride that follows its references exactly, measured: a cheap one for finding an effect's size."""
+    """Simulates a ride that follows its references exactly, and measures it; a cheap way to find an effect's size."""
     times, starts, start, count = [], [], 0.0, 0
     motions = []
     for reference in references:
@@ -147,16 +148,16 @@ def open_loop(
 
 
 def projection_of(ride: Ride, level: np.ndarray) -> Projection:
-    """The projection off the base model of a ride."""
+    """Returns the projection off the base model for a ride's motion."""
     return Projection(base_regressor(ride.machine.known, ride.q, ride.v, ride.a, ride.sign), level)
 
 
 def _closed_loop(
     machine: Machine, references: Sequence[Reference], clocks: Sequence[float], effects: Sequence[Effect]
 ) -> Ride:
-    """Motions of the closed position loop: the reference less the error that the unforeseen torque makes.
+    """Simulates the closed position loop: the motion is the reference minus the loop's error.
 
-    Joint by joint m (e'' + 2 d w e' + w^2 e) = torque needed - torque fed forward.
+    For each joint m (e'' + 2 d w e' + w^2 e) = required torque - feed-forward torque.
     """
     times, wanted, starts, count = [], [], [], 0
     for reference, clock in zip(references, clocks, strict=True):
@@ -197,8 +198,8 @@ def _closed_loop(
 def _loop_error(ride: Ride, unforeseen: np.ndarray, inertia: np.ndarray) -> list[np.ndarray]:
     """Solves m (e'' + 2 d w e' + w^2 e) = unforeseen torque + friction(v - e') for e, e' and e'' of each joint.
 
-    Implicit in Coulomb friction, so that a joint can stick. The trapezoidal rule ties e to e', central differences tie
-    e'' to it: all of second order.
+    The solution is implicit in Coulomb friction, so that a joint can stick. The trapezoidal rule gives e from e', and
+    central differences give e''. Both are of second order.
     """
     machine, h = ride.machine, CONTROL_STEP
     error, rate = np.empty_like(unforeseen), np.empty_like(unforeseen)
@@ -216,8 +217,8 @@ def _loop_error(ride: Ride, unforeseen: np.ndarray, inertia: np.ndarray) -> list
                 real = v - s
                 slow = (f2 + f3 * abs(real) + f4 * real * real) * real / m
                 x = c * v - s - h * (d + slow - w2 * (e + h * s / 2))
-                # c v' + g tanh(v' / width) = x for the joint's new velocity v': from a ramp's solution Newton's steps
-                # approach it from one side, for tanh bends one way.
+                # Solve c v' + g tanh(v' / width) = x for the joint's new velocity v'. From the solution with a linear
+                # ramp for tanh, Newton's steps converge from one side, because tanh has one sign of curvature there.
                 real = x / (c + g / width) if abs(x) <= c * width + g else (x - g if x > 0 else x + g) / c
                 if abs(real) < NEAR_STILL * width:
                     for _ in range(NEWTON_STEPS):

@@ -1,4 +1,4 @@
-"""Reference motions that the robots are told to follow, as functions of time."""
+"""Reference motions of the robots, as functions of time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.truth.machines import Machine
 
 @dataclass(frozen=True, kw_only=True)
 class Reference:
-    """A motion: its duration [s], its period [s] or None, and a spline or a Fourier series behind it."""
+    """A motion: its duration [s], its period [s] or None, its kind, and its spline or Fourier series."""
 
     duration: float
     period: float | None
@@ -20,13 +20,13 @@ class Reference:
     curve: object
 
     def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Positions, velocities and accelerations (N, n) at times t; before and after it the robot stands still."""
+        """Evaluates positions, velocities and accelerations (N, n) at times t (N,) [s]."""
         return self.curve.at(t)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fourier:
-    """A Fourier series: centre (n,), amplitudes of cosine and sine (H, n), angular frequencies (H,)."""
+    """A Fourier series: centre (n,), amplitudes of cosine and sine (H, n), angular frequencies (H,) [rad/s]."""
 
     centre: np.ndarray
     cosine: np.ndarray
@@ -34,7 +34,7 @@ class Fourier:
     omega: np.ndarray
 
     def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The series and two derivatives."""
+        """Evaluates the series and its first two derivatives (N, n)."""
         c, s = np.cos(np.outer(t, self.omega)), np.sin(np.outer(t, self.omega))
         w = self.omega[:, None]
         q = self.centre + c @ self.cosine + s @ self.sine
@@ -45,14 +45,14 @@ class Fourier:
 
 @dataclass(frozen=True, kw_only=True)
 class Spline:
-    """A spline at rest at both ends, and standing still outside."""
+    """A spline with rest at both ends; outside, the robot is at rest there."""
 
     curve: BSpline | PPoly
     start: float
     end: float
 
     def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The spline and two derivatives."""
+        """Evaluates the spline and its first two derivatives (N, n)."""
         inside = np.clip(t, self.start, self.end)
         moving = ((t >= self.start) & (t <= self.end))[:, None]
         first, second = self.curve.derivative(1)(inside), self.curve.derivative(2)(inside)
@@ -62,7 +62,7 @@ class Spline:
 def draw_periodic(
     machine: Machine, rng: np.random.Generator, *, period: float = 10.0, cycles: int = 6, harmonics: int | None = None
 ) -> Reference:
-    """Draws a Fourier motion that uses most of range, speed or acceleration, whichever ends first."""
+    """Draws a Fourier motion that uses most of the range, speed or acceleration, whichever is reached first."""
     count = int(rng.integers(5, 8)) if harmonics is None else harmonics
     omega = 2 * np.pi / period * np.arange(1, count + 1)
     weight = (1.0 / np.arange(1, count + 1) ** 0.5)[:, None]
@@ -85,14 +85,14 @@ def draw_periodic(
 
 
 def draw_aperiodic(machine: Machine, rng: np.random.Generator, *, duration: float = 60.0) -> Reference:
-    """Draws a quintic B-spline through random coefficients: smooth, never repeating, at rest at both ends."""
+    """Draws a quintic B-spline with random coefficients: smooth, not periodic, at rest at both ends."""
     step = float(rng.uniform(0.5, 1.0))
     spans = round(duration / step)
     knots = np.linspace(-5, spans + 5, spans + 11) * (duration / spans)
     free = spans - 5
     coefficients = np.zeros((spans + 5, machine.n))
     coefficients[5 : 5 + free] = rng.normal(size=(free, machine.n))
-    # Six equal coefficients at an end are a robot that stands still there.
+    # With six equal coefficients at an end the robot is at rest there.
     coefficients[:6] = coefficients[5]
     coefficients[-6:] = coefficients[-6]
     shape = Spline(curve=BSpline(knots, coefficients, 5), start=0.0, end=duration)
@@ -106,7 +106,7 @@ def draw_aperiodic(machine: Machine, rng: np.random.Generator, *, duration: floa
 
 
 def draw_moves(machine: Machine, rng: np.random.Generator, *, duration: float = 60.0) -> Reference:
-    """Draws moves between random points, of .8 to 2.5 s each, with pauses of up to a second: a robot at its work."""
+    """Draws moves between random points, of 0.8 to 2.5 s each, with pauses of up to 1 s, as in a production task."""
     times, points = [0.0, rng.uniform(0.3, 1.0)], [rng.normal(size=machine.n)] * 2
     while times[-1] < duration:
         times.append(times[-1] + rng.uniform(0.8, 2.5))
@@ -115,7 +115,7 @@ def draw_moves(machine: Machine, rng: np.random.Generator, *, duration: float = 
         points.append(points[-1])
     begin, q = np.array(times), np.array(points)
     width, span = np.diff(begin)[:, None], np.diff(q, axis=0)
-    # 10 u^3 - 15 u^4 + 6 u^5 of each stretch's own time, highest power first.
+    # 10 u^3 - 15 u^4 + 6 u^5 in the relative time u of each piece, highest power first.
     powers = np.zeros((6, *span.shape))
     powers[0], powers[1], powers[2] = 6 * span / width**5, -15 * span / width**4, 10 * span / width**3
     powers[5] = q[:-1]

@@ -1,4 +1,4 @@
-"""One ride of a robot: what its motors and links really did, and the torque that took."""
+"""True motion of a robot's motors and links in one session, and its torque."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from tests.truth.machines import Machine
 
 @dataclass(kw_only=True)
 class Ride:
-    """All runs of a session, one after the other; time keeps running in the pauses between them.
+    """All runs of a session, concatenated; time continues in the pauses between them.
 
-    ``q, v, a`` are of the motors, seen at the joint; ``link_q, link_v, link_a`` of the links behind the gears: the same
-    until an elastic or loose gear parts them. ``parts`` collects what each effect adds; ``carried`` is the torque that
-    passes the gears besides the robot's own, None for none.
+    ``q, v, a`` (N, n) are the motion of the motors, referred to the joint. ``link_q, link_v, link_a`` are that of the
+    links, which differs only with an elastic gear or backlash. ``rigid`` is the rigid-body torque of the motors'
+    motion. ``parts`` collects the effects' torques. ``carried`` is additional gear load, None for none.
     """
 
     machine: Machine
@@ -41,7 +41,7 @@ class Ride:
 
     @property
     def runs(self) -> list[slice]:
-        """The samples of each run."""
+        """The rows of each run."""
         return [slice(a, b) for a, b in pairwise((*self.starts, len(self.t)))]
 
     @property
@@ -56,30 +56,30 @@ class Ride:
 
     @property
     def load(self) -> np.ndarray:
-        """Torque that the gears bear (N, n)."""
+        """The gear load (N, n) [N m]."""
         return self.borne(self.rigid)
 
     def borne(self, rigid: np.ndarray) -> np.ndarray:
-        """Adds what is carried to the robot's own torque (N, n)."""
+        """Adds the additional gear load to a rigid-body torque (N, n) [N m]."""
         return rigid if self.carried is None else rigid + self.carried
 
     def friction(self) -> np.ndarray:
-        """Friction of the base model (N, n)."""
+        """Evaluates the friction of the base model (N, n) [N m]."""
         return friction_of(self.machine.friction, self.v, self.sign)
 
     def base_torque(self) -> np.ndarray:
-        """Torque without any effect (N, n), for the motors' motion."""
+        """Evaluates the torque without any effect (N, n) [N m], for the motors' motion."""
         return self.rigid + self.machine.rotor * self.a + self.friction() + self.machine.offset
 
     def derivative(self, values: np.ndarray) -> np.ndarray:
-        """Time derivative within each run."""
+        """Computes the time derivative (N, n) within each run."""
         result = np.zeros_like(values)
         for run in self.runs:
             result[run] = np.gradient(values[run], self.t[run], axis=0, edge_order=2)
         return result
 
     def smooth(self, values: np.ndarray, seconds: float) -> np.ndarray:
-        """Gaussian low-pass within each run, without lag."""
+        """Filters values (N, n) by a Gaussian low-pass without lag, within each run."""
         result = np.empty_like(values)
         for run in self.runs:
             result[run] = gaussian_filter1d(values[run], seconds / self.step, axis=0, mode="nearest")
@@ -87,5 +87,5 @@ class Ride:
 
 
 def friction_of(friction: np.ndarray, v: np.ndarray, sign: np.ndarray) -> np.ndarray:
-    """The friction polynomial (N, n)."""
+    """Evaluates the friction polynomial (N, n) [N m] with coefficients (n, 4)."""
     return friction[:, 0] * sign + friction[:, 1] * v + friction[:, 2] * v * np.abs(v) + friction[:, 3] * v**3

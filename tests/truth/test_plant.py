@@ -1,4 +1,4 @@
-"""The truth shares no code with what it judges, and its logs obey the mechanics that they claim to."""
+"""The independent plant shares no code with the packages under test, and its logs obey mechanics."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ALLOWED = {"numpy", "scipy", "pinocchio", "tests"} | set(sys.stdlib_module_names
 
 
 def test_imports_numpy_scipy_and_pinocchio_alone() -> None:
-    """No file of the truth, its tests apart, imports anything but numpy, scipy, pinocchio and the truth itself."""
+    """Files of `tests.truth`, except tests, import only numpy, scipy, pinocchio and `tests.truth`."""
     files = [path for path in Path(__file__).parent.rglob("*.py") if not path.name.startswith("test_")]
     assert len(files) > 10
     for path in files:
@@ -47,7 +47,7 @@ def test_imports_numpy_scipy_and_pinocchio_alone() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_description_is_the_known_robot_and_not_the_true_one(kind: str, tmp_path: Path) -> None:
-    """The URDF that a user gets moves as the robot does, but weighs up to 8 % otherwise."""
+    """The user's URDF has the robot's described dynamics, which differ from the true dynamics."""
     machine = draw_machine(kind, np.random.default_rng(1))
     write_description(machine, tmp_path)
     read = pin.buildModelFromXML(urdf_of(machine.known, kind))
@@ -62,14 +62,14 @@ def test_description_is_the_known_robot_and_not_the_true_one(kind: str, tmp_path
 
 @pytest.mark.parametrize("draw", [draw_periodic, draw_aperiodic, draw_moves])
 def test_references_are_smooth_and_within_limits(draw: object) -> None:
-    """A reference's velocity and acceleration are its derivatives, and it stays within the robot's limits."""
+    """Velocity and acceleration of a reference are its derivatives, and it stays within the robot's limits."""
     machine = draw_machine("er3a", np.random.default_rng(3))
     reference = draw(machine, np.random.default_rng(4))
     t = np.arange(5.0, 15.0, 1e-3)
     q, v, a = reference.at(t)
-    # Central differences err by h^2/6 times the third derivative, below 1e3 here.
+    # The error of central differences is h^2/6 times the third derivative, which is below 1e3 here.
     np.testing.assert_allclose(np.gradient(q, t, axis=0)[1:-1], v[1:-1], atol=1e-3)
-    # Where a move begins or ends its jerk jumps, by some 50 rad/s3 here: half a step of it.
+    # The jerk jumps by some 50 rad/s3 where a move begins or ends; the error is this times half a step.
     np.testing.assert_allclose(np.gradient(v, t, axis=0)[1:-1], a[1:-1], atol=5e-2 if draw is draw_moves else 1e-2)
     assert (np.abs(v) < machine.speed).all()
     assert (q > machine.lower - 0.1).all()
@@ -77,7 +77,7 @@ def test_references_are_smooth_and_within_limits(draw: object) -> None:
 
 
 def test_log_obeys_inverse_dynamics() -> None:
-    """Without effect and noise the logged torque is the true robot's inverse dynamics of the motion."""
+    """Without effects and noise the logged torque is the true robot's inverse dynamics."""
     case = draw_case(1, kind="er3a", periodic=False, duration=10.0, unseen=0.0)
     record, machine = case.logs[0], case.machine
     wanted = rigid_torque(machine.model, record.q_true, record.v_true, record.a_true) + machine.rotor * record.a_true
@@ -85,18 +85,18 @@ def test_log_obeys_inverse_dynamics() -> None:
     v = record.v_true
     wanted += friction[:, 0] * record.sign + friction[:, 1] * v + friction[:, 2] * v * np.abs(v) + friction[:, 3] * v**3
     np.testing.assert_allclose(record.clean, wanted + machine.offset, rtol=1e-9, atol=1e-9)
-    # The position is quantised and nothing else.
+    # The logged position is only quantised.
     assert np.abs(record.q - record.q_true).max() <= 1.01 * np.pi / case.noise.counts.min()
-    # The loop's motion is its own derivative: to the control step's second order, but for the friction's jumps.
+    # The velocity is the position's derivative to second order of the control step, except at jumps of friction.
     numeric = np.gradient(record.q_true, record.t, axis=0)
     assert np.median(np.abs(numeric - record.v_true)) < 1e-3 * np.abs(record.v_true).max()
 
 
 def test_size_is_what_shows_beyond_the_base_model() -> None:
-    """An effect drawn at 1 % shows 1 % of its joint's torque after a least-squares fit of the base model."""
+    """An effect with a size of 1 % leaves 1 % of its joint's torque after a least-squares fit of the base model."""
     case = draw_case(7, hide=[Stribeck], size=0.01, kind="ur10", periodic=True, duration=20.0, unseen=0.0)
     assert case.visible()[0] == pytest.approx(0.01, rel=0.1)
-    # It is larger before the base model takes its share.
+    # It is larger before the fit, because the base model absorbs part of it.
     effect = case.effects[0]
     whole = np.sqrt((case.logs[0].parts[0][:, effect.j] ** 2).mean()) / case.level()[effect.j]
     assert whole > 0.012
@@ -104,7 +104,7 @@ def test_size_is_what_shows_beyond_the_base_model() -> None:
 
 @pytest.mark.slow
 def test_every_effect_changes_the_log_and_is_reproducible() -> None:
-    """Every effect can be drawn, adds torque, and the same seed gives the same log."""
+    """Every effect can be drawn and adds torque, and the same seed gives the same log."""
     machine = draw_machine("panda", np.random.default_rng(5))
     reference = draw_periodic(machine, np.random.default_rng(6), cycles=2)
     for choice in (*KNOWN, *STRANGERS):
@@ -120,14 +120,14 @@ def test_every_effect_changes_the_log_and_is_reproducible() -> None:
 
 @pytest.mark.slow
 def test_too_large_a_size_is_refused() -> None:
-    """A size that no plausible value reaches is said to be hidden."""
+    """A size that no plausible value reaches raises `Hidden`."""
     with pytest.raises(Hidden):
         draw_case(2, hide=[Elastic], size=0.5, kind="er3a", periodic=True, duration=20.0, unseen=0.0)
 
 
 @pytest.mark.slow
 def test_elastic_gear_obeys_both_inertias() -> None:
-    """The link of an elastic joint, integrated by itself behind the motor's logged motion, moves as the truth says."""
+    """The link of an elastic joint agrees with an independent integration behind the motor's logged motion."""
     machine = draw_machine("heavy", np.random.default_rng(9))
     reference = draw_periodic(machine, np.random.default_rng(10))
     effect = Elastic(joint=6, amount=1e-5)
@@ -146,19 +146,16 @@ def test_elastic_gear_obeys_both_inertias() -> None:
         return [state[1], (through - still) / inertia]
 
     start = [ride.link_q[2000, 5], ride.link_v[2000, 5]]
-    # A step of 0.2 ms is a tenth of the shortest vibration's period over 2 pi.
+    # A step of 0.2 ms is a tenth of the shortest period of vibration over 2 pi.
     solved = solve_ivp(link, (t[0], t[-1]), start, max_step=2e-4, t_eval=t[::50])
     twist = np.abs(ride.link_q[:, 5] - ride.q[:, 5]).max()
-    # Linear interpolation of the motor's motion excites the undamped spring by a part of the twist.
+    # Linear interpolation of the motor's motion excites the undamped spring by a fraction of the deflection.
     assert np.abs(solved.y[0] - ride.link_q[rows, 5][::50]).max() < 0.03 * twist
 
 
 @pytest.mark.slow
 def test_a_loose_link_flies_lands_and_settles() -> None:
-    """The link of a joint with play, its whole equation of motion integrated from where it leaves its flank.
-
-    Teeth push as a damped spring where it has gone beyond half the play, and not at all between.
-    """
+    """The link of a joint with backlash agrees with an integration of its full equation of motion on damped teeth."""
     machine = draw_machine("heavy", np.random.default_rng(9))
     reference = draw_periodic(machine, np.random.default_rng(10))
     effect = Backlash(joint=5, amount=1e-3, swing=30.0, damping=0.4)
@@ -186,12 +183,12 @@ def test_a_loose_link_flies_lands_and_settles() -> None:
     solved = solve_ivp(link, (t[0], t[-1]), start, max_step=5e-4, t_eval=t)
     off = solved.y[0] - ride.link_q[rows, 4]
     assert np.ptp(behind[rows]) > 0.9e-3, "the link does not cross"
-    # The plant takes the arm's pose of the moment at which the link leaves.
+    # The plant uses the inertia at the pose in which the link leaves its flank.
     assert np.abs(off).max() < 0.05 * 1e-3
 
 
 def test_two_effects_that_part_links_act_once() -> None:
-    """A gear with play and a spring: the motor gives what its link takes, and what each brings adds up to that."""
+    """With an elastic gear and backlash the parts of both add up to the torque difference by the link's motion."""
     machine = draw_machine("heavy", np.random.default_rng(9))
     reference = draw_periodic(machine, np.random.default_rng(10))
     both = [Elastic(joint=4, amount=1e-5), Backlash(joint=4, amount=1e-3)]
@@ -207,7 +204,7 @@ def _link(ride: object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def test_bristles_follow_their_equation() -> None:
-    """The presliding state is the solution of z' = v - |v| z / reach that an adaptive integrator finds."""
+    """The presliding state agrees with an adaptive integration of z' = v - |v| z / reach."""
     t = np.arange(0.0, 2.0, 1e-3)
     v = 0.2 * np.cos(2 * np.pi * t)
     reach = 5e-3
@@ -219,12 +216,12 @@ def test_bristles_follow_their_equation() -> None:
         rtol=1e-8,
         atol=1e-12,
     )
-    # Four sub-steps of a quarter millisecond: first order in v.
+    # The error of four sub-steps of 0.25 ms is of first order in v.
     assert np.abs(_bristles(v, 1e-3, reach) - solved.y[0] / reach).max() < 0.01
 
 
 def test_payload_acts_on_all_joints_from_its_moment() -> None:
-    """A payload's torque is zero before it is taken up, and that of a heavier last link afterwards."""
+    """A payload's torque is zero before it is picked up, and that of a heavier last link afterwards."""
     machine = draw_machine("ur10", np.random.default_rng(12))
     reference = draw_periodic(machine, np.random.default_rng(13), cycles=1)
     ride = open_loop(machine, [reference], [Payload(amount=3.0, moment=4.0)], step=0.01)
@@ -240,7 +237,7 @@ def test_payload_acts_on_all_joints_from_its_moment() -> None:
 
 
 def test_gears_feel_what_a_user_changes() -> None:
-    """Friction grows, a gear twists and its play turns by what a tilted base and a payload add to the load, too."""
+    """The load of a tilted base and a payload acts on load-dependent friction and on an elastic gear."""
     machine = draw_machine("ur10", np.random.default_rng(12))
     reference = draw_periodic(machine, np.random.default_rng(13), cycles=1)
     stage = Stage(t=np.zeros(1), q=np.zeros((1, 6)), payload=5.0, gravity=np.array([3.0, 0.0, -9.3]))
@@ -250,7 +247,7 @@ def test_gears_feel_what_a_user_changes() -> None:
     added = change.torque(ride)[:, 0]
     wanted = 0.1 * np.abs(ride.rigid[:, 0] + added) * ride.sign[:, 0]
     np.testing.assert_allclose(ride.parts[0][:, 0], wanted, atol=1e-12)
-    # An upright first joint bears no weight until its base is tilted.
+    # Gravity does not load a vertical first joint unless the base is tilted.
     assert np.abs(ride.parts[0]).max() > 1.5 * np.abs(plain.parts[0]).max()
     before = ride.t < 2.0
     np.testing.assert_allclose(ride.parts[0][before], plain.parts[0][before], atol=1e-12)
@@ -265,7 +262,7 @@ def test_gears_feel_what_a_user_changes() -> None:
 
 
 def test_gears_bear_a_spring() -> None:
-    """Friction that is a share of the load is one of weight, inertia and the spring behind the gear."""
+    """The load of load-dependent friction includes the torque of a spring behind the gear."""
     machine = draw_machine("er3a", np.random.default_rng(14))
     reference = draw_periodic(machine, np.random.default_rng(15), cycles=1)
     lossy, spring = LoadDependent(joint=2, amount=0.1, back=1.0), Balancer(joint=2, amount=2e4)
@@ -277,25 +274,25 @@ def test_gears_bear_a_spring() -> None:
 
 @pytest.mark.slow
 def test_a_stranger_shows_beyond_the_base_model_and_its_own_column_brings_a_gain() -> None:
-    """An effect outside every catalogue shows beyond the base model, on motion that the fit has not seen, too."""
+    """An effect outside the catalogue has the wanted visible size, and its true column improves held-out prediction."""
     case = draw_case(17, hide=[CrossWave], size=0.03, kind="er3a", periodic=True, duration=20.0, unseen=20.0)
     assert case.visible()[0] == pytest.approx(0.03, rel=0.15)
     told = ask_oracle(case, logged=True)
-    # 3 % squared is 9e-4 in the logs; another motion shows more or less of it, and 20 s of noise change it by 1e-4.
+    # 3 % squared is 9e-4 in the logs. Another motion shows more or less, and 20 s of noise change it by 1e-4.
     gain = ((told.before - told.after) / case.level() ** 2)[case.effects[0].j]
     assert 3e-4 < gain < 5e-3
-    # A wave over the joints' angles is as well known from encoders.
+    # A function of joint positions is known as well from the encoders.
     assert told.as_measured is not None
     assert ((told.before - told.as_measured) / case.level() ** 2)[case.effects[0].j] == pytest.approx(gain, rel=0.05)
 
 
 def test_presliding_starts_where_it_slips() -> None:
-    """In steady sliding LuGre and Coulomb friction are one and the same."""
+    """In steady sliding LuGre friction equals Coulomb friction."""
     machine = draw_machine("er3a", np.random.default_rng(16))
     reference = draw_periodic(machine, np.random.default_rng(17), cycles=1)
     ride = open_loop(machine, [reference], [LuGre(joint=1, amount=1e-3, damping=0.0)], step=0.001)
     measure(ride, [LuGre(joint=1, amount=1e-3, damping=0.0)])
     fast = np.abs(ride.v[:, 0]) > 0.7 * np.abs(ride.v[:, 0]).max()
     coulomb = machine.friction[0, 0]
-    # e^-10 of a bristle's reach is left ten reaches after a reversal.
+    # Ten presliding travels after a reversal, a fraction e^-10 of the difference is left.
     assert np.abs(ride.parts[0][fast, 0]).max() < 1e-4 * coulomb

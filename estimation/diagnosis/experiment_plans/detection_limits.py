@@ -23,6 +23,7 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scan import Entry
 from estimation.diagnosis.hypothesis_tests.scoring import accept, visible_root
 from robots.common.plain import finite
+from robots.terms.effect_bases.capabilities import AtReversals, Persistence
 from robots.terms.effects import EFFECTS
 
 Array = NDArray[np.float64]
@@ -161,7 +162,11 @@ def _limit(
         fitted = min((sum(known[k] is None for k in free) for known in assumed), default=len(free))
         penalty = (len(roots[at]) + fitted) * float(np.log(problem.rows * len(entry.groups[at].joints)))
         needed = detectable_energy(len(roots[at]), tries, false_alarm=false_alarm, penalty=penalty)
-        sure = _certain_share(problem, hypothesis, entry.shapes[at]) if hypothesis.effect.lags else 1.0
+        sure = (
+            _certain_share(problem, hypothesis, entry.shapes[at])
+            if hypothesis.effect.at_reversals is AtReversals.LATE
+            else 1.0
+        )
         return float(size_per_energy(mixtures[at], entry.groups[at].gram) * np.sqrt(needed / sure))
 
     sizes = {at: size(at) for at in showing}
@@ -217,7 +222,7 @@ def _note(problem: Problem, hypothesis: Hypothesis) -> str:
 
     A rest hides transient effects. A short log does not determine long time constants.
     """
-    if hypothesis.effect.transient:
+    if hypothesis.effect.persistence is Persistence.TRANSIENT:
         resting = float(np.mean(problem.recording.sign_unknown.all(axis=1)))
         if resting > RESTING:
             return RESTS.format(100 * resting)

@@ -15,6 +15,7 @@ from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
+from robots.terms.effect_bases.capabilities import Persistence
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,11 @@ class FittedEffect:
     def local_evidence(self) -> Evidence:
         """Evidence against no effect. A transient effect counts only the rows in which it acts."""
         known = self.evidence
-        rows = min(known.rows, self._acting_rows()) if self.hypothesis.effect.transient else known.rows
+        rows = (
+            min(known.rows, self._acting_rows())
+            if self.hypothesis.effect.persistence is Persistence.TRANSIENT
+            else known.rows
+        )
         return replace(known, chi2=known.chi2 - self.motion_error_chi2, rows=rows)
 
     @property

@@ -23,7 +23,7 @@ class Group:
         raw: squared norms (k,) before the projection; infinite for columns that are nearly all in masked rows.
         cross: inner products with the residual (k,).
         high_band_columns: white columns (N', k) of each joint above its band; none for effects that are not
-            `independent_of_acceleration`.
+            searched `above_band`.
         reversal_columns: column of each joint's reversal timing over its error (n, k); None if the effect does not
             delay all torque.
     """

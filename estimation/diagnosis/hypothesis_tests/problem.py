@@ -18,6 +18,7 @@ from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.reversals.reversal_timing import ReversalTiming
 from estimation.regressions.parameter_priors import GaussianPrior
+from robots.terms.effect_bases.capabilities import AboveBand, AtReversals, Reading
 from robots.terms.effect_bases.gear_load import ExtraGearLoad
 from robots.terms.effects import Effect, Situation
 from robots.terms.situations.flange_body import with_body
@@ -72,11 +73,11 @@ class Problem:
 
     def state_for(self, effect: Effect) -> Situation:
         """Returns the situation on which an effect depends."""
-        if effect.acts_on_total_torque and self.total_torque_state is not None:
+        if effect.reading is Reading.CUTS and self.total_torque_state is not None:
             return self.total_torque_state
         return (
             self.delayed_torque_state
-            if effect.smooths_friction_sign and self.delayed_torque_state is not None
+            if effect.at_reversals is AtReversals.LATE and self.delayed_torque_state is not None
             else self.situation
         )
 
@@ -111,12 +112,12 @@ class Problem:
 
     @cached_property
     def score_gradient_with_high_band(self) -> Array:
-        """Gradient (N0, n) for effects that are `independent_of_acceleration`: includes the high band."""
+        """Gradient (N0, n) for effects that are searched `above_band`: includes the high band."""
         return self._with_high_band(bare=False)
 
     @cached_property
     def score_gradient_exogenous(self) -> Array:
-        """Gradient (N0, n) for such effects that are also `exogenous`: no base model is fitted in the high band."""
+        """Gradient (N0, n) for such effects that are also exogenous: no base model is fitted in the high band."""
         return self._with_high_band(bare=True)
 
     def _with_high_band(self, *, bare: bool) -> Array:
@@ -131,9 +132,9 @@ class Problem:
         """Returns the gradient (N0, n) by which the points of an effect's grid are ranked."""
         return (
             self.score_gradient_exogenous
-            if effect.exogenous
+            if effect.above_band is AboveBand.EXOGENOUS
             else self.score_gradient_with_high_band
-            if effect.independent_of_acceleration
+            if effect.above_band is not AboveBand.NO
             else self.score_gradient
         )
 
@@ -154,9 +155,9 @@ class Problem:
     ) -> list[Group]:
         """Whitens columns of several groups on the same joints at once and projects the base model out.
 
-        Columns that are nearly all in masked rows get infinite `raw`. Columns of an effect with a `shared_coefficient`
+        Columns that are nearly all in masked rows get infinite `raw`. Columns of an effect that delays all torque
         do not, if most of their unmasked energy is away from rows of unknown friction sign. Effects
-        `independent_of_acceleration` include the high band.
+        searched `above_band` include the high band.
 
         Args:
             joints: joints on which the columns act, from 0.
@@ -173,26 +174,26 @@ class Problem:
         P = self.whitening.precision
         power = [sum(P[j, j] * _squares(part) for j, part in zip(joints, kind, strict=True)) for kind in (white, whole)]
         above: list[Array] = []
-        if self.high_band is not None and effect is not None and effect.independent_of_acceleration:
-            how = {"calm": effect.acceleration_driven, "bare": effect.exogenous}
+        if self.high_band is not None and effect is not None and effect.above_band is not AboveBand.NO:
+            how = {"calm": effect.at_reversals is AtReversals.IMPACT, "bare": effect.above_band is AboveBand.EXOGENOUS}
             above = [self.high_band.columns(part, j, **how) for j, part in zip(joints, columns, strict=True)]
             above = above if any(map(len, above)) else []
         # A column may have little energy in the band and still be visible in the high band.
         power = [own + sum(map(_squares, above)) for own in power]
         raw = np.where(power[0] > MIN_COUNTED_ENERGY * power[1], power[0], np.inf)
         doubtful = np.flatnonzero(np.isinf(raw) & (power[0] > FAINT * power[1]))
-        if effect is not None and effect.shared_coefficient and len(doubtful):
+        if effect is not None and effect.delays_all_torque and len(doubtful):
             known = self._known(joints, [part[:, doubtful] for part in columns])
             raw[doubtful] = np.where(known > MIN_DISTANT_ENERGY * power[0][doubtful], power[0][doubtful], np.inf)
         against, cross, gram = self._products(joints, white, count)
         for j, part in zip(joints, above, strict=False):
             assert self.high_band is not None
             assert effect is not None
-            cross += self.high_band.cross(part, j, bare=effect.exogenous)
+            cross += self.high_band.cross(part, j, bare=effect.above_band is AboveBand.EXOGENOUS)
             apart = part.T.reshape(count, k, -1)
             gram += apart @ apart.transpose(0, 2, 1)
         timed = None
-        if self.timing is not None and effect is not None and effect.lags and effect.whole_robot:
+        if self.timing is not None and effect is not None and effect.delays_all_torque:
             timed = self.timing.column(joints)
             energy = float(np.sum(timed**2))
             raw, gram = np.where(np.isfinite(raw), raw + energy, raw), gram + energy

@@ -16,6 +16,7 @@ from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evid
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.reversal_errors import gain_from_reversal_errors
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
+from robots.terms.effect_bases.capabilities import AtReversals, Reading
 
 Array = NDArray[np.float64]
 
@@ -85,7 +86,7 @@ def refine(
                 at[:] = slopes[int(np.argmax(gains))]
                 climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)
 
-    if hypothesis.effect.acts_on_total_torque or hypothesis.effect.distorts:
+    if hypothesis.effect.reading is Reading.CUTS or hypothesis.effect.reading is Reading.DISTORTS:
         # The bounds may have changed since the start was found.
         start = clip_shape(start, bounds)
     evaluate(start)
@@ -101,16 +102,16 @@ def refine(
             shape = tuple(own if value is None else value for value, own in zip(known, refined.shape, strict=True))
             evaluate(shape, sum(known[k] is None for k in loose))
     found = best[0]
-    if hypothesis.effect.lags:
+    if hypothesis.effect.at_reversals is AtReversals.LATE:
         return _with_scatter(problem, found, accepted)
-    if hypothesis.effect.acts_at_reversals and hypothesis.joint is not None:
+    if hypothesis.effect.at_reversals is AtReversals.GRADUAL and hypothesis.joint is not None:
         if found.shape[0] < SHORT_TRAVEL_FACTOR * bounds[0][0]:
             return replace(found, birge_ratio=np.inf)
         owed = gain_from_reversal_errors(problem, hypothesis.joint, found.group, found.gain, accepted)
         return replace(found, motion_error_chi2=owed)
     return (
         replace(found, birge_ratio=_reversal_scatter(problem, found, accepted))
-        if hypothesis.effect.acceleration_driven
+        if hypothesis.effect.at_reversals is AtReversals.IMPACT
         else found
     )
 

@@ -13,6 +13,7 @@ from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
 from estimation.diagnosis.hypothesis_tests.time_windows import best_window
 from robots.common.parallel import threaded
+from robots.terms.effect_bases.capabilities import Persistence
 
 
 def open_event_edges(
@@ -45,7 +46,7 @@ def refit_event_window(problem: Problem, member: FittedEffect, beside: Accepted)
         beside: groups already in the model.
     """
     hypothesis = member.hypothesis
-    if not hypothesis.effect.transient:
+    if hypothesis.effect.persistence is not Persistence.TRANSIENT:
         return member
     shapes = hypothesis.effect.sustained_shapes(problem.state_for(hypothesis.effect), member.shape)
     if not shapes:

@@ -26,6 +26,7 @@ from estimation.identifications.identification import NEGLIGIBLE, RELATIVE
 from estimation.models.extension import Extension
 from estimation.models.model import Model
 from estimation.regressions.parameter_priors import GaussianPrior
+from robots.terms.effect_bases.capabilities import AboveBand, AtReversals
 
 Array = NDArray[np.float64]
 
@@ -83,7 +84,7 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
     fast, kicks = np.zeros((2, columns.shape[2]), dtype=bool)
     for member, (start, size, shapes) in zip(members, slices, strict=True):
         rows, effect = slice(start, start + size + shapes), member.hypothesis.effect
-        fast[rows], kicks[rows] = effect.independent_of_acceleration, effect.acceleration_driven
+        fast[rows], kicks[rows] = effect.above_band is not AboveBand.NO, effect.at_reversals is AtReversals.IMPACT
     flat, tau = white.independent(columns), white.independent(problem.recording.tau)
     if problem.high_band is not None and fast.any():
         above, beyond = problem.high_band.regression(columns[:, :, fast], calm=kicks[fast])

@@ -14,6 +14,7 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
+from robots.terms.effect_bases.capabilities import GearLoad
 from robots.terms.effect_bases.gear_load import ExtraGearLoad, LoadPath, LoadSource
 from robots.terms.effects import EFFECTS
 
@@ -24,7 +25,7 @@ BY_LOAD = EFFECTS["load_dependent_friction"]
 
 
 @dataclass(frozen=True, eq=False)
-class GearLoad:
+class GearLoadFit:
     """Gear load of the effects found.
 
     Attributes:
@@ -36,10 +37,10 @@ class GearLoad:
     improves_fit: bool = False
 
 
-NO_GEAR_LOAD = GearLoad()
+NO_GEAR_LOAD = GearLoadFit()
 
 
-def find_gear_load(problem: Problem, members: Sequence[FittedEffect], values: Array) -> GearLoad:
+def find_gear_load(problem: Problem, members: Sequence[FittedEffect], values: Array) -> GearLoadFit:
     """Selects the gear load of the effects found by the BIC.
 
     Effects with `loads_gear` load the gears by default. A fit without this load may have named another cause for the
@@ -59,7 +60,9 @@ def find_gear_load(problem: Problem, members: Sequence[FittedEffect], values: Ar
             weights.append(LoadSource(place.effect, place.joint, member.shape, own))
     if not weights:
         return NO_GEAR_LOAD
-    ways: list[LoadPath] = ["effects", "preloads"] if any(w.effect.preloads for w in weights) else ["effects"]
+    ways: list[LoadPath] = (
+        ["effects", "preloads"] if any(w.effect.gear_load is GearLoad.PRELOADS for w in weights) else ["effects"]
+    )
     bearings = [ExtraGearLoad(way, weights) for way in ways]
     state = problem.baseline.situation(problem.recording, values[: problem.baseline.base.size])
     extra = bearings[0].on(state).extra_load
@@ -68,15 +71,15 @@ def find_gear_load(problem: Problem, members: Sequence[FittedEffect], values: Ar
     felt = set((np.flatnonzero(size > MIN_GEAR_LOAD * other) + 1).tolist())
     on_them = [m for m in members if m.hypothesis.joint in felt and not m.hypothesis.effect.loads_gear]
     if not on_them:
-        return GearLoad(bearings[0])
+        return GearLoadFit(bearings[0])
     before = set_bic_gain(problem, members)
-    best, most = GearLoad(bearings[0]), before
+    best, most = GearLoadFit(bearings[0]), before
     for bearing in bearings:
         now = replace(problem, situation=bearing.on(state), extra_load=bearing)
         for alternative in _alternatives(now, members, on_them):
             worth = set_bic_gain(now, alternative)
             if worth > most + (0.0 if best.improves_fit else MIN_BIC_GAIN):
-                best, most = GearLoad(bearing, improves_fit=True), worth
+                best, most = GearLoadFit(bearing, improves_fit=True), worth
     return best
 
 
@@ -84,7 +87,7 @@ def _alternatives(
     problem: Problem, members: Sequence[FittedEffect], on_them: Sequence[FittedEffect]
 ) -> list[list[FittedEffect]]:
     """Lists the effects refitted with this load, with at most one of them left out or replaced."""
-    feel = [m for m in on_them if m.hypothesis.effect.depends_on_gear_load]
+    feel = [m for m in on_them if m.hypothesis.effect.gear_load is GearLoad.FEELS]
     result = []
     for out in (None, *(m for m in on_them if m not in feel)):
         rest = [m for m in members if m is not out and m not in feel]

@@ -14,6 +14,7 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import clip_shape, refine
 from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.total_torque import JointFit
+from robots.terms.effect_bases.capabilities import Reading
 from robots.terms.effect_bases.static import StaticJointEffect
 
 Array = NDArray[np.float64]
@@ -33,13 +34,13 @@ def fit_sensor_nonlinearity(problem: Problem, members: Sequence[FittedEffect]) -
 
     Args:
         problem: data and base model.
-        members: all effects; those with `distorts` are fitted here.
+        members: all effects; those that distort the reading are fitted here.
 
     Returns:
         The problem with the situation of the true torque, and the members with refitted distortions. Both are unchanged
         if no effect distorts.
     """
-    wrong = [k for k, member in enumerate(members) if member.hypothesis.effect.distorts]
+    wrong = [k for k, member in enumerate(members) if member.hypothesis.effect.reading is Reading.DISTORTS]
     found = list(members)
     if not wrong:
         return problem, found

@@ -15,6 +15,7 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import climb
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from robots.common.stretches import spans
+from robots.terms.effect_bases.capabilities import Reading
 
 Array = NDArray[np.float64]
 
@@ -254,7 +255,7 @@ def _hidden(
     t, joints = problem.recording.t, member.hypothesis.effect.acts_on(problem.situation.robot, member.hypothesis.joint)
     blind = [np.asarray(problem.recording.sign_unknown[:, list(joints)].all(axis=1))]
     for other in others:
-        if other.hypothesis.effect.acts_on_total_torque and set(other.group.joints) & set(joints):
+        if other.hypothesis.effect.reading is Reading.CUTS and set(other.group.joints) & set(joints):
             lost = [np.abs(X).max(axis=1) for X in problem.columns_of(other.hypothesis, other.shape)[1]]
             blind.append(np.asarray(np.any([loss > CUT * loss.max() for loss in lost], axis=0)))
     found = [(float(t[start]), float(t[stop - 1])) for rows in blind for start, stop in spans(rows)]

@@ -16,6 +16,7 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.joint_fits.extended_fit import dense, reversal_columns
 from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short
 from estimation.diagnosis.recordings.recording import Recording
+from robots.terms.effect_bases.capabilities import AtReversals, Reading
 from robots.terms.effect_bases.gear_load import with_gear_load
 from robots.terms.effects import Situation
 
@@ -40,13 +41,13 @@ def with_total_torque(problem: Problem, members: Sequence[FittedEffect], hypothe
         members: effects that are already in the model.
         hypotheses: hypotheses to be tested, some of which may act on the total torque.
     """
-    others = [member for member in members if not member.hypothesis.effect.smooths_friction_sign]
-    if others and any(hypothesis.effect.smooths_friction_sign for hypothesis in hypotheses):
+    others = [member for member in members if member.hypothesis.effect.at_reversals is not AtReversals.LATE]
+    if others and any(hypothesis.effect.at_reversals is AtReversals.LATE for hypothesis in hypotheses):
         beyond = np.sum([dense(problem, m.hypothesis, m.shape) @ m.coefficients for m in others], axis=0)
         problem = replace(problem, delayed_torque_state=problem.situation.beside(beyond))
     useless = np.zeros_like(problem.recording.sign_unknown)
     for hypothesis in hypotheses:
-        if hypothesis.effect.acts_on_total_torque:
+        if hypothesis.effect.reading is Reading.CUTS:
             flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
             useless |= False if flags is None else flags
     return (
@@ -64,7 +65,7 @@ def total_torque_from_unclipped(problem: Problem, members: Sequence[FittedEffect
         members: effects in the model; those that act on the total torque are left out.
         useless: rows without a usable torque measurement (N, n).
     """
-    before = [member for member in members if not member.hypothesis.effect.acts_on_total_torque]
+    before = [member for member in members if member.hypothesis.effect.reading is not Reading.CUTS]
     known = JointFit(problem, before, ~useless)
     return known.total_torque(known.values(problem.recording.tau))
 
@@ -79,10 +80,10 @@ def fit_clipped_torque(problem: Problem, members: Sequence[FittedEffect]) -> Pro
         problem: data and base model, with a first estimate of the total torque.
         members: all effects in the model.
     """
-    last = [member for member in members if member.hypothesis.effect.acts_on_total_torque]
+    last = [member for member in members if member.hypothesis.effect.reading is Reading.CUTS]
     if not last or problem.total_torque_state is None:
         return problem
-    before = [member for member in members if not member.hypothesis.effect.acts_on_total_torque]
+    before = [member for member in members if member.hypothesis.effect.reading is not Reading.CUTS]
     known = JointFit(problem, before, np.ones_like(problem.recording.sign_unknown))
     step = STEP * np.sqrt(np.mean(problem.recording.tau**2, axis=0))
     values = known.values(problem.recording.tau - _lost(problem, last))
@@ -194,7 +195,7 @@ def effect_columns(
     own = build_situation(recording, model, problem.parameters_without_payload)
     now = with_gear_load(replace(own, since=problem.situation.origin), problem.extra_load)
     states, columns = [now] * len(members), [_dense(now, member) for member in members]
-    late = [k for k, member in enumerate(members) if member.hypothesis.effect.smooths_friction_sign]
+    late = [k for k, member in enumerate(members) if member.hypothesis.effect.at_reversals is AtReversals.LATE]
     if problem.delayed_torque_state is not None and 0 < len(late) < len(members):
         plain = [columns[k] @ member.coefficients for k, member in enumerate(members) if k not in late]
         followed = now.beside(np.sum(plain, axis=0))
@@ -207,11 +208,11 @@ def effect_columns(
         parts = [
             X @ m.coefficients
             for X, m in zip(columns, members, strict=True)
-            if not m.hypothesis.effect.acts_on_total_torque
+            if m.hypothesis.effect.reading is not Reading.CUTS
         ]
         whole = whole.beside(np.sum(parts, axis=0) if parts else None)
         for k, member in enumerate(members):
-            if member.hypothesis.effect.acts_on_total_torque:
+            if member.hypothesis.effect.reading is Reading.CUTS:
                 states[k], columns[k] = whole, _dense(whole, member)
     return states, columns
 

@@ -49,7 +49,7 @@ class JointHighBand:
 
 @dataclass(frozen=True, eq=False)
 class HighBand:
-    """A second regression above each joint's band, for effects that are `independent_of_acceleration`.
+    """A second regression above each joint's band, for effects that are searched `above_band`.
 
     Its noise is that of the residual in this band, unknown accelerations included. The base model is fitted anew for
     each joint, because the errors of friction and inertia differ from those in the usable band. For exogenous effects

@@ -243,7 +243,7 @@ def beside_larger(slight: FittedEffect | None, members: Sequence[FittedEffect]) 
     if not shares:
         return ()
     share, member, j = min(shares, key=lambda each: each[0])
-    if slight.hypothesis.effect.shared_coefficient:
+    if slight.hypothesis.effect.delays_all_torque:
         return (_NOT_ALIKE.format(slight.hypothesis.label, member.hypothesis.label),)
     if share >= 1.0:
         return ()

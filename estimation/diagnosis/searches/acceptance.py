@@ -14,6 +14,7 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
 from estimation.diagnosis.hypothesis_tests.shocks import gain_beside_shock
 from estimation.diagnosis.searches.log_noise_levels import profile_gain
+from robots.terms.effect_bases.capabilities import AtReversals
 
 # Time [s] before and after an impact of another effect in which the drives respond to it; share of the rows from which
 # such times no longer count as impacts; share of a delay that the other rows must show.
@@ -96,7 +97,7 @@ def exceeds_leakage(problem: Problem, candidate: FittedEffect, members: Sequence
     flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
     if flags is not None and flags.any():
         return True
-    if hypothesis.effect.shared_coefficient:
+    if hypothesis.effect.delays_all_torque:
         return not members or _joints_agree(problem, candidate, members)
     robot = problem.situation.robot
     able = [
@@ -129,8 +130,8 @@ def delay_supported_away_from_impacts(
         candidate: effect; any other than a shared delay passes.
         members: other effects in the model.
     """
-    kicks = [member for member in members if member.hypothesis.effect.acceleration_driven]
-    if not kicks or not candidate.hypothesis.effect.shared_coefficient:
+    kicks = [member for member in members if member.hypothesis.effect.at_reversals is AtReversals.IMPACT]
+    if not kicks or not candidate.hypothesis.effect.delays_all_torque:
         return True
     reach = round(ANSWERS / (problem.recording.step * problem.whitening.stride))
     beside = np.zeros(problem.rows, dtype=bool)

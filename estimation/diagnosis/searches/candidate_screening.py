@@ -10,6 +10,7 @@ from estimation.diagnosis.calibration import MAX_CANDIDATES, MIN_CANDIDATE_GAIN
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scan import Outcome, Scan
+from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effects import Effect
 
 # Assumed largest ratio of refined gain to grid gain of a transient effect, whose refinement takes longest.
@@ -54,4 +55,4 @@ def screen_candidates(
 
 
 def _of_a_moment(effect: Effect) -> bool:
-    return effect.transient or any(shape.moment for shape in effect.shapes)
+    return effect.persistence is Persistence.TRANSIENT or any(shape.moment for shape in effect.shapes)

@@ -11,6 +11,7 @@ from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, a
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
+from robots.terms.effect_bases.capabilities import Reading
 
 ROUNDS = 8  # largest number of rounds
 # Gain of chi2 by a round below which the refinement stops.
@@ -36,7 +37,7 @@ def refine_shapes_jointly(problem: Problem, members: Sequence[FittedEffect]) -> 
     for joint in sorted({m.hypothesis.joint for m in members if m.hypothesis.joint is not None}):
         own = [i for i, m in enumerate(result) if m.hypothesis.joint == joint and m.shape]
         # Effects on the total torque depend on the torque of the other effects, which is fixed here.
-        if len(own) > 1 and not any(result[i].hypothesis.effect.acts_on_total_torque for i in own):
+        if len(own) > 1 and not any(result[i].hypothesis.effect.reading is Reading.CUTS for i in own):
             _along(problem, result, own)
     return result
 

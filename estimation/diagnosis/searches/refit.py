@@ -14,13 +14,14 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.extended_fit import dense
-from estimation.diagnosis.joint_fits.gear_load import NO_GEAR_LOAD, GearLoad, find_gear_load
+from estimation.diagnosis.joint_fits.gear_load import NO_GEAR_LOAD, GearLoadFit, find_gear_load
 from estimation.diagnosis.joint_fits.sensor_nonlinearity import fit_sensor_nonlinearity
 from estimation.diagnosis.joint_fits.total_torque import fit_clipped_torque, fit_jointly, total_torque_from_unclipped
 from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.diagnosis.recordings.thinning import shift_motion
+from robots.terms.effect_bases.capabilities import AtReversals
 from robots.terms.effect_bases.gear_load import with_gear_load
 
 Array = NDArray[np.float64]
@@ -49,7 +50,7 @@ class RefitResult:
     degrees: int = 0
     delayed: Array | None = None
     delay_torque: Array | None = None
-    gear_load: GearLoad = NO_GEAR_LOAD
+    gear_load: GearLoadFit = NO_GEAR_LOAD
 
     def without_delay(self) -> tuple[Array, Array | None]:
         """Returns residual and torque of the effects without delays of the whole robot.
@@ -70,7 +71,7 @@ class RefitResult:
             recording: logs of the fit.
             members: effects of the fit.
         """
-        late = [m for m in members if m.hypothesis.effect.lags and m.hypothesis.effect.whole_robot]
+        late = [m for m in members if m.hypothesis.effect.delays_all_torque]
         beyond = self.without_delay()[1]
         blurring = 0.0 if beyond is None or self.delayed is None else beyond - self.delayed
         return shift_motion(replace(recording, tau=recording.tau - blurring), sum(m.shape[0] for m in late))
@@ -100,8 +101,8 @@ def refit(problem: Problem, members: Sequence[FittedEffect]) -> RefitResult:
     values, left, full = fit_jointly(problem, members)
     known = len(problem.prior.target)
     effects = [(m.hypothesis.effect, len(m.coefficients)) for m in members]
-    plain = np.concatenate([np.repeat(not effect.smooths_friction_sign, size) for effect, size in effects])
-    late = np.concatenate([np.repeat(effect.lags and effect.whole_robot, size) for effect, size in effects])
+    plain = np.concatenate([np.repeat(effect.at_reversals is not AtReversals.LATE, size) for effect, size in effects])
+    late = np.concatenate([np.repeat(effect.delays_all_torque, size) for effect, size in effects])
     return RefitResult(
         residual=left,
         values=values[: problem.baseline.base.size],

@@ -30,6 +30,7 @@ from estimation.diagnosis.searches.selection import Selection, select, with_riva
 from robots.base_parameters import BaseParameters
 from robots.common.memory import give_back
 from robots.common.progress import Progress
+from robots.terms.effect_bases.capabilities import AboveBand, AtReversals
 from robots.terms.effects import Effect
 
 SEARCHES = 2  # largest number of searches
@@ -106,7 +107,7 @@ def search(
             followed=settled.delayed,
             bearing=settled.gear_load.extra_load,
         )
-        if any(effect.independent_of_acceleration for effect in effects):
+        if any(effect.above_band is not AboveBand.NO for effect in effects):
             wide = estimate_whitening(recording, settled.residual, fitted, inertia, MAX_HIGH_BAND_ERROR, spared)
             # A base model fitted beside effects may leave a very different residual than the base model alone.
             upper = build_high_band(recording, baseline, posed.base_residual, settled.residual, whitening.bands, wide)
@@ -128,7 +129,7 @@ def search(
         known = {found.effect.hypothesis: found.effect.shape for found in last.selection.found}
         settled = refit(last.problem, [found.effect for found in last.selection.found])
         # Such an effect, for example a delay, increased the estimated width of the friction sign.
-        blurred = any(found.effect.hypothesis.effect.smooths_friction_sign for found in last.selection.found)
+        blurred = any(found.effect.hypothesis.effect.at_reversals is AtReversals.LATE for found in last.selection.found)
     assert last is not None
     with_alternatives = with_rivals(last.searched_problem, last.entries, last.selection)
     return replace(last, selection=with_alternatives)

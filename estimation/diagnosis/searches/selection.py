@@ -26,6 +26,7 @@ from estimation.diagnosis.searches.acceptance import (
 from estimation.diagnosis.searches.candidate_screening import screen_candidates
 from estimation.diagnosis.searches.joint_shape_refinement import refine_shapes_jointly
 from estimation.diagnosis.searches.swap_search import refine_candidates, refine_with_swaps, remeasure
+from robots.terms.effect_bases.capabilities import Persistence
 
 FAR_MORE = 1.5  # ratio of gains by which a joint refinement must strengthen a candidate
 
@@ -105,7 +106,10 @@ def select(
         able = [m for m in refined if chance[m.hypothesis] <= false_alarm and m.hypothesis not in spurned]
         candidates = [m for m in able if is_accepted(problem, m, chance[m.hypothesis], members, false_alarm)]
         candidates = [
-            m for m in candidates if not m.hypothesis.effect.transient or exceeds_single_shock(problem, m, accepted)
+            m
+            for m in candidates
+            if m.hypothesis.effect.persistence is not Persistence.TRANSIENT
+            or exceeds_single_shock(problem, m, accepted)
         ]
         if not candidates:
             break

@@ -16,6 +16,7 @@ from estimation.diagnosis.simulations.simulation_result import Curves, Simulatio
 from robots.plants.closed_loop import Driven, Loop, Reference, Tangent, drive
 from robots.regressor import TorqueModel
 from robots.terms.discrepancies.patterns import PREFIX
+from robots.terms.effect_bases.capabilities import Persistence, Reading
 from robots.terms.effect_bases.gear_load import ExtraGearLoad, with_gear_load
 from robots.terms.effect_bases.static import StaticJointEffect
 from robots.terms.situations.flange_body import with_body
@@ -116,7 +117,7 @@ class FittedRobot:
         Returns:
             The robot without these effects, and the undistorted torque (N, n).
         """
-        wrong = [i for i, member in enumerate(self.members) if member.hypothesis.effect.distorts]
+        wrong = [i for i, member in enumerate(self.members) if member.hypothesis.effect.reading is Reading.DISTORTS]
         plain = [i for i in range(len(self.members)) if i not in wrong]
         beyond, torque = self.beyond(now, plain), reading.copy()
         for i in wrong:
@@ -219,7 +220,9 @@ class _Effects:
         count = range(len(plant.members))
         # Effects that depend on earlier motion, as free functions may, need the earlier data.
         effects = [member.hypothesis.effect for member in plant.members]
-        late = [i for i in count if effects[i].depends_on == "time" or effects[i].name.startswith(PREFIX)]
+        late = [
+            i for i in count if effects[i].persistence is not Persistence.STATE or effects[i].name.startswith(PREFIX)
+        ]
         self.near = [i for i in count if i not in late]
         self.late = late
         zero = np.zeros_like(self.part.q)

@@ -31,6 +31,7 @@ from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
 from estimation.diagnosis.validations.name_comparison import ComparedNames
 from robots.terms.discrepancies.patterns import PREFIX, is_of_time, is_oscillation
+from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effects import Effect
 
 
@@ -160,7 +161,11 @@ def _without_change(
     """Measures with a change undone on held-out data, such as a removed payload; None without significant gain."""
     hypothesis = members[place].hypothesis
     effect = hypothesis.effect
-    comes = effect.depends_on == "time" and not effect.transient and any(shape.moment for shape in effect.shapes)
+    comes = (
+        effect.persistence is not Persistence.STATE
+        and effect.persistence is not Persistence.TRANSIENT
+        and any(shape.moment for shape in effect.shapes)
+    )
     if hypothesis in absent or not comes:
         return None
     absent.add(hypothesis)
@@ -254,7 +259,7 @@ def _is_harmful(seen: HeldOutResult, i: int, member: FittedEffect, beyond: Calla
     supported = (speaks >= MIN_RETAINED_GAIN and gain.ci95[0] > 0) or (
         speaks >= MIN_SUPPORT and speaks * member.gain > MIN_SUPPORT_CHI2
     )
-    if effect.depends_on == "state" and seen.cv_retained_gain[i] < MIN_RETAINED_GAIN and not supported:
+    if effect.persistence is Persistence.STATE and seen.cv_retained_gain[i] < MIN_RETAINED_GAIN and not supported:
         return True
     if joint is not None and seen.errors.is_unreliable(joint - 1):
         return True
@@ -270,7 +275,7 @@ def _is_harmful(seen: HeldOutResult, i: int, member: FittedEffect, beyond: Calla
         else seen.rmse_ratio[i] > REJECT_RMSE_RATIO and gain.ci95[0] <= 0
     )
     # Contradiction does not count for thermal effects: heat stored before the held-out data is unknown.
-    return (against and not effect.has_thermal_memory) or idle or risen
+    return (against and effect.persistence is not Persistence.HEAT) or idle or risen
 
 
 def _explained_by_cooling(seen: HeldOutResult, i: int, member: FittedEffect) -> bool:
@@ -282,4 +287,6 @@ def _explained_by_cooling(seen: HeldOutResult, i: int, member: FittedEffect) -> 
     known = seen.cv_retained_gain[i] >= MIN_RETAINED_GAIN and not (
         joint is not None and seen.errors.is_unreliable(joint - 1)
     )
-    return member.hypothesis.effect.has_thermal_memory and known and seen.rmse_ratio[i] <= REJECT_RMSE_RATIO
+    return (
+        member.hypothesis.effect.persistence is Persistence.HEAT and known and seen.rmse_ratio[i] <= REJECT_RMSE_RATIO
+    )

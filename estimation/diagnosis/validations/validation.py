@@ -21,6 +21,7 @@ from estimation.diagnosis.validations.held_out_validation import ValidatedFindin
 from estimation.diagnosis.validations.name_comparison import ComparedNames
 from robots.robot import Robot
 from robots.terms.discrepancies.patterns import all_patterns
+from robots.terms.effect_bases.capabilities import Persistence
 
 
 def validate(
@@ -48,7 +49,10 @@ def validate(
         if effect.name in by_reversals:
             return True
         # Without recording times, held-out logs cannot test time-dependent effects either.
-        return bool(prepared.held_out) and (effect.transient or (not prepared.dated and effect.depends_on == "time"))
+        return bool(prepared.held_out) and (
+            effect.persistence is Persistence.TRANSIENT
+            or (not prepared.dated and effect.persistence is not Persistence.STATE)
+        )
 
     validated = validate_on_held_out(
         whole,

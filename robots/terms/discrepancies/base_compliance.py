@@ -1,4 +1,4 @@
-"""A base that gives way under the robot's weight: it leans to where the robot reaches."""
+"""A compliant base that tilts under the moment of the robot's weight."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ Array = NDArray[np.float64]
 
 
 class BaseCompliance(Effect):
-    """(d rigid/dg) (g x t), t = C m + R(q1) o: the base turns about its level axes by C per moment of the weight.
+    """tau = (d rigid/dg) (g x t), t = C m + R(q1) o: the base rotates about its horizontal axes by C per weight moment.
 
-    m_k = e_k' (S x g) is the moment about the level axis e_k, S the first moment of the links' masses about the base, C
-    symmetric. Of the first link's own, no motion of a level robot that turns about gravity shows anything: it has the
-    base lean by some o that goes round with it. Accelerations are left out: a base that rings is more than this.
+    m_k = e_k' (S x g) is the moment about the horizontal axis e_k, S the first moment of the links' masses about the
+    base, and C is symmetric. On a level robot with a vertical first axis, no log shows the first link's first moments.
+    They tilt the base by an unknown o that rotates with the first joint. Accelerations are neglected, so oscillations
+    of the base are not included.
     """
 
     name: ClassVar[str] = "pattern:leaning:0:even"
@@ -27,17 +28,17 @@ class BaseCompliance(Effect):
     whole_robot: ClassVar[bool] = True
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
-        """Describes the compliance about each level axis and of both, and what the first link adds."""
+        """Describes the compliances about both horizontal axes, their coupling, and the first link's tilt."""
         compliances = tuple(Coefficient(f"compliance_{axes}", "rad/(N m)") for axes in ("1", "2", "12"))
         own = tuple(Coefficient(f"own_{axis}", "rad") for axis in ("1", "2"))
         return (*compliances, *own) if upright(robot) else compliances
 
     def joints(self, robot: Robot) -> tuple[int | None, ...]:
-        """Names the whole robot, if there is gravity."""
+        """Returns the whole robot if gravity acts on it, else nothing."""
         return (None,) if np.any(robot.chain.gravity) else ()
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of all joints per compliance and per angle (N, n, 5), or (N, n, 3)."""
+        """Evaluates the torque of all joints per compliance (N, n, 3), or per compliance and own angle (N, n, 5)."""
         robot, gravity = situation.robot, situation.gravity
         axes = level_axes(np.asarray(robot.chain.gravity, dtype=float))
         moment = np.cross(situation.sensitivity("moment").reshape(len(situation), 3), gravity) @ axes.T  # (N, 2)

@@ -1,4 +1,4 @@
-"""Positions and torques whose clocks go apart: the one is logged later and later after the other, on all joints."""
+"""A delay between torque and position that changes with time, on all joints, as with two drifting clocks."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from robots.terms.effects.time_delay import lateness
 Array = NDArray[np.float64]
 
 KNOTS = 3
-# The change of torque per delay is a quotient over this [s], for friction turns round at once.
+# Time [s] of the difference quotient for the change of torque per delay; friction changes sign within a sample.
 OVER = 1e-3
 
 
 class ClockDrift(OverTime):
-    """-g(t) dtau_j / dt on every joint j, g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
+    """tau_e,j = -g(t) dtau_j/dt on every joint j, g a smooth delay: k half cosine waves over the logs, k = 1 ... KNOTS.
 
-    A delay that stays is `time_delay`.
+    A constant delay is `time_delay`.
     """
 
     name: ClassVar[str] = "pattern:parting:0:even"
     title: ClassVar[str] = "drift between the clocks of torque and position"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
-        """Describes the delays of the half waves."""
+        """Describes the amplitude of each half wave."""
         return tuple(Coefficient(f"delay_{k}", "s") for k in range(1, KNOTS + 1))
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the change of torque per delay times each wave (N, n, KNOTS)."""
+        """Evaluates the change of torque per delay, times each half wave (N, n, KNOTS)."""
         times = half_waves(log_time(situation), KNOTS)
         return np.asarray(lateness(situation, OVER)[:, :, None] * times[:, None])
 

@@ -1,4 +1,4 @@
-"""A place in a joint's range beyond which something is met: a buffer, a stop, a hose or cable that goes taut."""
+"""A contact beyond a position of a joint: a buffer, an end stop, or a hose or cable that becomes taut."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from robots.terms.effects import Coefficient, Shape, Situation
 Array = NDArray[np.float64]
 
 SCANNED = tuple(float(share) for share in np.arange(0.05, 0.96, 0.075))
-"""Places of a scan, as shares of the joint's range."""
+"""Positions of a scan, as fractions of the joint's range in the data."""
 RANGE = (0.02, 0.98)
-"""Shares of it between which one is: what is met before it, or after it, is all or nothing of the data."""
+"""Least and largest position of the contact, as fractions of that range; outside, all or no data show the contact."""
 
 
 @dataclass(frozen=True)
 class EndStop(Placed):
-    """tau = (k + d dq) x beyond a place c, x = (q - c) there; or short of it, x = (c - q).
+    """tau = k x + d |x| dq with x = max(q - c, 0), or x = min(q - c, 0) for a contact below c.
 
-    The stop has a stiffness k and a damping d that grows with the depth, as a rubber buffer has.
+    The contact begins at the position c. It has a stiffness k and, like a rubber buffer, a damping that grows with the
+    depth.
 
     Attributes:
-        below: whether it is met at positions short of the place.
+        below: whether the contact is below the position c.
     """
 
     below: bool = False
@@ -36,27 +37,27 @@ class EndStop(Placed):
 
     @property
     def name(self) -> str:  # type: ignore[override]
-        """A text that `build_pattern` reads."""
+        """The effect's name, which `build_pattern` reads."""
         return f"pattern:stop:0:{'below' if self.below else 'above'}"
 
     @property
     def title(self) -> str:  # type: ignore[override]
-        """The effect's title."""
+        """The effect's title in reports."""
         return f"contact {'below' if self.below else 'above'} a position of the joint"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
-        """Describes the torque per depth, and per depth and velocity."""
+        """Describes stiffness and damping."""
         assert joint is not None
         force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
         return (Coefficient("stiffness", f"{force}/{length}"), Coefficient("damping", f"{force} s/{length}2"))
 
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
-        """Lists places all over the joint's range; none for one that hardly moves."""
+        """Lists positions over the joint's range; empty if the joint hardly moves."""
         low, reach = self.reach(situation, joint)
         return tuple((low + reach * share,) for share in SCANNED) if reach else ()
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
-        """Keeps the place within the joint's range."""
+        """Bounds the position to the joint's range."""
         low, reach = self.reach(situation, joint)
         return ((low + RANGE[0] * reach, low + RANGE[1] * reach),)
 
@@ -74,7 +75,7 @@ class EndStop(Placed):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says where it begins and how stiff it is."""
+        """Describes position and stiffness of the contact."""
         return (
             f"The residual torque of joint {joint} starts {'below' if self.below else 'above'} {shape[0]:.3g} "
             f"{length} and changes by {coefficients[0]:.3g} {force}/{length} from there. Likely cause: a buffer, an "

@@ -1,4 +1,4 @@
-"""Families of free functions for torque errors without a known cause."""
+"""Families of free functions, which describe torque errors without a known cause."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ from robots.terms.effects import Situation
 Array = NDArray[np.float64]
 
 HARMONICS = (1, 2, 3, 4)
-# Time constants of velocity memory, of a creeping sensor, and of a sagging supply [s].
+# Time constants [s] of the memory of velocity, of sensor creep, and of a drop of the supply voltage.
 MEMORIES, CREEPS, SUPPLIES = (0.1, 0.3, 1.0, 3.0), (1.0, 3.0, 10.0, 30.0), (0.03, 0.15, 0.7)
-# time constants of grease that thins as it is worked [s].
+# Time constants [s] of grease that thins under shear.
 WORKED = (0.5, 2.0, 8.0)
+# Numbers of half waves over time, for slow changes and for changes of a dependence on position.
 KNOTS, AGEING = 8, 3
-WHIRLING = 6  # joints at most beside the two
-# Changes of torque, as shares of its largest, within which a hysteresis turns round.
+WHIRLING = 6  # largest number of further joints in products of velocities
+# Changes of torque over which hysteresis changes sign, as fractions of the largest torque.
 STRAINS = (0.05, 0.2, 0.6)
-# A joint stands that is slower than this share of its RMS speed for so long [s]. What it feels when it goes changes
-# evenly between some times [s] from then on, and ends with the last.
+# A joint is at rest if its speed is below this fraction of its RMS speed for at least this time [s]. After the start
+# its torque is linear between these times [s], and zero after the last.
 STANDS, RESTS, SINCE = 0.02, 0.1, (0.0, 0.1, 0.2, 0.3, 0.5, 0.8)
 
 
@@ -37,12 +38,12 @@ class Family:
     """Functions of one or two inputs.
 
     Attributes:
-        columns: evaluates them (N, k), of what is seen, the joint (from 1), another one's number and the shape.
-        count: k.
+        columns: evaluates the functions (N, k) for a situation, the joint, another joint (both from 1) and the shape.
+        count: the number k of functions.
         words: the dependence of the residual torque, with placeholders for the other joint and the shape.
-        of: the joint's input (N,) that the shape's value is the largest size of, in the logs that it was found in: the
-            functions are the same ones in any other log.
-        unit: of that.
+        of: evaluates the joint's input (N,); its largest absolute value in the logs of the fit is the shape parameter
+            that scales it, so that the functions are the same in other logs. None if the input is not scaled.
+        unit: unit of that input.
     """
 
     columns: Callable[[Situation, int, int, tuple[float, ...]], Array]
@@ -168,7 +169,7 @@ def _supply(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> A
 
 
 def _followers(s: Situation, source: Array, memories: tuple[float, ...]) -> Array:
-    """First-order filters of a source (N,) with several time constants [s], (N, k). Each log starts at its mean.
+    """Filters a source (N,) by first-order low-passes with k time constants [s] (N, k), starting at each log's mean.
 
     A start from zero would cause a transient that resembles a drift at the log's start.
     """
@@ -215,7 +216,7 @@ def _vibration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -
     phase = 2 * np.pi * shape[0] * (s.t - s.origin)
     pull = s.sensitivity("gravity")[:, joint - 1]
     size = np.abs(pull).max(axis=0)
-    # An axis along gravity feels none of it, but for rounding.
+    # For an axis along gravity the sensitivity is zero up to rounding.
     pull = np.where(size > 1e-6 * max(float(size.max()), 1e-300), pull, 0.0)
     if not float(size.max()) > 1e-9:
         pull = np.ones((len(s), 1)) * [1.0, 0.0, 0.0]

@@ -1,4 +1,4 @@
-"""A load that swings at the flange, such as liquid in a tank or a hose, and acts on all joints."""
+"""A swinging load at the flange, such as liquid in a tank or a hose, which acts on all joints."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _WAYS = ("level", "upright")
 
 
 class FlangeOscillator(Effect):
-    """-J(q)' f, f the force of masses that hang on weak springs at the flange and are driven by its acceleration.
+    """tau = -J(q)' f, f the force of masses on springs at the flange, which its acceleration p'' excites.
 
-    x'' + 2 d w x' + w^2 x = -p'' along the level and the upright directions; f = m_1 w^2 x + m_2 w x', so that the
-    coefficients of the second column stand for another damping. The drives hold against f: a mass is positive.
+    x'' + 2 d w x' + w^2 x = -p'' in horizontal and in vertical direction, and f = m_1 w^2 x + m_2 w x'. The second
+    coefficient allows for another damping. The drives act against f, so a mass has a positive coefficient.
     """
 
     name: ClassVar[str] = "pattern:swinging:0:even"
@@ -30,16 +30,16 @@ class FlangeOscillator(Effect):
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("frequency", "Hz", 0.3, 6.0, "log", FREQUENCIES),)
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
-        """Describes the masses, of what swings in phase and a quarter of a period late."""
+        """Describes the masses for the motion in phase and a quarter of a period late, in both directions."""
         return tuple(Coefficient(f"{phase}_{way}", "kg") for way in _WAYS for phase in ("mass", "late_mass"))
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of a unit mass, level and upright, in both phases (N, n, 4)."""
+        """Evaluates the torque per mass, horizontal and vertical, in both phases (N, n, 4)."""
         jacobian = situation.sensitivity("jacobian")[:, :3]
         pulls = situation.cached("flange acceleration", lambda: _accelerations(situation))
         X = np.empty((len(situation), situation.robot.n, 4))
         for k, pull in enumerate(np.moveaxis(pulls, 1, 0)):
-            # The mass is driven by -p'' and the drives hold against its pull: the signs cancel.
+            # The mass is excited by -p'', and the drives act against its force: the signs cancel.
             for phase, force in enumerate(resonance(situation, pull, shape[0])):
                 X[:, :, 2 * k + phase] = np.einsum("tin,ti->tn", jacobian, force)
         return X
@@ -61,7 +61,7 @@ class FlangeOscillator(Effect):
 
 
 def _accelerations(situation: Situation) -> Array:
-    """The flange's acceleration [m/s2], level and upright parts (N, 2, 3)."""
+    """Computes the horizontal and vertical parts of the flange's acceleration (N, 2, 3) [m/s2]."""
     velocity = np.einsum("tin,tn->ti", situation.sensitivity("jacobian")[:, :3], situation.dq)
     acceleration = situation.derivatives(velocity)[0]
     gravity = situation.gravity

@@ -16,7 +16,7 @@ _WAYS = ("x", "y", "z")
 
 
 class FlangeSpring(Effect):
-    """-J(q)' f(p), f a force on the flange that is linear in the flange's place p: f = f0 + S p.
+    """tau = -J(q)' f(p), f = f0 + S p a force on the flange that is linear in the flange's position p.
 
     A constant downward force is a payload, which the base model contains.
     """
@@ -26,12 +26,12 @@ class FlangeSpring(Effect):
     whole_robot: ClassVar[bool] = True
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
-        """Describes the force at the middle of the motion, and how it changes with each coordinate."""
+        """Describes the constant force f0, and the stiffnesses S per coordinate of the flange."""
         steady = (Coefficient(f"force_{way}", "N") for way in _WAYS)
         return (*steady, *(Coefficient(f"stiffness_{way}{by}", "N/m") for by in _WAYS for way in _WAYS))
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of unit forces, steady and by each coordinate of the flange (N, n, 12)."""
+        """Evaluates the torque of unit forces, constant and times each coordinate of the flange (N, n, 12)."""
         arms = -np.swapaxes(situation.sensitivity("jacobian")[:, :3], 1, 2)  # (N, n, 3)
         place = situation.sensitivity("flange").reshape(len(situation), 3)
         return np.concatenate([arms, *(arms * place[:, k, None, None] for k in range(3))], axis=2)

@@ -1,13 +1,14 @@
-"""Torque that all joints log by the same share more or less as time goes on: a supply, one reference of all drives."""
+"""A common gain of all joints' torque signals that drifts, for example with the supply or a common reference."""
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.robot import Robot
+from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effects import Coefficient, Effect, Situation
 
 Array = NDArray[np.float64]
@@ -17,18 +18,18 @@ FEWEST = 3  # joints
 
 
 class OverTime(Effect):
-    """Base class of slow changes over time that all joints share."""
+    """Base class of changes over time that all joints share."""
 
     whole_robot: ClassVar[bool] = True
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
+    persistence: ClassVar[Persistence] = Persistence.TIME
 
     def joints(self, robot: Robot) -> tuple[int | None, ...]:
-        """Names the whole robot where it has joints enough for something to be one of all of them."""
+        """Returns the whole robot if it has at least `FEWEST` joints; with fewer, a common change is not distinct."""
         return (None,) if robot.n >= FEWEST else ()
 
 
 class GainDrift(OverTime):
-    """tau_j g(t) on every joint j, g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
+    """tau_e,j = tau_j g(t) on every joint j, g smooth in time: k half cosine waves over the logs, k = 1 ... KNOTS.
 
     The temperature dependence of a torque constant differs between joints; see `torque_constant_heat`.
     """
@@ -37,11 +38,11 @@ class GainDrift(OverTime):
     title: ClassVar[str] = "common gain drift of all torque signals"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
-        """Describes the shares of the half waves."""
+        """Describes the relative amplitude of each half wave."""
         return tuple(Coefficient(f"share_{k}", "1") for k in range(1, KNOTS + 1))
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the base model's torque times each wave (N, n, KNOTS)."""
+        """Evaluates the base model's torque times each half wave (N, n, KNOTS)."""
         return np.asarray(situation.torque[:, :, None] * half_waves(log_time(situation))[:, None])
 
     def describe(
@@ -63,10 +64,10 @@ class GainDrift(OverTime):
 
 
 def half_waves(x: Array, count: int = KNOTS) -> Array:
-    """Gives half waves (N, count) of time x (N,), which goes from 0 to 1."""
+    """Evaluates the half cosine waves cos(pi k x), k = 1 ... count (N, count), of relative time x (N,) from 0 to 1."""
     return np.column_stack([np.cos(np.pi * k * x) for k in range(1, count + 1)])
 
 
 def log_time(situation: Situation) -> Array:
-    """Gives time (N,) from 0 at the first row to 1 at the last."""
+    """Returns relative time (N,), from 0 at the first row to 1 at the last."""
     return (situation.t - situation.t[0]) / max(float(situation.t[-1] - situation.t[0]), 1e-9)

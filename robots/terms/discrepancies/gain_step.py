@@ -1,4 +1,4 @@
-"""Torque of one joint that is logged by another share from one moment on: another amplifier, sensor or range."""
+"""A sudden gain change of one joint's torque signal: another amplifier, sensor or measuring range."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from robots.terms.effects import Coefficient, JointEffect, Situation
 
 Array = NDArray[np.float64]
 
-# Larger changes are no amplifier's or sensor's: another drive, or none.
+# Largest relative change; larger ones are not caused by an amplifier or sensor.
 MOST = 0.5
 
 
 class GainStep(Sudden, JointEffect):
-    """tau = e tau_j from the time t_c on.
+    """tau_e = e tau_j from the time t_c on.
 
     The temperature dependence of a torque constant is gradual; see `torque_constant_heat`.
     """
@@ -27,11 +27,11 @@ class GainStep(Sudden, JointEffect):
     title: ClassVar[str] = "sudden gain change of a torque signal"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
-        """Describes the share by which the torque changes."""
+        """Describes the relative change of the torque."""
         return (Coefficient("share", "1", -MOST, MOST),)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the base model's torque after the change."""
+        """Evaluates the base model's torque after the change, zero before (N, 1)."""
         return np.where(situation.t >= shape[0], situation.torque[:, joint - 1], 0.0)[:, None]
 
     def describe(

@@ -1,8 +1,8 @@
-"""Intermittent torques, independent of the motion: a brake that drags for some time, a machine with a cycle."""
+"""Intermittent torques that do not depend on the motion: a dragging brake, another machine with a cycle."""
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from robots.robot import Robot
 from robots.terms.base import force_unit
 from robots.terms.discrepancies.gain_drift import OverTime
+from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effect_bases.states import spells
 from robots.terms.effects import Coefficient, JointEffect, Shape, Situation
 from robots.terms.effects.external_contact import HOLD, pulse
@@ -17,27 +18,30 @@ from robots.terms.effects.external_contact import HOLD, pulse
 Array = NDArray[np.float64]
 
 SPELLS = (1.5, 3.0, 6.0, 12.0)
-"""Durations of a spell [s], no more than the second share of the data: what lasts longer is a change for good."""
+"""Durations [s] of temporary friction in a scan."""
 MOST = 0.4
+"""Longest temporary friction, as a fraction of the data; a longer one is a lasting change."""
 SHARES = (0.05, 0.15, 0.4)
-"""Shares of its period for which a push lasts."""
+"""Durations of a periodic force in a scan, as fractions of its period."""
 TIMES = 5.0
-"""So often it must come in the data; that and the least time it lasts [s] bound the periods."""
+"""Least number of periods in the data."""
 BRIEFEST, SHORTEST = 0.15, 1.5
+"""Least duration [s] of a periodic force, and its shortest period [s]."""
 PAUSED = 2.0
-"""Logs that are so many times as long from first to last as what was recorded lie apart."""
+"""Ratio of total to recorded time above which the logs have long pauses."""
 BIN = 0.05
-"""[s] over which forces are summed before they are folded."""
+"""Bin width [s] in which forces are summed before they are folded over a period."""
 LIKE_MOTION, HIGHEST = 0.9, 5.0
-"""With a period whose harmonics have this share of the motion, up to a frequency [Hz], the motion repeats as well."""
+"""Fraction of the motion's power at harmonics of a period above which the motion has that period, and the highest
+frequency [Hz] that counts."""
 
 
 class IntermittentTorque(JointEffect):
-    """tau = c sign(dq) p(t), p a pulse: friction that is there for a while."""
+    """tau = c sign(dq) p(t), p a pulse: temporary friction."""
 
     name: ClassVar[str] = "pattern:spell:0:odd"
     title: ClassVar[str] = "temporary additional friction of a joint"
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
+    persistence: ClassVar[Persistence] = Persistence.TIME
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.03),
         Shape("duration", "s", 0.5, np.inf, "log", SPELLS, 0.05),
@@ -49,19 +53,19 @@ class IntermittentTorque(JointEffect):
         return (Coefficient("friction", force_unit(robot, joint - 1)),)
 
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
-        """Lists durations, each starting every half of it."""
+        """Lists windows of several durations, with starts half a duration apart."""
         longest = self.bounds(situation, joint)[1][1]
         return spells(situation, [duration for duration in SPELLS if duration <= longest])
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
-        """Keeps the spell within the data, and a spell."""
+        """Bounds the start to the data, and the duration to a fraction of it."""
         first, last = float(situation.t[0]), float(situation.t[-1])
         return (first, last), (self.shapes[1].lower, max(MOST * len(situation) * situation.period, 1.0))
 
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks all spells at once, by the sum of what the residual has of the joint's direction in each."""
+        """Ranks windows by the squared sum of residual times velocity sign, over the number of rows that count."""
         assert joint is not None
         grid = self.grid(situation, joint)
         if len(grid) <= count:
@@ -97,9 +101,9 @@ class IntermittentTorque(JointEffect):
 
 
 class PeriodicTorque(OverTime):
-    """J(q)' f p(t - k T - t_0) for all k: a force on the flange, constant in the base frame, that comes every T s.
+    """tau = J(q)' f p(t - k T - t_0) for all k: a force on the flange, constant in the base frame, with a period T.
 
-    Its period distinguishes it from the motion; a period of the motion itself is excluded.
+    Periods of the motion itself are excluded, because the force would not be distinguishable from the motion.
     """
 
     name: ClassVar[str] = "pattern:recurring:0:even"
@@ -115,7 +119,7 @@ class PeriodicTorque(OverTime):
         return tuple(Coefficient(f"force_{way}", "N") for way in ("x", "y", "z"))
 
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
-        """Lists periods, durations and moments, so near that a push is hardly missed by half of what it lasts."""
+        """Lists periods, durations and times of the force, with times half a duration apart."""
         return tuple(
             (period, float(_middle(situation) + phase), share * period)
             for share in SHARES
@@ -124,7 +128,7 @@ class PeriodicTorque(OverTime):
         )
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
-        """Bounds the period and the duration of a push."""
+        """Bounds the period, the time and the duration of the force."""
         first, last = float(situation.t[0]), float(situation.t[-1])
         longest = max((last - first) / (TIMES - 1.0), 2 * SHORTEST)
         return (0.5 * SHORTEST, longest), (first, last), (0.5 * BRIEFEST, 0.6 * longest)
@@ -132,7 +136,7 @@ class PeriodicTorque(OverTime):
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks the grid by the force that the residual shows, folded over each period."""
+        """Ranks shapes by the force that the residual shows when folded over each period."""
         force = np.einsum("tin,tn->ti", situation.sensitivity("jacobian")[:, :3], residual)
         bins = ((situation.t - situation.t[0]) / BIN).astype(int)
         sums = np.column_stack([np.bincount(bins, weights=column) for column in force.T])
@@ -161,7 +165,7 @@ class PeriodicTorque(OverTime):
             if has_long_pauses(situation):
                 return ()
             shortest, longest = max(SHORTEST, BRIEFEST / share), duration / TIMES
-            # Between neighbouring periods, the last push moves by its own duration.
+            # From one period to the next in the list, the last pulse moves by its own duration.
             rates = np.arange(1.0 / longest, 1.0 / shortest, share / duration) if longest > shortest else np.zeros(0)
             return tuple(float(1.0 / rate) for rate in rates if not _with_motion(situation, rate))
 
@@ -192,24 +196,24 @@ class PeriodicTorque(OverTime):
 
 
 def has_long_pauses(situation: Situation) -> bool:
-    """Whether logs have longer pauses between them than they are: over those nothing keeps its time."""
+    """Returns whether the pauses between the logs are longer than the logs; no phase persists over such pauses."""
     return float(situation.t[-1] - situation.t[0]) > PAUSED * len(situation) * situation.period
 
 
 def _middle(situation: Situation) -> float:
-    """The middle of the data [s]: about it a period turns without moving the pushes as a whole."""
+    """Returns the middle of the data [s]; with pulses timed from there, a period's error does not shift them all."""
     return float(situation.t[0] + situation.t[-1]) / 2
 
 
 def _with_motion(situation: Situation, rate: float) -> bool:
-    """Whether the motion repeats at a rate [Hz], too: most of its power is at harmonics of it."""
+    """Returns whether the motion repeats at a rate [Hz]: most of its power is at harmonics of that rate."""
     f, power, duration = situation.cached("power of the motion", lambda: _power(situation))
     lines = np.abs(f - np.round(f / rate) * rate) <= 1.0 / duration
     return bool(power[lines].sum() > LIKE_MOTION)
 
 
 def _power(situation: Situation) -> tuple[Array, Array, float]:
-    """Frequencies (K,) up to the highest, the shares of the joints' velocity there (K,), and the data's duration."""
+    """Computes frequencies (K,) [Hz], the fraction of velocity power at each (K,), and the recorded duration [s]."""
     rows = len(situation)
     f = np.fft.rfftfreq(rows, max(situation.period, 1e-9))
     power = np.abs(np.fft.rfft(situation.dq - situation.dq.mean(axis=0), axis=0)) ** 2

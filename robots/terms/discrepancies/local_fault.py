@@ -1,4 +1,4 @@
-"""A spot in a joint's range where something catches or rubs: a damaged tooth, a dented bearing, a cable that snags."""
+"""A local disturbance at one position of a joint: a damaged tooth, a dented bearing, a cable that catches."""
 
 from __future__ import annotations
 
@@ -14,26 +14,27 @@ from robots.terms.effects import Coefficient, JointEffect, Shape, Situation
 Array = NDArray[np.float64]
 
 WIDTHS = (0.015, 0.03, 0.06, 0.12)
-"""Standard widths of a scan's spots, as shares of the joint's range; closer ones are a ripple, wider ones a spring."""
+"""Widths (standard deviations) in a scan, as fractions of the joint's range; narrower ones are ripple, wider ones a
+spring."""
 APART = 1.5
-"""Distance of a scan's spots, in widths."""
+"""Distance between centres in a scan, in widths."""
 NARROWEST, WIDEST = 0.004, 0.2
-"""Smallest and largest width of a spot, as fractions of the joint's range."""
+"""Smallest and largest width, as fractions of the joint's range."""
 BINS = 1000
-"""Number of bins of the joint's range, by which all positions are ranked at once."""
+"""Number of bins over the joint's range for ranking the grid."""
 
 
 class Placed(JointEffect):
     """Base class of effects at a position of a joint's range."""
 
     def coordinate(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the position."""
+        """Returns the position."""
         assert joint is not None
         return f"position of joint {joint} [rad or m]", situation.q[:, joint - 1]
 
     @staticmethod
     def reach(situation: Situation, joint: int | None) -> tuple[float, float]:
-        """Gives where a joint's range begins, and its extent; zero for one that hardly moves."""
+        """Returns the lower end and the extent of a joint's range in the data; zeros if it hardly moves."""
         assert joint is not None
         q = situation.q[:, joint - 1]
         reach = float(np.ptp(q)) if len(q) else 0.0
@@ -42,10 +43,10 @@ class Placed(JointEffect):
 
 @dataclass(frozen=True)
 class LocalFault(Placed):
-    """tau = c exp(-((q - centre) / width)^2 / 2), times the direction of motion where it rubs.
+    """tau = c exp(-((q - centre) / width)^2 / 2), times the velocity's sign if it is friction.
 
     Attributes:
-        odd: whether it turns round with the direction of motion.
+        odd: whether it changes sign with the direction of motion.
     """
 
     odd: bool = False
@@ -57,21 +58,21 @@ class LocalFault(Placed):
 
     @property
     def name(self) -> str:  # type: ignore[override]
-        """A text that `build_pattern` reads."""
+        """The effect's name, which `build_pattern` reads."""
         return f"pattern:spot:0:{'odd' if self.odd else 'even'}"
 
     @property
     def title(self) -> str:  # type: ignore[override]
-        """The effect's title."""
+        """The effect's title in reports."""
         return f"local {'friction' if self.odd else 'torque'} at one position of the joint"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
-        """Describes the torque at the spot."""
+        """Describes the torque at the centre."""
         assert joint is not None
         return (Coefficient("peak", force_unit(robot, joint - 1)),)
 
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
-        """Lists spots all over the joint's range."""
+        """Lists centres over the joint's range, for several widths."""
         low, reach = self.reach(situation, joint)
         if not reach:
             return ()
@@ -82,14 +83,14 @@ class LocalFault(Placed):
         )
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
-        """Keeps the spot within the joint's range."""
+        """Bounds the centre to the joint's range, and the width to fractions of it."""
         low, reach = self.reach(situation, joint)
         return (low, low + reach), (NARROWEST * reach, WIDEST * reach)
 
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks all spots at once, by what the residual has to do with each over its own size."""
+        """Ranks the grid by the product of the residual with each disturbance, over the disturbance's norm."""
         assert joint is not None
         grid = self.grid(situation, joint)
         if len(grid) <= count:
@@ -104,13 +105,13 @@ class LocalFault(Placed):
         middles = (np.arange(BINS) + 0.5) / BINS * reach + low
         centres, widths = np.array(grid).T
         spots = np.exp(-0.5 * ((middles - centres[:, None]) / widths[:, None]) ** 2)
-        # A constant level is part of the joint's offset; a spot shows only by its difference from it.
+        # A constant is part of the joint's offset, so only the deviation from the mean shows.
         seen = spots - (spots @ rows / max(rows.sum(), 1.0))[:, None]
         size = np.sqrt(np.maximum(seen**2 @ rows, 1e-12))
         return tuple(grid[i] for i in np.argsort(-np.abs(seen @ binned) / size)[:count])
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque per unit of its peak (N, 1)."""
+        """Evaluates the torque per torque at the centre (N, 1)."""
         centre, width = shape
         spot = np.exp(-0.5 * ((situation.q[:, joint - 1] - centre) / max(width, 1e-12)) ** 2)
         return np.asarray((spot * situation.sign[:, joint - 1] if self.odd else spot)[:, None])
@@ -124,7 +125,7 @@ class LocalFault(Placed):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Says where the spot is, how wide and how strong."""
+        """Describes position, width and size of the disturbance."""
         what = "friction" if self.odd else "torque"
         return (
             f"The residual torque of joint {joint} matches a local disturbance at {shape[0]:.3g} {length}, "

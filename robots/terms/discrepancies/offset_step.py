@@ -1,4 +1,4 @@
-"""Lasting steps during the logs: a base that slips on its mount, a joint zero that jumps."""
+"""Lasting steps during the logs: a base that tilts on its mount, or a joint zero that changes."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ Array = NDArray[np.float64]
 
 
 CHANGES = 64
-"""Times through the data; of so many only the likeliest are scanned, for what acts on all joints takes much memory."""
+"""Number of candidate times within the data. Only the best are scanned, because effects on all joints take much
+memory."""
 APART = 2
 """Number of neighbours of a scanned time that are skipped, because the time is refined."""
 LEAST = 0.02
-"""Share of its torque's energy below which a change is taken to have that much."""
+"""Least energy of a step's torque in the ranking, as a fraction of its energy over all data."""
 
 
 class Step(Sudden):
@@ -33,7 +34,7 @@ class Step(Sudden):
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks all times at once, by what the residual has to do with all that is after each, over its own size."""
+        """Ranks times by the squared product of the residual with the torque after each, over that torque's energy."""
         grid = self.grid(situation, joint)
         if len(grid) <= count:
             return grid
@@ -42,29 +43,29 @@ class Step(Sudden):
         products = np.einsum("tjk,tj->tk", X, residual)
         sums, size = (np.cumsum(x[::-1], axis=0)[::-1] for x in (products, np.einsum("tjk,tjk->tk", seen, seen)))
         rows = np.searchsorted(situation.t, np.ravel(grid))
-        # The data after the last candidate times are too short for a fit.
+        # LEAST bounds the divisor, because the data after the last candidate times are too short for a fit.
         scores = np.sum(sums[rows] ** 2 / np.maximum(size[rows], LEAST * size[:1] + 1e-300), axis=1)
         return tuple(grid[i] for i in best_apart(scores, count, APART))
 
 
 def _after(columns: Array, situation: Situation, shape: tuple[float, ...]) -> Array:
-    """Keeps of columns (N, n, k) what is after the change."""
+    """Sets columns (N, n, k) to zero before the change."""
     return np.where((situation.t >= shape[0])[:, None, None], columns, 0.0)
 
 
 class BaseStep(Step):
-    """(d rigid/dg) (g x e_k) a_k from t_c on, e_1 and e_2 level: `base_tilt` that begins while the robot moves."""
+    """tau = (d rigid/dg) (g x e_k) a_k from t_c on, e_1 and e_2 horizontal: `base_tilt` that begins within the logs."""
 
     name: ClassVar[str] = "pattern:base_shift:0:even"
     title: ClassVar[str] = "sudden tilt of the base"
     whole_robot: ClassVar[bool] = True
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
-        """Describes the base's rotations about its two level axes."""
+        """Describes the base's rotations about two horizontal axes."""
         return Coefficient("tilt_1", "rad", -0.5, 0.5), Coefficient("tilt_2", "rad", -0.5, 0.5)
 
     def joints(self, robot: Robot) -> tuple[int | None, ...]:
-        """Names the whole robot, if there is gravity."""
+        """Returns the whole robot if gravity acts on it, else nothing."""
         return (None,) if np.any(robot.chain.gravity) else ()
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
@@ -89,7 +90,7 @@ class BaseStep(Step):
 
 
 class ZeroStep(Step):
-    """(d rigid/dq_j) o from t_c on: `encoder_offset` that begins while the robot moves."""
+    """tau = (d rigid/dq_j) o from t_c on: `encoder_offset` that begins within the logs."""
 
     name: ClassVar[str] = "pattern:zero_shift:0:even"
     title: ClassVar[str] = "sudden change of a joint zero"
@@ -100,7 +101,7 @@ class ZeroStep(Step):
         return (Coefficient("offset", length_unit(robot, joint - 1), -0.5, 0.5),)
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of all joints per offset of one (N, n, 1)."""
+        """Evaluates the torque of all joints per offset of one joint (N, n, 1)."""
         assert joint is not None
         return _after(situation.sensitivity("position")[:, :, joint - 1 : joint], situation, shape)
 

@@ -1,4 +1,4 @@
-"""Description of a model error without a known cause: its joint, its inputs and its shape."""
+"""Patterns: model errors without a known cause, described by free functions of their inputs."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from robots.terms.discrepancies.local_fault import LocalFault
 from robots.terms.discrepancies.offset_step import BaseStep, Step, ZeroStep
 from robots.terms.discrepancies.payload_drift import PayloadDrift
 from robots.terms.discrepancies.session_friction import SessionFriction
+from robots.terms.effect_bases.capabilities import AboveBand
 from robots.terms.effects import Coefficient, Effect, JointEffect, Shape, Situation
 
 Array = NDArray[np.float64]
@@ -28,12 +29,14 @@ Array = NDArray[np.float64]
 PREFIX = "pattern:"
 # Frequencies of a ringing load and of a vibration [Hz].
 RINGING = tuple(float(f) for f in np.geomspace(0.5, 8.0, 13))
+# Orders per turn of the joint.
 TURNS = tuple(float(h) for h in (*range(5, 33), 40, 48, 64))
+# Highest frequencies [Hz] of an oscillating torque and of an oscillating friction; above the first are vibrations.
 SLOWEST, RUBBING = 0.6, 2.0
-# Swings of a torque that goes back and forth by itself: fewer than so many in the data are a drift.
+# Least number of periods of an oscillation in the data; fewer are a drift.
 SWINGS = 5.0
 SWAYING = ("vibration", "sway")
-# Effects on all joints at once.
+# Effects on the whole robot.
 WHOLE: tuple[Effect, ...] = (
     FlangeOscillator(),
     FlangeSpring(),
@@ -62,9 +65,9 @@ class Pattern(JointEffect):
     """Functions of one or two inputs on one joint's torque, linear in their coefficients.
 
     Attributes:
-        kind: which family of functions.
+        kind: the family of functions, a key of `FAMILIES`.
         other: the joint (from 1) whose motion is the input; 0 for the joint itself.
-        odd: whether the functions turn round with the joint's direction.
+        odd: whether the functions change sign with the joint's direction of motion.
     """
 
     kind: str
@@ -73,27 +76,22 @@ class Pattern(JointEffect):
 
     @property
     def name(self) -> str:  # type: ignore[override]
-        """A text that `build_pattern` reads."""
+        """The effect's name, which `build_pattern` reads."""
         return f"{PREFIX}{self.kind}:{self.other}:{'odd' if self.odd else 'even'}"
 
     @property
     def title(self) -> str:  # type: ignore[override]
-        """The effect's title."""
+        """The effect's title in reports."""
         return self.sentence(None)
 
     @property
-    def independent_of_acceleration(self) -> bool:  # type: ignore[override]
-        """Whether it is looked for above the bands too: what vibrates owes nothing to accelerations."""
-        return self.kind == "vibration"
-
-    @property
-    def exogenous(self) -> bool:  # type: ignore[override]
-        """Whether the arm's motion answers to it, and not it to the motion."""
-        return self.kind == "vibration"
+    def above_band(self) -> AboveBand:  # type: ignore[override]
+        """Exogenous for an external vibration: it excites the arm but does not depend on its motion."""
+        return AboveBand.EXOGENOUS if self.kind == "vibration" else AboveBand.NO
 
     @property
     def shapes(self) -> tuple[Shape, ...]:  # type: ignore[override]
-        """A frequency or an order where the family has one, or what its input is measured by."""
+        """The shape parameter of the family: a frequency, an order, the scale of its input, or none."""
         if self.kind == "ringing":
             return (Shape("frequency", "Hz", 0.3, 12.0, "log", RINGING),)
         if self.kind in SWAYING:
@@ -104,13 +102,14 @@ class Pattern(JointEffect):
         return (Shape("largest", family.unit, 0.0, np.inf),) if family.of else ()
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
-        """Describes the coefficients: numbers of functions, without a physical meaning each."""
+        """Describes the coefficients, which have no physical meaning."""
         return tuple(Coefficient(f"function_{i + 1}", "") for i in range(FAMILIES[self.kind].count))
 
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
-        """Lists the frequencies of what goes back and forth half a resolution apart; else the family's own points.
+        """Lists the shape values of a scan.
 
-        An input is measured by its largest size here.
+        An input is scaled by its largest absolute value in these data. Frequencies of oscillations and vibrations are
+        half a resolution apart. All other families have fixed values.
         """
         of = FAMILIES[self.kind].of
         if of:
@@ -125,7 +124,7 @@ class Pattern(JointEffect):
         return tuple((float(f),) for f in np.arange(bottom, top, 0.5 / duration))
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
-        """Bounds a vibration to frequencies that the samples resolve, a swing to its range, and fixes input scales."""
+        """Bounds the frequencies of oscillations and vibrations by the data, and fixes the scale of an input."""
         if FAMILIES[self.kind].of:
             ((largest,),) = self.grid(situation, joint)
             return ((largest, largest),)
@@ -152,12 +151,12 @@ class Pattern(JointEffect):
         level = np.convolve(np.pad(power, width // 2, mode="reflect"), np.ones(width) / width, mode="valid")
         points = np.array(grid)[:, 0]
         contrast = np.interp(points, f, power / np.maximum(level, 1e-300))
-        # A search that starts beside the top of a narrow spectral line would not reach it.
+        # The search must start at the top of a narrow spectral line; from beside it, it would not reach the top.
         return tuple((_top(np.asarray(f), power, float(points[i])),) for i in np.argsort(-contrast)[:count])
 
     @property
     def _fastest(self) -> float:
-        """Frequency up to which a torque sways [Hz]; a friction does by the turns of what rubs, as a belt's."""
+        """Highest frequency [Hz] of an oscillation; friction may oscillate faster, as with each turn of a belt."""
         return RUBBING if self.odd else SLOWEST
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
@@ -183,7 +182,7 @@ class Pattern(JointEffect):
         )
 
     def sentence(self, joint: int | None, shape: tuple[float, ...] = ()) -> str:
-        """Describes in words the dependence of a joint's residual."""
+        """Describes the dependence of a joint's residual in one sentence."""
         where = f"of joint {joint}" if joint else "of the joint"
         who = f"joint {self.other}" if self.other and self.other != joint else "its own joint"
         point = f"{shape[0]:.3g}" if shape else ""
@@ -193,7 +192,7 @@ class Pattern(JointEffect):
 
 
 def build_pattern(text: str) -> Effect | None:
-    """Reads the name of a pattern; None for anything else."""
+    """Builds the pattern with a given name; None if the name is not that of a pattern."""
     for known in (*SINGLE, *WHOLE):
         if text == known.name:
             return known
@@ -204,7 +203,7 @@ def build_pattern(text: str) -> Effect | None:
 
 
 def all_patterns(robot: Robot) -> tuple[Effect, ...]:
-    """Lists the patterns to look for on every joint, and on the robot as a whole."""
+    """Lists the patterns to search on every joint, and on the robot as a whole."""
     joints = range(1, robot.n + 1)
     own = [Pattern("speed"), Pattern("speed", odd=True), Pattern("load"), Pattern("load", odd=True)]
     own += [
@@ -229,26 +228,26 @@ def all_patterns(robot: Robot) -> tuple[Effect, ...]:
 
 
 def is_of_time(effect: object) -> bool:
-    """Whether a pattern's function goes by time: of the motion it knows what it acts on, or the direction."""
+    """Returns whether a pattern describes a change with time, not a dependence on the motion."""
     return isinstance(effect, (OverTime, GainStep, Step, IntermittentTorque)) or (
         isinstance(effect, Pattern) and effect.kind in ("time", "ageing")
     )
 
 
 def is_plain(effect: object) -> bool:
-    """Whether a simple pattern resembles one specific cause."""
+    """Returns whether a pattern is simple and resembles one specific cause."""
     return isinstance(effect, (EndStop, GainStep, Step, PayloadDrift)) or (
         isinstance(effect, Pattern) and effect.kind == "ageing"
     )
 
 
 def is_oscillation(effect: object) -> bool:
-    """Whether a pattern oscillates in time, not with the motion: its phase in other logs is unknown."""
+    """Returns whether a pattern oscillates in time, independent of the motion; its phase in other logs is unknown."""
     return isinstance(effect, Pattern) and effect.kind in SWAYING
 
 
 def _top(f: Array, power: Array, near: float) -> float:
-    """The frequency of a spectrum's (K,) top at or beside a point, by the parabola through three values."""
+    """Finds the frequency of a spectrum's (K,) maximum next to a point, by a parabola through three values."""
     k = int(np.clip(round(near / f[1]), 2, len(f) - 3))
     k += int(np.argmax(power[k - 1 : k + 2])) - 1
     low, middle, high = np.log(np.maximum(power[k - 1 : k + 2], 1e-300))
@@ -257,6 +256,6 @@ def _top(f: Array, power: Array, near: float) -> float:
 
 
 def _duration(situation: Situation) -> float:
-    """The time from first to last [s]; where logs are days apart what was recorded, for no phase lasts so long."""
+    """Returns the time from first to last sample [s], or the recorded time if there are long pauses between logs."""
     span, recorded = float(situation.t[-1] - situation.t[0]), len(situation) * situation.period
     return max(recorded if has_long_pauses(situation) else span, 1.0)

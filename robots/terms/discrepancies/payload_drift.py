@@ -1,4 +1,4 @@
-"""A body at the flange that grows or shrinks as time goes on: a tank that empties, a coil of wire that unwinds."""
+"""A payload that changes slowly with time: a tank that empties, a coil of wire that unwinds."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ _PARTS = (("mass", "kg"), ("moment_x", "kg m"), ("moment_y", "kg m"), ("moment_z
 
 
 class PayloadDrift(OverTime):
-    """Y_tool (m, m c) g(t), g a smooth function of time: k half waves over the logs, k = 1 ... KNOTS.
+    """tau = Y_tool (m, m c) g(t), g a smooth function of time: k half cosine waves over the logs, k = 1 ... KNOTS.
 
-    A body that comes or goes at once is `payload_change`.
+    A payload that changes at one time is `payload_change`.
     """
 
     name: ClassVar[str] = "pattern:draining:0:even"
     title: ClassVar[str] = "slowly changing payload"
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
-        """Describes mass and first moments of each half wave."""
+        """Describes mass and first moments for each half wave."""
         return tuple(Coefficient(f"{part}_{k}", unit) for k in range(1, KNOTS + 1) for part, unit in _PARTS)
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of a unit body times each wave (N, n, 4 KNOTS)."""
+        """Evaluates the torque per inertial parameter, times each half wave (N, n, 4 KNOTS)."""
         body = situation.sensitivity("tool")[:, :, : len(_PARTS)]
         times = half_waves(log_time(situation), KNOTS)
         return np.concatenate([body * wave[:, None, None] for wave in times.T], axis=2)

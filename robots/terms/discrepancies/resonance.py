@@ -1,4 +1,4 @@
-"""A lightly damped mass on a spring that something drives: how what was set in motion goes on ringing."""
+"""Response of a lightly damped oscillator to an excitation."""
 
 from __future__ import annotations
 
@@ -10,17 +10,20 @@ from robots.terms.effects import Situation
 
 Array = NDArray[np.float64]
 
-# The damping ratio is known only to a factor of about two, because both phases have a column.
+# Damping ratio. A factor of about two in it hardly matters, because the two outputs can combine to another damping.
 DAMPING = 0.05
 
 
 def resonance(situation: Situation, drive: Array, frequency: float) -> tuple[Array, Array]:
-    """Gives w^2 x and w x' (N, ...) of x'' + 2 d w x' + w^2 x = u, by the bilinear rule, at rest before each log.
+    """Solves x'' + 2 d w x' + w^2 x = u by the bilinear rule, from rest at the start of each log.
 
     Args:
-        situation: what the robot did (N samples).
-        drive: u (N, ...).
+        situation: the motion (N samples).
+        drive: the excitation u (N, ...).
         frequency: w / 2 pi [Hz].
+
+    Returns:
+        w^2 x and w x' (N, ...), each in the unit of u.
     """
     omega = 2 * np.pi * frequency
     k = 2 / max(situation.period, 1e-9)

@@ -1,4 +1,4 @@
-"""Friction of all joints that differs from log to log: gears that are warmer or colder today, grease that is new."""
+"""Friction of all joints that differs between sessions, because gears are warmer or colder, or grease is new."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from robots.terms.effects import Coefficient, Situation
 Array = NDArray[np.float64]
 
 SESSIONS = 6
-"""Largest number of separate sessions; more of them are grouped, in order."""
+"""Largest number of separate sessions; if there are more, consecutive ones are grouped."""
 
 
 class SessionFriction(OverTime):
-    """tau_j = s_jk f_j in the session k, f_j the friction of the base model, which is that of the first one.
+    """tau_j = s_jk f_j in the session k, f_j the base model's friction, which describes the first session.
 
-    A change of one joint at one time is `friction_step`; here each joint has its own factor in each session.
+    Each joint has its own factor in each session. A change of one joint at one time is `friction_step`.
     """
 
     name: ClassVar[str] = "pattern:daily:0:odd"
     title: ClassVar[str] = "friction that differs between logs"
 
     def joints(self, robot: Robot) -> tuple[int | None, ...]:
-        """Names the whole robot: no joint alone is another."""
+        """Returns the whole robot, for any number of joints."""
         return (None,)
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
-        """Describes the shares of each session after the first, joint by joint."""
+        """Describes the relative change of friction in each session after the first, per joint."""
         return tuple(
             Coefficient(f"share_{k}_of_joint_{j}", "1", -1.0, 10.0)
             for k in range(2, SESSIONS + 1)
@@ -41,7 +41,7 @@ class SessionFriction(OverTime):
         )
 
     def grid(self, situation: Situation, joint: int | None) -> tuple[tuple[float, ...], ...]:
-        """Lists the one form that it has, where there is more than one session."""
+        """Lists the one form without shape parameters; empty if there is only one session."""
         return ((),) if len(_sessions(situation)) > 1 else ()
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
@@ -74,9 +74,10 @@ class SessionFriction(OverTime):
 
 
 def _sessions(situation: Situation) -> list[slice]:
-    """Gives the rows of each session: logs with a pause between that is shorter than `UNKNOWN_PAUSE` are one.
+    """Returns the rows of each session.
 
-    Logs without known pauses may be from several days.
+    Logs belong to one session if the pause between them is shorter than `UNKNOWN_PAUSE`. Logs without known pauses may
+    be from different days.
     """
     t, runs, least = situation.t, situation.runs, UNKNOWN_PAUSE - situation.period
     begins = [0, *(b.start for a, b in pairwise(runs) if t[b.start] - t[a.stop - 1] > least)]

@@ -1,4 +1,4 @@
-"""Checks an effect that was written outside this package, before anything relies on it."""
+"""Checks of effects that were written outside this package, made before they are used."""
 
 from __future__ import annotations
 
@@ -17,10 +17,13 @@ _complete = subclass_check(Effect)
 
 
 def check_definition(effect: object) -> None:
-    """Checks that an object is an effect, or a class of one, with a name, a title and known experiments.
+    """Checks that an object is an effect or an effect class, with a name, a title and known experiments.
+
+    Args:
+        effect: the object to check.
 
     Raises:
-        InputError: naming what is missing.
+        InputError: something is missing or unknown; the message names it.
     """
     kind = effect if isinstance(effect, type) else type(effect)
     _complete(kind)
@@ -35,9 +38,13 @@ def check_definition(effect: object) -> None:
 def check_effect(effect: Effect, robot: Robot) -> None:
     """Checks an effect's parameters and columns on a short motion of a robot.
 
+    Args:
+        effect: the effect to check, at the first joint where it can act.
+        robot: the robot.
+
     Raises:
-        InputError: naming the effect: a parameter without name or unit, columns of a wrong shape, columns that are not
-            finite, or an exception in its own code.
+        InputError: a parameter has no name or unit, the columns have a wrong shape or are not finite, or the effect's
+            own code raises. The message names the effect.
     """
     try:
         _check(effect, robot)
@@ -63,7 +70,7 @@ def _check(effect: Effect, robot: Robot) -> None:
     phase = 2 * np.pi * (0.5 * t[:, None] + np.arange(robot.n) / robot.n)
     model = default_model(robot, velocity_scale=0.01)
     values = np.where(np.isfinite(model.nominal), model.nominal, 0.1)
-    # Small motions about zero: the check is of shapes, not of physics.
+    # Small motions about zero suffice, because only array shapes and finiteness are checked.
     state = situation(model, values, t, 0.1 * np.sin(phase), 0.3 * np.cos(phase), -np.sin(phase))
     for shape in effect.grid(state, joint)[:1]:
         columns = np.asarray(effect.columns(state, joint, shape))

@@ -14,4 +14,4 @@ EXPERIMENTS: dict[str, str] = {
     "multisine": "a motion with higher frequencies",
     "repeat": "the same motion again",
 }
-"""Description of each kind; `Effect.experiments` names them."""
+"""Description of each kind of experiment, by the name that `Effect.experiments` uses."""

@@ -1,4 +1,4 @@
-"""Additional gear load besides the robot's own weight and inertia: springs, payloads, contacts, a tilted base."""
+"""Gear load in addition to the robot's own weight and inertia: springs, payloads, contacts, a tilted base."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.effect_bases.base import Effect, Place
+from robots.terms.effect_bases.capabilities import GearLoad
 from robots.terms.situations.situation import Situation
 
 Array = NDArray[np.float64]
 
 LoadPath = Literal["effects", "preloads"]
-"""Torque of effects that load the gear: alone, or with the base model's offset on joints that they preload."""
+"""Which torque loads the gears: that of the effects alone, or also the base model's offset on preloaded joints."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,10 +24,10 @@ class LoadSource:
     """An effect whose torque loads the gears.
 
     Attributes:
-        effect: with `loads_gear`.
+        effect: an effect with `loads_gear`.
         joint: where it acts, counted from 1; None for the whole robot.
         shape: values of its shape parameters.
-        coefficients: of its columns (k,).
+        coefficients: coefficients of its columns (k,).
     """
 
     effect: Effect
@@ -37,12 +38,12 @@ class LoadSource:
 
 @dataclass(frozen=True, eq=False)
 class ExtraGearLoad:
-    """Additional load of the gears by effects that were fitted together with the base parameters.
+    """Additional gear load by effects that were fitted together with the base parameters.
 
-    A part of a spring's torque resembles gravity and may be in the base model. Only the sum of both is the gear's load.
+    Part of a spring's torque resembles gravity and may be in the base model. Only the sum of both is the gear's load.
 
     Attributes:
-        path: which part of their torque loads the gears.
+        path: which torque loads the gears.
         sources: the effects.
     """
 
@@ -50,16 +51,18 @@ class ExtraGearLoad:
     sources: Sequence[LoadSource]
 
     def on(self, now: Situation) -> Situation:
-        """Gives the situation with the additional gear load, for load-dependent effects."""
+        """Returns the situation with the additional gear load, for load-dependent effects."""
         load = np.zeros_like(now.q)
         for weight in self.sources:
             load += weight.effect.columns(now, weight.joint, weight.shape) @ weight.coefficients
         if self.path == "preloads":
-            preloaded = sorted({w.joint - 1 for w in self.sources if w.effect.preloads and w.joint is not None})
+            preloaded = sorted(
+                {w.joint - 1 for w in self.sources if w.effect.gear_load is GearLoad.PRELOADS and w.joint is not None}
+            )
             load[:, preloaded] += (now.torque - now.rigid - now.friction)[:, preloaded]
         return now.bearing(load)
 
 
 def with_gear_load(now: Situation, bearing: ExtraGearLoad | None) -> Situation:
-    """Gives the situation with an additional gear load, if there is any."""
+    """Returns the situation with an additional gear load; unchanged if `bearing` is None."""
     return now if bearing is None else bearing.on(now)

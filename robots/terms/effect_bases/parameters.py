@@ -23,7 +23,7 @@ STRAIGHT = {
     "kg m2": "kg",
     "periods per turn": "rad/m",
 }
-"""Units of shape parameters on a linear axis."""
+"""Unit of a shape parameter on a linear axis, by its unit on a revolute joint."""
 
 
 @dataclass(frozen=True)
@@ -35,13 +35,13 @@ class Shape:
         unit: its unit.
         lower: the least value that is physically possible.
         upper: the largest.
-        scale: ``log`` where values differ by factors, ``linear`` where by steps.
-        grid: the values of a scan, unless the data give them (see `Effect.grid`).
-        inexact: standard error of the formula itself, in addition to that of the data: no change is exactly sudden. In
-            the parameter's unit, or as a fraction of the value on a logarithmic scale.
+        scale: ``log`` if the search steps by factors, ``linear`` if by differences.
+        grid: the values of a scan, unless they depend on the data (see `Effect.grid`).
+        inexact: standard error of the formula itself, in addition to that of the data. In the parameter's unit, or as
+            a fraction of the value on a logarithmic scale.
         default: the value if a description does not state it; None if it must be stated.
-        beside: whether it is optional: it is searched after the others, and counts only if it is not the default.
-        choices: the only possible values, if they are few: `likely` lists them, and no others are searched.
+        beside: whether it is optional. It is then searched after the others, and counts only if it is not the default.
+        choices: the only possible values, if they are few; `Effect.likely` lists them, and no others are searched.
     """
 
     name: str
@@ -57,15 +57,15 @@ class Shape:
 
     @property
     def moment(self) -> bool:
-        """Whether it is a time on the logs' clock."""
+        """Whether the parameter is a time on the logs' clock, not a duration."""
         return self.unit == "s" and self.lower == -np.inf
 
     def is_left(self, value: float) -> bool:
-        """Whether a value means that the optional parameter is unused."""
+        """Returns whether a value means that the optional parameter is unused."""
         return self.beside and value == self.default
 
     def unit_at(self, robot: Robot, joint: Place) -> str:
-        """Gives its unit where the effect acts: that of a linear axis' positions and forces on one."""
+        """Returns the parameter's unit at a joint, which differs on a linear axis."""
         straight = joint is not None and length_unit(robot, joint - 1) == "m"
         return STRAIGHT.get(self.unit, self.unit) if straight else self.unit
 
@@ -76,11 +76,11 @@ class Coefficient:
 
     Attributes:
         name: such as ``stribeck_torque``.
-        unit: its unit, in which the column is N m (or N) per one.
+        unit: its unit; the column is torque or force per this unit.
         lower: the least value that is physically possible.
         upper: the largest.
         inexact: standard error of the formula itself, in addition to that of the data, as a fraction of the value.
-        least: size below which it counts as zero: errors of the formulas are of this size.
+        least: size below which it counts as zero, because errors of the formula are as large.
     """
 
     name: str

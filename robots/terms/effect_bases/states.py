@@ -1,4 +1,4 @@
-"""Shared states of effects: heat that relaxes, a bristle that follows the motion, times of changes."""
+"""States that several effects share: stored heat, the presliding state, and candidate times of changes."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from robots.terms.situations.situation import Situation
 Array = NDArray[np.float64]
 
 CHANGES = 24
-"""Change times that a scan tries: between two of them, no step loses more than a tenth of its energy."""
+"""Number of change times in a scan: a step between two of them loses at most a tenth of its energy."""
 
 
 STRAINED = 0.01
-"""Share of its largest speed at which a joint begins a log in motion, its bristle strained."""
+"""Fraction of a joint's largest speed above which a log starts in motion, with fully developed friction."""
 
 
 def relaxation(situation: Situation, source: Array, time_constant: float) -> Array:
-    """Integrates x' = source - x / time_constant from zero, exactly for the mean source between two samples.
+    """Integrates x' = source - x / time_constant from zero.
 
-    In the pauses between logs the source is zero, and x decays by the real time that passes.
+    The integration is exact for a source that is constant between two samples, at their mean. In the pauses between
+    logs the source is zero, and x decays over the real time of the pause.
 
     Args:
         situation: the samples' times and logs.
@@ -50,7 +51,7 @@ def _relax(t: Array, u: Array, time_constant: float, level: float) -> Array:
     steps = np.diff(t)
     step = float(steps.mean())
     if np.abs(steps - step).max() > 1e-3 * step:
-        # Uneven samples are rare, and heat is slow: an even grid of the finest step is as good.
+        # Heat is slow, so interpolation on an even grid of the median step is accurate enough.
         even = np.linspace(t[0], t[-1], int(np.ceil((t[-1] - t[0]) / max(float(np.median(steps)), 1e-6))) + 1)
         return np.interp(t, even, _relax(even, np.interp(even, t, u), time_constant, level))
     decay = float(np.exp(-step / time_constant))
@@ -60,21 +61,21 @@ def _relax(t: Array, u: Array, time_constant: float, level: float) -> Array:
 
 
 def bristle(t: Array, q: Array, dq: Array, runs: tuple[slice, ...], length: float) -> Array:
-    """Follows Dahl's bristle: dz/dq = 1 - sign(dq) z / length, as z / length between -1 and 1.
+    """Evaluates the presliding state of Dahl's model, dz/dq = 1 - sign(dq) z / length, scaled to z / length.
 
-    Between two reversals the solution is closed: z goes to its limit as exp(-travel / length). Where the joint turns
-    between two samples is found by the parabola through them: the bristle may be shorter than that travel. At the start
-    of a log it is strained by the motion, or by nothing if the joint stands.
+    Between two reversals the solution is in closed form: z approaches its limit with exp(-travel / length). A reversal
+    between two samples is located by linear interpolation of the velocity, because `length` may be shorter than the
+    travel between samples. A log starts with z at its limit if the joint moves, and at zero if it rests.
 
     Args:
         t: time (N,) [s].
-        q: positions of one joint (N,).
-        dq: its velocities (N,).
-        runs: the logs.
-        length: travel within which friction turns round [rad or m].
+        q: positions of one joint (N,) [rad or m].
+        dq: its velocities (N,) [rad/s or m/s].
+        runs: the logs' rows.
+        length: travel over which friction changes sign [rad or m].
 
     Returns:
-        (N,).
+        z / length (N,), between -1 and 1.
     """
     return np.concatenate([_bristle(t[run], q[run], dq[run], length) for run in runs])
 
@@ -83,7 +84,7 @@ def _bristle(t: Array, q: Array, dq: Array, length: float) -> Array:
     moving = np.flatnonzero(dq)
     if not len(moving):
         return np.zeros(len(q))
-    # A joint at rest keeps the direction it had.
+    # A joint at rest keeps the sign of its last velocity.
     way = np.sign(dq[moving[np.maximum(np.searchsorted(moving, np.arange(len(q)), side="right") - 1, 0)]])
     turns = np.flatnonzero(np.diff(way))
     before, after = np.abs(dq[turns]), np.abs(dq[turns + 1])
@@ -101,7 +102,7 @@ def _bristle(t: Array, q: Array, dq: Array, length: float) -> Array:
 
 
 def change_times(situation: Situation, count: int = CHANGES) -> tuple[float, ...]:
-    """Gives times at which something may have changed: evenly through the samples, and between the logs."""
+    """Returns candidate times [s] of a change: `count` evenly spaced samples, and the start of each further log."""
     N = len(situation)
     inside = {int(N * (k + 0.5) / count) for k in range(count)} if 4 * count < N else set()
     between = set(situation.starts[1:]) if len(situation.starts) <= 2 * count else set()
@@ -109,7 +110,7 @@ def change_times(situation: Situation, count: int = CHANGES) -> tuple[float, ...
 
 
 def best_apart(scores: Array, count: int, apart: int) -> list[int]:
-    """Picks the places of the highest scores (K,), the best first, more than `apart` places from each other."""
+    """Returns the indices of the highest scores (K,), the best first, more than `apart` indices from each other."""
     left = np.where(np.isnan(scores), -np.inf, scores)
     chosen: list[int] = []
     while len(chosen) < count and np.isfinite(left).any():
@@ -120,7 +121,7 @@ def best_apart(scores: Array, count: int, apart: int) -> list[int]:
 
 
 def spells(situation: Situation, durations: Sequence[float]) -> tuple[tuple[float, float], ...]:
-    """Gives spells of some lengths [s] within the logs: the start of each [s], every half of its length, and that."""
+    """Lists time windows (start [s], duration [s]) within the logs, with starts half a duration apart."""
     return tuple(
         (float(start), duration)
         for duration in durations
@@ -130,9 +131,9 @@ def spells(situation: Situation, durations: Sequence[float]) -> tuple[tuple[floa
 
 
 def moving_speed(situation: Situation, joint: int) -> tuple[float, float]:
-    """Gives the speeds (1 % and 100 %) that a joint reaches while it moves; zeros where it never does.
+    """Returns the 1 % quantile and the maximum of a joint's speed while it moves; zeros if it never moves.
 
-    Slower than a ten-thousandth of its fastest is rest: a smoother's ripple.
+    Speeds below a ten-thousandth of the largest count as rest: they are ripple of the smoothing filter.
     """
     speed = np.abs(situation.dq[:, joint - 1])
     top = float(speed.max(initial=0.0))
@@ -141,6 +142,6 @@ def moving_speed(situation: Situation, joint: int) -> tuple[float, float]:
 
 
 def torque_reference(robot: Robot, joint: int) -> float:
-    """Gives a joint's torque limit, or 100 N m where it has none."""
+    """Returns a joint's torque limit [N m or N], or 100 where it has none."""
     limit = float(robot.limits.torque[joint - 1])
     return limit if np.isfinite(limit) and limit > 0 else 100.0

@@ -1,4 +1,4 @@
-"""Effects that depend on this instant alone: one symbolic expression serves simulator, design and diagnosis."""
+"""Static effects, which depend on the present sample alone and are given by one symbolic expression."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 NEWTON, LEAST_SLOPE = 20, 0.1
-"""Steps by which a reading is undone; and what it is taken to rise by at least, where it would fall."""
+"""Number of Newton steps to invert a distorted reading, and the least slope of reading over torque in each step."""
 
 
 class Instant(NamedTuple):
@@ -32,9 +32,9 @@ class Instant(NamedTuple):
         dq: velocities (n,) [rad/s or m/s].
         ddq: accelerations (n,) [rad/s2 or m/s2].
         rigid: torque of the rigid body and the rotors (n,) [N m or N].
-        load: torque that passes the gears (n,) [N m or N]: `rigid` without the rotors'.
+        load: gear load (n,) [N m or N], see `Situation.load`.
         torque: torque of the whole base model (n,) [N m or N].
-        sign: sign of the velocities as the base model takes it (n,): smooth where that is.
+        sign: sign of the velocities (n,), as smooth as in the base model.
         shape: one value per entry of the effect's `shapes`.
     """
 
@@ -49,29 +49,29 @@ class Instant(NamedTuple):
 
     @staticmethod
     def symbols(joints: int, shapes: int) -> Instant:
-        """Makes symbols for so many joints and shape values."""
+        """Creates the symbols for given numbers of joints and shape values."""
         sizes = [*(joints for _ in Instant._fields[:-1]), shapes]
         return Instant._make(casadi.SX.sym(name, size) for name, size in zip(Instant._fields, sizes, strict=True))
 
     def of(self, joint: int) -> Instant:
-        """Picks one joint's scalars, counted from 0; the shape is for all."""
+        """Selects the scalars of one joint, counted from 0; the shape is kept."""
         return Instant._make([*(symbol[joint] for symbol in self[:-1]), self.shape])
 
 
 class StaticEffect(Effect):
-    """An effect that depends on this instant alone: its columns are one symbolic expression.
+    """An effect that depends on the present sample alone: its columns are one symbolic expression.
 
-    The simulator, a design by automatic differentiation and the diagnosis share it.
+    The simulator, the experiment design (by automatic differentiation) and the diagnosis share it.
     """
 
     @abstractmethod
     def expression(self, robot: Robot, joint: Place, at: Instant) -> casadi.SX:
-        """Builds X (n, k), symbolic.
+        """Builds the symbolic columns X (n, k); torque = X @ coefficients.
 
         Args:
             robot: the robot with n joints.
             joint: where the effect acts, counted from 1; None for the whole robot.
-            at: what the columns are built from.
+            at: the symbolic inputs.
         """
 
     def function(self, robot: Robot, joint: Place) -> casadi.Function:
@@ -81,21 +81,21 @@ class StaticEffect(Effect):
         return casadi.Function(self.name, list(at), [casadi.densify(X)], list(Instant._fields), ["X"])
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates `expression` on all samples."""
+        """Evaluates `expression` on all samples (N, n, k)."""
         s = situation
         shapes = np.broadcast_to(np.asarray(shape, dtype=float), (len(s), len(self.shapes)))
         return _evaluator(self, s.robot, joint)(s.q, s.dq, s.ddq, s.rigid, s.load, s.torque, s.sign, shapes)[0]
 
 
 class StaticJointEffect(StaticEffect, JointEffect):
-    """An effect of one joint on its own torque, that depends on this instant alone."""
+    """An effect of one joint on its own torque that depends on the present sample alone."""
 
     @abstractmethod
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
-        """Builds (1, k) from the joint's own scalars in `at`; all of `at.shape`."""
+        """Builds the joint's columns (1, k) from its own scalars in `at` and all values of `at.shape`."""
 
     def expression(self, robot: Robot, joint: Place, at: Instant) -> casadi.SX:
-        """Places `row` into the joint's row."""
+        """Builds X (n, k): `row` in the joint's row, zero elsewhere."""
         assert joint is not None
         j = joint - 1
         row = self.row(robot, joint, at.of(j))
@@ -104,14 +104,14 @@ class StaticJointEffect(StaticEffect, JointEffect):
         return X
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates `row` on all samples."""
+        """Evaluates `row` on all samples (N, k)."""
         s, j = situation, joint - 1
         shapes = np.broadcast_to(np.asarray(shape, dtype=float), (len(s), len(self.shapes)))
         signals = (np.ascontiguousarray(a[:, j]) for a in (s.q, s.dq, s.ddq, s.rigid, s.load, s.torque, s.sign))
         return _row_evaluator(self, s.robot, joint)(*signals, shapes)[0][:, 0]
 
     def slopes(self, situation: Situation, joint: int, coefficients: Array, shape: tuple[float, ...]) -> Array:
-        """Evaluates how its torque changes with the base model's and with each shape value (N, 1 + s), exactly."""
+        """Evaluates the derivatives of the torque (N, 1 + s) by the base model's torque and by each shape value."""
         s, j = situation, joint - 1
         shapes, weights = (np.broadcast_to(np.asarray(x, dtype=float), (len(s), len(x))) for x in (shape, coefficients))
         signals = (np.ascontiguousarray(a[:, j]) for a in (s.q, s.dq, s.ddq, s.rigid, s.load, s.torque, s.sign))
@@ -120,7 +120,18 @@ class StaticJointEffect(StaticEffect, JointEffect):
     def undone(
         self, situation: Situation, joint: int, coefficients: Array, shape: tuple[float, ...], reading: Array
     ) -> Array:
-        """Finds the base model's torque (N,) that is read as this (N,) with the effect, by Newton's method."""
+        """Inverts the distortion of a torque reading by Newton's method.
+
+        Args:
+            situation: the motion and the base model's torque, from which the iteration starts (N samples).
+            joint: the joint, counted from 1.
+            coefficients: coefficients of the effect (k,).
+            shape: values of its shape parameters.
+            reading: distorted torque (N,) [N m or N].
+
+        Returns:
+            The base model's torque (N,) for which torque plus effect equals the reading [N m or N].
+        """
         torque = situation.torque.copy()
         for _ in range(NEWTON):
             now = replace(situation, torque=torque, _cache={})
@@ -133,7 +144,7 @@ class StaticJointEffect(StaticEffect, JointEffect):
     acts_on = JointEffect.acts_on
 
 
-# Numpy, not compiled C: a column is a handful of operations, and a catalogue of them would take minutes to compile.
+# Numpy, not compiled C: a column has few operations, and compiling the whole catalogue would take minutes.
 @lru_cache(maxsize=512)
 @builds_expressions
 def _evaluator(effect: StaticEffect, robot: Robot, joint: Place) -> BatchFunction:

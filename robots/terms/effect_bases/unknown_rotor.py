@@ -1,6 +1,7 @@
-"""Rotor inertia of the first joints, which no log separates from the link inertia, but which does not load the gear.
+"""Rotor inertia of the first joints, which no log separates from the link inertia.
 
-Where a robot's description does not say it, or says it as datasheets do, what gears do with their load may.
+Only the link inertia loads the gear. An effect that depends on the gear's load can therefore determine the rotor
+inertia, if the robot's description lacks it or is inaccurate.
 """
 
 from __future__ import annotations
@@ -13,22 +14,26 @@ from robots.terms.effect_bases.base import Shape, Situation
 Array = NDArray[np.float64]
 
 KNOWN = 0.0
-"""No rotor beside those that are known."""
+"""Additional rotor inertia of a known rotor: none."""
 ROTOR = Shape("rotor_inertia", "kg m2", -np.inf, np.inf, "linear", (KNOWN,), default=KNOWN)
-"""Rotor inertia in addition to the base model's, fitted or described."""
+"""Rotor inertia in addition to the one that is fitted or described [kg m2 or kg]."""
 DATASHEET = 0.3
-"""Share of a described rotor by which it may differ: brakes, couplings and gears' own shafts are often left out."""
+"""Relative error of a described rotor inertia: datasheets often leave out brakes, couplings and gear shafts."""
 LOOKS = 9
-"""Rotors of a look along all that are possible."""
+"""Number of rotor inertias in `rotors_between`."""
 
 
 def unknown_rotor(situation: Situation, joint: int) -> float:
-    """Gives the most that the rotor of a joint may have of its inertia, zero where one is known."""
+    """Returns the largest possible inertia of an unknown rotor [kg m2 or kg]; zero if the rotor is known."""
     return 0.0 if situation.rotors[:, joint - 1].any() else max(_least_inertia(situation, joint), 0.0)
 
 
 def rotor_bounds(situation: Situation, joint: int) -> tuple[float, float]:
-    """Gives the range of the additional rotor inertia: zero if a log determines it, small if it is described."""
+    """Returns the range of the additional rotor inertia [kg m2 or kg].
+
+    It is zero if the base model's fit determines the rotor, and narrow if the robot's description states it. The rotor
+    inertia cannot be larger than the joint's least inertia.
+    """
     described = float(situation.rotors[1, joint - 1])
     if described:
         within = DATASHEET * described
@@ -37,25 +42,25 @@ def rotor_bounds(situation: Situation, joint: int) -> tuple[float, float]:
 
 
 def rotor_grid(situation: Situation, joint: int) -> tuple[float, ...]:
-    """Lists what a scan tries: no other rotor, and where none is known half of the inertia."""
+    """Lists the additional rotor inertias of a scan: zero, and half of the largest one if the rotor is unknown."""
     most = unknown_rotor(situation, joint)
     return (KNOWN, 0.5 * most) if most else (KNOWN,)
 
 
 def rotors_between(situation: Situation, joint: int) -> tuple[float, ...]:
-    """Lists rotors from the least to the most that one may be, for a look along them; none for one that is sure."""
+    """Lists evenly spaced additional rotor inertias over their range; empty if the rotor is known exactly."""
     low, high = rotor_bounds(situation, joint)
     return tuple(float(rotor) for rotor in np.linspace(low, high, LOOKS)) if low < high else ()
 
 
 def is_sure(situation: Situation, joint: int) -> bool:
-    """Tells whether a joint's rotor can be no other than the one that is known."""
+    """Returns whether the inertia of a joint's rotor is known exactly."""
     low, high = rotor_bounds(situation, joint)
     return low == high
 
 
 def load_beside(situation: Situation, joint: int, rotor: float) -> Array:
-    """Gives the torque (N,) that passes a joint's gear: without what turns a rotor beside the one that is known."""
+    """Returns a joint's gear load (N,) [N m or N] without the torque that accelerates an additional rotor."""
     return np.asarray(situation.load[:, joint - 1] - rotor * situation.ddq[:, joint - 1])
 
 

@@ -1,4 +1,4 @@
-"""Effects beyond the base model, one a file: played by the plant, found by the diagnosis, added to a model."""
+"""Effects beyond the base model, one per file, for the plant, the diagnosis and extended models."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from robots.terms.effects.torque_ripple import TorqueRipple
 from robots.terms.effects.torque_sensor_drift import TorqueSensorDrift
 from robots.terms.situations.situation import situation
 
-# Adding an effect is one file, and one line here.
+# A new effect needs one file, and one line here.
 _ALL: tuple[Effect, ...] = (
     ThermalFriction(),
     FrictionStep(),

@@ -1,4 +1,4 @@
-"""Friction that is not the same both ways."""
+"""Friction that differs with the direction of motion."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class AsymmetricFriction(StaticJointEffect):
     experiments: ClassVar[tuple[str, ...]] = ("mirrored", "sweep")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes half the difference of viscous and of quadratic friction."""
+        """Describes half the difference between both directions, of viscous and of quadratic friction."""
         assert joint is not None
         force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
         return (
@@ -60,6 +60,6 @@ class AsymmetricFriction(StaticJointEffect):
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the velocity."""
+        """Returns the velocity."""
         assert joint is not None
         return f"velocity of joint {joint} [rad/s]", situation.dq[:, joint - 1]

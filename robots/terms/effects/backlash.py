@@ -1,4 +1,4 @@
-"""Play in a gear: the link changes sides when its load changes sign."""
+"""Gear backlash: the link moves to the other tooth flank when the gear's load changes sign."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from robots.terms.base import length_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.capabilities import AboveBand, AtReversals, GearLoad
 from robots.terms.effect_bases.unknown_rotor import (
     KNOWN,
     ROTOR,
@@ -27,47 +28,50 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 QUICKEST, SLOWEST = 0.004, 0.3
-"""Times [s] between which a crossing of the gap takes; a log shows nothing quicker than a sample."""
+"""Shortest and longest time [s] in which the link crosses the gap; the sample period is a lower limit, too."""
 SCANNED = (0.006, 0.012, 0.025, 0.05, 0.1, 0.2)
-"""Times [s] of a scan."""
+"""Crossing times [s] of a scan."""
 ASIDE = (-0.03, -0.015, 0.0, 0.015, 0.03)
-"""Loads of a scan at which the link changes sides, as shares of the load's root mean square."""
+"""Loads of a scan at which the link changes sides, as fractions of the load's RMS."""
 FARTHEST = 0.1
-"""Largest such share: of a base model whose zero is less sure nothing follows."""
+"""Largest such fraction: a base model whose zero load is less certain cannot show backlash."""
 BRIEFEST, LANDS = 0.012, 0.02
-"""Shortest and default time [s] in which a flank stops the link. The time of an impact is known to some milliseconds:
-the prediction of a shorter impact would be worse than none."""
+"""Shortest and default time [s] in which a flank stops the link. The time of an impact is known to some milliseconds,
+so predicting a shorter impact would increase the error."""
 REBOUND, SETTLES = 0.2, 2.0
-"""Share of its speed with which a link comes back from the flank, and in how many times its landing it loses that."""
+"""Fraction of its speed with which a link rebounds from the flank, and the decay time of that in landing times."""
 LEAST, MOST = 1 / 8, 8.0
-"""Uncertainty of the gap from its crossing time: the time, whose cube it is, is correct to a factor of two."""
+"""Factors on the gap from the crossing time: the gap grows with the cube of that time, which is known to a factor of
+two."""
 
 HOVERS = 0.05
-"""Share of its root mean square that a load must get beyond zero to have changed sides."""
+"""Fraction of its RMS that a load must exceed on the new side to have changed sign."""
 
 INEXACT = 0.2
-"""Share by which a play errs besides: links bounce otherwise, and drives give way to the kick, by as much."""
+"""Relative error of the formula, because links rebound differently and drives yield to the impact."""
 SMALLEST = 5e-7
-"""Half a backlash below which it counts as zero [rad or m]: the roughness of teeth at a radius of 0.1 m."""
+"""Half backlash below which it counts as zero [rad or m]: the roughness of teeth at a radius of 0.1 m."""
 
 
 class Backlash(Effect):
-    """The link lags its encoder by (b / 2) side: the side changes from where the load changes sign, in T + L.
+    """The link lags its encoder by (b / 2) side; the side changes within T + L after the load changes sign.
 
-    A load that grows by r per second moves the link's inertia M over the gap b in T = (6 b M / r)^(1/3), or in the
-    longest time that the moving motor leaves. The motion in the gap grows with the third power of time, so the link is
-    fastest when it lands. The far flank stops it with a half wave of force over a time L: half a period of the link on
-    the stiffness of teeth and drive. The torque first lacks the load slightly for a long time, then shows a short and
-    large impact. It follows from the lag as for an elastic gear: bursts at zero crossings of the load, not of the
-    velocity. Size and duration of the bursts both determine the gap, each only roughly, because real crossings and
-    landings vary. The zero of the load is known from the base model to some per cent; a log separates offset and load
-    poorly, and a slow load crosses late.
+    A load that grows by r per second moves the link's inertia M over the gap b in T = (6 b M / r)^(1/3). T is at most
+    the parameter `longest`, because the motor moves, too. The motion in the gap grows with the third power of time, so
+    the link is fastest when it lands. The other flank stops it within a time L by a half wave of force. L is half a
+    period of the link on the stiffness of teeth and drive. The torque is therefore slightly too small during the
+    crossing; then it shows a short and large impact. It follows from the lag as for an elastic gear, at zero crossings
+    of the load, not of the velocity.
+
+    Size and duration of the impacts both determine the gap, but only roughly, because real crossings vary. The zero of
+    the load is known to some per cent, because a log separates offset and load poorly. It is a shape parameter.
     """
 
     name: ClassVar[str] = "backlash"
     title: ClassVar[str] = "gear backlash"
-    depends_on_gear_load: ClassVar[bool] = True
-    acceleration_driven: ClassVar[bool] = True
+    at_reversals: ClassVar[AtReversals] = AtReversals.IMPACT
+    gear_load: ClassVar[GearLoad] = GearLoad.FEELS
+    above_band: ClassVar[AboveBand] = AboveBand.COUNTS
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("gap_crossed", "rad", 1e-7, 0.2, "log"),
         Shape("longest", "s", 0.01, SLOWEST, "log", (SLOWEST,), default=SLOWEST),
@@ -76,21 +80,20 @@ class Backlash(Effect):
         Shape("landing", "s", BRIEFEST, 0.1, "log", (LANDS,), default=LANDS),
     )
     rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "presliding_hysteresis", "load_dependent_friction")
-    independent_of_acceleration: ClassVar[bool] = True
     experiments: ClassVar[tuple[str, ...]] = ("payload", "micro_reversals")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes half the play."""
+        """Describes half the backlash."""
         assert joint is not None
         return (Coefficient("half_play", length_unit(robot, joint - 1), 0.0, 0.05, INEXACT, SMALLEST),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
-        """Links the backlash from the size of the torque to the gap from the crossing times."""
+        """Bounds the backlash from the torque's size to within a factor of the gap from the crossing times."""
         ((lower, upper),) = super().ranges(robot, joint, shape)
         return ((max(lower, LEAST * shape[0] / 2), min(upper, MOST * shape[0] / 2)),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists gaps that take 6 to 50 ms, at loads near zero; none for a load that hardly ever changes sign."""
+        """Lists gaps with crossing times of 6 to 200 ms, at loads near zero; empty if the load hardly changes sign."""
         assert joint is not None
         points = []
         size = _size(situation, joint)
@@ -104,7 +107,7 @@ class Backlash(Effect):
         return tuple(points)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the load at which sides change near zero, and the rotor near what is known of it."""
+        """Bounds the load at which sides change to values near zero, and the rotor inertia to its known range."""
         assert joint is not None
         gap, longest, *_, landing = self.shapes
         most = FARTHEST * _size(situation, joint)
@@ -119,9 +122,9 @@ class Backlash(Effect):
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the gap from the size of the torque, for free motion, and the base model's zero."""
+        """Lists combinations of usual and refined values, such as the gap that follows from the torque's size."""
         gap = float(np.clip(2.0 * coefficients[0], self.shapes[0].lower, self.shapes[0].upper))
-        # All but what was refined itself: each as it should be, or not.
+        # Each parameter has its usual or its refined value; the last combination is the refined shape itself.
         assert joint is not None
         rotors = (KNOWN,) if is_sure(situation, joint) else (KNOWN, None)
         either = ((LANDS, None), rotors, (0.0, None), (SLOWEST, None), (gap, None))
@@ -130,11 +133,11 @@ class Backlash(Effect):
     def other_optima(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Gives the gap from the size of the torque with the present crossing time, limited by the motor.
+        """Lists starts with the gap that follows from the torque's size, and starts with other rotor inertias.
 
-        Free flight in the time that was seen asks for a smaller gap, and goes astray where loads change more slowly.
-        Another rotor, where it is not sure, makes the load change sign at other times: a narrow summit on the right
-        one, which a search along rotor and load together misses.
+        The first start keeps the present crossing time as `longest`; free motion in that time means a smaller gap.
+        Another rotor inertia makes the load change sign at other times. Its optimum is narrow, so that a joint search
+        over rotor inertia and load misses it.
         """
         assert joint is not None
         gap = float(np.clip(2.0 * coefficients[0], self.shapes[0].lower, self.shapes[0].upper))
@@ -148,7 +151,7 @@ class Backlash(Effect):
         return tuple(starts for starts in (slower, turned) if starts)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of all joints per half play of one."""
+        """Evaluates the torque of all joints per half backlash of one joint (N, n, 1)."""
         assert joint is not None
         _, _, at, rotor, landing = shape
         times, ways, quickness = _crossings(situation, joint, at, rotor)
@@ -160,7 +163,7 @@ class Backlash(Effect):
             inside = (times >= t[0]) & (times <= t[-1])
             start, jump, flight = times[inside], 2 * ways[inside], flights[inside]
             begins, last = np.searchsorted(t, (start, start + flight + (1 + SETTLES) * landing))
-            # The rows of all crossings, one after the other; they may overlap.
+            # Rows of all crossings, concatenated; crossings may overlap.
             count = last - begins
             of = np.repeat(np.arange(len(start)), count)
             rows = np.arange(len(of)) + np.repeat(begins - np.cumsum(count) + count, count)
@@ -187,16 +190,24 @@ class Backlash(Effect):
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the gear's load."""
+        """Returns the gear's load."""
         assert joint is not None
         return f"load of joint {joint} [N m]", load_beside(situation, joint, shape[3] if len(shape) > 3 else KNOWN)
 
 
 def _course(since: Array, flight: Array, landing: float) -> tuple[Array, Array, Array]:
-    """Gives how far a link has crossed a gap of one, with both derivatives [1/s, 1/s2], some time [s] after its start.
+    """Evaluates the motion of a link through a gap of size one.
 
-    It flies under a force that grows from nothing. Half a wave of force takes what speed it has then and throws it back
-    with a share of that, which it loses over some times as long.
+    A force that grows from zero accelerates the link. At the flank a half wave of force reverses its velocity to the
+    fraction `REBOUND`, which decays within `SETTLES` landing times.
+
+    Args:
+        since: time since the start of the crossing (K,) [s].
+        flight: time until the link reaches the flank (K,) [s].
+        landing: time in which the flank stops the link [s].
+
+    Returns:
+        The position (K,), and its two derivatives [1/s] and [1/s2].
     """
     lost = SETTLES * landing
     grows = 1.0 / (flight**3 / 6 + flight**2 / 4 * ((1 - REBOUND) * landing - REBOUND * lost))  # of its acceleration
@@ -216,7 +227,7 @@ def _course(since: Array, flight: Array, landing: float) -> tuple[Array, Array, 
 
 
 def _flights(situation: Situation, shape: tuple[float, ...], quickness: Array) -> Array:
-    """Gives the times [s] that crossings take before they land: of free flight, or the longest."""
+    """Computes the times [s] from each load reversal to the landing: that of free motion, at most `longest`."""
     return np.clip((6.0 * shape[0] / quickness) ** (1 / 3), max(QUICKEST, situation.period), shape[1])
 
 
@@ -225,10 +236,10 @@ def _size(situation: Situation, joint: int) -> float:
 
 
 def _crossings(situation: Situation, joint: int, at: float, rotor: float) -> tuple[Array, Array, Array]:
-    """Finds where the load passes a value: times [s], the new side, and its rate over the link's inertia [rad/s3].
+    """Finds where the load crosses a value: times [s], the new sign, and its rate over the link's inertia [rad/s3].
 
-    A crossing counts only if the load gets beyond `HOVERS` before it comes back. A load that stays near zero, as on a
-    horizontal axis at constant speed, would cross only by errors of the motion.
+    A crossing counts only if the load exceeds `HOVERS` before it returns. A load that stays near zero, as on a
+    joint without gravity load at constant speed, crosses only because of errors of the motion.
     """
     load = load_beside(situation, joint, rotor) - at
     inertia = np.maximum(link_inertia(situation, joint, rotor)[:, joint - 1], 1e-12)
@@ -238,7 +249,7 @@ def _crossings(situation: Situation, joint: int, at: float, rotor: float) -> tup
         part = load[run]
         sure = np.flatnonzero(np.abs(part) > beyond)
         last = sure[:-1][part[sure[:-1]] * part[sure[1:]] < 0]
-        # The load changes sign for good in the last row before the new side.
+        # The final sign change is the last one before the load is clearly on the new side.
         changes = np.flatnonzero(part[:-1] * part[1:] <= 0)
         after = sure[np.searchsorted(sure, last, side="right")]
         found.append(run.start + changes[np.searchsorted(changes, after, side="left") - 1])

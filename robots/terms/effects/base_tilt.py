@@ -1,4 +1,4 @@
-"""A base that does not stand level."""
+"""A base that is tilted against the robot's description."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.capabilities import GearLoad
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -15,60 +16,60 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-# First moments [kg m] of what turns about an upright first axis, along the level axes where that joint is at zero.
+# First moments [kg m] of all that rotates about a vertical first axis, along the horizontal axes at zero joint angle.
 OWN = tuple(Shape(f"own_moment_{k}", "kg m", -np.inf, np.inf, "linear", (0.0,), default=0.0, beside=True) for k in "12")
-# They are no larger than this times the largest that the other joints show: theirs is the same arm.
+# Their bound, as a multiple of the largest first moment that the other joints show for the same arm.
 LARGEST = 1.0
-# Where a search for them begins, as a share of that.
+# Start of their search, as a fraction of that bound.
 NEAR = 0.01
 
 
 class BaseTilt(Effect):
-    """tau = (d rigid/dg) (g x e1) a + (d rigid/dg) (g x e2) b: gravity turned by small angles about two level axes.
+    """tau = (d rigid/dg) (g x e1) a + (d rigid/dg) (g x e2) b: gravity rotated by small angles about two axes.
 
-    The axes are level where the robot stands as described, and turn with the base where a log's base is tilted: the
-    base is set askew on its mount. About an upright first axis d a level robot has first moments s that no log of it
-    shows, and its base parameters lack. A tilt shows them: -d' (R(q1) s x (g x e_k)) on the first joint besides. They
-    act by the angles alone: without those, what pulls there is something else.
+    The axes are horizontal if the robot stands as described. They rotate with the base in logs of a base that was
+    tilted by a known angle. On a level robot with a vertical first axis d, the first moments s about that axis cause no
+    torque, so the base parameters do not contain them. With a tilt they add -d' (R(q1) s x (g x e_k)) to the torque of
+    the first joint, per angle.
     """
 
     name: ClassVar[str] = "base_tilt"
     title: ClassVar[str] = "tilted base"
-    loads_gear: ClassVar[bool] = True
+    gear_load: ClassVar[GearLoad] = GearLoad.CAUSES
     whole_robot: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = OWN
     rivals: ClassVar[tuple[str, ...]] = ("spring", "encoder_offset", "torque_constant_error", "payload_change")
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "second_base_pose")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the base's rotations about its two level axes (x and y where gravity is along z)."""
+        """Describes the base's rotations about two horizontal axes (x and y if gravity is along z)."""
         return Coefficient("tilt_1", "rad", -0.5, 0.5), Coefficient("tilt_2", "rad", -0.5, 0.5)
 
     def unused(self, shape: tuple[float, ...]) -> frozenset[int]:
-        """Gives the shape without moments."""
+        """Returns both moments if both are zero."""
         return frozenset() if any(shape) else frozenset((0, 1))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Gives what an upright first axis may have; a log from another base has shown it, and no other has any."""
+        """Bounds the moments of a vertical first axis; zero for other axes, and if logs include a tilted base."""
         most = _largest(situation)
         return ((-most, most), (-most, most))
 
     def joints(self, robot: Robot) -> tuple[Place, ...]:
-        """Names the whole robot, if there is gravity."""
+        """Returns the whole robot if gravity acts on it, else nothing."""
         return (None,) if np.any(robot.chain.gravity) else ()
 
     def leakage(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
-        """Gives half of it for an upright first axis whose own moments are too small to be determined."""
+        """Returns one half for a vertical first axis without fitted moments, else the default."""
         hidden = joint == 0 and upright(robot) and not any(shape)
         return 0.5 if hidden else super().leakage(robot, joint, shape)
 
     def complete(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[float, ...]:
-        """Gives the first axis' own moments, if they may be there: angles would take what they are."""
+        """Adds start values of the first axis' moments if they are possible; without them the angles are biased."""
         most = _largest(situation)
         return shape if any(shape) or not most else (NEAR * most, NEAR * most)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of all joints per angle."""
+        """Evaluates the torque of all joints per angle (N, n, 2)."""
         tilted = tilted_torque(situation)
         if any(shape):
             tilted = tilted.copy()
@@ -90,14 +91,17 @@ class BaseTilt(Effect):
 
 
 def upright(robot: Robot) -> bool:
-    """Whether the first joint turns about gravity: moments of its link are then not shown by a level robot."""
+    """Returns whether the first joint rotates about the direction of gravity.
+
+    A level robot then does not show the first moments about that axis.
+    """
     first, down = robot.chain.joints[0], np.asarray(robot.chain.gravity, dtype=float)
     along = float(abs(first.rotation @ first.axis @ down)) > 0.99 * float(np.linalg.norm(down))
     return first.kind == "revolute" and along
 
 
 def _own_torque(situation: Situation, moments: tuple[float, ...]) -> Array:
-    """Torque of an upright first joint per angle (N, 2), by its own first moments [kg m]."""
+    """Computes the torque of a vertical first joint per tilt angle (N, 2) from its first moments [kg m]."""
     first = situation.robot.chain.joints[0]
     axis = first.rotation @ first.axis
     axes = level_axes(np.asarray(situation.robot.chain.gravity, dtype=float))
@@ -108,7 +112,7 @@ def _own_torque(situation: Situation, moments: tuple[float, ...]) -> Array:
 
 
 def _largest(situation: Situation) -> float:
-    """The largest first moment that an upright first axis may have [kg m], where no log of a tilted base shows it."""
+    """Computes the bound of a vertical first axis' first moments [kg m]; zero if logs determine them."""
     level = np.asarray(situation.robot.chain.gravity, dtype=float)
     if not upright(situation.robot) or not bool(np.all(situation.gravity == level)):
         return 0.0
@@ -120,14 +124,14 @@ def _largest(situation: Situation) -> float:
 
 
 def tilted_torque(situation: Situation) -> Array:
-    """Evaluates the torque of all joints per angle of the base about each of its level axes (N, n, 2)."""
+    """Evaluates the torque of all joints per angle of the base about each horizontal axis (N, n, 2)."""
     axes = level_axes(np.asarray(situation.robot.chain.gravity, dtype=float))
     turned = np.cross(situation.gravity[:, None], axes)  # (N, 2, 3)
     return np.asarray(situation.sensitivity("gravity") @ turned.transpose(0, 2, 1))
 
 
 def level_axes(gravity: Array) -> Array:
-    """Gives two unit axes (2, 3) across gravity (3,): x and y where it is along z."""
+    """Returns two unit axes (2, 3) orthogonal to gravity (3,): x and y if it is along z."""
     down = gravity / np.linalg.norm(gravity)
     nearest = np.eye(3)[np.argsort(np.abs(down), kind="stable")[:2]]
     first = nearest[0] - (nearest[0] @ down) * down

@@ -1,4 +1,4 @@
-"""A drive at the end of its current: torque that is cut off."""
+"""Torque that is clipped at the drive's current limit."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from scipy.special import ndtr
 
 from robots.common.stretches import spans
 from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Shape, Situation
+from robots.terms.effect_bases.capabilities import Reading
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -18,35 +19,35 @@ Array = NDArray[np.float64]
 
 
 class CurrentClipping(JointEffect):
-    """tau = c (clip(tau, -L, L) - tau), c = 1 where all of the torque beyond L is lost.
+    """tau = c (clip(tau, -L, L) - tau), with c = 1 if all torque beyond L is lost.
 
-    tau is all of the torque, that of other effects too. A drive cuts noise as well, which at the limit is then lost to
-    one side: where a log shows L by flat tops, the column is what is lost on average; elsewhere L comes out low.
+    The total torque tau includes that of other effects. A drive also clips noise, which is then one-sided at the
+    limit. If a log shows L by flat tops, the column is the mean loss including noise; otherwise L is estimated too low.
 
-    Flat tops in the log are also flagged by `gate`: such samples say that the torque was L or more, not how much.
+    `gate` flags flat tops in the log, because such samples give only a lower bound of the torque.
     """
 
     name: ClassVar[str] = "current_clipping"
     title: ClassVar[str] = "torque limited by the drive current"
-    acts_on_total_torque: ClassVar[bool] = True
+    reading: ClassVar[Reading] = Reading.CUTS
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("level", "N m", 1e-3, 1e6, "log", inexact=0.01),)
     rivals: ClassVar[tuple[str, ...]] = ("torque_constant_saturation", "load_dependent_friction")
     experiments: ClassVar[tuple[str, ...]] = ("payload", "static_hold")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the share that is lost."""
+        """Describes the fraction of the torque beyond the level that is lost."""
         return (Coefficient("share_lost", "1", 0.0, 1.0),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
-        """Gives what a limit takes of the torque beyond its level: of less, another bends it."""
+        """Bounds the fraction that is lost; a smaller loss has another cause, such as saturation."""
         return ((LEAST, 1.0),)
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
-        """Gives true for all of the range: a torque that is cut off is all lost."""
+        """Returns whether most of the torque is lost; its upper limit, one, is the expected value."""
         return float(coefficients[0]) > LEAST
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists levels that .15 to 40 % of the samples exceed; the largest torque where that is a flat top."""
+        """Lists levels that 0.15 to 40 % of the samples exceed, or the largest torque alone if it is a flat top."""
         assert joint is not None
         if flat := self._flat(situation, joint):
             return ((flat,),)
@@ -55,21 +56,21 @@ class CurrentClipping(JointEffect):
         return tuple((float(level),) for level in np.unique(levels) if 1e-3 < level < size.max())
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the level below the largest torque, and at the largest of the log where that is a flat top."""
+        """Bounds the level by the largest torque, or fixes it at the log's flat top."""
         assert joint is not None
         top = float(np.abs(situation.whole[:, joint - 1]).max(initial=0.0))
         flat = self._flat(situation, joint)
         return ((flat, flat),) if flat else ((max(0.2 * top, 1e-3), max(top, 2e-3)),)
 
     def _flat(self, situation: Situation, joint: int) -> float:
-        """The largest torque of the log where that is a flat top, and the known torque comes near it; else zero."""
+        """Returns the log's largest torque if it is a flat top that the modelled torque approaches, else zero."""
         measured = situation.measured
         if measured is None or self.chance(situation, joint, measured) >= CERTAIN:
             return 0.0
         return float(np.abs(measured[:, joint - 1]).max())
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque removed by the limit; with noise, its mean."""
+        """Evaluates the torque that the limit removes (N, 1); with flat tops, its mean over the noise."""
         torque, level = situation.whole[:, joint - 1], shape[0]
         lost = np.clip(torque, -level, level) - torque
         if self._flat(situation, joint):
@@ -79,9 +80,9 @@ class CurrentClipping(JointEffect):
         return lost[:, None]
 
     def gate(self, situation: Situation, joint: Place, measured: Array) -> NDArray[np.bool_]:
-        """Flags flat tops: three and more samples in a row at the largest torque of the log.
+        """Flags flat tops: three or more consecutive samples at the log's largest torque.
 
-        They must be thirty in all, or such that chance does not make them.
+        None are flagged unless there are at least thirty samples, or chance is unlikely to produce them.
         """
         assert joint is not None
         flagged = np.zeros(measured.shape, dtype=bool)
@@ -92,10 +93,7 @@ class CurrentClipping(JointEffect):
         return flagged if certain and size.any() else np.zeros_like(flagged)
 
     def chance(self, situation: Situation, joint: Place, measured: Array) -> float:
-        """Gives the probability of the log's flat peaks by chance, if the known torque comes near them.
-
-        If it does not come near them, its largest values are unknown.
-        """
+        """Returns the probability of the log's flat tops by chance; 1 if the modelled torque does not approach them."""
         assert joint is not None
         most, known = (float(np.abs(x[:, joint - 1]).max(initial=0.0)) for x in (measured, situation.whole))
         return _accident(situation, joint, measured) if known > NEAR * most else 1.0
@@ -113,38 +111,39 @@ class CurrentClipping(JointEffect):
         return f"The torque of joint {joint} is limited to {shape[0]:.3g} {force}, the drive's current limit."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the torque that is cut."""
+        """Returns the torque before clipping."""
         assert joint is not None
         name = "the base model" if situation.beyond is None else "the model without a limit"
         return f"torque of joint {joint} by {name} [N m]", situation.whole[:, joint - 1]
 
 
 LEAST = 0.5
-"""Fraction of the torque beyond the level that a limit removes, with estimation errors; the true value is one."""
+"""Least fraction of the torque beyond the level that a limit removes; the true value is one."""
 FLAT = 1e-4
-"""Relative difference from the largest torque up to which a sample is at it."""
+"""Relative distance from the largest torque within which a sample is at it."""
 FLAT_SAMPLES = 30
+"""Number of samples in flat tops above which they count without a test against chance."""
 EQUAL = 1e-6
-"""Share of the largest torque by which samples that are equal differ."""
+"""Difference between two samples, relative to the largest torque, below which they are equal."""
 CERTAIN = 1e-6
-"""Chance below which flat tops are no chance."""
+"""Probability below which flat tops are not by chance."""
 NEAR = 0.9
-"""Share of such a top down to which the known torque is near it."""
+"""Fraction of a flat top that the modelled torque must reach."""
 
 
 def _stretches(situation: Situation, flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Lists the stretches [start, stop) of three and more flagged rows (N,), of one log each."""
+    """Lists the ranges [start, stop) of three or more consecutive flagged rows (N,) within one log."""
     parts = ((run.start, spans(flags[run])) for run in situation.runs)
     return [(first + a, first + b) for first, part in parts for a, b in part if b - a >= 3]
 
 
 def _spread(values: Array, counted: NDArray[np.bool_]) -> float:
-    """Gives a robust standard deviation of the noise."""
+    """Estimates a robust standard deviation of the values at counted rows."""
     return 1.4826 * float(np.median(np.abs(values[counted]))) if counted.any() else 0.0
 
 
 def _above(excess: Array, noise: float) -> Array:
-    """Gives how much more normal noise of that deviation is cut on average than a torque alone, by its excess (N,)."""
+    """Computes the mean extra torque (N,) that clipping removes because of normal noise, per excess over the level."""
     if noise <= 0:
         return np.zeros_like(excess)
     z = -np.abs(excess) / noise
@@ -152,9 +151,9 @@ def _above(excess: Array, noise: float) -> Array:
 
 
 def _accident(situation: Situation, joint: int, measured: Array) -> float:
-    """Gives the probability that the largest torque appears in this many runs of three samples or more by chance.
+    """Computes the probability of as many runs of three or more samples at the largest torque by chance.
 
-    Reference: runs of equal values elsewhere. With a coarse torque resolution such runs are usual.
+    The reference is the frequency of runs of equal values elsewhere. A coarse torque resolution causes many of them.
     """
 
     def evaluate() -> float:

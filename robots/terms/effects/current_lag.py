@@ -1,4 +1,4 @@
-"""A drive that logs its torque late, on one joint."""
+"""A torque signal of one joint that is logged late."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class CurrentLag(Late, JointEffect):
-    """tau_j(t - d) - tau_j(t): as a delay, but of one joint: its current's filter."""
+    """tau_j(t - d) - tau_j(t): a delay of one joint's torque, for example by a current filter."""
 
     name: ClassVar[str] = "current_lag"
     title: ClassVar[str] = "delayed (filtered) torque signal of one joint"
@@ -28,16 +28,16 @@ class CurrentLag(Late, JointEffect):
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "micro_reversals")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the lag: a filter has no other sign, and more than 50 ms is no drive's."""
+        """Describes the lag; a filter's lag is positive, and no drive has more than 50 ms."""
         return (Coefficient("lag", "s", 0.0, 0.05, INEXACT, SHORTEST),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
-        """Keeps the lag near that of the reversals, and positive."""
+        """Bounds the lag to positive values near that of the reversals."""
         ((low, high),) = near(shape[0])
         return ((max(low, 0.0), max(high, SMALL)),)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the change of the joint's torque per delay."""
+        """Evaluates the change of the joint's torque per delay (N, 1) [N m/s]."""
         return lateness(situation, shape[0])[:, joint - 1 : joint]
 
     def describe(
@@ -54,6 +54,6 @@ class CurrentLag(Late, JointEffect):
         return f"The torque of joint {joint} is logged {late:.3g} ms late. Likely cause: a filter in its drive."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the rate of the joint's torque."""
+        """Returns the rate of the joint's torque."""
         assert joint is not None
         return f"rate of the torque of joint {joint} [N m/s]", -lateness(situation, shape[0])[:, joint - 1]

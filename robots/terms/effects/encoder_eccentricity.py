@@ -1,4 +1,4 @@
-"""An encoder whose disc runs out of true."""
+"""An encoder with an eccentric disc."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 class EncoderEccentricity(Effect):
-    """tau = (d rigid/dq_j) (a cos(q_j) + b sin(q_j)): the joint stands further by an error of one period per turn."""
+    """tau = (d rigid/dq_j) (a cos(q_j) + b sin(q_j)): the encoder value has an error with one period per turn."""
 
     name: ClassVar[str] = "encoder_eccentricity"
     title: ClassVar[str] = "encoder eccentricity"
@@ -26,7 +26,7 @@ class EncoderEccentricity(Effect):
     experiments: ClassVar[tuple[str, ...]] = ("payload", "static_hold")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the two phases' amplitudes."""
+        """Describes the amplitudes of cosine and sine."""
         assert joint is not None
         length = length_unit(robot, joint - 1)
         return Coefficient("cosine", length, -0.1, 0.1), Coefficient("sine", length, -0.1, 0.1)
@@ -36,7 +36,7 @@ class EncoderEccentricity(Effect):
         return tuple(i for i, joint in enumerate(robot.chain.joints, start=1) if joint.kind == "revolute")
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of all joints per amplitude."""
+        """Evaluates the torque of all joints per amplitude (N, n, 2)."""
         assert joint is not None
         q = situation.q[:, joint - 1, None, None]
         error = np.concatenate([np.cos(q), np.sin(q)], axis=2)
@@ -56,6 +56,6 @@ class EncoderEccentricity(Effect):
         return f"The encoder of joint {joint} has an error with an amplitude of {size:.3g} {length}, once per turn."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the position."""
+        """Returns the position."""
         assert joint is not None
         return f"position of joint {joint} [rad]", situation.q[:, joint - 1]

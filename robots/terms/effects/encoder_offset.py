@@ -1,4 +1,4 @@
-"""An encoder that is mounted with an offset."""
+"""An encoder with a wrong zero."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 class EncoderOffset(Effect):
-    """tau = (d rigid/dq_j) o: joint j stands at q + o when it reports q."""
+    """tau = (d rigid/dq_j) o: joint j is at q + o when its encoder reports q."""
 
     name: ClassVar[str] = "encoder_offset"
     title: ClassVar[str] = "wrong joint zero (encoder offset)"
@@ -30,7 +30,7 @@ class EncoderOffset(Effect):
         return (Coefficient("offset", length_unit(robot, joint - 1), -0.5, 0.5),)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of all joints per offset of one."""
+        """Evaluates the torque of all joints per offset of one joint (N, n, 1)."""
         assert joint is not None
         return situation.sensitivity("position")[:, :, joint - 1 : joint].copy()
 
@@ -47,6 +47,6 @@ class EncoderOffset(Effect):
         return f"The true position of joint {joint} is {coefficients[0]:.3g} {length} larger than its encoder value."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the position."""
+        """Returns the position."""
         assert joint is not None
         return f"position of joint {joint} [rad]", situation.q[:, joint - 1]

@@ -1,8 +1,8 @@
-"""Somebody or something that pushes the flange for a moment."""
+"""A short external force on the arm."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from scipy.special import gamma
 
 from robots.terms.base import force_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.capabilities import GearLoad, Persistence
 from robots.terms.effect_bases.states import spells
 
 if TYPE_CHECKING:
@@ -18,35 +19,36 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-BETWEEN = 0.6  # hardness of a push that is neither a half sine nor a hold
-HOLD = 0.1  # of one that lasts
-# A push that lasts while the arm moves looks like a brief one of constant torques where it moves least: so many times
-# as long, and from there, its middle or its end, it is looked for.
+BETWEEN = 0.6  # hardness of a push between a half sine and a constant force
+HOLD = 0.1  # hardness of a nearly constant force
+# A long push on a moving arm resembles a short one with constant torques while the arm moves least. Longer windows are
+# therefore tried: factors on the duration, and where in the longer window the short one lies.
 LONGER = (1.0, 2.0, 4.0, 8.0)
 FROM = (0.0, 0.5, 1.0)
-ALONE = 0.05  # share of what a joint feels below which others feel nothing
+ALONE = 0.05  # fraction of the largest joint torque below which another joint counts as unloaded
 NONE = 1e-6  # ratio of force to moment, or the reverse, below which the smaller one counts as zero
 WRENCH = tuple(f"mean_{what}_{k}" for what in ("force", "moment") for k in "xyz")
-# A force F at the place r of a body; F along the base's axes, r along the body's.
+# Force F at the point r of a body: F along the base's axes, r along the body's axes.
 PLACED = tuple(f"place_{i}_force_{k}" for i in "xyz" for k in "xyz")
 
 
 class ExternalContact(Effect):
     """tau_j = c_j p(t): a pulse of each joint's torque from the time t_0 for the duration d, p = sin(pi s)^h.
 
-    A force anywhere on the arm: during so short a time the pose, and with it what each joint feels, stays nearly the
-    same. The hardness h makes it a half sine (1), a hold (near 0), or what lies between. One that lasts while the arm
-    moves is tau = J(q)' w p(t) / p_m instead: a force and a moment on the flange, constant in the base frame; or a
-    force F, constant there, at a place r of one of the bodies, J_b(q, r)' F p(t) / p_m, which is linear in F and in all
-    r_i F_k. p_m is the mean of p over d, so that F is the mean force, which no guess at its course changes.
+    The force may act anywhere on the arm. During a short pulse the pose is nearly constant, and so is each joint's
+    torque. The hardness h gives a half sine (1), a constant (near 0), or a course between them.
+
+    A longer push on a moving arm has one of two other formulas. Either a force and a moment on the flange, constant in
+    the base frame: tau = J(q)' w p(t) / p_m. Or a force F, constant in the base frame, at a point r of one body:
+    tau = J_b(q, r)' F p(t) / p_m, which is linear in F and in all r_i F_k. p_m is the mean of p over d, so w and F are
+    mean values, which do not depend on the assumed course.
     """
 
     name: ClassVar[str] = "external_contact"
     title: ClassVar[str] = "external contact"
-    loads_gear: ClassVar[bool] = True
+    persistence: ClassVar[Persistence] = Persistence.TRANSIENT
+    gear_load: ClassVar[GearLoad] = GearLoad.CAUSES
     whole_robot: ClassVar[bool] = True
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
-    transient: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.03),
         Shape("duration", "s", 0.03, 60.0, "log", (0.2, 0.5, 1.25, 3.2), 0.05),
@@ -58,11 +60,11 @@ class ExternalContact(Effect):
     experiments: ClassVar[tuple[str, ...]] = ("repeat",)
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes what each joint feels at the peak."""
+        """Describes the peak torque of each joint."""
         return self.described(robot, joint, ())
 
     def described(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[Coefficient, ...]:
-        """Describes what each joint feels at the peak, or force and moment on the flange, or force and place."""
+        """Describes the joints' peak torques, or force and moment on the flange, or force and force times point."""
         if on_body(shape):
             named = [Coefficient(name, "N") for name in WRENCH[:3]] + [Coefficient(name, "N m") for name in PLACED]
         elif on_the_flange(shape):
@@ -72,10 +74,10 @@ class ExternalContact(Effect):
         return (*named, *(Coefficient("", "") for _ in range(_count(robot.n) - len(named))))
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
-        """Whether joints before the most loaded one are loaded as well.
+        """Returns whether the joints before the most loaded one are loaded as well.
 
-        A force misses the axes of the first two where it acts across the arm, or along an upright first axis; all
-        before a further one it misses by chance only. What one of those has alone is its own.
+        A force may cause no torque on the first joints, for example along a vertical first axis. If only the third
+        joint or a later one is loaded, an error of that joint is more likely than a force on the arm.
         """
         size = np.abs(coefficients[: robot.n])
         most = int(np.argmax(size))
@@ -84,11 +86,11 @@ class ExternalContact(Effect):
         return not alone and super().is_plausible(robot, joint, coefficients, shape)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists durations, each starting every half of it."""
+        """Lists windows of several durations, with starts half a duration apart."""
         return tuple((*spell, BETWEEN, 0.0, 0.0) for spell in spells(situation, self.shapes[1].grid))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the contact within the data."""
+        """Bounds the contact to the data."""
         first, last = float(situation.t[0]), float(situation.t[-1])
         longest = min(self.shapes[1].upper, max(last - first, 0.1))
         hardness = (self.shapes[2].lower, self.shapes[2].upper)
@@ -97,7 +99,7 @@ class ExternalContact(Effect):
     def other_optima(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Gives longer pushes on the flange that may contain this one."""
+        """Lists longer pushes on the flange that contain this one."""
         if on_body(shape):
             return ()
         (first, last), (_, longest), *_ = self.bounds(situation, joint)
@@ -113,13 +115,16 @@ class ExternalContact(Effect):
         )
 
     def open_edges(self, shape: tuple[float, ...]) -> tuple[tuple[int, tuple[float, ...]], ...]:
-        """Gives pushes as long as this, just before and just after: what pushes an arm that moves is no such pulse."""
+        """Lists pushes of the same duration just before and just after this one.
+
+        A push on a moving arm is not a pulse of constant joint torques, so its true edges may lie further out.
+        """
         start, duration = shape[:2]
         times = ((0, start - duration), (1, start + duration))
         return tuple((k, (at, duration, HOLD, 0.0, 0.0)) for k, at in times)
 
     def sustained_shapes(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
-        """Gives forces at a place of each of the bodies."""
+        """Lists constant forces at a point of each body, over all data."""
         if on_body(shape):
             return ()
         first, last = float(situation.t[0]), float(situation.t[-1])
@@ -127,7 +132,7 @@ class ExternalContact(Effect):
         return tuple((*ever, 0.0, float(body + 1)) for body in range(situation.robot.n))
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates a pulse on each joint, or the joints' torques of one on the flange or a body (N, n, k)."""
+        """Evaluates a pulse on each joint, or the joints' torques by a force on the flange or a body (N, n, k)."""
         n, during = situation.robot.n, pulse(situation.t, shape)
         during = during / mean_of(shape[2]) if on_body(shape) or on_the_flange(shape) else during
         X = np.zeros((len(situation), n, _count(n)))
@@ -148,7 +153,7 @@ class ExternalContact(Effect):
     def propose(
         self, situation: Situation, joint: Place, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks all times at once, by the residual's sum in each window over what it is in most of that length."""
+        """Ranks all windows by the residual's squared sum, relative to the median over windows of equal duration."""
         grid = self.grid(situation, joint)
         if len(grid) <= count:
             return grid
@@ -158,7 +163,7 @@ class ExternalContact(Effect):
         last = np.searchsorted(situation.t, starts + 0.9 * durations)
         energies = (sums[last] - sums[first]) ** 2
         for duration in np.unique(durations):
-            # Noise of long and short windows differs; the median of a chi-square normalises both.
+            # Noise differs with the duration; 0.455 is the median of chi-square with one degree of freedom.
             own = energies[durations == duration]
             usual = np.array([np.median(some) / 0.455 if len(some := of[of > 0]) else 0.0 for of in own.T])
             energies[durations == duration] = np.divide(own, usual, out=np.zeros_like(own), where=usual > 0)
@@ -184,7 +189,7 @@ class ExternalContact(Effect):
                 "(mean values, along the base's axes; the signs are those of the arm's reaction)."
             )
         if on_the_flange(shape):
-            # A part that no joint feels is zero, or rounding.
+            # A component that causes no joint torque is zero up to rounding.
             push, turn = (float(np.linalg.norm(part)) for part in (coefficients[:3], coefficients[3:6]))
             sizes = (("force", push, "N"), ("moment", turn, "N m"))
             least = NONE * max(push, turn)
@@ -207,12 +212,12 @@ def _count(joints: int) -> int:
 
 
 def _at_body(robot: Robot, links: Array, body: int) -> Array:
-    """The joints' torques (N, n, 12) of forces on a body, from 1: at its origin, and as they grow with the place.
+    """Computes the joints' torques (N, n, 12) by unit forces on a body: at its origin, and per coordinate of the point.
 
     Args:
-        robot: its joints.
+        robot: the robot with n joints.
         links: each link's rotation and origin (N, 12, n).
-        body: the link.
+        body: the link, counted from 1.
     """
     turns, origins = links[:, :9].reshape(len(links), 3, 3, robot.n), links[:, 9:]
     axes = turns[:, :, :, body - 1]
@@ -229,17 +234,17 @@ def _at_body(robot: Robot, links: Array, body: int) -> Array:
 
 
 def on_the_flange(shape: tuple[float, ...]) -> bool:
-    """Whether a push is a force on the flange that lasts while the arm moves."""
+    """Returns whether a push acts on the flange of a moving arm."""
     return len(shape) > 3 and shape[3] > 0.5
 
 
 def on_body(shape: tuple[float, ...]) -> bool:
-    """Whether a push is a force at a place of a body that lasts while the arm moves."""
+    """Returns whether a push acts at a point of a body of a moving arm."""
     return len(shape) > 4 and shape[4] > 0.5
 
 
 def mean_of(hardness: float) -> float:
-    """Gives the mean of sin(pi s)^h over s from 0 to 1."""
+    """Computes the mean of sin(pi s)^h over s from 0 to 1."""
     return float(gamma(0.5 * hardness + 0.5) / (np.sqrt(np.pi) * gamma(0.5 * hardness + 1.0)))
 
 
@@ -248,7 +253,7 @@ def pulse(t: Array, shape: tuple[float, ...]) -> Array:
 
     Args:
         t: time (N,) [s].
-        shape: start and duration [s], and the hardness h, `BETWEEN` where it is not given.
+        shape: start and duration [s], and the hardness h, by default `BETWEEN`.
     """
     hardness = shape[2] if len(shape) > 2 else BETWEEN
     s = (t - shape[0]) / shape[1]

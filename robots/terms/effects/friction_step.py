@@ -1,4 +1,4 @@
-"""Friction that changes from one moment to the next: damage, a lost seal, a dragging brake."""
+"""A sudden, lasting change of friction, for example by damage, a lost seal or a dragging brake."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class FrictionStep(Sudden, JointEffect):
     experiments: ClassVar[tuple[str, ...]] = ("pause", "repeat")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the steps of Coulomb and of viscous friction."""
+        """Describes the steps of Coulomb and viscous friction."""
         assert joint is not None
         force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
         return Coefficient("coulomb_step", force), Coefficient("viscous_step", f"{force} s/{length}")
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates sign(dq) and dq after the change."""
+        """Evaluates sign(dq) and dq after the change, zero before (N, 2)."""
         after = (situation.t >= shape[0]).astype(float)
         return np.column_stack([after * situation.sign[:, joint - 1], after * situation.dq[:, joint - 1]])
 

@@ -1,44 +1,43 @@
-"""A hand that guides the robot through a log: an external force on all of its motion."""
+"""Hand guiding: an external force that causes the robot's motion."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.capabilities import Persistence
 
 if TYPE_CHECKING:
     from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Fraction of the torque below which a value is rounding.
+# Fraction of the torque below which the weight of a joint is rounding.
 NO_WEIGHT = 1e-9
-# Who moves the arm takes over this share of what its motion needs at least: less is no hand.
+# Least fraction of the inertial torque that a guiding hand takes over.
 MOST = 0.5
-# Windows in a log in which a hand is looked for, as shares of it, and the shortest [s]: what is briefer is a contact.
+# Durations of scanned windows, as fractions of a log, and the shortest [s]; a shorter event is a contact.
 SHARES, SHORTEST = (1 / 2, 1 / 4, 1 / 8, 1 / 16), 2.0
-# Windows that are proposed: each has four columns a joint.
+# Number of windows proposed for the scan; it is small because each has four columns per joint.
 PROPOSED = 3
 
 
 class HandGuiding(Effect):
-    """tau_j = w(t) (a_j sign(dq_j) + b_j dq_j - s_j tau_M,j - g_j tau_G,j), w one during a log.
+    """tau_j = w(t) (a_j sign(dq_j) + b_j dq_j - s_j tau_M,j - g_j tau_G,j), w one from start to end.
 
-    tau_G is the torque of gravity and tau_M the rest of the rigid body's. A hand that moves the robot takes over what
-    friction and inertia need. What gravity needs stays with the drives, but for the error g of the weight that they
-    compensate: that the hand feels too. The friction's columns are free of the base model's values, which such a log
-    has spoilt.
+    tau_G is the gravity torque and tau_M the rest of the rigid-body torque. A hand that moves the robot takes over the
+    torque for friction and inertia. The drives compensate gravity up to a relative error g, which the hand carries as
+    well. The friction columns do not use the base model's friction, because such a log biases it.
     """
 
     name: ClassVar[str] = "hand_guiding"
     title: ClassVar[str] = "robot guided by hand (external force)"
     whole_robot: ClassVar[bool] = True
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
-    transient: ClassVar[bool] = True
+    persistence: ClassVar[Persistence] = Persistence.TRANSIENT
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.02),
         Shape("end", "s", -np.inf, np.inf, "linear", inexact=0.02),
@@ -47,7 +46,7 @@ class HandGuiding(Effect):
     experiments: ClassVar[tuple[str, ...]] = ("repeat",)
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes, joint after joint, Coulomb and viscous friction taken over, and shares of inertia and weight."""
+        """Describes per joint the Coulomb and viscous friction, and the fractions of inertia and weight, taken over."""
         result: list[Coefficient] = []
         for j in range(robot.n):
             force, length = force_unit(robot, j), length_unit(robot, j)
@@ -60,7 +59,10 @@ class HandGuiding(Effect):
         return tuple(result)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists the logs, where there are several, and windows in each; one hand on all of them is the base model's."""
+        """Lists windows in each log, and whole logs if there are several.
+
+        Guiding over all data is not listed, because the base model's fit absorbs it.
+        """
         several = len(situation.starts) > 1
         logs = [(float(situation.t[run.start]), float(situation.t[run.stop - 1])) for run in situation.runs]
         inside = [window for log in logs for window in _windows(*log)]
@@ -69,7 +71,7 @@ class HandGuiding(Effect):
     def propose(
         self, situation: Situation, joint: Place, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks windows by how much more is left in them than in most of their length, on all joints."""
+        """Ranks windows by the residual's mean square, relative to the median over all windows, summed over joints."""
         grid, count = self.grid(situation, joint), min(count, PROPOSED)
         if len(grid) <= count:
             return grid
@@ -83,17 +85,17 @@ class HandGuiding(Effect):
         return tuple(grid[i] for i in np.argsort(-scores)[:count])
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps start and end within the data."""
+        """Bounds start and end to the data."""
         span = (float(situation.t[0]), float(situation.t[-1]))
         return span, span
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates four columns per joint, each on that joint alone."""
+        """Evaluates four columns per joint, each on that joint alone (N, n, 4 n)."""
         n = situation.robot.n
         during = (situation.t >= shape[0]) & (situation.t <= shape[1])
         weight = np.einsum("njk,nk->nj", situation.sensitivity("gravity")[during], situation.gravity[during])
         moving = situation.rigid[during] - weight
-        # An axis along gravity carries no weight, but for rounding.
+        # An axis along gravity carries no weight up to rounding.
         weight[:, np.abs(weight).max(axis=0, initial=0.0) < NO_WEIGHT * np.abs(moving).max(initial=1e-300)] = 0.0
         X = np.zeros((len(situation), n, n, 4))
         for j in range(n):
@@ -121,7 +123,7 @@ class HandGuiding(Effect):
 
 
 def _windows(start: float, end: float) -> list[tuple[float, float]]:
-    """Lists windows in a log, each length from half of it down, every quarter of that from the one before."""
+    """Lists windows (start, end) [s] in a log, of several lengths, with starts a quarter of a length apart."""
     result = []
     for share in SHARES:
         length = share * (end - start)

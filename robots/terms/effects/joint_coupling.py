@@ -1,4 +1,4 @@
-"""Two wrist joints whose drives run through each other."""
+"""Two wrist joints with coupled drives, where one drive passes through the other joint."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ WAYS = (1.0, -1.0)
 
 
 class JointCoupling(StaticEffect):
-    """Of joint k and j = k - 1: tau_j = I ddq_k + a dq_k + F s, tau_k = I ddq_j + b dq_j + w F s.
+    """For joints k and j = k - 1: tau_j = I ddq_k + a dq_k + F s, tau_k = I ddq_j + b dq_j + w F s.
 
-    s = sign(dq_j + w dq_k). The rotor of a drive that passes through another (Gautier 1995). Rotors and seals that both
-    motions turn give a = b; each is free, so that coupling in one direction is found as well. The way w is -1 where the
-    description's axes of both joints turn the seal between them against each other. Counted at the outer joint.
+    s = sign(dq_j + w dq_k), see Gautier 1995 for a rotor whose drive passes through another joint. Rotors and seals
+    that both motions turn give a = b. Both are fitted independently, so that a coupling in one direction is found as
+    well. The sign w is -1 if positive motions of both joints turn the seal between them in opposite directions. The
+    effect is listed at the outer joint k.
     """
 
     name: ClassVar[str] = "joint_coupling"
@@ -38,11 +39,11 @@ class JointCoupling(StaticEffect):
     experiments: ClassVar[tuple[str, ...]] = ("single_joint",)
 
     def joints(self, robot: Robot) -> tuple[Place, ...]:
-        """Lists the last two joints, each with the one before it."""
+        """Lists the last two joints; each is coupled with the joint before it."""
         return tuple(range(max(2, robot.n - 1), robot.n + 1))
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes inertia, viscous friction each way, and Coulomb friction."""
+        """Describes the coupled inertia, viscous friction in each direction, and Coulomb friction."""
         assert joint is not None
         force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
         return (
@@ -55,7 +56,7 @@ class JointCoupling(StaticEffect):
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives both ways round."""
+        """Lists both signs w."""
         return tuple((way,) for way in WAYS)
 
     def expression(self, robot: Robot, joint: Place, at: Instant) -> casadi.SX:
@@ -65,13 +66,13 @@ class JointCoupling(StaticEffect):
         X = casadi.SX(robot.n, 4)
         X[inner, 0], X[outer, 0] = at.ddq[outer], at.ddq[inner]
         X[inner, 1], X[outer, 2] = at.dq[outer], at.dq[inner]
-        # Two smooth signs are not the sign of a sum: it has the same slope at rest, a millirad per second wide.
+        # The sign of a sum does not follow from the two smooth signs, so it has its own smoothing width.
         X[inner, 3] = casadi.tanh((at.dq[inner] + way * at.dq[outer]) / COULOMB_SCALE)
         X[outer, 3] = way * X[inner, 3]
         return X
 
     def acts_on(self, robot: Robot, joint: Place) -> tuple[int, ...]:
-        """Names both joints."""
+        """Returns both joints, counted from 0."""
         assert joint is not None
         return joint - 2, joint - 1
 
@@ -93,10 +94,10 @@ class JointCoupling(StaticEffect):
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the velocity of the inner joint, which the outer one should not feel."""
+        """Returns the velocity of the inner joint, which should not influence the outer one."""
         assert joint is not None
         return f"velocity of joint {joint - 1} [rad/s]", situation.dq[:, joint - 2]
 
 
 COULOMB_SCALE = 5e-3
-"""Velocity [rad/s or m/s] below which the common Coulomb friction fades."""
+"""Velocity [rad/s or m/s] of the smooth sign of the shared Coulomb friction."""

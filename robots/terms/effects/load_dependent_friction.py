@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from robots.terms.base import length_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
+from robots.terms.effect_bases.capabilities import GearLoad
 from robots.terms.effect_bases.static import Instant, StaticJointEffect
 from robots.terms.effect_bases.unknown_rotor import KNOWN, ROTOR, load_beside, rotor_bounds, rotor_grid
 
@@ -19,21 +20,21 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-# A gear that loses as much when its load drives it as when it drives the load.
+# Ratio of friction when the load drives the joint to friction when the joint drives the load, if both are equal.
 ALIKE = 1.0
 
 
 class LoadDependentFriction(StaticJointEffect):
-    """tau = w |tau_L| (a sign(dq) + b dq), tau_L the torque that passes the gear (Hamon et al. 2010).
+    """tau = w |tau_L| (a sign(dq) + b dq), tau_L the gear load (Hamon et al. 2010).
 
-    w is 1 where the joint drives its load, and `driven_back` where the load drives it: a gear's two efficiencies. What
-    they differ in is a share of tau_L itself, as an error of the torque constant is. How much of the first joints'
-    inertia is the rotor's, which loads no gear, this effect tells where the robot's description does not.
+    w is 1 while the joint drives its load, and `driven_back` while the load drives the joint: a gear has two
+    efficiencies. Their difference is a torque proportional to tau_L itself, like an error of the torque constant. A
+    rotor's inertia does not load the gear. This effect can therefore determine an unknown rotor of the first joints.
     """
 
     name: ClassVar[str] = "load_dependent_friction"
     title: ClassVar[str] = "load-dependent friction"
-    depends_on_gear_load: ClassVar[bool] = True
+    gear_load: ClassVar[GearLoad] = GearLoad.FEELS
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("driven_back", "1", 0.0, 1.0, "linear", (ALIKE,), 0.05, default=ALIKE),
         ROTOR,
@@ -54,19 +55,19 @@ class LoadDependentFriction(StaticJointEffect):
         )
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists a gear that loses alike both ways; where no rotor is known, with none and with half of the inertia."""
+        """Lists a gear with equal friction in both power directions, for each rotor inertia of the scan."""
         assert joint is not None
         return tuple((ALIKE, rotor) for rotor in rotor_grid(situation, joint))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the rotor near what is known of it."""
+        """Bounds the rotor inertia to its known range."""
         assert joint is not None
         return (0.0, 1.0), rotor_bounds(situation, joint)
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the gear that loses alike both ways, with the rotor that is known or as fitted."""
+        """Lists equal friction in both power directions, the known rotor, and both together."""
         return (ALIKE, KNOWN), (ALIKE, None), (None, KNOWN)
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
@@ -101,7 +102,7 @@ class LoadDependentFriction(StaticJointEffect):
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the load times the direction of motion."""
+        """Returns the absolute load times the sign of velocity."""
         assert joint is not None
         j = joint - 1
         back, rotor = shape or (ALIKE, KNOWN)

@@ -1,4 +1,4 @@
-"""Friction that falls as the motor, not the gear, heats the joint."""
+"""Friction that falls as the motor's current heats the joint."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class LoadHeat(HeatEffect):
-    """tau = -x (a sign(dq) + b dq), dx/dt = tau^2 - x / T: x is copper heat, at rest as in motion."""
+    """tau = -x (a sign(dq) + b dq), dx/dt = tau^2 - x / T: x is stored copper heat, which also builds up at rest."""
 
     name: ClassVar[str] = "load_heat"
     title: ClassVar[str] = "friction reduced by motor heat"
@@ -30,14 +30,14 @@ class LoadHeat(HeatEffect):
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "pause")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the fall of Coulomb and of viscous friction per squared torque and time."""
+        """Describes the decrease of Coulomb and viscous friction per squared torque and time."""
         assert joint is not None
         force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
         heat = f"(({force})2 ks)"
         return Coefficient("coulomb_fall", f"{force}/{heat}"), Coefficient("viscous_fall", f"{force} s/{length}/{heat}")
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates -x sign(dq) and -x dq."""
+        """Evaluates -x sign(dq) and -x dq (N, 2)."""
         x = copper_heat(situation, joint, shape[0])
         return np.column_stack([-x * situation.sign[:, joint - 1], -x * situation.dq[:, joint - 1]])
 
@@ -58,7 +58,13 @@ class LoadHeat(HeatEffect):
 
 
 def copper_heat(situation: Situation, joint: int, time_constant: float) -> Array:
-    """Integrates the squared torque into heat kept (N,) [(N m)2 ks]."""
+    """Integrates a joint's squared base-model torque to stored copper heat (N,) [(N m)2 ks].
+
+    Args:
+        situation: the motion and the base model's torque (N samples).
+        joint: the joint, counted from 1.
+        time_constant: [s].
+    """
 
     def integrate() -> Array:
         return relaxation(situation, situation.torque[:, joint - 1] ** 2, time_constant) / 1000.0

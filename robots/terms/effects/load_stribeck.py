@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
+from robots.terms.effect_bases.capabilities import GearLoad
 from robots.terms.effect_bases.states import moving_speed
 from robots.terms.effect_bases.static import Instant, StaticJointEffect
 
@@ -23,7 +24,7 @@ class LoadStribeck(StaticJointEffect):
 
     name: ClassVar[str] = "load_stribeck"
     title: ClassVar[str] = "load-dependent break-away friction"
-    depends_on_gear_load: ClassVar[bool] = True
+    gear_load: ClassVar[GearLoad] = GearLoad.FEELS
     needs_full_rate: ClassVar[bool] = True
     rare: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("stribeck_velocity", "rad/s", 1e-3, 2.0, "log"),)
@@ -31,11 +32,11 @@ class LoadStribeck(StaticJointEffect):
     experiments: ClassVar[tuple[str, ...]] = ("payload", "sweep")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the share of the load."""
+        """Describes the break-away friction per load."""
         return (Coefficient("share_of_load", "1"),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists velocities, by factors of 3, up to half the fastest."""
+        """Lists Stribeck velocities, spaced by factors of about 3, up to half the largest speed."""
         assert joint is not None
         slow, top = moving_speed(situation, joint)
         if top == 0.0:
@@ -66,6 +67,6 @@ class LoadStribeck(StaticJointEffect):
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the velocity."""
+        """Returns the velocity."""
         assert joint is not None
         return f"velocity of joint {joint} [rad/s]", situation.dq[:, joint - 1]

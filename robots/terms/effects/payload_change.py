@@ -1,13 +1,14 @@
-"""A payload that is gripped, dropped or exchanged."""
+"""A payload that is picked up, dropped or exchanged at one time."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.capabilities import GearLoad, Persistence
 from robots.terms.effect_bases.states import change_times
 
 if TYPE_CHECKING:
@@ -17,17 +18,17 @@ Array = NDArray[np.float64]
 
 
 class PayloadChange(Effect):
-    """tau = Y_tool (m, m c, Ixx, Iyy, Izz) from the time t_c on: a body on the flange, in its frame.
+    """tau = Y_tool (m, m c, Ixx, Iyy, Izz) from the time t_c on: a body at the flange, in the flange's frame.
 
-    Its products of inertia are left out: a tool's are small against what its distance makes of the others. Where
-    `own_inertia` is 0, so are its moments of inertia: a small body's hardly show.
+    The products of inertia are left out, because those of usual tools are comparatively small. The moments of inertia
+    are used only if `own_inertia` is 1, because those of a small body hardly show.
     """
 
     name: ClassVar[str] = "payload_change"
     title: ClassVar[str] = "sudden change of the payload"
-    loads_gear: ClassVar[bool] = True
+    persistence: ClassVar[Persistence] = Persistence.TIME
+    gear_load: ClassVar[GearLoad] = GearLoad.CAUSES
     whole_robot: ClassVar[bool] = True
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("change_time", "s", -np.inf, np.inf, "linear", inexact=0.03),
         Shape("own_inertia", "", 0.0, 1.0, "linear", default=1.0),
@@ -36,7 +37,7 @@ class PayloadChange(Effect):
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "repeat")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the change of mass, of first moments and of moments of inertia, in the flange's frame."""
+        """Describes the changes of mass, first moments and moments of inertia in the flange's frame."""
         return (
             Coefficient("mass_change", "kg"),
             *(Coefficient(f"moment_change_{axis}", "kg m") for axis in "xyz"),
@@ -44,21 +45,21 @@ class PayloadChange(Effect):
         )
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists times through the data, and the pauses between logs."""
+        """Lists candidate times within the data, and the start of each further log."""
         return tuple((time, 0.0) for time in change_times(situation))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the change within the data, and leaves moments of inertia to `likely`."""
+        """Bounds the change time to the data; `likely` decides on the moments of inertia."""
         return (float(situation.t[0]), float(situation.t[-1])), (0.0, 0.0)
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives a body with moments of inertia of its own."""
+        """Lists a body with its own moments of inertia."""
         return ((None, 1.0),)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of all joints per kg, kg m and kg m2."""
+        """Evaluates the torque of all joints per kg, kg m and kg m2 (N, n, 7)."""
         X = situation.sensitivity("tool")[:, :, USED] * (situation.t >= shape[0]).astype(float)[:, None, None]
         if not shape[1]:
             X[:, :, 4:] = 0.0
@@ -79,4 +80,4 @@ class PayloadChange(Effect):
 
 
 USED = (0, 1, 2, 3, 4, 7, 9)
-"""Used inertial parameters: all but the products of inertia."""
+"""Indices of the inertial parameters used: all but the products of inertia."""

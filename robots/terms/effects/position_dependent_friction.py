@@ -1,4 +1,4 @@
-"""Friction that differs round the turn: a bent shaft, a worn spot, a bearing out of true."""
+"""Friction that varies with the joint position, for example by a bent shaft, a worn spot or an eccentric bearing."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 HIGHEST = {"rad": 12.0, "m": 1000.0}
-"""Highest order per turn, and wave number of a linear axis [rad/m]: what is quicker is a ripple."""
+"""Highest order per turn, and highest wave number of a linear axis [rad/m]; above it the effect is a ripple."""
 OVER = (1.5, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0)
-"""Phases [rad] that a scan's friction goes through over the range of a linear axis."""
+"""Phases [rad] over the range of a linear axis in a scan."""
 
 
 class PositionDependentFriction(StaticJointEffect):
-    """tau = sign(dq) (a cos(h q) + b sin(h q)), h periods per turn; of a linear axis h is a wave number [rad/m]."""
+    """tau = sign(dq) (a cos(h q) + b sin(h q)), h in periods per turn; a wave number [rad/m] on a linear axis."""
 
     name: ClassVar[str] = "position_dependent_friction"
     title: ClassVar[str] = "position-dependent friction"
@@ -35,13 +35,13 @@ class PositionDependentFriction(StaticJointEffect):
     experiments: ClassVar[tuple[str, ...]] = ("sweep", "payload")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the two phases' amplitudes."""
+        """Describes the amplitudes of cosine and sine."""
         assert joint is not None
         force = force_unit(robot, joint - 1)
         return Coefficient("cosine", force), Coefficient("sine", force)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists the orders of which the joint travels at least a sixth of a period; of a linear axis, waves over it."""
+        """Lists orders with at least a sixth of a period over the joint's range; by phase over it on a linear axis."""
         assert joint is not None
         reach = float(np.ptp(situation.q[:, joint - 1]))
         if length_unit(situation.robot, joint - 1) == "m":
@@ -49,14 +49,14 @@ class PositionDependentFriction(StaticJointEffect):
         return tuple((order,) for order in self.shapes[0].grid if order * reach > 1.0)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the order below what would be a ripple's."""
+        """Bounds the order below that of a ripple."""
         assert joint is not None
         return ((self.shapes[0].lower, HIGHEST[length_unit(situation.robot, joint - 1)]),)
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the nearest whole order, if the joint's range does not distinguish it from the fitted one."""
+        """Lists the nearest whole order, if the joint's range does not distinguish it from the fitted one."""
         assert joint is not None
         order = max(float(round(shape[0])), 1.0)
         if length_unit(situation.robot, joint - 1) == "m":
@@ -86,6 +86,6 @@ class PositionDependentFriction(StaticJointEffect):
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the position."""
+        """Returns the position."""
         assert joint is not None
         return f"position of joint {joint} [rad]", situation.q[:, joint - 1]

@@ -1,4 +1,4 @@
-"""Friction that turns round over a travel, not at once, when the motion reverses."""
+"""Friction that changes sign gradually after a reversal (presliding)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from robots.terms.base import force_unit
 from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Shape, Situation
+from robots.terms.effect_bases.capabilities import AtReversals
 from robots.terms.effect_bases.states import bristle
 
 if TYPE_CHECKING:
@@ -20,30 +21,30 @@ Array = NDArray[np.float64]
 class PreslidingHysteresis(JointEffect):
     """tau = F (z / z_s - sign(dq)), z' = dq - |dq| z / z_s (Dahl 1968; LuGre at low speed).
 
-    The base model's Coulomb friction jumps at each reversal; the contacts' bristles bend first.
+    The base model's Coulomb friction jumps at each reversal. In presliding it changes sign over a travel of about z_s.
     """
 
     name: ClassVar[str] = "presliding_hysteresis"
     title: ClassVar[str] = "presliding hysteresis"
     needs_full_rate: ClassVar[bool] = True
-    acts_at_reversals: ClassVar[bool] = True
+    at_reversals: ClassVar[AtReversals] = AtReversals.GRADUAL
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("presliding_travel", "rad", 1e-5, 0.2, "log"),)
     rivals: ClassVar[tuple[str, ...]] = ("stribeck", "backlash", "time_delay", "current_lag", "spring")
     experiments: ClassVar[tuple[str, ...]] = ("micro_reversals", "sweep")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the part of Coulomb friction that turns round gradually; none does so beforehand."""
+        """Describes the part of Coulomb friction that changes sign gradually, which is not negative."""
         assert joint is not None
         return (Coefficient("presliding_torque", force_unit(robot, joint - 1), 0.0),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists travels, by factors of 2.5, between what the samples resolve and a tenth of the range."""
+        """Lists travels, spaced by factors of about 2.5, from the samples' resolution to a tenth of the range."""
         assert joint is not None
         q = situation.q[:, joint - 1]
         reach = float(np.ptp(q))
         if reach < 1e-9:
             return ()
-        # At a reversal the joint moves by half the acceleration times the squared period from sample to sample.
+        # At a reversal the joint moves by half the acceleration times the squared sample period between two samples.
         step = 0.5 * float(np.quantile(np.abs(situation.ddq[:, joint - 1]), 0.5)) * situation.sampled**2
         lowest, highest = max(2.0 * step, 1e-5), min(0.1 * reach, 0.2)
         if highest <= lowest:
@@ -52,7 +53,7 @@ class PreslidingHysteresis(JointEffect):
         return tuple((float(value),) for value in np.geomspace(lowest, highest, count))
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates z / z_s - sign(dq)."""
+        """Evaluates z / z_s - sign(dq) (N, 1)."""
         q, dq = situation.q[:, joint - 1], situation.dq[:, joint - 1]
         z = bristle(situation.t, q, dq, situation.runs, shape[0])
         return (z - situation.sign[:, joint - 1])[:, None]
@@ -74,14 +75,19 @@ class PreslidingHysteresis(JointEffect):
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the travel since the last reversal."""
+        """Returns the travel since the last reversal."""
         assert joint is not None
         q = situation.q[:, joint - 1]
         return f"travel of joint {joint} since it reversed [rad]", travel_since_reversal(q, situation.runs)
 
 
 def travel_since_reversal(q: Array, runs: tuple[slice, ...]) -> Array:
-    """Gives the signed way (N,) from the last reversal of a joint's positions (N,)."""
+    """Computes the signed travel (N,) since the last reversal, from a joint's positions (N,).
+
+    Args:
+        q: positions of one joint (N,) [rad or m].
+        runs: the logs' rows.
+    """
     travel = np.zeros(len(q))
     for run in runs:
         part = q[run]

@@ -1,4 +1,4 @@
-"""Friction of shear-thinning grease."""
+"""Viscous friction of shear-thinning grease, which grows less than the speed."""
 
 from __future__ import annotations
 
@@ -54,6 +54,6 @@ class ShearThinning(StaticJointEffect):
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the velocity."""
+        """Returns the velocity."""
         assert joint is not None
         return f"velocity of joint {joint} [rad/s]", situation.dq[:, joint - 1]

@@ -1,4 +1,4 @@
-"""A spring on a joint: a balancer, a gas spring, a cable bundle."""
+"""A spring on a joint, such as a balancer, a gas spring or a cable bundle."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
+from robots.terms.effect_bases.capabilities import GearLoad
 from robots.terms.effect_bases.static import Instant, StaticJointEffect
 
 if TYPE_CHECKING:
@@ -20,30 +21,30 @@ Array = NDArray[np.float64]
 PLAIN = (0.0, 0.0)
 
 
-# Lever ratios and dead centres of the scan; a joint that moves less than this [rad] does not determine them.
+# Lever ratios and dead centres [rad] of the scan; a joint that moves less than the third value [rad] does not
+# determine them.
 RATIOS, CENTRES, TOLD = (0.35,), tuple(float(x) for x in np.arange(-np.pi, np.pi, np.pi / 4)), 1.0
-# A shorter lever (as a fraction of the other) is ignored.
+# Least length of the shorter lever, as a fraction of the other; below it the spring counts as one without levers.
 SHORTEST = 0.1
-# Ends of levers so alike would nearly meet where the joint passes their dead centre: no spring is as short.
+# Ratio above which the levers' ends nearly meet at the dead centre; no spring is as short as their distance there.
 MEETING = 0.8
 LEVER = Shape("lever_ratio", "", 0.0, 0.95, "linear", inexact=0.1, default=0.0)
 CENTRE = Shape("dead_centre", "rad", -1.5 * np.pi, 1.5 * np.pi, "linear", inexact=0.1, default=0.0)
 
 
 class Spring(StaticJointEffect):
-    """tau = (p + c1 s + c2 s^2 + c3 s^3) ds/dq, s how far the joint's position q winds the spring up.
+    """tau = (p + c1 s + c2 s^2 + c3 s^3) ds/dq, s the deflection of the spring at joint position q.
 
-    A cable or a torsion spring has s = q - the middle of the joint's range, and p is the offset of the base model. A
-    balancer is fixed to both links, at r a and at a from the joint: s = (L - 1) / r with L = sqrt(1 + r^2 - 2 r cos
-    (q - q0)) the distance of its ends over a, and q0 where they are nearest; its c3 is zero: the lever's own curve and
-    two orders follow a gas spring. What sin(q) and cos(q) of it resemble gravity is the base model's, and cannot be
-    told from it on a level base.
+    A cable or a torsion spring has s = q minus the middle of the joint's range. Its p is the base model's offset. A
+    balancer is fixed to both links, at the distances r a and a from the joint. It has s = (L - 1) / r with the length
+    L = sqrt(1 + r^2 - 2 r cos(q - q0)) over a. At the dead centre q0 its ends are nearest. Its c3 is zero, because two
+    orders and the lever's nonlinearity fit a gas spring. The part of the torque proportional to sin(q) or cos(q) is the
+    same as gravity on a level base, and becomes part of the base model.
     """
 
     name: ClassVar[str] = "spring"
     title: ClassVar[str] = "spring or cable on the joint"
-    loads_gear: ClassVar[bool] = True
-    preloads: ClassVar[bool] = True
+    gear_load: ClassVar[GearLoad] = GearLoad.PRELOADS
     undetermined_text: ClassVar[str] = (
         "A spring or cable acts on joint {joint}. These logs do not determine its stiffness, because gravity has a "
         "similar effect."
@@ -53,7 +54,7 @@ class Spring(StaticJointEffect):
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "second_base_pose", "payload")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes stiffness, its two next orders, and the force at s = 0."""
+        """Describes the stiffness, its next two orders, and the preload at s = 0."""
         assert joint is not None
         force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
         return (
@@ -64,35 +65,35 @@ class Spring(StaticJointEffect):
         )
 
     def described(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[Coefficient, ...]:
-        """Describes them without a lever's third order and a plain spring's preload (the model's offset)."""
+        """Describes the coefficients; the third order of a lever and the preload of a plain spring are unused."""
         stiffness, second, third, preload = self.parameters(robot, joint)
         none = Coefficient("", "")
         return (stiffness, second, none, preload) if _has_lever(shape) else (stiffness, second, third, none)
 
     def unused(self, shape: tuple[float, ...]) -> frozenset[int]:
-        """Gives ratio and dead centre of a spring without levers."""
+        """Returns ratio and dead centre if the spring has no levers."""
         return frozenset() if _has_lever(shape) else frozenset((0, 1))
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
-        """Whether its ends stay apart: a catch at one angle resembles a spring whose ends nearly meet there."""
+        """Rejects a spring whose ends nearly meet within the joint's limits, which resembles a local fault there."""
         assert joint is not None
         meets = _has_lever(shape) and shape[0] > MEETING and _passes(robot, joint, shape[1])
         return not meets and super().is_plausible(robot, joint, coefficients, shape)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists a spring without levers, and levers if the joint turns far enough to determine them."""
+        """Lists a spring without levers, and levers if the joint moves far enough to determine them."""
         assert joint is not None
         return (PLAIN,) if np.ptp(situation.q[:, joint - 1]) < TOLD else self.forms(situation, joint)
 
     def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists a spring without levers, and levers of a revolute joint that moves far enough."""
+        """Lists a spring without levers, and for a revolute joint those with levers."""
         assert joint is not None
         if situation.robot.chain.joints[joint - 1].kind != "revolute":
             return (PLAIN,)
         return (PLAIN, *((ratio, centre) for ratio in RATIOS for centre in CENTRES))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps a spring plain if the data do not determine a lever."""
+        """Fixes a spring without levers if the data do not determine a lever."""
         if len(self.grid(situation, joint)) == 1:
             return ((0.0, 0.0), (0.0, 0.0))
         return super().bounds(situation, joint)
@@ -100,12 +101,12 @@ class Spring(StaticJointEffect):
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the spring without levers."""
+        """Lists the spring without levers."""
         return (PLAIN,)
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds s s', s^2 s', s^3 s' (zero for a lever) and s'."""
-        # The offset and the lower orders belong together: any middle spans the same torques, this one conditions well.
+        # With the offset, any middle spans the same torques; the middle of the range gives a good conditioning.
         x = at.q - _middle(robot, joint)
         plain = casadi.horzcat(x, x**2, x**3, 1.0)
         ratio, angle = at.shape[0], at.q - at.shape[1]
@@ -134,7 +135,7 @@ class Spring(StaticJointEffect):
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the position."""
+        """Returns the position."""
         assert joint is not None
         return f"position of joint {joint} [rad]", situation.q[:, joint - 1]
 
@@ -144,7 +145,7 @@ def _has_lever(shape: tuple[float, ...]) -> bool:
 
 
 def _passes(robot: Robot, joint: int, angle: float) -> bool:
-    """Whether an angle, or one some turns from it, is within a joint's limits."""
+    """Returns whether an angle, plus any number of turns, is within a joint's limits."""
     lower, upper = float(robot.limits.lower[joint - 1]), float(robot.limits.upper[joint - 1])
     return not np.isfinite(lower + upper) or lower + (angle - lower) % (2 * np.pi) <= upper
 

@@ -1,4 +1,4 @@
-"""Friction that rises as the joint slows down, before it breaks away: the Stribeck effect."""
+"""Stribeck friction, which rises as the joint slows down."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Stribeck(StaticJointEffect):
         return (Coefficient("stribeck_torque", force_unit(robot, joint - 1), lower=0.0),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists velocities, by factors of 2, between the slowest and half the fastest that the joint moves at."""
+        """Lists Stribeck velocities, spaced by factors of about 2, from the slowest to half the largest speed."""
         assert joint is not None
         slow, top = moving_speed(situation, joint)
         if top == 0.0:
@@ -51,12 +51,12 @@ class Stribeck(StaticJointEffect):
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the two curves of the literature: an exponential, and a Gaussian one."""
+        """Lists the two exponents of the literature: exponential (1) and Gaussian (2)."""
         return tuple((None, exponent) for exponent in self.shapes[1].grid)
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds exp(-(|dq| / v_s)^d) sign(dq)."""
-        # The power of zero has no derivative; a thousandth of the velocity does no harm.
+        # The power has no derivative at zero, so the velocity ratio is smoothed by a thousandth.
         ratio = casadi.sqrt((at.dq / at.shape[0]) ** 2 + 1e-6)
         return casadi.exp(-(ratio ** at.shape[1])) * at.sign
 
@@ -77,6 +77,6 @@ class Stribeck(StaticJointEffect):
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the velocity."""
+        """Returns the velocity."""
         assert joint is not None
         return f"velocity of joint {joint} [rad/s]", situation.dq[:, joint - 1]

@@ -1,4 +1,4 @@
-"""Friction that changes as the joint's own friction heats it."""
+"""Friction that falls as friction heat warms the joint."""
 
 from __future__ import annotations
 
@@ -19,20 +19,21 @@ Array = NDArray[np.float64]
 
 
 SLOWER = 12.0
-"""Time constant of the housing, as a multiple of the gear's; only a log of hours would determine it."""
+"""Time constant of the housing as a multiple of the gear's. It is fixed, because only logs of hours determine it."""
 MIDDLE = 400.0
+"""Time constant [s] of the stored heat that limits `fading`."""
 FADES = 5.0
-"""Largest fading times the heat kept with a middling time constant: friction is as good as gone there."""
+"""Largest product of `fading` and that stored heat; the decrease of friction is then saturated."""
 
 
 class ThermalFriction(HeatEffect):
     """tau = -f (a sign(dq) + b dq), f = (1 - exp(-k x)) / k, x = y + w z / c, dy/dt = P - y / T, dz/dt = P - z / (c T).
 
-    x is the heat kept of the friction power P. Temperature is heat over capacity; without a sensor, capacity and the
-    friction's change per degree cannot be told apart, so coefficients are per kilojoule. Two heat nodes, gear and
-    housing, answer with two exponentials: the slow one, of weight w where both have settled, is little of a log, but
-    most of what a pause leaves. A lubricant's viscosity falls exponentially: the first kilojoule takes more than the
-    next. Where the data do not ask for them, w and k are zero.
+    x is the heat stored from the friction power P. Without a thermometer, heat capacity and the change per degree
+    cannot be separated, so the coefficients are per kilojoule. Gear and housing are two heat nodes, whose response is
+    the sum of two exponentials. The slow one has the weight w in steady state. It is small within a log, but most of
+    the heat that remains after a pause. A lubricant's viscosity falls exponentially, so friction falls more with the
+    first kilojoule than with the next. w and k are zero unless the data require them.
     """
 
     name: ClassVar[str] = "thermal_friction"
@@ -47,7 +48,7 @@ class ThermalFriction(HeatEffect):
     experiments: ClassVar[tuple[str, ...]] = ("pause", "single_joint", "static_hold")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the fall of Coulomb and of viscous friction per heat."""
+        """Describes the decrease of Coulomb and viscous friction per stored heat."""
         assert joint is not None
         force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
         return (
@@ -56,19 +57,19 @@ class ThermalFriction(HeatEffect):
         )
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates -x sign(dq) and -x dq, x in kJ."""
+        """Evaluates -f sign(dq) and -f dq, f in kJ (N, 2)."""
         x = _kept(situation, joint, shape)
         return np.column_stack([-x * situation.sign[:, joint - 1], -x * situation.dq[:, joint - 1]])
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Lets friction fade no faster than the heat of these logs can show."""
+        """Bounds `fading` by the heat stored in these logs."""
         assert joint is not None
         time, weight, _ = super().bounds(situation, joint)
         most = float(heat(situation, joint, MIDDLE).max(initial=0.0))
         return time, weight, (0.0, FADES / most if most > 0 else 0.0)
 
     def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists time constants with housings that stay cold, and that warm up as much as the gear or more."""
+        """Lists time constants, each with several housing weights."""
         return tuple((time, weight, 0.0) for time, *_ in self.grid(situation, joint) for weight in (0.0, 1.0, 3.0))
 
     def describe(
@@ -88,7 +89,7 @@ class ThermalFriction(HeatEffect):
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the heat kept."""
+        """Returns the stored heat."""
         assert joint is not None
         return f"friction heat kept in joint {joint} [kJ]", _kept(situation, joint, shape)
 
@@ -108,11 +109,17 @@ def _kept(situation: Situation, joint: int, shape: tuple[float, ...]) -> Array:
 
 
 def heat(situation: Situation, joint: int, time_constant: float) -> Array:
-    """Integrates the base model's friction power into heat kept (N,) [kJ]."""
+    """Integrates the base model's friction power to stored heat (N,) [kJ].
+
+    Args:
+        situation: the motion and the base model's torque (N samples).
+        joint: the joint, counted from 1.
+        time_constant: [s].
+    """
 
     def integrate() -> Array:
         j = joint - 1
-        # The fitted friction of a joint that hardly moves may have a wrong sign; friction never cools.
+        # The fitted friction of a joint that hardly moves may have a wrong sign, but friction never cools.
         power = np.maximum(situation.friction[:, j] * situation.dq[:, j], 0.0)
         return relaxation(situation, power, time_constant) / 1000.0
 

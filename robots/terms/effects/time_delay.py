@@ -1,4 +1,4 @@
-"""Torque and position that were not taken at the same instant."""
+"""A delay between logged torque and logged position."""
 
 from __future__ import annotations
 
@@ -10,34 +10,36 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator, make_interp_spline
 
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.capabilities import AtReversals
 
 if TYPE_CHECKING:
     from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-SMALL = 1e-5  # [s]
+SMALL = 1e-5
+"""Least step [s] of the difference quotient."""
 SHORTEST = 1e-4
-"""Delay [s] below which it counts as zero: the sign change of friction within a sample is not known better."""
+"""Delay [s] below which it counts as zero: the time of a reversal within a sample is not known better."""
 APART = 1.6
-# Motion above the known frequencies is delayed as well, so a delay is underestimated by some per cent.
+"""Largest ratio between the delay and that of the reversals."""
+# A delay also acts above the frequency band of the data, so it is underestimated by some per cent.
 INEXACT = 0.05
 SHIFT = Shape("reversals_late", "s", -0.02, 0.02, "linear", (-0.003, -0.001, -0.0002, 0.0002, 0.001, 0.003, 0.008))
 
 
 class Late(Effect):
-    """Delay of the logged torque; the shape follows from reversals, the coefficient from all other data."""
+    """A delay of the logged torque: the shape is the delay at reversals, the coefficient that of all other data."""
 
-    lags: ClassVar[bool] = True
-    smooths_friction_sign: ClassVar[bool] = True
+    at_reversals: ClassVar[AtReversals] = AtReversals.LATE
     needs_full_rate: ClassVar[bool] = True
 
     def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
-        """Ties reversals to all else: what `near` allows is 95 %."""
+        """Ties the delay at reversals to the delay elsewhere: the range of `near` is taken as 95 %."""
         return ((0, 0, 0.5 * (APART - 1.0 / APART) / 1.96 * float(abs(coefficients[0]))),)
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
-        """Whether a machine may have these values: it does not stand where its reversals' lets it come no closer."""
+        """Rejects a delay at the end of the range that the delay at reversals allows."""
         ends = [end for shift in shape for end in near(shift)[0]]
         torn = any(bool(np.isclose(coefficients[0], end, rtol=1e-6, atol=0.0)) for end in ends)
         return super().is_plausible(robot, joint, coefficients, shape) and not torn
@@ -45,28 +47,27 @@ class Late(Effect):
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Gives the reversals that are as late as all else."""
+        """Lists a delay at reversals that equals the delay elsewhere."""
         return ((float(np.clip(coefficients[0], SHIFT.lower, SHIFT.upper)),),)
 
 
 class TimeDelay(Late):
-    """tau(t - d) - tau(t): the logged torque lags the logged position by d, on all joints alike.
+    """tau(t - d) - tau(t): the logged torque lags the logged position by d, equally on all joints.
 
-    It is d times a difference quotient over d', computed from the base model's torque and velocities shortly before.
-    Rates are not sufficient, because Coulomb friction changes sign, and a sticking joint breaks loose, within one
-    sample. With a correct model d' = d.
+    The torque change is d times a difference quotient over d', computed from the base model's torque and velocities at
+    t - d'. Derivatives are not sufficient, because Coulomb friction changes sign within one sample. With a correct
+    model d' = d.
     """
 
     name: ClassVar[str] = "time_delay"
     title: ClassVar[str] = "delay between torque and position"
     whole_robot: ClassVar[bool] = True
-    shared_coefficient: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (SHIFT,)
     rivals: ClassVar[tuple[str, ...]] = ("current_lag", "presliding_hysteresis", "joint_elasticity")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "micro_reversals")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the delay; more than 50 ms is no sensor's."""
+        """Describes the delay; no sensor has more than 50 ms."""
         return (Coefficient("delay", "s", -0.05, 0.05, INEXACT, SHORTEST),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
@@ -74,7 +75,7 @@ class TimeDelay(Late):
         return near(shape[0])
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the change of torque per delay."""
+        """Evaluates the change of torque per delay (N, n, 1) [N m/s or N/s]."""
         return lateness(situation, shape[0])[:, :, None]
 
     def describe(
@@ -91,17 +92,24 @@ class TimeDelay(Late):
         return f"Torque is logged {1000 * abs(coefficients[0]):.3g} ms {which} than position, on all joints."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the rate of torque of the joint where it is largest."""
+        """Returns the rate of torque of the joint where it is largest."""
         rate = -lateness(situation, shape[0])
         most = int(np.argmax(np.mean(rate**2, axis=0)))
         return f"rate of the torque of joint {most + 1} [N m/s]", rate[:, most]
 
 
 def lateness(situation: Situation, shift: float) -> Array:
-    """Gives the change of the torque per delay (N, n) [N m/s], as it was `shift` [s] before.
+    """Computes the change of torque per delay, (tau(t - shift) - tau(t)) / shift.
 
-    Of a small shift, and of a robot that hardly turns round, this is -dtau/dt. The torque is the base model's, and that
-    of other effects where the situation has it: what breaks loose at low speed is logged late, too.
+    Without reversals this is close to -dtau/dt. The torque is that of the base model, and of other effects if the
+    situation has them.
+
+    Args:
+        situation: the motion and the base model's torque (N samples).
+        shift: delay of the difference quotient [s]; `SMALL` is used if its size is below that.
+
+    Returns:
+        (N, n) [N m/s or N/s].
     """
     step = shift if abs(shift) > SMALL else SMALL
 
@@ -122,7 +130,7 @@ def lateness(situation: Situation, shift: float) -> Array:
     others = np.empty_like(own)
     for run in situation.runs:
         t, torque = situation.t[run], situation.beyond[run]
-        # It may jump between two samples.
+        # Linear interpolation, because this torque may jump between two samples.
         others[run] = make_interp_spline(t, torque, min(1, len(t) - 1))(_before(t, step)) - torque
     return own + others / step
 
@@ -132,16 +140,16 @@ def _before(t: Array, step: float) -> Array:
 
 
 def _past(situation: Situation, smooth: Array) -> list[tuple[Callable[[Array], Array], Callable[[Array], Array]]]:
-    """Gives each log's torque without friction, and its velocities, between the samples.
+    """Interpolates each log's torque without friction, and its velocities, between the samples.
 
-    Velocities by cubics that do not overshoot: those of a joint that breaks loose would turn round before.
+    Velocities are interpolated by cubics without overshoot, which next to standstill would be a false reversal.
     """
     result = []
     for run in situation.runs:
         t, count = situation.t[run], run.stop - run.start
         torque = make_interp_spline(t, smooth[run], min(3, count - 1))
         dq = situation.dq[run]
-        # The harmonic mean of slopes next to nothing, of a joint at rest, overflows; its inverse is as good as zero.
+        # For a joint at rest the harmonic mean of tiny slopes overflows; its inverse is zero, as it should be.
         with np.errstate(over="ignore"):
             velocity = PchipInterpolator(t, dq, axis=0) if count > 1 else make_interp_spline(t, dq, 0)
         result.append((torque, velocity))
@@ -149,9 +157,9 @@ def _past(situation: Situation, smooth: Array) -> list[tuple[Callable[[Array], A
 
 
 def near(shift: float) -> tuple[tuple[float, float], ...]:
-    """Gives the range of a delay beside that of reversals: within a factor of `APART`.
+    """Returns the range [s] of a delay for a given delay at reversals: within a factor of `APART`.
 
-    A quotient over far more than the delay would be the torque's second derivative as much as its first.
+    A difference quotient over a much longer time than the delay would contain the torque's second derivative.
     """
     low, high = sorted((shift / APART, shift * APART))
     return ((low - SMALL, high + SMALL),)

@@ -1,4 +1,4 @@
-"""A torque that is scaled wrongly on one joint."""
+"""A wrong torque constant: the logged torque of one joint has a wrong scale."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ Array = NDArray[np.float64]
 
 
 class TorqueConstantError(StaticJointEffect):
-    """tau = c tau_L: the joint's rigid-body torque, which it shares with the others, is logged by a factor 1 + c.
+    """tau = c tau_R, tau_R the joint's rigid-body torque, which is logged with a factor 1 + c.
 
-    Its friction scales with it unseen. Seen only where one body's parameters show in several joints.
+    The error shows only where the parameters of one body act on several joints. The same factor on the joint's own
+    friction cannot be seen.
     """
 
     name: ClassVar[str] = "torque_constant_error"
@@ -33,7 +34,7 @@ class TorqueConstantError(StaticJointEffect):
         return (Coefficient("relative_error", "1", -0.9, 9.0),)
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
-        """Builds tau_L."""
+        """Builds tau_R."""
         return at.rigid
 
     def describe(
@@ -52,6 +53,6 @@ class TorqueConstantError(StaticJointEffect):
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the base model's torque."""
+        """Returns the base model's torque."""
         assert joint is not None
         return f"torque of joint {joint} by the base model [N m]", situation.torque[:, joint - 1]

@@ -1,4 +1,4 @@
-"""A motor that gives less torque per ampere as it warms up."""
+"""A torque constant that falls as the motor warms up."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class TorqueConstantHeat(HeatEffect):
-    """tau = c x tau, dx/dt = tau^2 - x / T: magnets weaken as copper heat x builds up."""
+    """tau_e = c x tau, dx/dt = tau^2 - x / T: the magnets weaken as copper heat x builds up."""
 
     name: ClassVar[str] = "torque_constant_heat"
     title: ClassVar[str] = "temperature-dependent torque constant"
@@ -29,12 +29,12 @@ class TorqueConstantHeat(HeatEffect):
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "pause")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the relative rise of the logged torque per squared torque and time."""
+        """Describes the relative increase of the logged torque per squared torque and time."""
         assert joint is not None
         return (Coefficient("rise_per_heat", f"1/(({force_unit(robot, joint - 1)})2 ks)"),)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates x tau."""
+        """Evaluates x tau (N, 1)."""
         return (copper_heat(situation, joint, shape[0]) * situation.torque[:, joint - 1])[:, None]
 
     def describe(

@@ -1,4 +1,4 @@
-"""A motor that gives less torque per ampere when it gives much."""
+"""A torque constant that falls at high torque, because the motor saturates."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
+from robots.terms.effect_bases.capabilities import Reading
 from robots.terms.effect_bases.states import torque_reference
 from robots.terms.effect_bases.static import Instant, StaticJointEffect
 
@@ -18,20 +19,20 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-# The formula is a power of the base model's torque, which contains some of the error itself.
+# Relative error of the formula: it uses a power of the base model's torque, which contains part of the error itself.
 INEXACT = 0.1
 
 
 class TorqueConstantSaturation(StaticJointEffect):
-    """tau = c tau |tau / tau_r|^p: the logged torque, current times a constant, outgrows the true one.
+    """tau_e = c tau |tau / tau_r|^p: the logged torque, current times a constant, exceeds the true one.
 
-    c is the error at the torque tau_r, the largest of the logs that it was found in: what happens beyond they do not
-    say. Of zero, tau_r is the joint's torque limit (100 N m where it has none).
+    c is the relative error at the torque tau_r, the largest one in the logs of the fit. If `at_torque` is zero, tau_r
+    is the joint's torque limit, or 100 N m without a limit.
     """
 
     name: ClassVar[str] = "torque_constant_saturation"
     title: ClassVar[str] = "saturation of the torque constant"
-    distorts: ClassVar[bool] = True
+    reading: ClassVar[Reading] = Reading.DISTORTS
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("exponent", "1", 1.0, 8.0, "linear", (1.0, 2.0, 4.0)),
         Shape("at_torque", "N m", 0.0, np.inf, "linear", default=0.0),
@@ -40,16 +41,16 @@ class TorqueConstantSaturation(StaticJointEffect):
     experiments: ClassVar[tuple[str, ...]] = ("payload", "static_hold")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the relative error at that torque."""
+        """Describes the relative error at the torque tau_r."""
         return (Coefficient("error", "1", inexact=INEXACT),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists exponents, at the largest torque."""
+        """Lists exponents, with the largest torque of the data as tau_r."""
         assert joint is not None
         return tuple((exponent, _largest(situation, joint)) for exponent in self.shapes[0].grid)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps to the largest torque."""
+        """Bounds the exponent, and fixes tau_r at the largest torque of the data."""
         assert joint is not None
         exponent, _ = self.shapes
         return (exponent.lower, exponent.upper), (_largest(situation, joint),) * 2
@@ -78,11 +79,11 @@ class TorqueConstantSaturation(StaticJointEffect):
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the base model's torque."""
+        """Returns the base model's torque."""
         assert joint is not None
         return f"torque of joint {joint} by the base model [N m]", situation.torque[:, joint - 1]
 
 
 def _largest(situation: Situation, joint: int) -> float:
-    """Gives the largest torque of a joint, by the base model."""
+    """Returns the largest torque of a joint in the base model."""
     return float(np.abs(situation.torque[:, joint - 1]).max(initial=0.0))

@@ -1,4 +1,4 @@
-"""A torque signal that shows a part of its neighbour."""
+"""A torque signal that contains part of the neighbouring joints' torque."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 class TorqueCrosstalk(JointEffect):
-    """tau_j = c tau_{j-1} + d tau_{j+1}: a sensor that also feels its neighbours' torque."""
+    """tau_j = c tau_{j-1} + d tau_{j+1}: a sensor that also measures part of its neighbours' torque."""
 
     name: ClassVar[str] = "torque_crosstalk"
     title: ClassVar[str] = "crosstalk between torque signals"
@@ -25,7 +25,7 @@ class TorqueCrosstalk(JointEffect):
     experiments: ClassVar[tuple[str, ...]] = ("single_joint", "payload")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the shares of the neighbours' torque."""
+        """Describes the fractions of the neighbours' torque."""
         assert joint is not None
         return tuple(Coefficient(f"share_of_joint_{k}", "1", -0.5, 0.5) for k in _neighbours(robot, joint))
 
@@ -34,7 +34,7 @@ class TorqueCrosstalk(JointEffect):
         return tuple(range(1, robot.n + 1)) if robot.n > 1 else ()
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the neighbours' torque."""
+        """Evaluates the neighbours' torque (N, k)."""
         return situation.torque[:, [k - 1 for k in _neighbours(situation.robot, joint)]]
 
     def describe(
@@ -51,7 +51,7 @@ class TorqueCrosstalk(JointEffect):
         return f"The torque signal of joint {joint} contains {shares} of the torque of its neighbours."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives a neighbour's torque."""
+        """Returns the torque of the first neighbour."""
         assert joint is not None
         neighbour = _neighbours(situation.robot, joint)[0]
         return f"torque of joint {neighbour} [N m]", situation.torque[:, neighbour - 1]

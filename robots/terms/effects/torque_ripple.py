@@ -1,4 +1,4 @@
-"""Torque that ripples with the angle of gear or motor."""
+"""Torque ripple with the angle of gear or motor."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from scipy.ndimage import median_filter
 
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
+from robots.terms.effect_bases.capabilities import AboveBand
 from robots.terms.effect_bases.states import best_apart
 from robots.terms.effect_bases.static import Instant, StaticJointEffect
 
@@ -20,30 +21,32 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SAMPLES_PER_PERIOD = 2.5
-"""A ripple that passes in fewer samples is not resolved."""
+"""Least number of samples in a period of the ripple."""
 WAVES = 2.0
-"""Waves over the joint's range below which a ripple looks like gravity or a spring."""
+"""Number of waves over the joint's range below which a ripple resembles gravity or a spring."""
 HIGHEST = {"rad": 1000.0, "m": 10_000.0}
-"""Highest order per turn, and wave number of a linear axis [rad/m]: four waves a turn of a screw with 3 mm of lead."""
+"""Highest order per turn, and highest wave number of a linear axis [rad/m]: four waves per turn of a screw with 3 mm
+lead."""
 LARGEST = 1600
 """Largest number of orders on the grid: more than a joint resolves over one and a half turns."""
 ABOUT = 201
-"""Points of the spectrum, four per resolution, for the usual level around an order."""
+"""Number of spectrum points, four per resolution, in the median that gives the local level around an order."""
 APART = 2
-"""Orders of the grid, two a resolution, beside one that is scanned: they are the same line."""
+"""Neighbouring grid points, two per resolution, that belong to the spectral line of a proposed order."""
 
 
 class TorqueRipple(StaticJointEffect):
-    """tau = (a + c l) cos(h p) + (b + d l) sin(h p), h periods per turn: a wave generator's, the teeth's, the poles'.
+    """tau = (a + c l) cos(h p) + (b + d l) sin(h p), h in periods per turn (wave generator, teeth or motor poles).
 
-    Of a linear axis h is a wave number [rad/m]: a ball screw's, a rack's teeth's, the poles' of its motor.
+    On a linear axis h is a wave number [rad/m] (ball screw, teeth of a rack or motor poles).
 
-    l is the load [N m or N]: teeth mesh harder under it. A motor's constant ripples by a share of the motor's torque,
-    which has all of the friction in it (`friction_share` 1, else 0: machines have the one or the other).
-    p = q - dq T is the position a moment T before: a ripple of 50 Hz and more turns with what delays the torque's log.
+    l is the load [N m or N], which increases the ripple of a gear. The ripple of a motor's torque constant is
+    proportional to the motor's torque instead, which includes friction. `friction_share` is 0 for the first and 1 for
+    the second. p = q - dq T is the position a time T earlier. It matters for a ripple of 50 Hz and more, whose phase a
+    delay of the logged torque shifts.
 
-    Orders are those that the data resolve, known gear or not. Below 3 per turn, or two waves over the joint's range,
-    gravity and springs look alike.
+    All orders that the data resolve are searched, also without a known gear. Below an order of 2.5, or two waves over
+    the joint's range, ripple resembles gravity and springs.
     """
 
     name: ClassVar[str] = "torque_ripple"
@@ -54,32 +57,31 @@ class TorqueRipple(StaticJointEffect):
         Shape("friction_share", "", 0.0, 1.0, "linear", (0.0,), default=0.0, choices=(0.0, 1.0)),
     )
     rivals: ClassVar[tuple[str, ...]] = ("position_dependent_friction", "spring", "encoder_eccentricity")
-    independent_of_acceleration: ClassVar[bool] = True
-    oscillates_over_range: ClassVar[bool] = True
+    above_band: ClassVar[AboveBand] = AboveBand.COUNTS
     experiments: ClassVar[tuple[str, ...]] = ("sweep",)
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the two phases' amplitudes, and their growth with the load."""
+        """Describes the amplitudes of cosine and sine, and their increase with the load."""
         assert joint is not None
         force = force_unit(robot, joint - 1)
         units = {"cosine": force, "sine": force, "cosine_per_load": "1", "sine_per_load": "1"}
         return tuple(Coefficient(name, unit) for name, unit in units.items())
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists orders half a resolution apart, up to what a tenth of the samples is slow enough for.
+        """Lists orders half a resolution apart, up to the highest one that the slowest tenth of the samples resolves.
 
-        The resolution is a period over the joint's range. Of a known gear, once, twice and four times per motor turn
-        are listed exactly.
+        The resolution is one period over the joint's range. For a known gear, once, twice and four times per motor
+        turn are listed exactly.
         """
         assert joint is not None
         spacing, top = self._resolution(situation, joint)
         if not top:
             return ()
         low = self._lowest(situation, joint)
-        count = int(min(max((top - low) / spacing, 0), LARGEST))  # a known gear's orders may lie beyond
+        count = int(min(max((top - low) / spacing, 0), LARGEST))  # orders of a known gear may lie beyond
         orders = set((low + spacing * np.arange(count + 1)).tolist())
         orders |= {order for order in _of_gear(situation.robot, joint) if low <= order <= top}
-        # Whole orders are the likely ones: the nearest point of the grid moves to each.
+        # Whole orders are more likely, so each replaces the grid points next to it.
         whole = {float(h) for h in range(3, 13) if low <= h <= top}
         return tuple(
             (order, 0.0, 0.0)
@@ -87,14 +89,14 @@ class TorqueRipple(StaticJointEffect):
         )
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Keeps the order within what the samples resolve."""
+        """Bounds the order to the range that the samples resolve."""
         assert joint is not None
         lowest = self._lowest(situation, joint)
         _, *others = super().bounds(situation, joint)
         return (lowest, max(self._resolution(situation, joint)[1], lowest + 0.5)), *others
 
     def _lowest(self, situation: Situation, joint: int) -> float:
-        """Gives the least order: fewer waves over the joint's range are no ripple but any smooth function."""
+        """Returns the lowest order; with fewer waves over the joint's range a ripple resembles any smooth function."""
         reach = float(np.ptp(situation.q[:, joint - 1]))
         fewest = 2 * np.pi * WAVES / max(reach, 1e-9)
         return float(np.clip(fewest, self.shapes[0].lower, 0.5 * _highest(situation, joint)))
@@ -102,10 +104,10 @@ class TorqueRipple(StaticJointEffect):
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Lists whole orders up to 12 within the resolution of an order, and those of a known gear; none is late.
+        """Lists whole orders up to 12 near the fitted one and all orders of a known gear, without or with a delay.
 
-        Each with the load and with the motor torque. A periodic motion may not distinguish a known gear's order from
-        distant ones; the known one is more likely.
+        Each is listed for the load and for the motor torque. A periodic motion may not distinguish the order of a known
+        gear from a distant one; the known order is then more likely.
         """
         assert joint is not None
         spacing = self._resolution(situation, joint)[0]
@@ -119,7 +121,7 @@ class TorqueRipple(StaticJointEffect):
         return tuple((*form, share) for share in self.shapes[2].choices for form in forms)
 
     def _resolution(self, situation: Situation, joint: int) -> tuple[float, float]:
-        """Gives the grid's spacing and its highest order; zeros for a joint that does not move."""
+        """Returns the grid's spacing and its highest order; zeros for a joint that does not move."""
         q, speed = situation.q[:, joint - 1], np.abs(situation.dq[:, joint - 1])
         reach = float(np.ptp(q))
         moving = speed[speed > 1e-3 * speed.max(initial=0.0)]
@@ -132,9 +134,9 @@ class TorqueRipple(StaticJointEffect):
     def propose(
         self, situation: Situation, joint: Place, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
-        """Ranks all orders at once, by the residual's spectrum over the angle over that of their surroundings.
+        """Ranks orders by the residual's spectrum over the joint angle, relative to its local level.
 
-        Beside one that is listed no other is, but for those of a known gear, which are listed besides.
+        Close neighbours of a proposed order are skipped. The orders of a known gear are always added.
         """
         assert joint is not None
         grid = self.grid(situation, joint)
@@ -146,7 +148,7 @@ class TorqueRipple(StaticJointEffect):
         return tuple(grid[i] for i in dict.fromkeys([*best_apart(power, count, APART), *known.tolist()]))
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
-        """Builds cos(h p) and sin(h p), by themselves and times the load or the motor's torque."""
+        """Builds cos(h p) and sin(h p), alone and times the load or the motor's torque."""
         angle = at.shape[0] * (at.q - at.dq * at.shape[1])
         wave = casadi.horzcat(casadi.cos(angle), casadi.sin(angle))
         return casadi.horzcat(wave, wave * (at.rigid + at.shape[2] * (at.torque - at.rigid)))
@@ -167,14 +169,14 @@ class TorqueRipple(StaticJointEffect):
         return f"The torque of joint {joint} ripples with an amplitude of {much}, {often}."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
-        """Gives the angle within the ripple's period."""
+        """Returns the position within the ripple's period."""
         assert joint is not None
         period = 2 * np.pi / shape[0]
         return f"position of joint {joint} within 1/{shape[0]:.4g} turn [rad]", situation.q[:, joint - 1] % period
 
 
 def _of_gear(robot: Robot, joint: int) -> tuple[float, ...]:
-    """Gives the orders of once, twice and four times per motor turn; none without a known gear."""
+    """Returns the orders of once, twice and four times per motor turn; none without a known gear."""
     ratio = abs(float(robot.gear_ratio[joint - 1]))
     return tuple(h * ratio for h in (1, 2, 4)) if ratio > 1 else ()
 
@@ -184,16 +186,21 @@ def _highest(situation: Situation, joint: int) -> float:
 
 
 def angle_spectrum(q: Array, values: Array, orders: Array, *, level: bool = False) -> Array:
-    """Gives |sum(values exp(-i h q))|^2 for each order h (K,), by binning the angle and one Fourier transform.
+    """Computes the spectrum of values over the joint angle, |sum(values exp(-i h q))|^2, for each order h.
+
+    The angle is binned, so that one fast Fourier transform gives all orders.
 
     Args:
-        q: positions (N,) [rad].
-        values: (N,).
-        orders: (K,).
-        level: whether over the median of the orders about each.
+        q: positions (N,) [rad or m].
+        values: the series (N,).
+        orders: the orders h (K,).
+        level: whether to divide by the local level, a running median.
+
+    Returns:
+        The spectrum at the orders (K,).
     """
     reach = float(np.ptp(q)) or 1.0
-    # Eight bins a period of the highest order keep its power to 5 %; the length sets the transform's resolution.
+    # With eight bins per period the highest order loses at most 5 % of its power; zero padding refines the resolution.
     bins = int(2 ** np.ceil(np.log2(max(8 * float(orders.max()) * reach / (2 * np.pi), 256))))
     sums = np.bincount(np.minimum(((q - q.min()) / reach * bins).astype(int), bins - 1), weights=values, minlength=bins)
     spectrum = np.abs(np.fft.rfft(sums, 4 * bins)) ** 2

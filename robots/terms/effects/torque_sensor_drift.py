@@ -1,14 +1,15 @@
-"""A torque sensor or current loop whose zero wanders."""
+"""A drifting zero of a torque sensor or current loop."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.terms.base import force_unit
 from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Shape, Situation
+from robots.terms.effect_bases.capabilities import Persistence
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -17,17 +18,16 @@ Array = NDArray[np.float64]
 
 
 class TorqueSensorDrift(JointEffect):
-    """tau = sum_k b_k clip((t' - t_0 - k d) / d, 0, 1): a zero that goes by b_k during the k-th stretch of length d.
+    """tau = sum_k b_k clip((t' - t_0 - k d) / d, 0, 1): the zero drifts by b_k during the k-th interval of length d.
 
-    One stretch as long as the data is a straight line; more of them follow a zero that wanders. It stays where the data
-    end, t' = min(t, t_1), because later drift is unknown. A stretch with less than half of its length in the data is
-    left out, because it is not determined.
+    One interval as long as the data is a straight line; more intervals follow a varying drift. The zero is constant
+    after the data's end, t' = min(t, t_1), because later drift is unknown. An interval with less than half of its
+    length in the data is left out, because it is not determined.
     """
 
     name: ClassVar[str] = "torque_sensor_drift"
     title: ClassVar[str] = "zero drift of a torque sensor"
-    depends_on: ClassVar[Literal["state", "time"]] = "time"
-    transient: ClassVar[bool] = True
+    persistence: ClassVar[Persistence] = Persistence.TRANSIENT
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("origin", "s", -np.inf, np.inf, "linear"),
         Shape("stretch", "s", 1e-3, 1e7, "log"),
@@ -37,24 +37,24 @@ class TorqueSensorDrift(JointEffect):
     experiments: ClassVar[tuple[str, ...]] = ("repeat", "static_hold")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the drift in each stretch."""
+        """Describes the drift in each interval."""
         assert joint is not None
         return tuple(Coefficient(f"drift_{k}", force_unit(robot, joint - 1)) for k in range(1, STRETCHES + 1))
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists a line, and zeros that wander in more and more stretches."""
+        """Lists a straight line, and drifts with more and more intervals."""
         (origin, _), (shortest, longest), (end, _) = self.bounds(situation, joint)
         pieces = [count for count in (1, 2, 4, 8, STRETCHES) if longest / count >= shortest]
         return tuple((origin, longest / count, end) for count in pieces)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
-        """Fixes origin and end, which only date the drift; the stretches cover the data."""
+        """Fixes origin and end to those of the data, and bounds the intervals' length."""
         origin, end = float(situation.t[0]), float(situation.t[-1])
         duration = max(end - origin, 1.0)
         return (origin, origin), (min(max(duration / STRETCHES, SHORTEST), duration), duration), (end, end)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates a ramp per stretch; those that begin after the data, or end far beyond them, are zero."""
+        """Evaluates one ramp per interval (N, 16); zero for intervals with less than half in the data."""
         origin, stretch, end = shape
         elapsed = (np.minimum(situation.t, end) - origin) / stretch
         begun = np.arange(STRETCHES)
@@ -76,8 +76,8 @@ class TorqueSensorDrift(JointEffect):
 
 
 STRETCHES = 16
-"""Stretches of a zero that wanders."""
+"""Largest number of intervals."""
 SHOWN = 0.5
-"""Share of a stretch that the data have at least."""
+"""Least fraction of an interval that lies in the data."""
 SHORTEST = 3.5
-"""Least time of a stretch [s]: what changes faster goes with the motion, not with time."""
+"""Least length of an interval [s]; a faster change depends on the motion, not on time."""

@@ -1,1 +1,1 @@
-"""Inputs of effects: the motion, the base model's torque, and its sensitivities."""
+"""Situations, the input of effects: the motion, the base model's torque, and its sensitivities."""

@@ -1,4 +1,4 @@
-"""Known bodies at the flange: added to a model's parameters, or made from a mass and its place."""
+"""Known payloads at the flange: their inertial parameters, and adding them to a model's parameters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,15 @@ Array = NDArray[np.float64]
 
 
 def with_body(model: TorqueModel, parameters: Array, body: Array) -> Array:
-    """Adds a body at the flange (10,), in its frame, to a model's standard parameters (p,).
+    """Adds a body at the flange to a model's standard parameters.
+
+    Args:
+        model: the torque model.
+        parameters: its standard parameters (p,).
+        body: inertial parameters of the body in the flange's frame (10,); zeros for none.
+
+    Returns:
+        The parameters with the body (p,).
 
     Raises:
         InputError: a body of another shape, or a model without links.
@@ -28,7 +36,7 @@ def with_body(model: TorqueModel, parameters: Array, body: Array) -> Array:
 
 
 def point_mass(mass: float, centre: tuple[float, float, float]) -> Array:
-    """Gives the ten inertial parameters of a point mass [kg] at a place [m] in the flange's frame."""
+    """Returns the inertial parameters (10,) of a point mass [kg] at a point [m] in the flange's frame."""
     x, y, z = centre
     inertia = (y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y)
     return mass * np.array([1.0, x, y, z, *inertia])

@@ -1,4 +1,4 @@
-"""Situations of several logs as one."""
+"""Concatenation of situations."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ def join_situations(parts: Sequence[Situation], model: TorqueModel | None = None
     """Joins situations of one robot on one clock; the parameters are those of the first.
 
     Args:
-        parts: one or more; their bodies and gravities may differ.
+        parts: one or more situations; their payloads and gravities may differ.
         model: the base model under the gravity of the robot's description; by default that of the first part.
+
+    Returns:
+        The joined situation.
     """
     model = model or parts[0].model
     if len(parts) == 1 and parts[0].model is model:

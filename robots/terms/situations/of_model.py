@@ -14,13 +14,17 @@ Array = NDArray[np.float64]
 
 
 def rotor_inertias(model: TorqueModel, parameters: Array) -> Array:
-    """Gives the rotors' inertias (2, n): as fitted, and as described where the fit holds them within the links'.
+    """Returns the rotor inertias of a base model: fitted ones, and described ones that are not fitted.
 
-    Next to the base, a rotor moves with its link: no log separates them, and one base parameter contains both.
+    No log separates the first joints' rotor inertia from their link inertia. One base parameter contains both, so the
+    rotor's own parameter is zero, and its described value is given instead.
 
     Args:
         model: the base model.
         parameters: its standard parameters (p,).
+
+    Returns:
+        (2, n) [kg m2 or kg]: fitted inertias, and described inertias of rotors whose parameter is zero; zero elsewhere.
     """
     result = np.zeros((2, model.robot.n))
     for column, value in zip(model.columns, parameters, strict=True):
@@ -31,11 +35,11 @@ def rotor_inertias(model: TorqueModel, parameters: Array) -> Array:
 
 
 def sign_of(dq: Array, v0: float | Array) -> Array:
-    """Gives the sign of velocities as a base model takes it: tanh(dq / v0), the sharp sign where v0 is 0."""
+    """Evaluates the base model's sign of velocities: tanh(dq / v0), or the sharp sign where v0 is 0."""
     return np.where(v0 > 0, np.tanh(dq / np.where(v0 > 0, v0, 1.0)), np.sign(dq))
 
 
 def velocity_scale(model: TorqueModel) -> Array:
-    """Gives v0 (n,) of a model's sign, tanh(dq / v0); 0 for the sharp sign."""
+    """Returns v0 (n,) [rad/s or m/s] of a model's sign, tanh(dq / v0); 0 for the sharp sign."""
     scales = [term.velocity_scale for term in model.terms if hasattr(term, "velocity_scale")]
     return np.broadcast_to(np.asarray(scales[0] if scales else 0.0, dtype=float), (model.robot.n,)).copy()

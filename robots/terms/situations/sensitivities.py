@@ -1,4 +1,4 @@
-"""How the rigid-body torque changes with position, velocity, acceleration, gravity and a body on the flange."""
+"""Sensitivities of the rigid-body torque to position, velocity, acceleration, gravity and a body at the flange."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def evaluate(kind: str, model: TorqueModel, parameters: Array, q: Array, dq: Arr
         The sensitivity (N, r, c).
 
     Raises:
-        InputError: an unknown kind.
+        InputError: the kind is unknown.
     """
     if kind not in KINDS:
         raise InputError(f"sensitivity {kind!r}", allowed=", ".join(KINDS))
@@ -42,7 +42,7 @@ def evaluate(kind: str, model: TorqueModel, parameters: Array, q: Array, dq: Arr
     rigid = [i for i, column in enumerate(model.columns) if column.term == "rigid_body"]
     pi = parameters[rigid] if rigid else np.zeros(10 * model.robot.n)
     result = np.empty((len(q), *evaluator.output_shapes[0]))
-    # In chunks: the parameters, repeated for every sample of a long log, would not fit into memory.
+    # In chunks, because the parameters are repeated for every sample; for a long log they would not fit into memory.
     for start in range(0, len(q), CHUNK):
         rows = slice(start, min(start + CHUNK, len(q)))
         repeated = np.broadcast_to(pi, (rows.stop - rows.start, len(pi)))
@@ -62,15 +62,15 @@ def _evaluator(chain: Chain, kind: str) -> BatchFunction:
 def rigid_torque(
     chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, bodies: list[casadi.SX], gravity: casadi.SX
 ) -> casadi.SX:
-    """Builds the Newton-Euler torque (n,) of bodies with the inertial parameters (10, k) each, (n, k) in all.
+    """Builds the Newton-Euler torque (n, k) of bodies with k sets of inertial parameters.
 
     Args:
         chain: the chain of n joints.
         q: positions (n,).
         dq: velocities (n,).
         ddq: accelerations (n,).
-        bodies: per link, (10, k) inertial parameters about its frame; an empty matrix for none.
-        gravity: (3,) in the base frame [m/s2].
+        bodies: per link, inertial parameters (10, k) about its frame; an empty matrix for none.
+        gravity: gravity in the base frame (3,) [m/s2].
     """
     from robots.terms.rigid_body import _parameter_map
 
@@ -149,7 +149,7 @@ def _links(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi
 
 
 def _frames(chain: Chain, q: casadi.SX) -> list[tuple[casadi.SX, casadi.SX]]:
-    """Gives each link's rotation and origin in the base frame."""
+    """Builds each link's rotation and origin in the base frame."""
     rotation, origin = casadi.SX.eye(3), casadi.SX(3, 1)
     frames = []
     for i, joint in enumerate(chain.joints):
@@ -160,7 +160,7 @@ def _frames(chain: Chain, q: casadi.SX) -> list[tuple[casadi.SX, casadi.SX]]:
 
 
 def _forward(chain: Chain, q: casadi.SX) -> tuple[list[tuple[str, casadi.SX, casadi.SX]], casadi.SX]:
-    """Gives each joint's kind, axis and origin, and the flange's place, in the base frame."""
+    """Builds each joint's kind, axis and origin, and the flange's position, in the base frame."""
     frames = _frames(chain, q)
     poses: list[tuple[str, casadi.SX, casadi.SX]] = [
         (joint.kind, rotation @ casadi.SX(cleaned(joint.axis)), origin)
@@ -171,7 +171,7 @@ def _forward(chain: Chain, q: casadi.SX) -> tuple[list[tuple[str, casadi.SX, cas
 
 
 def _moment(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
-    # The potential energy of gravity g is -g' S: it is linear in g, and the torque of g is its gradient.
+    # First moment S of the links' masses. The potential energy under gravity g is -g' S.
     total = casadi.SX(3, 1)
     for i, (rotation, origin) in enumerate(_frames(chain, q)):
         total = total + pi[10 * i] * origin + rotation @ pi[10 * i + 1 : 10 * i + 4]
@@ -179,14 +179,14 @@ def _moment(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casad
 
 
 def moved_body(tip: Array) -> Array:
-    """Builds the (10, 10) map of inertial parameters in the flange frame to those in the last link's frame."""
+    """Builds the map (10, 10) from inertial parameters in the flange's frame to those in the last link's frame."""
     columns = []
     for unit in np.eye(10):
         mass, moment = unit[0], unit[1:4]
         Ixx, Ixy, Ixz, Iyy, Iyz, Izz = unit[4:]
         inertia = np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]])
         R, p = tip[:3, :3], tip[:3, 3]
-        # With Sigma the second moments of mass, everything moves as a homogeneous matrix: T J T^T.
+        # Sigma holds the second moments of mass. The pseudo-inertia J transforms as T J T^T.
         sigma = 0.5 * np.trace(inertia) * np.eye(3) - inertia
         rotated = R @ moment
         moved_sigma = R @ sigma @ R.T + np.outer(rotated, p) + np.outer(p, rotated) + mass * np.outer(p, p)

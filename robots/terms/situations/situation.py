@@ -1,4 +1,4 @@
-"""Inputs of effects: the motion, the base model's torque, and its sensitivities."""
+"""Input of effects: the motion, the base model's torque, and its sensitivities."""
 
 from __future__ import annotations
 
@@ -29,25 +29,24 @@ class Situation:
 
     Attributes:
         model: the base model.
-        parameters: its standard parameters (p,), zero where a base parameter stands for several.
-        t: time [s], (N,): one clock for all logs.
-        starts: indices at which a new log begins, 0 first. Derivatives, filters and presliding states do not cross
-            them; heat does, cooling in the pause.
-        q: positions (N, n) [rad or m], free of noise.
+        parameters: its standard parameters (p,); zero if another one represents them in a base parameter.
+        t: time (N,) [s] on one clock for all logs.
+        starts: indices of each log's first sample, 0 first. Derivatives, filters and presliding states restart there;
+            heat decays over the pause.
+        q: positions (N, n) [rad or m], without noise.
         dq: velocities (N, n) [rad/s or m/s].
         ddq: accelerations (N, n) [rad/s2 or m/s2].
         rigid: torque of rigid body and rotors (N, n) [N m or N].
         friction: torque of the base model's friction (N, n) [N m or N].
         torque: torque of the whole base model (N, n) [N m or N].
-        velocity_scale: (n,) v0 [rad/s or m/s] of the sign, tanh(dq / v0); 0 for the sharp sign.
-        parts: where logs carry different payloads, or the base stands otherwise than the robot's description says, the
-            situations that this one joins; `parameters` are the first's, and each has a model of its own gravity.
-        measured: torque as logged (N, n) [N m or N]; None where there is no log, and in models that are evaluated.
-        beyond: torque of other effects (N, n) [N m or N], for those that act on all of the torque; None for none.
-        extra_load: torque of other effects (N, n) that the gears bear besides the robot's own [N m or N]; None for
-            none.
-        full_rate: the same logs before they were thinned; None where they were not.
-        since: moment from which the phase of what vibrates counts [s]; None for its own first.
+        velocity_scale: v0 (n,) [rad/s or m/s] of the sign, tanh(dq / v0); 0 for the sharp sign.
+        parts: the joined situations, if payloads differ between logs or the base is tilted against the robot's
+            description; else empty. Each part has a model under its own gravity. `parameters` are those of the first.
+        measured: logged torque (N, n) [N m or N]; None without a log, for example when a model is evaluated.
+        beyond: torque of other effects (N, n) [N m or N], for effects that act on the total torque; None for none.
+        extra_load: torque of other effects that loads the gears (N, n) [N m or N]; None for none.
+        full_rate: the same logs before they were thinned; None if they were not.
+        since: time at which the phase of vibrations is zero [s]; None for the first sample.
     """
 
     model: TorqueModel
@@ -79,7 +78,7 @@ class Situation:
 
     @property
     def runs(self) -> tuple[slice, ...]:
-        """The logs' samples."""
+        """The rows of each log."""
         return tuple(slice(a, b) for a, b in pairwise((*self.starts, len(self.t))))
 
     @cached_property
@@ -90,7 +89,7 @@ class Situation:
 
     @property
     def origin(self) -> float:
-        """The moment from which the phase of what vibrates counts [s]."""
+        """The time at which the phase of vibrations is zero [s]."""
         return float(self.t[0]) if self.since is None else self.since
 
     @property
@@ -100,19 +99,19 @@ class Situation:
 
     @property
     def whole(self) -> Array:
-        """All of the torque that is known (N, n) [N m or N]: the base model's, and that of other effects."""
+        """The total modelled torque (N, n) [N m or N]: that of the base model and of other effects."""
         return self.torque if self.beyond is None else self.torque + self.beyond
 
     def beside(self, torque: Array | None) -> Situation:
-        """The same with torque of other effects (N, n), or as much at all times (n,) [N m or N]; None for none."""
+        """Returns the situation with torque of other effects (N, n) or (n,) [N m or N]; None for none."""
         return self._with("beyond", torque)
 
     def bearing(self, torque: Array | None) -> Situation:
-        """The same with an additional gear load (N, n) [N m or N]; None for none."""
+        """Returns the situation with an additional gear load (N, n) [N m or N]; None for none."""
         return self._with("extra_load", torque)
 
     def _with(self, name: str, torque: Array | None) -> Situation:
-        """The same with a torque that is known, at all samples too; what is kept for callers depends on neither."""
+        """Returns a copy with a torque, also at full rate. It shares the cache, which depends on neither torque."""
         if torque is not None:
             torque = np.broadcast_to(torque, self.q.shape)
         if self.full_rate is None or torque is None:
@@ -133,19 +132,19 @@ class Situation:
 
     @cached_property
     def sign(self) -> Array:
-        """The sign of the velocities as the base model takes it (N, n), low-passed where logs are thinned."""
+        """The base model's sign of the velocities (N, n), low-passed if the logs are thinned."""
         if self.full_rate is not None:
             return self.full_rate.thinned(self.full_rate.situation.sign)
         return sign_of(self.dq, self.velocity_scale)
 
     @cached_property
     def rotors(self) -> Array:
-        """The rotors' inertias (2, n) [kg m2 or kg], see `rotor_inertias`."""
+        """The rotor inertias (2, n) [kg m2 or kg], see `rotor_inertias`."""
         return rotor_inertias(self.model, self.parameters)
 
     @cached_property
     def load(self) -> Array:
-        """The load of the gears (N, n) [N m or N]: the rigid body's torque without rotors, and the additional load."""
+        """The gear load (N, n) [N m or N]: the rigid-body torque without rotors, plus the additional load."""
         own = self.rigid - self.ddq * self.rotors.sum(axis=0)
         return own if self.extra_load is None else own + self.extra_load
 
@@ -157,9 +156,9 @@ class Situation:
         return self.model.torque(self.q, dq, self.ddq, self.parameters[columns], columns=columns)
 
     def derivatives(self, values: Array) -> tuple[Array, Array]:
-        """Differentiates samples (N, ...) once and twice by time, within each log.
+        """Computes the first and second time derivative of samples (N, ...), within each log.
 
-        Central differences of sixth order, of second order near the ends and where samples are uneven.
+        It uses central differences of sixth order; near a log's ends and for uneven samples, of second order.
         """
         first, second = np.zeros_like(values), np.zeros_like(values)
         for run in self.runs:
@@ -178,15 +177,20 @@ class Situation:
         return first, second
 
     def sensitivity(self, kind: str) -> Array:
-        """Evaluates how the base model's rigid-body torque would change; kept for the next caller.
+        """Evaluates a sensitivity of the base model's rigid-body torque, or a kinematic quantity; results are cached.
 
         Args:
-            kind: ``position`` d rigid/dq (N, n, n), ``velocity`` d rigid/d(dq) (N, n, n), ``inertia`` (N, n, n) without
-                rotors, ``gravity`` d rigid/d(gravity in the base frame) (N, n, 3), ``tool`` torque per inertial
-                parameter of a body on the flange, in its frame (N, n, 10), ``jacobian`` of the flange in the base
-                frame, linear then angular (N, 6, n), ``flange`` its place there (N, 3, 1), ``moment`` the first moment
-                of the links' masses there [kg m] (N, 3, 1), ``links`` of each link's frame there the rotation matrix,
-                row by row, and the origin [m] (N, 12, n).
+            kind: which one.
+
+                - ``position``: d rigid/dq (N, n, n)
+                - ``velocity``: d rigid/d(dq) (N, n, n)
+                - ``inertia``: inertia matrix without rotors (N, n, n)
+                - ``gravity``: d rigid/d(gravity in the base frame) (N, n, 3)
+                - ``tool``: torque per inertial parameter of a body at the flange, in the flange's frame (N, n, 10)
+                - ``jacobian``: Jacobian of the flange in the base frame, linear, then angular (N, 6, n)
+                - ``flange``: position of the flange in the base frame [m] (N, 3, 1)
+                - ``moment``: first moment of the links' masses in the base frame [kg m] (N, 3, 1)
+                - ``links``: per link, rotation matrix (row by row) and origin [m] in the base frame (N, 12, n)
         """
         if kind not in self._cache:
             parts = [part.sensitivity(kind) for part in self.parts]
@@ -197,7 +201,7 @@ class Situation:
         return evaluate(kind, self.model, self.parameters, self.q, self.dq, self.ddq)
 
     def cached(self, key: object, compute: Callable[[], Kept]) -> Kept:
-        """Gives `compute()`, computed once per key: a state that several columns share."""
+        """Returns `compute()`, evaluated once per key, for states that several columns share."""
         if key not in self._cache:
             self._cache[key] = compute()
         return cast(Kept, self._cache[key])
@@ -208,8 +212,8 @@ class Finer:
     """Logs before thinning. Effects that change between samples are evaluated there and filtered like the torque.
 
     Attributes:
-        situation: what the robot did, at all samples.
-        thinned: low-passes rows (N, ...) of those as the torque was, and thins them.
+        situation: the motion and the base model's torque at all samples.
+        thinned: low-passes rows (N, ...) of these samples like the torque, and thins them.
     """
 
     situation: Situation
@@ -217,7 +221,7 @@ class Finer:
 
 
 def with_finer(coarse: Situation, finer: Finer) -> Situation:
-    """Gives a situation of thinned logs whose friction is that of all samples, low-passed as their torque."""
+    """Returns a situation of thinned logs with friction evaluated at all samples and low-passed like the torque."""
     friction = finer.thinned(finer.situation.friction)
     return replace(
         coarse, friction=friction, torque=coarse.torque - coarse.friction + friction, full_rate=finer, _cache={}
@@ -239,16 +243,19 @@ def situation(
 
     Args:
         model: the base model with p columns.
-        parameters: their values (p,), or those of `columns` only.
-        t: time [s], (N,).
-        q: positions (N, n), free of noise.
-        dq: velocities (N, n).
-        ddq: accelerations (N, n).
-        starts: indices at which a new log begins.
-        columns: indices of the model's columns that `parameters` are of; the others are zero.
+        parameters: values of all columns (p,), or of `columns` only.
+        t: time (N,) [s].
+        q: positions (N, n) [rad or m], without noise.
+        dq: velocities (N, n) [rad/s or m/s].
+        ddq: accelerations (N, n) [rad/s2 or m/s2].
+        starts: indices of each log's first sample.
+        columns: indices of the columns that `parameters` belong to; all other parameters are zero.
+
+    Returns:
+        The situation.
 
     Raises:
-        InputError: arrays that do not fit together.
+        InputError: the arrays' shapes do not match.
     """
     times = np.asarray(t, dtype=float)
     q, dq, ddq = (np.ascontiguousarray(np.atleast_2d(np.asarray(a, dtype=float))) for a in (q, dq, ddq))

@@ -1,4 +1,4 @@
-"""Members of a given gain, and a stand-in for the fit of several together."""
+"""Effects with a given gain, and a replacement for the fit of several effects together, for tests."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ def accepting(monkeypatch: pytest.MonkeyPatch, accept: Callable[..., Any]) -> No
 
 
 def adding(monkeypatch: pytest.MonkeyPatch, gains: Mapping[int, float]) -> None:
-    """Has members explain together the sum of what each explains, by the identity of its group."""
+    """Makes effects explain together the sum of their gains, which are given by the identity of their groups."""
     accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
 
 
 def member_of(name: str, joint: int | None, gain: float, degrees: int) -> FittedEffect:
-    """A member of a gain and a number of parameters."""
+    """Builds a fitted effect with a gain and a number of parameters."""
     group = Group((0,), (np.ones((ROWS, 1), np.float32),), np.zeros((1, 1)), np.eye(1), np.ones(1), np.ones(1))
     return replace(FittedEffect(Hypothesis(EFFECTS[name], joint), (), group, gain, np.ones(1), degrees, 1.0))

@@ -1,4 +1,4 @@
-"""Logs of the arm, posed as the diagnosis does."""
+"""Fixtures: the whitened regression problem of the arm's logs, and a motion of six joints."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from robots.terms.effects import Situation, situation
 
 @pytest.fixture(scope="session")
 def pose_arm(arm: Robot) -> Callable[..., Problem]:
-    """Fit the arm's base model to a recording, estimate the noise, and pose the whitened regression."""
+    """Fits the arm's base model to a recording, estimates the noise, and builds the whitened regression problem."""
 
     def build(recording: Recording, wider: float | None = None) -> Problem:
         baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
@@ -44,7 +44,7 @@ def pose_arm(arm: Robot) -> Callable[..., Problem]:
 
 @pytest.fixture(scope="session")
 def swept() -> Situation:
-    """A motion of six joints under gravity, with friction."""
+    """Returns a motion of six joints under gravity, with friction."""
     robot = load_robot("ur10")
     t = 0.02 * np.arange(500)
     rates = np.array([0.9, 1.1, 1.3, 1.7, 2.1, 2.6])

@@ -1,4 +1,4 @@
-"""Stands for the measurement of which names unseen data bear out: members, and what is shown of them."""
+"""Replacement for held-out measurements in tests: effects, and the result that is measured for each."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations.held_out_validation import ValidatedFindings, validate_on_held_out
 from estimation.diagnosis.validations.name_comparison import ComparedNames
 from robots.terms.discrepancies.patterns import build_pattern
+from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effects import EFFECTS
 
 
 @dataclass(frozen=True)
 class Shown:
-    """What unseen data say of a member: its gain's interval, its rise, shares kept and spoken for, its joint astray."""
+    """Held-out result of an effect: its gain's interval, RMSE ratio, retained gain, support, unreliable joint."""
 
     low: float = 0.001
     high: float = 0.003
@@ -37,9 +38,10 @@ HELPS, IDLE, HARMS = Shown(), Shown(-0.001, 0.002, 1.0), Shown(-0.004, -0.001, 1
 
 @dataclass
 class Bench:
-    """Stands for the measurement: what each label shows, also beside certain others or gone, and what it was asked.
+    """Replacement for the measurement: the result of each label, and a record of the calls.
 
-    On some joints several members together have an extra error beyond what each brings beside the others.
+    The result may differ beside certain other effects, or after removal. On some joints, several effects together have
+    an additional error.
     """
 
     shows: dict[str, Shown]
@@ -72,7 +74,7 @@ class Bench:
         )
 
     def _left(self, members: Sequence[FittedEffect], shown: Sequence[Shown], model: int) -> np.ndarray:
-        """Errors of the base model (0) and of all members together (-1) on each of eight joints."""
+        """Returns the errors of the base model (0) and of all effects together (-1) on each of eight joints."""
         error = np.full(8, 0.03)
         for member, what in zip(members, shown, strict=True) if model else ():
             if member.hypothesis.joint is not None:
@@ -83,12 +85,12 @@ class Bench:
 
 
 def label_of(member: FittedEffect) -> str:
-    """What a bench knows a member by: its hypothesis, and its shape if it has one."""
+    """Returns the label by which a bench identifies an effect: its hypothesis, and its shape if it has one."""
     return member.hypothesis.label + (f" {member.shape}" if member.shape else "")
 
 
 def member_of(name: str, joint: int | None) -> FittedEffect:
-    """A member by the name of its effect or pattern, which nothing was fitted to."""
+    """Builds an unfitted effect by the name of a catalogue effect or pattern."""
     effect = EFFECTS.get(name) or build_pattern(name)
     assert effect is not None
     return FittedEffect(Hypothesis(effect, joint), (), None, 100.0, np.zeros(1), 1, 1.0)  # type: ignore[arg-type]
@@ -105,7 +107,7 @@ LABELS = {m.hypothesis.name: m.hypothesis.label for m in (SPRING, STRIBECK, PRES
 
 
 def bench_with(**shows: Shown) -> Bench:
-    """Members by the names of their effects; what is not listed helps."""
+    """Builds a bench with results by the effects' names; all others help."""
     return Bench(
         {label: shows.get(name.split(":")[1] if ":" in name else name, HELPS) for name, label in LABELS.items()}
     )
@@ -122,16 +124,16 @@ def validated(
     worths: Mapping[FittedEffect, float] | None = None,
     unnamed: tuple[FittedEffect, float] | None = None,
 ) -> ValidatedFindings:
-    """What unseen data as a bench shows them bear out of names and free functions."""
+    """Validates named effects and free functions on the held-out results of a bench."""
     compared = ComparedNames(founds, tuple(free), tuple(p_values), 1.0)
     for found in founds:
         for member in (found.effect, *(rival for rival, _ in found.rivals)):
             worth = (worths or {}).get(member, 1.0 if member in faint else 100.0)
-            # Nothing was fitted: what is computed once from a fit is put in its place.
+            # Nothing was fitted, so the cached evidence is set directly.
             vars(member)["local_evidence"] = Evidence(worth, 0, 1.0)
 
     def beyond(member: FittedEffect) -> bool:
-        return held_out and member.hypothesis.effect.transient
+        return held_out and member.hypothesis.effect.persistence is Persistence.TRANSIENT
 
     return validate_on_held_out(
         compared,

@@ -1,4 +1,4 @@
-"""Logs of joints that stand still, and noise of two joints that is neither white nor alike."""
+"""Recordings of joints at rest, and coloured noise that is correlated between two joints."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ STEP = 0.004
 
 
 def recording_of(rows: int = 10_000, n: int = 2, unsure: np.ndarray | None = None) -> Recording:
-    """A recording of nothing, of some rows and joints."""
+    """Builds a recording with zero motion and torque, for given numbers of rows and joints."""
     zero = np.zeros((rows, n))
     return Recording(
         t=STEP * np.arange(rows),
@@ -32,7 +32,7 @@ def recording_of(rows: int = 10_000, n: int = 2, unsure: np.ndarray | None = Non
 
 
 def noise_of(rows: int, seed: int = 0) -> np.ndarray:
-    """Half AR(1), half white noise, of which the second joint has some of the first's."""
+    """Draws noise (rows, 2), half of it AR(1) and half white; the second joint's contains some of the first's."""
     rng = np.random.default_rng(seed)
     white = rng.standard_normal((rows, 2))
     coloured = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], rng.standard_normal((rows, 2)), axis=0)

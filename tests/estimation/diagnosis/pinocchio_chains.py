@@ -1,4 +1,4 @@
-"""Robots' chains in pinocchio, built joint by joint without any code of ours."""
+"""Kinematic chains of robots in pinocchio, built joint by joint, independent of the packages under test."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from robots.robot import Robot
 
 
 def chain_of(robot: Robot) -> tuple[pin.Model, int]:
-    """Builds a chain of joints without bodies, and gives its last joint's number."""
+    """Builds a chain of joints without bodies, and returns it with its last joint's index."""
     model, parent = pin.Model(), 0
     for joint in robot.chain.joints:
         placement = pin.SE3(np.asarray(joint.rotation), np.asarray(joint.translation))
@@ -21,7 +21,7 @@ def chain_of(robot: Robot) -> tuple[pin.Model, int]:
 def torque_of_mass(
     robot: Robot, mass: float, centre: np.ndarray, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray
 ) -> np.ndarray:
-    """Torque (N, n) of a point mass on the flange, at a place in its frame, of a robot without bodies."""
+    """Computes the torque (N, n) of a point mass on the flange, at a point in its frame, without other bodies."""
     model, last = chain_of(robot)
     tip = pin.SE3(np.asarray(robot.chain.tip)[:3, :3], np.asarray(robot.chain.tip)[:3, 3])
     model.appendBodyToJoint(last, pin.Inertia(mass, centre, np.zeros((3, 3))), tip)

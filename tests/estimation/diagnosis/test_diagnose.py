@@ -1,4 +1,4 @@
-"""Specification of the verb: what it names, what it leaves open, the extended model, and bad input."""
+"""Tests of `diagnose`: named and unexplained effects, the extended model, and bad input."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from robots.robot import Robot
 from robots.signals import Log
 
 SOME = ("asymmetric_friction", "friction_step", "load_dependent_friction", "stribeck", "spring", "payload_change")
-# The arm has no more: higher powers, hardly told apart by one motion, would blur the errors on another.
+# The arm has no higher powers; one motion hardly determines them, and they would add errors on another.
 SIMPLE = "coulomb-viscous"
 
 
 @pytest.fixture(scope="module")
 def hidden(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> Callable[..., tuple[Log, Log]]:
-    """Simulate the arm with an effect: a log of one motion, and one of another."""
+    """Simulates the arm with an effect, and returns logs of two motions."""
 
     def build(effect: str | None, joint: int | None = None, seed: int = 0, **values: float) -> tuple[Log, Log]:
         plant = arm_plant(torque_noise=0.02)
@@ -43,14 +43,17 @@ def hidden(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> Callabl
 
 @pytest.fixture(scope="module")
 def stepped(arm: Robot, hidden: Callable[..., tuple[Log, Log]]) -> tuple[Diagnosis, Log]:
-    """The diagnosis of an arm whose second joint's friction rises at 8 s."""
+    """Returns the diagnosis of an arm whose second joint's friction rises at 8 s."""
     log, unseen = hidden("friction_step", 2, coulomb_step=0.4, viscous_step=0.1, change_time=8.0)
     return diagnose(arm, log, held_out=unseen, candidates=SOME, friction=SIMPLE), unseen
 
 
 @pytest.mark.slow
 def test_a_log_without_effects_has_nothing_found(arm: Robot, hidden: Callable[..., tuple[Log, Log]]) -> None:
-    """The verdict is none, and the extended model is the base model; a false alarm has a chance of 1 %."""
+    """Without an effect the verdict is `none`, with the base model as the extended model.
+
+    A false alarm has a chance of 1 %.
+    """
     log, _ = hidden(None)
     result = diagnose(arm, log, candidates=SOME)
     assert result.verdict == "none"
@@ -62,7 +65,7 @@ def test_a_log_without_effects_has_nothing_found(arm: Robot, hidden: Callable[..
 
 @pytest.mark.slow
 def test_a_step_of_friction_is_named_with_its_joint_its_time_and_its_gain(stepped: tuple[Diagnosis, Log]) -> None:
-    """Name, joint, change time within 0.2 s and coefficients within their intervals; the unseen error falls."""
+    """A friction step is named with joint, time to 0.2 s and coefficients, and reduces the held-out error."""
     result, _ = stepped
     assert result.verdict in ("named", "ambiguous")
     finding = result.findings[0]
@@ -79,7 +82,7 @@ def test_a_step_of_friction_is_named_with_its_joint_its_time_and_its_gain(steppe
 def test_the_extended_model_predicts_an_unseen_log_as_its_file_does(
     stepped: tuple[Diagnosis, Log], tmp_path: Path
 ) -> None:
-    """Saved and read again it predicts the same, and better than the same parameters without the extension."""
+    """A saved model predicts the same after loading, and better than without its extension."""
     result, unseen = stepped
     result.save(tmp_path)
     model = load_model(tmp_path)
@@ -88,7 +91,7 @@ def test_the_extended_model_predicts_an_unseen_log_as_its_file_does(
     assert whole.predicted == pytest.approx(predict(result.model, unseen).predicted)
     alone = predict(replace(model, extensions=()), unseen)
     assert whole.nrmse[1] < alone.nrmse[1]
-    # What is said of the unseen log is what a prediction of it comes to, rows about reversals included.
+    # The stated held-out error is that of a prediction, including rows near reversals.
     np.testing.assert_allclose(result.every_row, whole.nrmse, rtol=1e-9)
     np.testing.assert_allclose(result.extended, whole.nrmse, rtol=0.15)
     assert " ".join(f"{100 * value:.2f}" for value in whole.nrmse) in result.summary()
@@ -99,7 +102,7 @@ def test_the_extended_model_predicts_an_unseen_log_as_its_file_does(
 def test_a_log_that_began_its_clock_anew_is_predicted_as_after_the_change(
     stepped: tuple[Diagnosis, Log], tmp_path: Path
 ) -> None:
-    """It overlaps the log of the fit in time, and counts as recorded after it; the log of the fit itself does not."""
+    """A log that overlaps the fit's log in time is predicted as recorded after it; the fit's own log is not."""
     result, unseen = stepped
     result.save(tmp_path)
     model = load_model(tmp_path)
@@ -113,7 +116,7 @@ def test_a_log_that_began_its_clock_anew_is_predicted_as_after_the_change(
 
 
 def test_a_diagnosis_survives_its_file(stepped: tuple[Diagnosis, Log], tmp_path: Path) -> None:
-    """What is saved is read again, in the form that others rely on."""
+    """A saved diagnosis is loaded unchanged, and its file has the documented keys."""
     result, _ = stepped
     result.save(tmp_path)
     data = json.loads((tmp_path / "diagnosis.json").read_text())
@@ -128,7 +131,7 @@ def test_a_diagnosis_survives_its_file(stepped: tuple[Diagnosis, Log], tmp_path:
 
 
 def test_the_summary_names_cause_joint_and_gain(stepped: tuple[Diagnosis, Log]) -> None:
-    """A person reads what was found, where, how well each number is known, and what it brings on which data."""
+    """The summary states effect, joint, parameters with intervals, and the data of the gain."""
     text = stepped[0].summary()
     assert "friction_step (joint 2)" in text
     for parameter in stepped[0].findings[0].parameters:
@@ -142,7 +145,7 @@ def test_the_summary_names_cause_joint_and_gain(stepped: tuple[Diagnosis, Log]) 
 def test_a_cause_outside_the_candidates_is_not_forced_into_a_name(
     arm: Robot, hidden: Callable[..., tuple[Log, Log]]
 ) -> None:
-    """A torque that waves with the angle, when no candidate can make it, is told as such, with its joint and a gain."""
+    """An effect outside the candidates is unexplained, with its joint and a gain."""
     log, unseen = hidden("position_dependent_friction", 1, cosine=0.9, sine=0.3, order=3.0)
     result = diagnose(arm, log, held_out=unseen, candidates=("payload_change", "torque_sensor_drift"), friction=SIMPLE)
     assert result.verdict == "unexplained"
@@ -156,7 +159,7 @@ def test_a_cause_outside_the_candidates_is_not_forced_into_a_name(
 def test_peaks_that_are_cut_off_are_named_though_they_explain_little(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable
 ) -> None:
-    """A few samples of one torque at its largest are no chance: nothing else of the log would show so small a cut."""
+    """Flat tops of 120 samples are named as clipping; 40 samples give a note only."""
     log = simulate(arm_plant(torque_noise=0.1), fourier_motion(arm, 0), seed=0)
     some = ("current_clipping", "spring", "friction_step")
 
@@ -184,7 +187,7 @@ def test_peaks_that_are_cut_off_are_named_though_they_explain_little(
 
 @pytest.mark.slow
 def test_noise_that_is_a_third_of_the_torque_is_said(arm: Robot, fourier_motion: Callable, arm_plant: Callable) -> None:
-    """Nothing is found in it, and a note says how much is left, joint by joint; quiet joints have none."""
+    """Noise of a third of the torque gives a note on its joint, and no finding."""
     log = simulate(arm_plant(torque_noise=0.02), fourier_motion(arm, 0), seed=0)
     loud = replace(
         log, tau=log.tau + np.random.default_rng(1).normal(size=log.tau.shape) * [0.0, 0.35 * log.tau[:, 1].std()]
@@ -199,7 +202,7 @@ def test_noise_that_is_a_third_of_the_torque_is_said(arm: Robot, fourier_motion:
 def test_unseen_motion_that_is_faster_than_friction_was_fitted_for_is_said(
     arm: Robot, fourier_motion: Callable, arm_plant: Callable
 ) -> None:
-    """The same path in half the time; with friction that has no polynomial there is nothing to warn of."""
+    """Held-out motion at twice the fitted speed gives a note, unless friction has no higher powers."""
     motion = fourier_motion(arm, 0)
     half = np.asarray(motion.t) / 2.0
     fast = replace(motion, t=half, dq=2.0 * motion.dq, ddq=4.0 * motion.ddq)
@@ -214,7 +217,7 @@ def test_unseen_motion_that_is_faster_than_friction_was_fitted_for_is_said(
     assert note.startswith("Joints 1, 2: up to 2.0 times")
     assert told(SIMPLE, unseen) == []
     assert told("polynomial", simulate(plant, replace(motion, t=2 * half + 100.0), seed=2)) == []
-    # One with a gap is two stretches.
+    # A log with a gap counts as two stretches.
     kept = np.abs(unseen.t - unseen.t.mean()) > 0.5
     torn = replace(unseen, t=unseen.t[kept], q=unseen.q[kept], tau=unseen.tau[kept])
     (note,) = told("polynomial", torn)
@@ -222,7 +225,7 @@ def test_unseen_motion_that_is_faster_than_friction_was_fitted_for_is_said(
 
 
 def test_a_finding_that_is_no_part_of_the_model_is_shown(stepped: tuple[Diagnosis, Log]) -> None:
-    """A page shows a free function that errs on unseen data too, though it has no coordinate of its own."""
+    """The report shows a finding that the model does not contain."""
     result, _ = stepped
     left = replace(result.findings[0], effect="unexplained", pattern="pattern:time:0:even")
     view = view_of(replace(result, findings=(*result.findings, left)))
@@ -231,7 +234,7 @@ def test_a_finding_that_is_no_part_of_the_model_is_shown(stepped: tuple[Diagnosi
 
 
 def test_bad_input_is_named(arm: Robot, hidden: Callable[..., tuple[Log, Log]]) -> None:
-    """An unknown effect, no log, an impossible level, a log given twice, a short one, an arm that stands."""
+    """Each bad input raises an error that names it."""
     log, _ = hidden(None)
     with pytest.raises(InputError, match="unknown effect"):
         diagnose(arm, log, candidates=("stribek",))

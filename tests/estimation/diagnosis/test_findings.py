@@ -1,4 +1,4 @@
-"""Specification of how a finding's parameters are told."""
+"""Tests of the text of a finding's parameters."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from estimation.diagnosis.findings import MOST_LISTED, Parameter, list_parameter
     ],
 )
 def test_both_ends_of_an_interval_are_told_apart(value: float, ci95: tuple, unit: str, told: str) -> None:
-    """A narrow one has the digits for that, a choice among a few no interval, what is open none either."""
+    """An interval has enough digits to distinguish its ends; choices and undetermined values have no interval."""
     parameter = Parameter(name="size", value=value, unit=unit, standard_error=1.0, ci95=ci95, determined=True)
     assert parameter.text == told
 
 
 def test_a_summary_lists_no_more_parameters_than_a_line_holds() -> None:
-    """One more is listed, for its name is no longer than the word that it is left out; of more, their number."""
+    """A summary lists a limited number of parameters, and the number of further ones."""
     names = [f"place_{k}" for k in range(12)]
     assert list_parameters(names[:MOST_LISTED]) == ", ".join(names[:MOST_LISTED])
     assert list_parameters(names[: MOST_LISTED + 1]) == ", ".join(names[: MOST_LISTED + 1])

@@ -1,4 +1,4 @@
-"""Specification of a diagnosis of logs under two gravities, whose torque is pinocchio's."""
+"""Tests of the diagnosis of logs under two gravities, against pinocchio."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Build = Callable[..., Log]
 
 @pytest.fixture(scope="module")
 def build(upright: Robot, fourier_motion: Callable[..., Motion], pinocchio_torque: Torque) -> Build:
-    """A log whose torque is pinocchio's, with drives that give a gain times their torque, on an askew base."""
+    """Builds a log with pinocchio's torque, with a gain per drive and an unknown tilt of the base."""
 
     def make(
         seed: int,
@@ -56,7 +56,7 @@ def build(upright: Robot, fourier_motion: Callable[..., Motion], pinocchio_torqu
 
 @pytest.mark.slow
 def test_each_log_is_evaluated_as_its_base_stood(upright: Robot, build: Build, pinocchio_torque: Torque) -> None:
-    """Columns, what effects feel, and the robot that is simulated: pinocchio's torque log by log, payloads included."""
+    """Columns, situations and the simulated robot use each log's own gravity and payload."""
     logs = (build(0), build(1, TILTED, MASS), build(2, TILTED))
     recording = build_recording(upright, logs)
     light = subtract_known_payload(upright, recording)
@@ -75,7 +75,7 @@ def test_each_log_is_evaluated_as_its_base_stood(upright: Robot, build: Build, p
         rotors = upright.rotor_inertia * motion.ddq
         assert now.rigid[run] == pytest.approx(full + rotors, abs=size)
         own = [i for i, column in enumerate(base.columns) if column.term == "rigid_body"]
-        # Of several rotors some are grouped with their links.
+        # Some rotors are grouped with their links.
         rigid = np.where([c.term in ("rigid_body", "rotor_inertia") for c in base.model.columns], parameters, 0.0)
         grouped = base.from_standard(rigid)
         assert baseline.regressor[run] @ grouped == pytest.approx(bare + rotors, abs=size)
@@ -91,7 +91,7 @@ def test_each_log_is_evaluated_as_its_base_stood(upright: Robot, build: Build, p
             gravity_fields=(light.gravities[recording.runs.index(run)],),
         )
         states = (part.q, part.dq, part.ddq)
-        # The plant has friction besides, and the mass; without bodies it would differ by the payload's torque.
+        # The plant also has friction and the payload.
         carried = plant.payload_torque(part, states)
         assert carried == pytest.approx(full - bare, abs=size)
         assert plant.base(part, states) - carried == pytest.approx(baseline.regressor[run] @ values, abs=1e-6)
@@ -104,7 +104,7 @@ def test_each_log_is_evaluated_as_its_base_stood(upright: Robot, build: Build, p
 
 @pytest.fixture(scope="module")
 def gained(upright: Robot, build: Build) -> tuple[Diagnosis, tuple[Log, Log]]:
-    """The diagnosis of an arm whose shoulder says 4 % too much torque, by a level and a tilted log."""
+    """Returns the diagnosis of an arm whose shoulder torque is logged 4 % too large, from a level and a tilted log."""
     gain = (1.0, 1.04, 1.0)
     logs = (build(0, gain=gain), build(1, TILTED, gain=gain))
     return diagnose(upright, logs, candidates=SOME, friction=SIMPLE), logs
@@ -112,7 +112,7 @@ def gained(upright: Robot, build: Build) -> tuple[Diagnosis, tuple[Log, Log]]:
 
 @pytest.mark.slow
 def test_a_wrong_torque_constant_is_told_from_a_tilt_and_a_mass(gained: tuple[Diagnosis, tuple[Log, Log]]) -> None:
-    """Named on its joint with its size, by logs under two gravities; unseen errors fall."""
+    """With logs under two gravities, a wrong torque constant is named with joint and size."""
     result, _ = gained
     assert result.verdict == "named"
     (finding,) = result.findings
@@ -125,7 +125,7 @@ def test_a_wrong_torque_constant_is_told_from_a_tilt_and_a_mass(gained: tuple[Di
 def test_the_extended_model_predicts_on_the_base_as_described_and_as_tilted(
     gained: tuple[Diagnosis, tuple[Log, Log]], build: Build, tmp_path: Path
 ) -> None:
-    """Saved and read again it holds under the description's gravity, and under the one that was told."""
+    """The loaded model predicts logs under both gravities, and with a payload."""
     result, _ = gained
     result.save(tmp_path)
     model = load_model(tmp_path)
@@ -133,13 +133,13 @@ def test_the_extended_model_predicts_on_the_base_as_described_and_as_tilted(
     assert {"mPx_1", "mPy_1"} <= set(model.names)
     gain = (1.0, 1.04, 1.0)
     for log in (build(3, gain=gain), build(4, TILTED, gain=gain), build(5, TILTED, MASS, gain=gain)):
-        # Noise is 0.02 N m of some 2 to 15; the rest is what smoothing leaves at reversals.
+        # Noise is 0.02 N m of some 2 to 15 N m; the rest are smoothing errors at reversals.
         assert np.all(predict(model, log).nrmse < 0.03)
 
 
 @pytest.mark.slow
 def test_a_tilt_that_was_not_told_is_not_taken_for_nothing(upright: Robot, build: Build) -> None:
-    """A robot without fault: told of the tilt, each log predicts the other to the noise; not told, not at all."""
+    """With the known tilt, logs predict each other to the noise; without it, errors are large."""
     logs = (build(0), build(1, TILTED))
     told = diagnose(upright, logs, candidates=SOME, friction=SIMPLE)
     assert told.verdict == "none"
@@ -150,7 +150,7 @@ def test_a_tilt_that_was_not_told_is_not_taken_for_nothing(upright: Robot, build
 
 @pytest.mark.slow
 def test_a_base_askew_on_its_mount_is_found_under_two_gravities(upright: Robot, build: Build) -> None:
-    """Gravity is off by the same small rotation of the base frame in both logs: its angles come back to 0.1 degrees."""
+    """An unknown base tilt is found from logs under two gravities, with angles to 0.1 degrees."""
     askew = (0.03, -0.02, 0.0)
     logs = (build(0, askew=askew), build(1, TILTED, askew=askew))
     result = diagnose(upright, logs, held_out=build(2, TILTED, askew=askew), candidates=SOME, friction=SIMPLE)
@@ -163,7 +163,7 @@ def test_a_base_askew_on_its_mount_is_found_under_two_gravities(upright: Robot, 
 
 @pytest.mark.slow
 def test_what_only_a_tilt_shows_of_an_upright_axis_is_no_spring(upright: Robot, build: Build) -> None:
-    """Moments about the first axis, in no base parameter of a level robot, are fitted with the tilt and named so."""
+    """First moments about the vertical first axis are fitted with the tilt, and not named as a spring."""
     askew = (0.02, 0.015, 0.0)
     candidates = ("base_tilt", "spring", "torque_constant_error", "torque_ripple")
     result = diagnose(upright, build(0, askew=askew), candidates=candidates, friction=SIMPLE)
@@ -171,20 +171,20 @@ def test_what_only_a_tilt_shows_of_an_upright_axis_is_no_spring(upright: Robot, 
     assert finding.effect == "base_tilt"
     told = {parameter.name: parameter.value for parameter in finding.parameters}
     assert (told["tilt_1"], told["tilt_2"]) == pytest.approx(askew[:2], abs=3e-3)
-    # The waist's own moments, and those of 6 kg on its lever.
+    # The first moments of the waist, and those of 6 kg on its lever.
     assert (told["own_moment_1"], told["own_moment_2"]) == pytest.approx((0.3 + 0.1 * 6, 0.2), abs=0.15)
 
 
 @pytest.mark.slow
 def test_unseen_logs_may_stand_as_none_before(upright: Robot, build: Build) -> None:
-    """Fitted on a level base, judged on a tilted one: what only the tilt shows is the description's."""
+    """A model fitted on a level base predicts a tilted one, with the description's values where only a tilt shows."""
     result = diagnose(upright, build(0), held_out=build(1, TILTED), candidates=SOME, friction=SIMPLE)
     assert result.verdict == "none"
     assert np.all(np.array(result.baseline) < 0.05)
 
 
 def test_the_default_model_is_one_object_a_gravity(upright: Robot) -> None:
-    """What was compiled for a gravity is kept: the same model comes back for it, and itself for its own."""
+    """The default model is cached per gravity."""
     model = default_model(upright)
     assert model.under(TILTED) is model.under(tuple(TILTED))
     assert model.under(None) is model.under(upright.chain.gravity) is model

@@ -1,4 +1,4 @@
-"""Specification of the search for a shape: moments by zooming, with intervals that hold; joints that must agree."""
+"""Tests of the search for change times and their intervals, and of delays on which joints must agree."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ TRUE = 7.31
 
 @pytest.fixture(scope="module")
 def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
-    """A log of the arm without effects."""
+    """Returns a recording of the arm without effects."""
     return build_recording(arm, [arm_log(torque_noise=0.02)])
 
 
 @pytest.fixture(scope="module")
 def posed(recording: Recording, pose_arm: Callable[..., Problem]) -> Callable[[np.ndarray], Problem]:
-    """Pose the log with more torque on it (N, 2)."""
+    """Returns a function that builds the problem of the log with additional torque (N, 2)."""
     return lambda extra: pose_arm(replace(recording, tau=recording.tau + extra))
 
 
@@ -48,7 +48,7 @@ def _stepped(recording: Recording, size: float) -> np.ndarray:
 
 @pytest.mark.parametrize("size", [0.1, 0.3])
 def test_the_moment_is_the_best_of_all(recording: Recording, posed: Callable, size: float) -> None:
-    """From a point of the grid a step of friction is found where a scan of every 5 ms has its top, or better."""
+    """From a grid point the search finds a change time at least as good as a scan with steps of 5 ms."""
     problem = posed(_stepped(recording, size))
     nothing = accept(problem, ())
     grid = STEP.effect.grid(problem.situation, STEP.joint)
@@ -66,9 +66,9 @@ def test_the_moment_is_the_best_of_all(recording: Recording, posed: Callable, si
 
 @pytest.mark.slow
 def test_intervals_of_a_moment_hold_it(recording: Recording, posed: Callable) -> None:
-    """Of sixteen logs with a step that hardly shows, the 95 % interval holds its moment in thirteen or more.
+    """In at least thirteen of sixteen logs with a small step, the 95 % interval contains its time.
 
-    Fewer have a chance of 1e-3; an interval by the curvature of the likelihood at its top holds it in half of them.
+    Fewer have a chance of 1e-3. An interval from the likelihood's curvature contains it in half of them.
     """
     held = 0
     for seed in range(16):
@@ -81,7 +81,7 @@ def test_intervals_of_a_moment_hold_it(recording: Recording, posed: Callable) ->
 
 
 def test_joints_must_agree_on_a_delay(recording: Recording, posed: Callable) -> None:
-    """A lateness of both joints is worth its gain; that of one joint, with the opposite of the other, is not."""
+    """A delay of both joints has a BIC gain; opposite delays of both joints have none."""
     plain = posed(np.zeros_like(recording.tau))
     late = 0.006 * lateness(plain.situation, 1e-3)
     both, one = posed(late), posed(late * [1.0, -1.0] * [1.0, 0.5])
@@ -97,7 +97,7 @@ def test_joints_must_agree_on_a_delay(recording: Recording, posed: Callable) -> 
 def test_a_shape_left_as_assumed_may_be_where_the_likelihood_has_its_top(
     top: float, farthest: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Assumed to be 1: every value counts whose gain is within 3.84 of the best, on a grid of a twentieth."""
+    """The error of a shape value that was assumed reaches all values whose gain is within 3.84 of the best."""
 
     def gain(problem: object, member: object, shape: tuple[float, ...], others: object) -> float:
         return 30.0 - ((shape[0] - top) / 0.1) ** 2
@@ -109,7 +109,7 @@ def test_a_shape_left_as_assumed_may_be_where_the_likelihood_has_its_top(
 
 
 def test_a_second_summit_belongs_to_the_interval() -> None:
-    """A moment whose profile drops by 14 and rises again may be at the second summit; what is lost for long is not."""
+    """The interval of a time includes a second, close maximum of the likelihood, but not a distant one."""
 
     def drop(value: float) -> float:
         away = abs(value - 7.0)
@@ -123,7 +123,7 @@ def test_a_second_summit_belongs_to_the_interval() -> None:
 
 
 def test_an_interval_is_no_narrower_than_the_profile(recording: Recording, posed: Callable) -> None:
-    """What the linearised fit says of a moment is no less than what the likelihood's own profile says."""
+    """The standard error of a time is at least that of the profile likelihood."""
     noise = np.random.default_rng(3).normal(size=recording.tau.shape) * [0.02, 0.06]
     problem = posed(_stepped(recording, 0.06) + noise)
     nothing = accept(problem, ())
@@ -136,7 +136,7 @@ def test_an_interval_is_no_narrower_than_the_profile(recording: Recording, posed
 def test_a_lag_of_one_joint_is_told_no_better_than_its_reversals(
     recording: Recording, posed: Callable, moment: float
 ) -> None:
-    """However many of them: of a lag d whose moments are known to m, no more than (d / m)^2 is evidence."""
+    """The local gain of a lag d is bounded by (d / m)^2 for reversal times with an error m."""
     lag, joint = 6e-3, 2
     plain = posed(np.zeros_like(recording.tau))
     problem = posed(lag * lateness(plain.situation, lag) * [0.0, 1.0])
@@ -162,7 +162,7 @@ def test_a_lag_of_one_joint_is_told_no_better_than_its_reversals(
 def test_friction_that_turns_round_over_microns_is_told_no_better_than_the_moments(
     recording: Recording, pose_arm: Callable[..., Problem]
 ) -> None:
-    """Late by some milliseconds at each reversal: all of it is sure where moments are, and less where not."""
+    """The doubtful part of a presliding gain grows with the error of reversal times."""
     q, dq = recording.q[:, 1], recording.dq[:, 1]
     z = bristle(recording.t, q, dq, recording.runs, 1e-4)
     extra = np.zeros_like(recording.tau)

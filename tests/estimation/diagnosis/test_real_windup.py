@@ -1,4 +1,4 @@
-"""The wind-up of a heavy arm's gears, by encoders on both sides of them."""
+"""Test of gear compliance on a real heavy arm with encoders on both sides of its gears."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from tests.kr300 import kr300
 
 @pytest.mark.slow
 def test_a_heavy_arm_s_gears(data: Callable[[str], Path], tmp_path: Path) -> None:
-    """The stiffness of joints 2 and 3 is that of the maker within its interval; joint 1 has too little load to tell.
+    """The stiffness intervals of joints 2 and 3 contain the maker's values; joint 1 has too little load.
 
-    All three encoders behind the gears are late by the same 3 ms: proportional to velocity, that hides nine tenths of
-    the wind-up until it is taken off.
+    All three link encoders have the same delay of 3 ms. Its contribution, proportional to velocity, hides nine tenths
+    of the deflection until it is subtracted.
     """
     robot, log = kr300(data("kuka_kr300_weigand"), tmp_path / "kr300.yaml")
     recording = build_recording(robot, [log])

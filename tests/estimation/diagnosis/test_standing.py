@@ -1,4 +1,4 @@
-"""Logs in which a joint stands, but for a tremble: they say nothing of it, and take nothing from the others."""
+"""Tests of logs in which a joint rests except for encoder flicker."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ COUNT = 2 * np.pi / 2**17
 
 @pytest.fixture(scope="module")
 def alone(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> Callable[..., Log]:
-    """A log of one joint's motion: the other trembles by a count, and friction holds it against any torque."""
+    """Returns a log in which one joint moves; the other flickers by a count while friction holds any torque."""
 
     def build(moving: int, later: float, step: float = 0.0) -> Log:
         motion = fourier_motion(arm, 1)
@@ -42,7 +42,7 @@ def alone(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> Callable
 @pytest.mark.slow
 @pytest.mark.parametrize("flicker", [False, True])
 def test_a_joint_that_never_moves_is_told(arm: Robot, alone: Callable[..., Log], flicker: bool, tmp_path: Path) -> None:
-    """Its encoder says one value throughout, or flickers by a count: no crash, no refusal, and a note; it is saved."""
+    """A joint that never moves gives a note, and the result can be saved."""
     log = alone(0, 0.0)
     q = np.array(log.q)
     q[:, 1] = 0.3 + 1e-5 * flicker * (np.random.default_rng(0).random(len(q)) < 0.3)
@@ -54,7 +54,7 @@ def test_a_joint_that_never_moves_is_told(arm: Robot, alone: Callable[..., Log],
 
 
 def test_a_joint_that_trembles_by_a_count_is_at_rest(arm: Robot, arm_log: Callable, alone: Callable[..., Log]) -> None:
-    """No row tells its direction, and its noise is that of the log in which it moves."""
+    """A joint that flickers by a count has no known sign, and its noise is that of the log in which it moves."""
     both = arm_log(torque_noise=0.02)
     first = build_recording(arm, [both])
     recording = build_recording(arm, [both, alone(0, 100.0)])
@@ -68,16 +68,16 @@ def test_a_joint_that_trembles_by_a_count_is_at_rest(arm: Robot, arm_log: Callab
 
 @pytest.mark.slow
 def test_an_unseen_log_of_one_joint_is_judged_by_that(arm: Robot, arm_log: Callable, alone: Callable[..., Log]) -> None:
-    """Torque that friction holds is no error of the model there; the joint that moves errs by noise."""
+    """In a held-out log of one joint, the resting joint has no error."""
     found = diagnose(arm, arm_log(torque_noise=0.02), held_out=alone(0, 100.0), candidates=("stribeck",))
     recording = build_recording(arm, [alone(0, 100.0)], travel=np.array([1.0, 1.0]))
     assert recording.sign_unknown[:, 1].all()
     assert found.baseline[0] < 0.05
-    assert np.isnan(found.baseline[1])  # nobody has seen its model err
+    assert np.isnan(found.baseline[1])  # its error is unknown
 
 
 def test_the_gate_asks_nothing_of_a_joint_that_stands(arm: Robot, alone: Callable[..., Log]) -> None:
-    """It is told to stand hardly moving; its steps are no jumps, and its torque has neither sign nor size."""
+    """The log check reports a resting joint only as hardly moving."""
     report = check_log(arm, alone(0, 0.0))
     own = {finding.name for finding in report.findings if finding.joint == 2}
     assert own <= {"hardly_moves", "quantised_position"}
@@ -89,7 +89,7 @@ def test_the_gate_asks_nothing_of_a_joint_that_stands(arm: Robot, alone: Callabl
 def test_single_joint_logs_beside_another_find_nothing_that_is_not_there(
     arm: Robot, arm_log: Callable, alone: Callable[..., Log]
 ) -> None:
-    """Torque that static friction takes is no effect, nor is it an unseen error (a false alarm: 1 in 100)."""
+    """Static friction torque in single-joint logs is no effect and no error (false alarm: 1 in 100)."""
     logs = [arm_log(torque_noise=0.02), alone(0, 100.0), alone(1, 200.0)]
     found = diagnose(arm, logs)
     assert found.verdict == "none", found.summary()
@@ -98,7 +98,7 @@ def test_single_joint_logs_beside_another_find_nothing_that_is_not_there(
 
 @pytest.mark.slow
 def test_what_one_joint_alone_shows_is_found(arm: Robot, alone: Callable[..., Log]) -> None:
-    """Logs of one joint each show that the first has more friction from a moment on; its own stretches measure that."""
+    """From logs of one moving joint each, a friction step is found, and stretches of its log measure the gain."""
     found = diagnose(arm, [alone(0, 100.0, step=0.6), alone(1, 200.0)])
     assert [(finding.effect, finding.joint) for finding in found.findings] == [("friction_step", 1)]
     assert "a joint moves in one log only" in found.how_unseen or "acts in one log only" in found.how_unseen
@@ -107,10 +107,10 @@ def test_what_one_joint_alone_shows_is_found(arm: Robot, alone: Callable[..., Lo
 
 @pytest.mark.slow
 def test_limits_say_that_a_push_in_a_rest_is_not_seen(arm: Robot, arm_log: Callable) -> None:
-    """Of what passes, and only where the arm stands for more than a moment."""
+    """Limits of transient effects have a note if the arm rests for some time."""
     log = arm_log(torque_noise=0.02)
     halves = np.linspace(0.0, len(log.t) - 1.0, len(log.t))
-    # Three seconds of rest in the middle, at the place where the motion is.
+    # Three seconds of rest in the middle of the motion.
     at = np.clip(np.where(halves < len(log.t) / 2, halves, np.maximum(halves - 750, len(log.t) / 2)), 0, None).astype(
         int
     )

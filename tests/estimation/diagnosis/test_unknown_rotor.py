@@ -1,4 +1,4 @@
-"""Specification of loads on a joint whose rotor the robot's description does not know."""
+"""Test of load-dependent effects on a joint with an unknown rotor."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ SHARE = 0.08
 def test_friction_by_the_load_tells_the_rotor_that_loads_no_gear(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable, pinocchio_torque: Callable
 ) -> None:
-    """The first joint's rotor, in one base parameter with its link, is told beside the friction that grows with load.
+    """Load-dependent friction determines the first joint's rotor, which is in one base parameter with its link.
 
-    The load is pinocchio's. Intervals of 95 %: the chance that one of two misses the truth is 10 %, hence the seed.
+    The load is pinocchio's. The chance that one of two 95 % intervals misses the true value is 10 %, so the seed is
+    fixed.
     """
     motion = fourier_motion(arm, 0)
     log = simulate(arm_plant(torque_noise=0.01), motion, seed=0)
@@ -38,7 +39,7 @@ def test_friction_by_the_load_tells_the_rotor_that_loads_no_gear(
         low, high = told[name].ci95
         assert low < truth < high
     assert told["rotor_inertia"].value == pytest.approx(0.2, rel=0.2)
-    # What is described is known.
+    # A described rotor counts as known.
     known = diagnose(arm, replace(log, tau=tau), candidates=candidates, friction="coulomb-viscous").findings
     assert [(f.effect, f.joint) for f in known] == [("load_dependent_friction", 1)]
     assert {p.name: p.value for p in known[0].parameters}["rotor_inertia"] == 0.0

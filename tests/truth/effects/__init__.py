@@ -1,4 +1,4 @@
-"""Effects of the truth, by the names of the vocabulary."""
+"""True effects that cases hide: those of the catalogue (`KNOWN`), and others (`STRANGERS`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motors and signals that don't say what they do."""
+"""Effects of motors and of logged signals."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.truth.ride import Ride
 
 @dataclass(frozen=True, kw_only=True)
 class TorqueConstant(Effect):
-    """One joint's torque is logged too large by the share amount."""
+    """A wrong torque constant: one joint's torque is logged too large by the fraction `amount`."""
 
     name = "torque_constant_error"
     largest = 0.3
@@ -25,9 +25,9 @@ class TorqueConstant(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Saturation(Effect):
-    """Iron that saturates: at the torque `top` the motor gives the share amount less than its current says.
+    """Magnetic saturation: at the torque `top` the true torque is lower than current times constant, by `amount`.
 
-    That is the largest of the first log: the iron is the same in all others.
+    `amount` is a fraction. `top` is the largest torque of the first log, and the same in all other logs.
     """
 
     top: float = np.nan
@@ -39,7 +39,7 @@ class Saturation(Effect):
         if np.isnan(self.top):
             object.__setattr__(self, "top", float(np.abs(torque[ride.runs[0], self.j]).max()))
         x = torque[:, self.j] / self.top
-        # x = y / (1 + b y^2)^(1/4), of which the root y is the logged torque; less than y by the amount at y = 1.
+        # x = y / (1 + b y^2)^(1/4) with the logged torque y; at y = 1, x is smaller by the fraction `amount`.
         b = (1 - self.amount) ** -4 - 1
         y = np.sign(x) * np.sqrt(0.5 * (b * x**4 + np.sqrt(b**2 * x**8 + 4 * x**4)))
         return torque + self.on_joint(ride, self.top * (y - x))
@@ -47,7 +47,7 @@ class Saturation(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Clipping(Effect):
-    """The logged torque stops at a limit: amount is the share of the largest torque that is cut off."""
+    """A current limit: `amount` is the fraction of the largest torque that is clipped."""
 
     limit: float = np.inf
 
@@ -73,7 +73,7 @@ class Clipping(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Drift(Effect):
-    """A torque signal whose zero wanders, along a line or at random: amount [N m] per span of the logs."""
+    """A drifting torque zero, linear or as a random walk: `amount` [N m] per duration `span` [s]."""
 
     span: float = 60.0
     path: tuple[float, ...] = ()
@@ -100,7 +100,7 @@ class Drift(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Delay(Effect):
-    """Torque logged amount [s] after the position, all joints alike."""
+    """A delay of `amount` [s] of the logged torque behind the position, equal on all joints."""
 
     name = "time_delay"
     largest = 0.02
@@ -122,7 +122,7 @@ class Delay(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class EncoderOffset(Effect):
-    """A joint's zero is off by amount [rad]."""
+    """A wrong zero of a joint: the logged position is larger than the true one by `amount` [rad]."""
 
     name = "encoder_offset"
     largest = 0.15

@@ -1,4 +1,4 @@
-"""What an effect of the truth can do: part links from motors, add torque, falsify a signal."""
+"""Interface of true effects: move links relative to motors, add torque, or falsify a logged signal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Kind = TypeVar("Kind", bound="Effect")
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:
-    """An effect of a size ``amount`` on a joint (from 1), or on the whole robot (None)."""
+    """An effect with the size ``amount`` on a joint (from 1), or on the whole robot (None)."""
 
     joint: int | None = None
     amount: float = 1.0
@@ -23,51 +23,51 @@ class Effect:
     name = ""
     smallest = 0.0
     largest = np.inf
-    # How the visible size grows with the amount, for the search of the amount.
+    # Exponent with which the visible size grows with the amount; the start of the search for the amount.
     power = 1.0
     lasting = True
-    # Whether its torque passes the gears: what the robot carries, what pulls or pushes its links.
+    # Whether its torque loads the gears, like a payload or an external force.
     borne = False
 
     @classmethod
     def draw(cls: type[Kind], machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Kind:
-        """Draws the effect's shape; ``span`` [s] is the duration of the logs it will be sought in."""
+        """Draws the effect's shape; ``span`` [s] is the duration of the logs to diagnose."""
         return cls(joint=joint)
 
     @classmethod
     def joints(cls, machine: Machine) -> tuple[int | None, ...]:
-        """Joints on which it can act."""
+        """Lists the joints on which it can act, from 1; (None,) for the whole robot."""
         return tuple(range(1, machine.n + 1))
 
     def of(self: Kind, amount: float) -> Kind:
-        """The same effect, another amount."""
+        """Returns the effect with another amount."""
         return replace(self, amount=amount)
 
     def part(self, ride: Ride) -> None:
-        """Parts links from motors."""
+        """Moves links relative to their motors, in place."""
 
     def torque(self, ride: Ride) -> np.ndarray | None:
-        """Extra torque (N, n) that the motors must give."""
+        """Computes the additional motor torque (N, n) [N m]."""
         return None
 
     def load(self, ride: Ride) -> np.ndarray | None:
-        """What of it gears feel as load (N, n) besides the robot's own."""
+        """Computes the additional gear load (N, n) [N m], None for none."""
         return self.torque(ride) if self.borne else None
 
     def signal(self, ride: Ride, torque: np.ndarray) -> np.ndarray:
-        """The torque as it is logged."""
+        """Returns the logged torque (N, n) for a true torque (N, n), without noise."""
         return torque
 
     def position(self, ride: Ride) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Error of the logged positions and its two derivatives, each (N, n)."""
+        """Computes the error of the logged positions and its first two derivatives, each (N, n)."""
         return None
 
     def last(self, torque: np.ndarray) -> np.ndarray:
-        """The torque as it is logged, noise and all."""
+        """Returns the logged torque (N, n) for a torque with noise."""
         return torque
 
     def truths(self) -> dict[str, float]:
-        """True values of parameters that a diagnosis may state, by plain names."""
+        """Returns true values of parameters that a diagnosis may state, by name."""
         return {}
 
     @property
@@ -77,12 +77,12 @@ class Effect:
         return self.joint - 1
 
     def on_joint(self, ride: Ride, values: np.ndarray) -> np.ndarray:
-        """A torque (N, n) of one joint's values (N,)."""
+        """Returns a torque (N, n) with values (N,) on the effect's joint, zero on all others."""
         torque = np.zeros_like(ride.q)
         torque[:, self.j] = values
         return torque
 
 
 def log_uniform(rng: np.random.Generator, lower: float, upper: float) -> float:
-    """Draws a number whose logarithm is uniform."""
+    """Draws a number whose logarithm is uniformly distributed."""
     return float(np.exp(rng.uniform(np.log(lower), np.log(upper))))

@@ -1,4 +1,4 @@
-"""Friction beyond the polynomial."""
+"""Friction effects beyond the friction polynomial."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HEAT_STEP = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class Stribeck(Effect):
-    """More friction at low speed, amount exp(-(|v|/speed)^exponent): amount [N m]."""
+    """Stribeck friction, amount exp(-(|v|/speed)^exponent) sign(v): amount [N m]."""
 
     speed: float = 0.05
     exponent: float = 1.0
@@ -42,7 +42,7 @@ class Stribeck(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class LuGre(Effect):
-    """Bristles that bend before they slip: amount is their reach [rad]."""
+    """Presliding by the LuGre model: `amount` is the presliding travel [rad]."""
 
     damping: float = 0.02
 
@@ -69,7 +69,7 @@ class LuGre(Effect):
 
 
 def _bristles(v: np.ndarray, step: float, reach: float) -> np.ndarray:
-    """Solves z' = v - |v| z / reach for z / reach, exactly for a velocity constant within each of the sub-steps."""
+    """Solves z' = v - |v| z / reach for z / reach, exactly for a velocity that is constant within each sub-step."""
     weight = np.arange(1, SUBSTEPS + 1) / SUBSTEPS
     before = np.concatenate([v[:1], v[:-1]])
     fine = (before[:, None] + (v - before)[:, None] * weight).ravel()
@@ -84,7 +84,7 @@ def _bristles(v: np.ndarray, step: float, reach: float) -> np.ndarray:
 
 @dataclass(frozen=True, kw_only=True)
 class Asymmetric(Effect):
-    """Viscous friction that differs between the directions: amount [N m s/rad] is half the difference."""
+    """Viscous friction that differs between both directions: `amount` [N m s/rad] is half the difference."""
 
     bend: float = 0.0
 
@@ -104,7 +104,10 @@ class Asymmetric(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class LoadDependent(Effect):
-    """Gear losses that grow with the load, driving and driven back: amount is 1/efficiency - 1 of driving."""
+    """Gear losses that grow with the load: `amount` is 1/efficiency - 1 while the joint drives its load.
+
+    `back` is the ratio of the losses while the load drives the joint.
+    """
 
     back: float = 0.7
 
@@ -127,7 +130,7 @@ class LoadDependent(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class PositionDependent(Effect):
-    """Friction that an eccentric part modulates over the joint's turn: amount [N m]."""
+    """Friction that varies over a turn of the joint, as with an eccentric part: `amount` [N m] is the amplitude."""
 
     order: int = 1
     phase: float = 0.0
@@ -149,7 +152,7 @@ class PositionDependent(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionStep(Effect):
-    """Damage: from a moment on the joint's friction is higher by the factor amount, ramped over 30 ms."""
+    """Damage at one time: friction increases by the fraction `amount`, within 30 ms."""
 
     moment: float = 0.0
     viscous: float = 1.0
@@ -173,9 +176,9 @@ class FrictionStep(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Warming(Effect):
-    """Two heat nodes, gear and housing: friction falls by the share amount per unit of gear heat.
+    """Two heat nodes, gear and housing: friction falls by the fraction `amount` per unit of gear heat.
 
-    Heat is counted in units of what the mean friction power of the ride's first run would settle at.
+    One unit is the steady-state heat, without exchange, for the mean friction power of the first run.
     """
 
     fast: float = 60.0

@@ -1,4 +1,4 @@
-"""Effects on a joint that no catalogue has."""
+"""Effects on one joint that are not in the catalogue."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class CrossWave(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class TiredCable(Effect):
-    """A cable whose pull relaxes: torque amount * x, x' = v - x / memory; it depends on how fast it was bent."""
+    """A cable whose force relaxes: torque amount * x, x' = v - x / memory, with a memory in [s]."""
 
     memory: float = 0.8
 
@@ -52,7 +52,7 @@ class TiredCable(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Interpolation(Effect):
-    """A joint-side encoder that errs 2^k times a turn: amount [rad]."""
+    """An interpolation error of a joint-side encoder, 2^k periods per turn: `amount` [rad]."""
 
     order: int = 16
     phase: float = 0.0
@@ -74,7 +74,7 @@ class Interpolation(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Drag(Effect):
-    """amount |v_k| v_k cos(q_j + phase) on joint j: what another joint stirs, felt by the pose."""
+    """amount |v_k| v_k cos(q_j + phase) on joint j: drag by another joint's velocity that depends on the position."""
 
     other: int = 1
     phase: float = 0.0
@@ -92,7 +92,7 @@ class Drag(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class BorrowedFriction(Effect):
-    """Friction amount |v_k| / (|v_k| + v0) that another joint's speed puts on joint j, as of shared seals."""
+    """Friction amount |v_k| / (|v_k| + v0) on joint j by another joint's speed, as with shared seals."""
 
     other: int = 1
 
@@ -111,7 +111,7 @@ class BorrowedFriction(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class DraggingBrake(Effect):
-    """A brake that drags by amount [N m] two fifths of the time."""
+    """A brake that drags with `amount` [N m] during two fifths of the time."""
 
     every: float = 15.0
 
@@ -129,7 +129,7 @@ class DraggingBrake(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class BeltFriction(Effect):
-    """Friction amount sin(2 pi f t + phase) of something that goes round by itself, as a fan's belt does."""
+    """Friction amount sin(2 pi f t + phase) of a part that rotates independently, such as the belt of a fan."""
 
     frequency: float = 0.5
     phase: float = 0.0
@@ -148,7 +148,7 @@ class BeltFriction(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class DeadZone(Effect):
-    """A torque signal that shows nothing up to the share amount of its first log's largest, and so much too little."""
+    """A dead zone of a torque signal: `amount` is its half width as a fraction of the first log's largest torque."""
 
     name = "unexplained"
     largest = 0.5
@@ -161,7 +161,7 @@ class DeadZone(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class SlippedZero(Effect):
-    """A joint that from a moment on stands amount [rad or m] further than its encoder says."""
+    """A joint zero that changes at one time: the true position is then larger than logged, by `amount` [rad or m]."""
 
     moment: float = 0.0
 
@@ -186,5 +186,5 @@ class SlippedZero(Effect):
 
 
 def _another(machine: Machine, rng: np.random.Generator, joint: int | None) -> int:
-    """Draws another joint than one, from 1."""
+    """Draws a joint (from 1) other than a given one."""
     return int(rng.choice([k for k in range(1, machine.n + 1) if k != joint]))

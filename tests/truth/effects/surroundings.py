@@ -1,4 +1,4 @@
-"""What the world does to the robot: a payload, a floor that is not level, a touch."""
+"""Effects of the robot's surroundings: a payload, a tilted base, a contact."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.truth.ride import Ride
 
 @dataclass(frozen=True, kw_only=True)
 class Payload(Effect):
-    """A rigid body of amount [kg] hangs on the flange from a moment on, taken up within 20 ms."""
+    """A rigid payload of `amount` [kg] at the flange from one time on, picked up within 20 ms."""
 
     moment: float = 0.0
     centre: tuple[float, float, float] = (0.0, 0.0, 0.1)
@@ -52,7 +52,7 @@ class Payload(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Tilt(Effect):
-    """The base is not level: amount [rad] about a horizontal axis."""
+    """A tilted base: `amount` [rad] about a horizontal axis."""
 
     heading: float = 0.0
 
@@ -70,7 +70,7 @@ class Tilt(Effect):
 
     @property
     def turn(self) -> np.ndarray:
-        """(3, 3) what the field of gravity is turned by, in the frame of the base."""
+        """The rotation (3, 3) of gravity in the frame of the base."""
         return np.asarray(pin.exp3(self.amount * np.array([np.cos(self.heading), np.sin(self.heading), 0.0])))
 
     def torque(self, ride: Ride) -> np.ndarray:
@@ -85,7 +85,7 @@ class Tilt(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Contact(Effect):
-    """Something pushes on a link with amount [N] for a moment."""
+    """An external contact: a short force of `amount` [N] on a link."""
 
     moment: float = 0.0
     seconds: float = 0.3

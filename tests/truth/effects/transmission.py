@@ -1,4 +1,4 @@
-"""Gears that ripple, give way, have play, or drive one another."""
+"""Effects of gears and joints: ripple, elasticity, backlash, coupling, springs."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from tests.truth.machines import Machine
 from tests.truth.ride import Ride
 
 SETTLES = 0.3  # time [s] in which a link that has landed comes to rest
-FINE = 2e-4  # step [s] of a floating link at most
-LOADED = 0.1  # share of a joint's torque RMS below which its load is none
+FINE = 2e-4  # largest integration step [s] of a link within the backlash
+LOADED = 0.1  # least RMS of the load that scales the ripple, as a fraction of the joint's torque RMS
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ripple(Effect):
-    """Torque that waves with the motor's angle: amount [N m], part of it growing with the load."""
+    """Torque ripple with the motor's angle: `amount` [N m], part of it proportional to the load."""
 
     order: float = 2.0
     gear: float = 100.0
@@ -37,7 +37,7 @@ class Ripple(Effect):
     def torque(self, ride: Ride) -> np.ndarray:
         angle = self.order * self.gear * ride.q[:, self.j] + self.phase
         load, first = ride.load[:, self.j], ride.runs[0]
-        # Of a joint that carries next to nothing, teeth mesh no harder for what rounding makes of its load.
+        # Without the lower bound, rounding of a load near zero would scale the ripple.
         whole = np.sqrt((ride.base_torque()[first, self.j] ** 2).mean())
         share = load / max(np.sqrt((load[first] ** 2).mean()), LOADED * whole)
         wave = np.cos(angle) * (1 - self.loaded + self.loaded * share)
@@ -49,10 +49,10 @@ class Ripple(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Elastic(Effect):
-    """A gear that twists by torque * amount (a compliance [rad/(N m)]), a little softer at small loads.
+    """An elastic gear with the compliance `amount` [rad/(N m)], slightly softer at small loads.
 
-    The robot is flat: from the link's motion follow the torque through the gear, from that the twist and the motor's
-    motion. So the two-inertia equations hold exactly.
+    The system is differentially flat: the link's motion gives the torque through the gear, the deflection, and so the
+    motor's motion. The two-inertia equations therefore hold exactly.
     """
 
     soft: float = 0.0
@@ -79,12 +79,12 @@ class Elastic(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Backlash(Effect):
-    """Play of amount [rad]: link and motor are two bodies with a dead zone between them, teeth on either side of it.
+    """Backlash of `amount` [rad]: link and motor are two bodies with a dead zone between elastic teeth.
 
-    The motor keeps to its motion. Where the torque through the gear changes sign, the link floats over, hits the teeth,
-    which give way as a damped spring, and may bounce: M x'' = torque - teeth(x), from rest on the flank it leaves.
+    The motor keeps its motion. When the torque through the gear changes sign, the link crosses the gap and hits the
+    other teeth, which act as a damped spring; it may rebound. M x'' = torque - teeth(x), from rest on the first flank.
 
-    ``swing`` [Hz] is what the link would swing at on the teeth, ``damping`` that swing's.
+    ``swing`` [Hz] is the natural frequency of the link on the teeth, and ``damping`` its damping ratio.
     """
 
     swing: float = 40.0
@@ -100,14 +100,14 @@ class Backlash(Effect):
 
     def part(self, ride: Ride) -> None:
         through = ride.borne(rigid_torque(ride.machine.model, ride.q, ride.v, ride.a))[:, self.j]
-        behind = np.zeros((3, len(through)))  # where the motor is ahead of the link, and two derivatives
+        behind = np.zeros((3, len(through)))  # position of the motor minus that of the link, and two derivatives
         for run in ride.runs:
             behind[:, run] = self._floating(ride, run, through[run])
         for name, change in zip(("link_q", "link_v", "link_a"), behind, strict=True):
             setattr(ride, name, getattr(ride, name) - self.on_joint(ride, change))
 
     def _floating(self, ride: Ride, run: slice, through: np.ndarray) -> np.ndarray:
-        """Where the motor is ahead of the link in a run, with two derivatives, (3, N)."""
+        """Simulates the motor's position minus the link's in a run, with two derivatives (3, N)."""
         half, settles = self.amount / 2, round(SETTLES / ride.step)
         signs = np.where(through >= 0, 1.0, -1.0)
         behind = np.zeros((3, len(through)))
@@ -116,7 +116,7 @@ class Backlash(Effect):
         starts = crossings[np.diff(crossings, prepend=-settles) >= settles]
         if not len(starts):
             return behind
-        # A link that has not settled where the load crosses again floats on: as long as the longest of such.
+        # If the load changes sign again before the link has settled, the simulation goes on; the longest one counts.
         last = [crossings[crossings < end][-1] for end in (*starts[1:], len(through))]
         length = int(np.max(np.subtract(last, starts))) + settles
         data, model = ride.machine.model.createData(), ride.machine.model
@@ -131,7 +131,7 @@ class Backlash(Effect):
             for fine in range(times):
                 deep = np.sign(x) * np.maximum(np.abs(x) - half, 0.0)
                 push = np.where(deep != 0, stiff * deep + damp * v, 0.0)
-                # Teeth push, and do not pull.
+                # Teeth can push, but not pull.
                 push = np.where(push * deep > 0, push, 0.0)
                 a = (force + fine * grows - push) / inertia
                 if fine == 0:
@@ -147,7 +147,7 @@ class Backlash(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class WristCoupling(Effect):
-    """Two wrist gears that drive one another: friction of the sum of speeds, and a common inertia; amount [N m]."""
+    """Two coupled wrist joints: friction of the sum of both velocities, and a coupled inertia; `amount` [N m]."""
 
     viscous: float = 1.0
     inertia: float = 0.05
@@ -175,7 +175,7 @@ class WristCoupling(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Balancer(Effect):
-    """A spring between the carousel and the upper arm: amount [N/m], on two levers; a gas spring gets stiffer."""
+    """A balancer, a spring on two levers between two links: `amount` [N/m]; a gas spring is progressive."""
 
     lever: tuple[float, float] = (0.1, 0.4)
     angle: float = 0.5
@@ -213,7 +213,7 @@ class Balancer(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Cable(Effect):
-    """A hose that pulls a joint back, harder towards the ends: amount [N m/rad]."""
+    """A progressive spring towards a centre, as with a hose: `amount` [N m/rad]."""
 
     centre: float = 0.0
     cubic: float = 0.5

@@ -1,4 +1,4 @@
-"""Effects on all joints at once that no catalogue has."""
+"""Effects on all joints at once that are not in the catalogue."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.truth.ride import Ride
 
 @dataclass(frozen=True, kw_only=True)
 class FloorVibration(Effect):
-    """A floor that shakes along a line: amount [m/s2] at a steady frequency."""
+    """A floor that vibrates along a line: `amount` [m/s2] at one frequency [Hz]."""
 
     frequency: float = 6.0
     direction: tuple[float, float, float] = (1.0, 0.0, 0.0)
@@ -47,7 +47,7 @@ class FloorVibration(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Slosh(Effect):
-    """Liquid in a tank at the flange: a mass amount [kg] on weak springs, driven by the flange's acceleration."""
+    """Liquid in a tank at the flange: a mass `amount` [kg] on weak springs, excited by the flange's acceleration."""
 
     frequency: float = 1.5
     damping: float = 0.05
@@ -69,7 +69,7 @@ class Slosh(Effect):
         place = _places(machine, ride.link_q, point)
         w, force = 2 * np.pi * self.frequency, np.zeros((len(ride.t), 3))
         h = ride.step
-        # x'' + 2 d w x' + w^2 x = -p'' in the horizontal plane, by the bilinear rule; the tank feels w^2 x + 2 d w x'.
+        # x'' + 2 d w x' + w^2 x = -p'' in the horizontal plane, by the bilinear rule; its force is w^2 x + 2 d w x'.
         k = 2 / h
         den = np.array(
             [k**2 + 2 * self.damping * w * k + w**2, 2 * w**2 - 2 * k**2, k**2 - 2 * self.damping * w * k + w**2]
@@ -87,7 +87,7 @@ class Slosh(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Hose(Effect):
-    """A dress pack of stiffness amount [N/m] from the ceiling to the flange, which pulls where it is taut."""
+    """A dress pack from the ceiling to the flange with the stiffness `amount` [N/m], which pulls only when taut."""
 
     anchor: tuple[float, float, float] = (0.0, 0.0, 2.0)
     slack: float = 0.5
@@ -118,7 +118,7 @@ class Hose(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class LeaningBase(Effect):
-    """A base on soft bolts that turns about its x and y axes under the robot's weight: amount [rad/(N m)]."""
+    """A compliant base that rotates about its x and y axes under the robot's weight: `amount` [rad/(N m)]."""
 
     ratio: float = 1.0
 
@@ -149,7 +149,7 @@ class LeaningBase(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class SlippedBase(Effect):
-    """A base that from a moment on stands tilted by amount [rad] about a horizontal axis."""
+    """A base that tilts at one time by `amount` [rad] about a horizontal axis."""
 
     moment: float = 0.0
     heading: float = 0.0
@@ -177,7 +177,7 @@ class SlippedBase(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Conveyor(Effect):
-    """A machine that pushes the tool by amount [N] in each of its cycles, bell-shaped in time."""
+    """Another machine that pushes the flange with `amount` [N] once per cycle, bell-shaped in time."""
 
     period: float = 4.0
     phase: float = 0.0
@@ -220,11 +220,11 @@ def _places(machine: Machine, q: np.ndarray, point: np.ndarray) -> np.ndarray:
 
 
 def _thinning(ride: Ride) -> int:
-    """Rows of a ride that become one, of 4 ms: what changes with the pose is slow."""
+    """Returns the number of rows in 4 ms; torques that change with the pose are slow enough for such steps."""
     return max(round(0.004 / ride.step), 1)
 
 
 def _between(ride: Ride, thinned: np.ndarray, every: int) -> np.ndarray:
-    """Interpolates the values (N', n) of every so many rows."""
+    """Interpolates the values (N', n) of every `every`-th row to all rows (N, n)."""
     places = np.arange(len(ride.t)) / every
     return np.column_stack([np.interp(places, np.arange(len(thinned)), column) for column in thinned.T])

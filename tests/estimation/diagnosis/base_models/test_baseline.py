@@ -1,4 +1,4 @@
-"""Specification of the base model's sign: as sharp as the data say."""
+"""Tests of the base model's smooth velocity sign, whose width is chosen from the data."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from robots.signals import Log
 def test_a_sign_is_as_wide_as_the_friction_turns_round(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable, share: float
 ) -> None:
-    """Up to a twentieth of a joint's largest speed, told to a factor of two."""
+    """Widths up to a twentieth of a joint's largest speed are estimated to a factor of two."""
     motion = fourier_motion(arm, 0)
     width = share * float(np.abs(motion.dq).max(axis=0).min())
     log = simulate(arm_plant(velocity_scale=width, torque_noise=0.01), motion, seed=0)
@@ -37,9 +37,9 @@ def test_a_sign_is_as_wide_as_the_friction_turns_round(
 def test_friction_that_turns_round_at_once_leaves_nothing(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable, share: float
 ) -> None:
-    """A sign as a formula has it, of joints as fast as usual and of slow ones, is a sign of the base model.
+    """Sharp Coulomb friction leaves no residual, on joints at usual and at low speed.
 
-    Where it is not as sharp, what is left at each reversal looks like a delay.
+    A sign that is too wide would leave a residual at each reversal that resembles a delay.
     """
     motions = [fourier_motion(arm, k, duration=30.0) for k in range(2)]
     slow = [replace(m, q=share * m.q, dq=share * m.dq, ddq=share * m.ddq) for m in motions]
@@ -52,9 +52,10 @@ def test_friction_that_turns_round_at_once_leaves_nothing(
 def test_beside_reversals_a_fit_to_the_other_rows_leaves_no_more_than_the_torque(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable
 ) -> None:
-    """How sharp a sign is shows in rows that do not count; fitted to the others, it would be anything there.
+    """If rows near reversals do not count, the residual there is still not larger than the torque.
 
-    What is above a joint's band is filtered over all rows: such residuals would hide any ripple.
+    Only these rows show the width of the sign. Residuals above a joint's band are filtered over all rows, so large ones
+    would hide a ripple.
     """
     log = simulate(arm_plant(velocity_scale=1e-3, torque_noise=0.01), fourier_motion(arm, 0, duration=30.0), seed=0)
     recording = build_recording(arm, [log])
@@ -64,7 +65,7 @@ def test_beside_reversals_a_fit_to_the_other_rows_leaves_no_more_than_the_torque
 
 
 def test_friction_that_is_logged_late_is_as_sharp_as_it_is(arm: Robot, arm_log: Callable[..., Log]) -> None:
-    """Its sign, by the motion of as long before, is no wider than that of torque on time; by that of now it is."""
+    """With a delayed torque the sign is as sharp as without delay, if the motion is shifted by the delay."""
     log = arm_log(velocity_scale=1e-4, torque_noise=0.02)
     coarse, late = 3, 2
     rows = np.arange(coarse, len(log), coarse)

@@ -1,4 +1,4 @@
-"""Specification of known payloads: pinocchio's torque of the robot that carries one, taken off and felt by effects."""
+"""Tests of known payloads against pinocchio: their torque is subtracted from the log and added to the gears' load."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def _point(mass: float, centre: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def logs(arm: Robot, arm_log: Callable[..., Log]) -> tuple[Log, Log]:
-    """One log without, one with a payload, a minute later."""
+    """Returns one log without and one with a payload, a minute apart."""
     first, second = arm_log(seed=1), arm_log(seed=2, motion_seed=1)
     start = float(first.t[-1]) + 60.0 - float(second.t[0])
     return first, replace(second, t=second.t + start, payload=_point(MASS, CENTRE))
 
 
 def test_a_known_payload_is_taken_off_and_felt(arm: Robot, logs: tuple[Log, Log]) -> None:
-    """What a log loses is pinocchio's torque of the point mass; what effects feel as load grows by the same."""
+    """The torque that is subtracted and added to the rigid-body torque is pinocchio's torque of the point mass."""
     recording = build_recording(arm, logs)
     light = subtract_known_payload(arm, recording)
     run = recording.runs[1]
@@ -60,6 +60,6 @@ def test_a_known_payload_is_taken_off_and_felt(arm: Robot, logs: tuple[Log, Log]
 
 @pytest.mark.parametrize("body", [np.zeros(9), -np.ones(10), np.full(10, np.nan)])
 def test_a_payload_that_is_none_is_refused(logs: tuple[Log, Log], body: np.ndarray) -> None:
-    """Ten finite numbers, a mass that is not negative."""
+    """A payload needs ten finite numbers and a mass that is not negative."""
     with pytest.raises(InputError, match="payload"):
         replace(logs[0], payload=body)

@@ -1,4 +1,4 @@
-"""Specification of what holds base parameters that a log leaves open."""
+"""Tests of the priors of base parameters that a log does not determine."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from robots.signals import Log
 
 
 def test_the_fit_is_that_of_rows_and_pull_together() -> None:
-    """Normal equations with a pull give least squares over the rows and one row a parameter more, written out."""
+    """The fit with a prior equals least squares with one additional row per parameter."""
     rng = np.random.default_rng(0)
     Y, tau, target = rng.standard_normal((40, 3)), rng.standard_normal(40), np.array([1.0, -2.0])
     weights = np.array([2.0, 5.0])
@@ -31,16 +31,16 @@ def test_the_fit_is_that_of_rows_and_pull_together() -> None:
 
 
 def test_a_direction_without_data_goes_to_the_target() -> None:
-    """A parameter whose column never acts takes the value that it is pulled to, the other that of the data."""
+    """A parameter whose column is zero takes the prior's mean, and another one the value of the data."""
     gram, cross = np.diag([100.0, 0.0]), np.array([300.0, 0.0])
     values = solve_map(gram, cross, GaussianPrior(np.diag([1e-9, 1e-9]), np.array([7.0, 5.0])))
     assert values == pytest.approx([3.0, 5.0], rel=1e-6)
 
 
 def test_a_standing_joint_does_not_make_another_motion_absurd(arm: Robot, arm_log: Callable[..., Log]) -> None:
-    """Fitted to a log in which joint 2 shakes by its encoder only, the model errs on a full motion by some torque RMS.
+    """After a fit to a log in which joint 2 rests, the error on a full motion is at most four times the torque RMS.
 
-    Least squares alone puts the shaking into friction of 1e4 times the joint's torque and more.
+    Least squares alone explains the encoder noise by friction of more than 1e4 times the joint's torque.
     """
     log = arm_log(torque_noise=0.02)
     other = build_recording(arm, [arm_log(motion_seed=3, torque_noise=0.02)])
@@ -51,16 +51,16 @@ def test_a_standing_joint_does_not_make_another_motion_absurd(arm: Robot, arm_lo
     scale = 0.02 * recording.tau.std(axis=0)
     values = fit_values(baseline, scale, recording.sign_unknown, recording.tau, base_model_prior(baseline, recording))
     error = other.tau - baseline.base.torque(other.q, other.dq, other.ddq, values)
-    # Wrong by its own size is what the pull allows: three times for friction, which holds where joints are fast.
+    # The prior allows errors of the torque's own size, and for friction of three times that, at high speed.
     assert np.all(np.sqrt((error**2).mean(axis=0)) < 4 * np.sqrt((other.tau**2).mean(axis=0)))
 
 
 @pytest.mark.slow
 def test_what_a_description_lacks_is_not_taken_for_noise(arm: Robot, arm_log: Callable[..., Log]) -> None:
-    """Links fifty times as heavy as described, as under rotors that no file tells of: what is left is the noise.
+    """If described links are fifty times too light, the residual is still the noise.
 
-    Against noise as large as the torque the description would hold the fit. What it leaves would be slow, noise so slow
-    would make rows tell little, and the description hold it all the more.
+    If the noise estimate contained the model error, the prior would count too much: the residual would be slow, slow
+    noise would give the data little weight, and the prior even more.
     """
     light = replace(arm, inertia=arm.inertia / 50.0)
     log, other = arm_log(torque_noise=0.02), arm_log(motion_seed=3, torque_noise=0.02)

@@ -1,4 +1,4 @@
-"""Specification of a base that leans under the robot's weight, by pinocchio's gravity and centre of mass."""
+"""Tests of a compliant base that tilts under the robot's weight, against pinocchio."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from robots.terms.effects import Situation, situation
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:
-    """A heavy arm of six joints on an upright axis."""
+    """Returns a heavy arm of six joints with a vertical first axis."""
     return load_robot("ur10")
 
 
 @pytest.fixture(scope="module")
 def state(robot: Robot) -> Situation:
-    """A hundred poses, with masses of our own for all links."""
+    """Returns a hundred poses with other link masses than described."""
     rng = np.random.default_rng(3)
     model = default_model(robot)
     values = np.zeros(model.size)
@@ -37,7 +37,7 @@ def _rigid(model: TorqueModel) -> list[int]:
 
 
 def _bodies(n: int) -> np.ndarray:
-    """Mass, first moment and inertia of each link about its frame (n, 10)."""
+    """Draws mass, first moment and inertia of each link about its frame (n, 10)."""
     rng = np.random.default_rng(4)
     bodies = []
     for _ in range(n):
@@ -53,16 +53,16 @@ def _model(robot: Robot) -> pin.Model:
     for joint, body in zip(robot.chain.joints, _bodies(robot.n), strict=True):
         placement = pin.SE3(np.asarray(joint.rotation), np.asarray(joint.translation))
         parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(np.asarray(joint.axis)), placement, joint.name)
-        # pinocchio counts xx, xy, yy, xz, yz, zz.
+        # pinocchio orders the inertia as xx, xy, yy, xz, yz, zz.
         inertia = pin.Inertia.FromDynamicParameters(body[[0, 1, 2, 3, 4, 5, 7, 6, 8, 9]])
         model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
     return model
 
 
 def test_the_columns_are_gravity_on_a_base_that_its_weight_has_turned(robot: Robot, state: Situation) -> None:
-    """Bolts softer about y than about x and askew: the torque of a base turned by C m, less that of one that is not.
+    """With an anisotropic compliance C, the columns give the torque difference by a base rotated by C m.
 
-    The turns are finite, of 2e-4 rad at most: their squares are within a few millionths of a newton metre.
+    The rotations are finite, 2e-4 rad at most, so the error of linearisation is a few millionths of a newton metre.
     """
     model = _model(robot)
     data = model.createData()
@@ -71,7 +71,7 @@ def test_the_columns_are_gravity_on_a_base_that_its_weight_has_turned(robot: Rob
     for k, q in enumerate(state.q):
         weight = sum(inertia.mass for inertia in model.inertias) * np.array([0, 0, -9.81])
         moment = np.cross(pin.centerOfMass(model, data, q), weight)[:2]
-        # In axes that turn with the base, gravity turns the other way.
+        # In the frame of the rotated base, gravity rotates in the opposite direction.
         turned = Rotation.from_rotvec([*(compliance @ moment), 0.0]).inv().apply([0, 0, -9.81])
         level = pin.computeGeneralizedGravity(model, data, q).copy()
         model.gravity.linear = turned
@@ -85,13 +85,13 @@ def test_the_columns_are_gravity_on_a_base_that_its_weight_has_turned(robot: Rob
 
 
 def test_what_the_first_link_adds_goes_round_with_it(robot: Robot, state: Situation) -> None:
-    """A mass beside the upright axis is felt by no joint of a level robot, and has the base lean all the same."""
+    """The first moments of the first link are covered by the two columns that rotate with it."""
     whole = BaseCompliance().columns(state, None)
     values = state.parameters.copy()
     values[_rigid(state.model)[:10]] = 0.0
     without = situation(state.model, values, state.t, state.q, state.dq, state.ddq)
     poorer = BaseCompliance().columns(without, None)
-    # Of bolts alike about both axes, on the joints behind the link: gravity askew turns the first one too.
+    # With equal compliances, and without the first joint, on which a tilted base acts, too.
     lost = (whole - poorer)[:, 1:, :2].sum(axis=2).ravel()
     own = poorer[:, 1:, 3:].reshape(-1, 2)
     rest = lost - own @ np.linalg.lstsq(own, lost, rcond=None)[0]
@@ -100,12 +100,12 @@ def test_what_the_first_link_adds_goes_round_with_it(robot: Robot, state: Situat
 
 
 def test_it_is_told_in_words_and_read_from_its_name(robot: Robot) -> None:
-    """Compliances by axis, and a sentence with the largest of them."""
+    """The effect is found by its name, has compliances per axis, and describes the largest of them."""
     effect = find_effect("pattern:leaning:0:even")
     assert isinstance(effect, BaseCompliance)
     units = [(c.name, c.unit) for c in effect.parameters(robot, None)]
     assert units[0] == ("compliance_1", "rad/(N m)")
     assert units[-1] == ("own_2", "rad")
     assert "0.29 deg per 1000 N m" in effect.describe(None, np.array([5e-6, 1e-6, 0.0, 0.3, 0.2]))
-    # No base leans against its load.
+    # A base cannot tilt against its load.
     assert "under the robot's weight" not in effect.describe(None, np.array([-5e-6, 1e-6, 0.0, 0.3, 0.2]))

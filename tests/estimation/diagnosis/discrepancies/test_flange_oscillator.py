@@ -1,4 +1,4 @@
-"""Specification of what swings at the flange: pinocchio's motion of it, springs integrated by scipy, two directions."""
+"""Tests of a swinging load at the flange, against pinocchio's kinematics and scipy's integration of its motion."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MIDDLE = np.array([0.3, -1.2, 1.4, -0.6, -1.2, 0.4])
 
 
 def _motion(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """q0 + a sin^3(w t) and its derivatives (N, 6): at rest, and without acceleration, at zero."""
+    """Computes q0 + a sin^3(w t) and its derivatives (N, 6); velocity and acceleration are zero at t = 0."""
     s, c = np.sin(np.outer(t, RATES)), np.cos(np.outer(t, RATES))
     speed = 3 * SIZES * RATES * s**2 * c
     return MIDDLE + SIZES * s**3, speed, 3 * SIZES * RATES**2 * (2 * s * c**2 - s**3)
@@ -34,20 +34,20 @@ def _motion(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True)
 class Flange:
-    """What pinocchio says of a robot's flange, by a model of its own."""
+    """A robot's flange in an independent pinocchio model."""
 
     model: pin.Model
     data: pin.Data
     frame: int
 
     def acceleration(self, t: float) -> np.ndarray:
-        """Acceleration (3,) in the base frame during the motion."""
+        """Computes the acceleration (3,) in the base frame during the motion."""
         pin.forwardKinematics(self.model, self.data, *(values[0] for values in _motion(np.array([t]))))
         aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         return pin.getFrameClassicalAcceleration(self.model, self.data, self.frame, aligned).linear
 
     def torque(self, q: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """J' f (N, n) of forces (N, 3) on the flange."""
+        """Computes J' f (N, n) for forces (N, 3) on the flange."""
         aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         jacobians = (pin.computeFrameJacobian(self.model, self.data, row, self.frame, aligned)[:3] for row in q)
         return np.array([J.T @ f for J, f in zip(jacobians, force, strict=True)])
@@ -55,7 +55,7 @@ class Flange:
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:
-    """Six joints, and a flange that is off the last link's frame."""
+    """Returns a robot of six joints with a flange that is offset from the last link's frame."""
     found = load_robot("ur10")
     tip = np.eye(4)
     tip[:3, 3] = 0.03, -0.02, 0.12
@@ -64,7 +64,7 @@ def robot() -> Robot:
 
 @pytest.fixture(scope="module")
 def flange(robot: Robot) -> Flange:
-    """The same in pinocchio."""
+    """Returns the robot's flange in pinocchio."""
     model, parent = chain_of(robot)
     tip = pin.SE3(np.asarray(robot.chain.tip)[:3, :3], np.asarray(robot.chain.tip)[:3, 3])
     frame = model.addFrame(pin.Frame("flange", parent, tip, pin.FrameType.OP_FRAME))
@@ -78,12 +78,12 @@ def _state(robot: Robot, t: np.ndarray, starts: tuple[int, ...] = (0,)) -> Situa
 
 @pytest.fixture(scope="module")
 def state(robot: Robot) -> Situation:
-    """Twelve seconds at 250 Hz."""
+    """Returns twelve seconds of motion at 250 Hz."""
     return _state(robot, PERIOD * np.arange(3000))
 
 
 def _swung(flange: Flange, t: np.ndarray, frequency: float, damping: float) -> tuple[np.ndarray, np.ndarray]:
-    """w^2 x and w x' (N, 3) of x'' + 2 d w x' + w^2 x = -p'', integrated to ten digits from rest."""
+    """Computes w^2 x and w x' (N, 3) of x'' + 2 d w x' + w^2 x = -p'', integrated accurately from rest."""
     w = 2 * np.pi * frequency
 
     def slope(time: float, y: np.ndarray) -> np.ndarray:
@@ -94,7 +94,7 @@ def _swung(flange: Flange, t: np.ndarray, frequency: float, damping: float) -> t
 
 
 def _forces(robot: Robot, flange: Flange, state: Situation, X: np.ndarray) -> np.ndarray:
-    """Forces on the flange (N, 3, k) that columns (N, n, k) are the torque of, which they must be to rounding."""
+    """Computes the forces on the flange (N, 3, k) that cause the columns (N, n, k), and checks that they exist."""
     aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     forces = np.empty((len(X), 3, X.shape[2]))
     for row, (q, torque) in enumerate(zip(state.q, X, strict=True)):
@@ -108,9 +108,9 @@ def _forces(robot: Robot, flange: Flange, state: Situation, X: np.ndarray) -> np
 def test_columns_are_the_torque_against_masses_on_springs(
     flange: Flange, robot: Robot, state: Situation, frequency: float
 ) -> None:
-    """Level and upright, in phase and late: -J' f by pinocchio and an integrated spring, to a hundredth.
+    """All four columns are -J' f of an independently integrated oscillator, to 1 %.
 
-    At 250 Hz the bilinear rule has a frequency of 3 Hz 0.05 % too low, a hundredth of the resonance's half width.
+    At 250 Hz the bilinear rule shifts a frequency of 3 Hz by 0.05 %, a hundredth of the resonance's half width.
     """
     X = FlangeOscillator().columns(state, None, (frequency,))
     upright = np.array([0.0, 0.0, 1.0])
@@ -125,10 +125,10 @@ def test_columns_are_the_torque_against_masses_on_springs(
 def test_a_tank_of_other_damping_is_a_mixture_of_both_phases(
     flange: Flange, robot: Robot, state: Situation, factor: float
 ) -> None:
-    """Spring and damper of 2 kg: with the damping assumed the coefficients are m and 2 d m.
+    """Both columns fit an oscillator of 2 kg with another damping; with the assumed damping, they give m and 2 d m.
 
-    Half and twice the damping have other masses, for these stand for the height of the resonance, but leave less than a
-    tenth of the energy.
+    With half or twice the damping the fitted mass differs, because it follows the height of the resonance. Less than a
+    tenth of the energy remains.
     """
     mass, damping = 2.0, factor * DAMPING
     X = FlangeOscillator().columns(state, None, (1.5,))[:, :, :2].reshape(-1, 2)
@@ -141,9 +141,9 @@ def test_a_tank_of_other_damping_is_a_mixture_of_both_phases(
 
 
 def test_a_stiff_spring_carries_a_payload_without_weight(flange: Flange, robot: Robot, state: Situation) -> None:
-    """Far above the motion's frequencies a mass follows the flange: the drives give J' m p''.
+    """Far above the motion's frequencies the mass follows the flange, and the torque is J' m p''.
 
-    The motion has 1.3 Hz at most, so that at 12 Hz a hundredth is left of the swinging: (1.3 / 12)^2.
+    The motion has at most 1.3 Hz, so at 12 Hz the oscillation is (1.3 / 12)^2, about a hundredth.
     """
     X = FlangeOscillator().columns(state, None, (12.0,))
     carried = flange.torque(state.q, np.array([flange.acceleration(t) for t in state.t]))
@@ -155,7 +155,7 @@ def test_a_stiff_spring_carries_a_payload_without_weight(flange: Flange, robot: 
 def test_level_is_across_gravity_and_upright_along_it(
     flange: Flange, robot: Robot, gravity: tuple[float, float, float]
 ) -> None:
-    """On the floor, on a wedge, and in space, where upright is the base's: no force across the split."""
+    """Horizontal columns have no force along gravity, vertical ones none across it; without gravity, z is vertical."""
     turned = replace(robot, chain=replace(robot.chain, gravity=np.array(gravity)))
     state = _state(turned, PERIOD * np.arange(400))
     forces = _forces(robot, flange, state, FlangeOscillator().columns(state, None, (1.5,)))
@@ -169,7 +169,7 @@ def test_level_is_across_gravity_and_upright_along_it(
 
 
 def test_each_log_begins_at_rest_under_its_own_gravity(robot: Robot) -> None:
-    """What swings in one log is still before the next, and a log of a tilted base has its own upright."""
+    """The oscillator starts each log at rest, and the vertical direction is that of the log's own gravity."""
     t = PERIOD * np.arange(500)
     one, wedge = _state(robot, t), replace(robot, chain=replace(robot.chain, gravity=np.array([0.0, -6.0, -7.5])))
     two = _state(wedge, t + 100.0)
@@ -182,7 +182,7 @@ def test_each_log_begins_at_rest_under_its_own_gravity(robot: Robot) -> None:
 
 
 def test_it_is_told_in_words_and_read_from_its_name(robot: Robot, state: Situation) -> None:
-    """Four masses, a frequency in its range, and a sentence with both."""
+    """The effect is found by its name, has four masses and a frequency within bounds, and describes both."""
     effect = find_effect("pattern:swinging:0:even")
     assert isinstance(effect, FlangeOscillator)
     assert effect.joints(robot) == (None,)

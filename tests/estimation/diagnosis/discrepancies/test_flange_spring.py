@@ -1,4 +1,4 @@
-"""Specification of what pulls at the flange by where it is, by pinocchio's kinematics."""
+"""Tests of an elastic force at the flange that depends on its position, against pinocchio's kinematics."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PLACE = np.array([0.03, -0.02, 0.12])
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:
-    """Six joints, and a flange that is off the last link's frame."""
+    """Returns a robot of six joints with a flange that is offset from the last link's frame."""
     found = load_robot("ur10")
     tip = np.eye(4)
     tip[:3, 3] = PLACE
@@ -30,7 +30,7 @@ def robot() -> Robot:
 
 @pytest.fixture(scope="module")
 def state(robot: Robot) -> Situation:
-    """Two hundred rows of a motion of all joints."""
+    """Returns two hundred rows of a motion of all joints."""
     t = 0.02 * np.arange(200)
     rates = np.array([0.9, 1.1, 1.3, 1.7, 2.1, 2.6])
     q = np.array([0.3, -1.2, 1.4, -0.6, -1.2, 0.4]) + 0.6 * np.sin(np.outer(t, rates))
@@ -40,7 +40,7 @@ def state(robot: Robot) -> Situation:
 
 
 def _kinematics(robot: Robot, state: Situation) -> tuple[np.ndarray, np.ndarray]:
-    """The flange's places (N, 3) and Jacobians (N, 3, n) by a pinocchio model of the same chain."""
+    """Computes the flange's positions (N, 3) and Jacobians (N, 3, n) by a pinocchio model of the same chain."""
     model, parent = chain_of(robot)
     frame = model.addFrame(pin.Frame("flange", parent, pin.SE3(np.eye(3), PLACE), pin.FrameType.OP_FRAME))
     data = model.createData()
@@ -53,7 +53,7 @@ def _kinematics(robot: Robot, state: Situation) -> tuple[np.ndarray, np.ndarray]
 
 
 def test_the_columns_are_the_torque_against_springs_at_the_flange(robot: Robot, state: Situation) -> None:
-    """A spring of another stiffness in each direction, and a steady pull: drives give -J' f, to rounding."""
+    """For a stiffness matrix and a constant force the columns give -J' f to rounding."""
     places, jacobians = _kinematics(robot, state)
     stiffness, steady = (
         np.array([[-30.0, 4.0, 1.0], [4.0, -20.0, -2.0], [1.0, -2.0, -50.0]]),
@@ -65,7 +65,7 @@ def test_the_columns_are_the_torque_against_springs_at_the_flange(robot: Robot, 
 
 
 def test_it_is_told_in_words_and_read_from_its_name(robot: Robot) -> None:
-    """Three forces, nine stiffnesses named by direction and coordinate, and a sentence with the largest."""
+    """The effect is found by its name, has three forces and nine stiffnesses, and describes the largest stiffness."""
     effect = find_effect("pattern:pulling:0:even")
     assert isinstance(effect, FlangeSpring)
     units = [(c.name, c.unit) for c in effect.parameters(robot, None)]

@@ -1,4 +1,4 @@
-"""Specification of torque that all joints log by the same share more or less as time goes on."""
+"""Tests of a common gain drift of all joints' torque signals."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robots.terms.effects import Situation
 
 
 def test_a_slow_gain_of_all_joints_is_within_its_columns(swept: Situation) -> None:
-    """A gain that goes up and down again is told to a tenth of what it changes, by the same values on all joints."""
+    """A gain that rises and falls is fitted to a tenth of its change, with the same coefficients for all joints."""
     x = (swept.t - swept.t[0]) / np.ptp(swept.t)
     gain = 0.05 * np.exp(-(((x - 0.4) / 0.3) ** 2))
     extra = swept.torque * gain[:, None]
@@ -28,14 +28,14 @@ def test_a_slow_gain_of_all_joints_is_within_its_columns(swept: Situation) -> No
 
 
 def test_one_or_two_joints_share_nothing(arm: Robot) -> None:
-    """What one joint's torque does with time is that joint's; a share of all is one of three joints and more."""
+    """The effect needs at least three joints, because with fewer a common change is not distinct."""
     assert arm.n < FEWEST
     assert GainDrift().joints(arm) == ()
     assert GainDrift().joints(load_robot("ur10")) == (None,)
 
 
 def test_it_is_found_by_its_name_and_knows_only_time() -> None:
-    """A model file names it; unseen data cannot say where on its way it is."""
+    """The effect is found by its name and counts as a change with time."""
     found = find_effect(GainDrift.name)
     assert isinstance(found, GainDrift)
     assert is_of_time(found)

@@ -1,4 +1,4 @@
-"""Specification of what changes with time on the way to the log: a joint's scale at one moment, two clocks."""
+"""Tests of changes with time in the torque signal, of products of velocities, and of worked grease."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from robots.terms.effects.time_delay import lateness
 
 @pytest.mark.slow
 def test_a_scale_that_changes_at_one_moment_is_not_called_heat(arm: Robot, arm_log: Callable[..., Log]) -> None:
-    """Four per cent more of one joint's torque from 11 s on: unexplained, with the joint, the share and the moment."""
+    """A gain change of 4 % on one joint at 11 s is unexplained, with the joint, the size and the time."""
     log = arm_log(torque_noise=0.02)
     tau = log.tau.copy()
     tau[:, 1] *= np.where(log.t >= 11.0, 1.04, 1.0)
@@ -38,7 +38,7 @@ def test_a_scale_that_changes_at_one_moment_is_not_called_heat(arm: Robot, arm_l
 
 
 def test_clocks_that_part_are_a_delay_that_grows() -> None:
-    """A torque that is up to 2 ms later at the end is told to a fifth of what it changes, by values of all joints."""
+    """A delay that grows to 2 ms is fitted to a fifth of its change, with the same coefficients for all joints."""
     robot = load_robot("ur10")
     t = 0.004 * np.arange(3000)
     rates = np.array([0.9, 1.1, 1.3, 1.7, 2.1, 2.6])
@@ -55,7 +55,7 @@ def test_clocks_that_part_are_a_delay_that_grows() -> None:
 
 
 def test_both_are_found_by_their_names_and_know_only_time(arm: Robot) -> None:
-    """A model file names them; a switch is one cause, that another name may not stand for."""
+    """Both effects are found by name and count as changes with time; a gain step resembles one specific cause."""
     assert isinstance(find_effect(GainStep.name), GainStep)
     assert isinstance(find_effect(ClockDrift.name), ClockDrift)
     assert is_of_time(GainStep())
@@ -66,7 +66,7 @@ def test_both_are_found_by_their_names_and_know_only_time(arm: Robot) -> None:
 
 
 def test_a_rotor_that_spins_in_a_turning_arm_feels_products_of_velocities(swept: Situation) -> None:
-    """All products of another joint's velocity with those of further ones, and none with its own or the joint's."""
+    """The family has the products of another joint's velocity with those of further joints, and no other products."""
     X = FAMILIES["whirl"].columns(swept, 4, 2, ())
     further = [0, 2, 4, 5]
     np.testing.assert_allclose(X[:, : len(further)], swept.dq[:, 1, None] * swept.dq[:, further])
@@ -75,7 +75,7 @@ def test_a_rotor_that_spins_in_a_turning_arm_feels_products_of_velocities(swept:
 
 
 def test_grease_that_thins_as_it_is_worked_is_within_its_columns(swept: Situation) -> None:
-    """A share of Coulomb and viscous friction that follows the speed within a second, to a tenth of its size."""
+    """Friction that falls with the speed of the last second is fitted to a tenth of its size."""
     speed = np.abs(swept.dq[:, 3])
     follows = np.zeros_like(speed)
     for k in range(1, len(speed)):

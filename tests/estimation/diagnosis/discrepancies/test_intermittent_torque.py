@@ -1,4 +1,4 @@
-"""Specification of what comes and goes by itself: forces on the flange by pinocchio, spells of friction."""
+"""Tests of intermittent torques: periodic forces on the flange, against pinocchio, and temporary friction."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ RATES = np.array([0.9, 1.1, 1.3, 1.7, 2.1, 2.6])  # [rad/s]
 
 
 def _moved(rates: np.ndarray, pause: float = 0.0) -> Situation:
-    """A minute of a motion of six joints; of two halves with a pause."""
+    """Builds a minute of a motion of six joints, optionally with a pause in the middle."""
     robot, t = load_robot("ur10"), 0.02 * np.arange(3000)
     q, dq, ddq = (0.6 * rates**k * f(np.outer(t, rates)) for k, f in enumerate((np.sin, np.cos, lambda x: -np.sin(x))))
     model, late = default_model(robot), np.where(t >= 30.0, pause, 0.0)
@@ -36,13 +36,13 @@ def _moved(rates: np.ndarray, pause: float = 0.0) -> Situation:
 
 @pytest.fixture(scope="module")
 def moved() -> Situation:
-    """A motion that does not repeat."""
+    """Returns a motion that does not repeat."""
     return _moved(RATES)
 
 
 @pytest.fixture(scope="module")
 def pushed(moved: Situation) -> np.ndarray:
-    """Torque (N, 6) that pinocchio says the drives hold against a force on the flange, in each period."""
+    """Computes pinocchio's torque (N, 6) for a periodic force on the flange."""
     model, last = chain_of(moved.robot)
     tip = np.asarray(moved.robot.chain.tip)
     frame = model.addFrame(pin.Frame("flange", last, pin.SE3(tip[:3, :3], tip[:3, 3]), pin.FrameType.OP_FRAME))
@@ -53,7 +53,7 @@ def pushed(moved: Situation) -> np.ndarray:
 
 
 def test_a_force_that_comes_again_is_within_its_columns(moved: Situation, pushed: np.ndarray) -> None:
-    """Its torque is pinocchio's, and its coefficients are the force."""
+    """The columns give pinocchio's torque, and the coefficients are the force."""
     X = PeriodicTorque().columns(moved, None, (PERIOD, MOMENT, LASTS))
     values = np.linalg.lstsq(X.reshape(-1, 3), pushed.ravel(), rcond=None)[0]
     np.testing.assert_allclose(values, FORCE, rtol=1e-6)
@@ -64,7 +64,7 @@ def test_a_force_that_comes_again_is_within_its_columns(moved: Situation, pushed
 
 
 def test_its_period_is_proposed_out_of_noise(moved: Situation, pushed: np.ndarray) -> None:
-    """Where each push is a third of the noise, one of six proposals meets their period, moment and length."""
+    """With pulses of a third of the noise, one of six proposals has the right period, time and duration."""
     noise = np.random.default_rng(0).standard_normal(pushed.shape) * np.sqrt(np.mean(pushed**2, axis=0)) * 3.0
     proposed = PeriodicTorque().propose(moved, None, (pushed + noise) / np.var(noise, axis=0), 6)
     assert len(proposed) == 6
@@ -79,7 +79,7 @@ def test_its_period_is_proposed_out_of_noise(moved: Situation, pushed: np.ndarra
 
 
 def test_a_period_with_which_the_motion_repeats_is_none() -> None:
-    """Of a motion of 6 s none is tried that keeps its pace over a minute; nor any where logs are hours apart."""
+    """Periods of the motion are not tried, and none at all if logs are hours apart."""
     periodic = _moved(2 * np.pi / 6.0 * np.array([1.0, 2.0, 3.0, 1.0, 2.0, 3.0]))
     periods = {shape[0] for shape in PeriodicTorque().grid(periodic, None)}
     assert periods
@@ -90,7 +90,7 @@ def test_a_period_with_which_the_motion_repeats_is_none() -> None:
 
 @pytest.mark.slow
 def test_friction_of_a_while_is_unexplained_with_its_time(arm: Robot, arm_log: Callable[..., Log]) -> None:
-    """A brake that drags on joint 2 from 8 s for 4 s: the joint, how much, from when and for how long."""
+    """A brake that drags on joint 2 from 8 s for 4 s is unexplained, with joint, size, start and duration."""
     log = arm_log(torque_noise=0.02)
     size = 0.05 * float(np.sqrt(np.mean(log.tau[:, 1] ** 2)))
     during = (log.t > 8.0) & (log.t < 12.0)
@@ -108,7 +108,7 @@ def test_friction_of_a_while_is_unexplained_with_its_time(arm: Robot, arm_log: C
 
 
 def test_a_spell_is_no_change_for_good(moved: Situation) -> None:
-    """It is found by its name and goes by time; none is longer than two fifths of the data."""
+    """Both effects are found by name and are changes with time; temporary friction lasts at most 40 % of the data."""
     assert isinstance(find_effect(IntermittentTorque.name), IntermittentTorque)
     assert isinstance(find_effect(PeriodicTorque.name), PeriodicTorque)
     assert is_of_time(IntermittentTorque())

@@ -1,4 +1,4 @@
-"""Specification of what moves once and for all: a base's tilt and a joint's zero, by pinocchio, and the moment."""
+"""Tests of a sudden tilt of the base and a sudden change of a joint zero, against pinocchio."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WHEN = 104.0  # [s], in the middle of the motion
 def test_its_torque_is_what_pinocchio_says_changes_at_a_moment(
     swept: Situation, pinocchio_torque: Callable[..., np.ndarray], moved: str
 ) -> None:
-    """None before, and afterwards the rigid body's under gravity turned by half a milliradian, or at another angle."""
+    """The columns are zero before the change; afterwards they give pinocchio's torque difference."""
     motion = Motion(swept.t, swept.q, swept.dq, swept.ddq)
     angle = 5e-4
     if moved == "base":
@@ -44,7 +44,7 @@ def test_its_torque_is_what_pinocchio_says_changes_at_a_moment(
 
 @pytest.mark.parametrize(("effect", "joint"), [(BaseStep(), None), (ZeroStep(), 3)])
 def test_its_moment_is_proposed_out_of_noise(swept: Situation, effect: BaseStep | ZeroStep, joint: int | None) -> None:
-    """Where noise is as large as the change, one of six proposals is within a fiftieth of the data of its moment."""
+    """With noise as large as the change, one of six proposals is within 2 % of the data of the true time."""
     change = effect.columns(swept, joint, (WHEN,)).sum(axis=2)
     size = np.sqrt(np.mean(change**2, axis=0)) + 1e-3 * np.abs(change).max()
     noise = np.random.default_rng(0).standard_normal(change.shape) * size
@@ -54,7 +54,7 @@ def test_its_moment_is_proposed_out_of_noise(swept: Situation, effect: BaseStep 
 
 
 def test_they_are_found_by_their_names_and_are_causes_of_their_own(arm: Robot, swept: Situation) -> None:
-    """A model file names them; they go by time, and names that explain less are none."""
+    """Both effects are found by name, are changes with time, and each resembles one specific cause."""
     for effect in (BaseStep(), ZeroStep()):
         assert type(find_effect(effect.name)) is type(effect)
         assert is_of_time(effect)

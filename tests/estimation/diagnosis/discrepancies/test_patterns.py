@@ -1,4 +1,4 @@
-"""Torques that no effect makes: told by what they depend on, not forced into a name."""
+"""Tests of torques outside the catalogue: they are described by what they depend on, not by a wrong name."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def _buffer(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
 
 
 def _lag_of_gauge(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
-    """A gauge that keeps what it showed until the torque has changed by a width: Prandtl's play."""
+    """Computes the error of a torque sensor with hysteresis (Prandtl's play operator)."""
     width, shown, inside = 0.4 * tau[:, 1].std(), [], float(tau[0, 1])
     for value in tau[:, 1]:
         inside = min(max(inside, value - width), value + width)
@@ -101,10 +101,7 @@ def test_a_stranger_is_told_by_what_it_depends_on(
     arm_plant: Callable,
     fourier_motion: Callable,
 ) -> None:
-    """A torque that swings by itself is no drift, one that grows with the cube of the acceleration no spring.
-
-    A tooth that catches is neither a spring nor a ripple, nor both.
-    """
+    """Each torque outside the catalogue is unexplained, with the right joint and the right pattern."""
     motion = fourier_motion(arm, duration=30.0)
     log = simulate(arm_plant(torque_noise=0.02), motion, seed=0)
     assert log.tau is not None
@@ -129,7 +126,10 @@ def test_a_stranger_is_told_by_what_it_depends_on(
 def test_a_line_is_proposed_at_its_top(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
-    """To a fiftieth of what the log resolves: from half of that beside it, a search would leave as much as it takes."""
+    """A spectral line is proposed to a fiftieth of the log's resolution.
+
+    A search that starts half a resolution from the line would leave as much of it as it explains.
+    """
     recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     problem = pose_arm(recording)
     vibration = build_pattern("pattern:vibration:0:even")
@@ -143,7 +143,7 @@ def test_a_line_is_proposed_at_its_top(
 
 @pytest.mark.longer
 def test_what_a_joint_feels_when_it_goes_is_told(arm: Robot, arm_plant: Callable) -> None:
-    """A brake that opens late drags in the first quarter of a second of each move, against it."""
+    """A brake that opens late, and drags in the first 0.25 s of each move, gives the pattern of a standstill."""
     step, moves = 0.004, 16
     rise = np.concatenate([np.zeros(150), 0.5 - 0.5 * np.cos(np.pi * np.arange(350) / 350), np.ones(100)])
     way = np.concatenate([[0.0], np.cumsum(np.tile([1.0, -0.6, -1.0, 0.6], moves // 4))])

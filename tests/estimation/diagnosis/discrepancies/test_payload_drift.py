@@ -1,4 +1,4 @@
-"""Specification of a body at the flange that changes slowly: pinocchio's torque of it, times the mass that is left."""
+"""Tests of a slowly changing payload, against pinocchio's torque of a point mass."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ COM = np.array([0.03, -0.02, 0.1])  # [m] in the flange's frame
 
 
 def test_a_tank_that_empties_is_within_its_columns(swept: Situation) -> None:
-    """Its torque is met to a twelfth of the largest, at the ends of the waves, and what it lost is told to a tenth."""
+    """The torque is fitted to 8 % of its largest value, and the lost mass is described to a tenth."""
     t = swept.t - swept.t[0]
     kilogramme = torque_of_mass(swept.robot, 1.0, COM, swept.q, swept.dq, swept.ddq)
     lost = 2.0 * np.exp(-t / 6.0)
     extra = kilogramme * lost[:, None]
-    # The base model has a payload that stays.
+    # The base model contains a constant payload.
     stays = swept.sensitivity("tool")[:, :, :4]
     X = np.concatenate([PayloadDrift().columns(swept, None), stays], axis=2)
     rows = X.reshape(-1, X.shape[2])
@@ -33,7 +33,7 @@ def test_a_tank_that_empties_is_within_its_columns(swept: Situation) -> None:
 
 
 def test_it_is_of_a_whole_robot_and_goes_by_time(arm: Robot) -> None:
-    """A model file names it; two joints cannot tell a body from what each of them does."""
+    """The effect is found by its name, is a change with time, and needs at least three joints."""
     found = find_effect(PayloadDrift.name)
     assert isinstance(found, PayloadDrift)
     assert is_of_time(found)

@@ -1,4 +1,4 @@
-"""Specification of friction that differs from log to log: told once, on all joints, with their shares."""
+"""Tests of friction that differs between sessions: one finding for all joints, with a factor for each."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ DAY = 86400.0
 
 
 def _later(seen: Situation, by: float) -> Situation:
-    """The same motion at another time, with some friction."""
+    """Returns the same motion at a later time, with a given friction."""
     return replace(seen, t=seen.t + by, friction=seen.q + 2.0, _cache={})
 
 
 def test_each_session_has_shares_of_its_own(swept: Situation) -> None:
-    """Friction of each joint in the second and in the third, none in the first; a short pause begins none."""
+    """Each session after the first has a column per joint; a short pause does not begin a session."""
     days = join_situations([_later(swept, by) for by in (0.0, 30.0, DAY, 2 * DAY)])
     rows, n = len(swept), 6
     X = SessionFriction().columns(days, None).reshape(4 * rows, n, SESSIONS - 1, n)
@@ -44,7 +44,7 @@ def test_each_session_has_shares_of_its_own(swept: Situation) -> None:
 
 
 def test_logs_whose_pauses_nobody_noted_may_be_of_several_days(swept: Situation) -> None:
-    """Logs that each began its clock anew are two sessions, whatever their times round to."""
+    """Two logs whose clocks both start anew are two sessions, for any start time."""
     rng = np.random.default_rng(0)
     for start in rng.uniform(0.0, 1e4, 50):
         log = Log(t=swept.t + start, q=swept.q, tau=swept.q)
@@ -55,7 +55,7 @@ def test_logs_whose_pauses_nobody_noted_may_be_of_several_days(swept: Situation)
 
 @pytest.mark.slow
 def test_colder_gears_on_the_second_day_are_told_once(arm: Robot, arm_log: Callable[..., Log]) -> None:
-    """Three twentieths more friction on both joints: unexplained, on the robot as a whole, with the share."""
+    """Friction that is 15 % higher on both joints in a second session is one unexplained finding of the robot."""
     first, second = arm_log(torque_noise=0.02), arm_log(seed=1, motion_seed=1, torque_noise=0.02)
     logs = [first, replace(second, t=second.t + DAY, tau=second.tau + 0.15 * _friction(arm, second))]
     found = diagnose(arm, logs, candidates=("friction_step", "load_dependent_friction"))
@@ -69,13 +69,13 @@ def test_colder_gears_on_the_second_day_are_told_once(arm: Robot, arm_log: Calla
 
 
 def _friction(arm: Robot, log: Log) -> np.ndarray:
-    """Coulomb and viscous friction (N, 2) of the virtual arm, by its description."""
+    """Evaluates Coulomb and viscous friction (N, 2) of the virtual arm from its description."""
     dq = np.gradient(log.q, log.t, axis=0)
     return arm.friction[:, 0] * np.sign(dq) + arm.friction[:, 1] * dq
 
 
 def test_it_is_found_by_its_name_and_its_phases_do_not_last_for_days(swept: Situation) -> None:
-    """A model file names it; a vibration is looked for with as many frequencies as the recorded time asks for."""
+    """The effect is found by its name; the frequency grids of oscillations depend on the recorded time only."""
     assert isinstance(find_effect(SessionFriction.name), SessionFriction)
     assert is_of_time(SessionFriction())
     days = join_situations([swept, _later(swept, DAY)])

@@ -1,4 +1,4 @@
-"""Limits of a planned experiment, against what a diagnosis of such data would score."""
+"""Tests of the limits of a planned experiment, against the scores of such data in a diagnosis."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def planned(ur10):
 
 @pytest.mark.slow
 def test_an_effect_of_the_limits_size_has_the_energy_to_be_found(planned):
-    """A torque of the detectable size, projected and white, has the energy that the false-alarm level asks for."""
+    """An effect of the detectable size has the whitened energy that the false-alarm level requires."""
     problem, entries = planned
     limits = {(limit.effect, limit.joint): limit for limit in find_limits(problem, entries)}
     tries = sum(entry.tries for entry in entries)
@@ -77,7 +77,7 @@ def test_an_effect_of_the_limits_size_has_the_energy_to_be_found(planned):
 
 
 def test_the_worst_limit_is_enough_for_each_kind_of_an_effect(planned, ur10):
-    """At that size, each exponent of a saturation has the energy that is asked for, and one has just that."""
+    """At the size `at_worst` each exponent of a saturation has at least the required energy; one has exactly that."""
     problem, _ = planned
     effect = EFFECTS["torque_constant_saturation"]
     entries = measure(problem, [Hypothesis(effect, joint) for joint in effect.joints(ur10)])
@@ -98,7 +98,7 @@ def test_the_worst_limit_is_enough_for_each_kind_of_an_effect(planned, ur10):
 
 
 def test_what_the_base_model_absorbs_is_hidden(planned):
-    """A turned encoder on a vertical first joint shows at no size, and the limit says so."""
+    """An encoder offset of a vertical first joint is not detectable at any size, and the limit has a note."""
     problem, entries = planned
     limits = {(limit.effect, limit.joint): limit for limit in find_limits(problem, entries)}
     first = limits["encoder_offset", 1]
@@ -109,7 +109,7 @@ def test_what_the_base_model_absorbs_is_hidden(planned):
 
 @pytest.mark.slow
 def test_limits_are_ordered_and_fall_with_the_noise(planned, ur10):
-    """Naming asks for at least what finding asks for; with a quarter of the noise, a quarter of the size shows."""
+    """Attributable sizes are not below detectable sizes, and both are proportional to the noise."""
     problem, entries = planned
     model = default_model(ur10, velocity_scale=2e-3)
     quiet = planned_problem(model, model.nominal, [_motion(5000)], noise=Sensors(torque_noise=0.025 / 4))
@@ -123,7 +123,7 @@ def test_limits_are_ordered_and_fall_with_the_noise(planned, ur10):
 
 @pytest.mark.slow
 def test_limits_grow_as_the_root_of_the_time(ur10):
-    """Of a fourfold time, effects half as large show, but for what more tries cost."""
+    """With four times the duration, detectable sizes are about half as large."""
     model = default_model(ur10, velocity_scale=2e-3)
     names = ("asymmetric_friction", "time_delay")
     sizes = []
@@ -135,19 +135,19 @@ def test_limits_grow_as_the_root_of_the_time(ur10):
 
 
 def test_a_joint_at_rest_is_told(ur10):
-    """Of a joint that does not move, friction shows at no size: the others' limits stand."""
+    """Friction of a joint that does not move has a note and no limit; the limits of other joints are finite."""
     model = default_model(ur10, velocity_scale=2e-3)
     problem = planned_problem(model, model.nominal, [_motion(2000, still=3)], noise=Sensors())
     entries = measure(problem, [Hypothesis(EFFECTS["stribeck"], joint) for joint in (4, 5)])
     limits = {limit.joint: limit for limit in find_limits(problem, entries) if limit.effect == "stribeck"}
     assert limits[4].note == "joint hardly moves"
     assert np.isfinite(limits[5].detectable)
-    # Of a joint that moves nobody is told that it does not.
+    # The note on rest is not given for a joint that moves.
     assert limits[1].note == "not excited by this motion"
 
 
 def test_unknown_dynamics_are_refused():
-    """A robot whose masses nobody states has no planned torque: the error says what to do."""
+    """Unknown link masses raise an error that names the first unknown parameter."""
     robot = load_robot("ur10")
     unknown = replace(robot, inertia=np.full((6, 10), np.nan))
     model = default_model(unknown)
@@ -156,7 +156,7 @@ def test_unknown_dynamics_are_refused():
 
 
 def test_a_log_shorter_than_the_slowest_heat_is_told(ur10):
-    """Of heat in a short log the limit says that slower time constants look alike."""
+    """For a short log the limit of a thermal effect notes that longer time constants cannot be distinguished."""
     model = default_model(ur10, velocity_scale=2e-3)
     problem = planned_problem(model, model.nominal, [_motion(2000)], noise=Sensors())
     limits = find_limits(problem, measure(problem, [Hypothesis(EFFECTS["thermal_friction"], 2)]))
@@ -165,7 +165,7 @@ def test_a_log_shorter_than_the_slowest_heat_is_told(ur10):
 
 
 def test_what_shows_at_no_size_is_named() -> None:
-    """Four at most, and one more where its name is no longer than the word that it is left out."""
+    """The summary names at most five undetectable effects, and the number of further ones."""
     known = {"at_worst": 0.02, "attributable": 0.02, "toughest": "", "visible": 0.5}
     seen = Limit(effect="spring", joint=1, detectable=0.01, **known)
     hidden = [Limit(effect="backlash", joint=j + 1, detectable=np.inf, **known) for j in range(6)]

@@ -1,4 +1,4 @@
-"""The next experiment: it must do what it predicts, and stay where the robot has been."""
+"""Tests of the next experiment: its predicted chances, and motions that stay within the range of the logs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from robots.terms.situations.flange_body import point_mass
 
 @dataclass(frozen=True)
 class Guess:
-    """An effect as a diagnosis leaves it."""
+    """An effect as a diagnosis found it."""
 
     hypothesis: Hypothesis
     shape: tuple[float, ...]
@@ -47,7 +47,7 @@ def problem():
 
 
 def _guess(problem, name, joint, shape, share):
-    """An effect of the given share of the joint's torque, its columns alike."""
+    """Builds an effect with a given fraction of the joint's torque, and columns of equal size."""
     hypothesis = Hypothesis(EFFECTS[name], joint)
     X = EFFECTS[name].columns(problem.situation, joint, shape)
     row = (joint or 2) - 1
@@ -57,13 +57,13 @@ def _guess(problem, name, joint, shape, share):
 
 
 def test_every_kind_has_its_motions(problem):
-    """Each kind of experiment that an effect names can be made, and is described."""
+    """Each kind of experiment that an effect can name has a generator of its motions."""
     assert set(MAKERS) == set(EXPERIMENTS)
 
 
 @pytest.mark.parametrize("kind", list(MAKERS))
 def test_motions_stay_where_the_robot_has_been(kind, problem):
-    """No motion leaves the positions of the logs or is much faster, and its derivatives are those of its positions."""
+    """Motions stay within the logs' positions and near their speeds, and velocities are the positions' derivatives."""
     room = motion_range(problem.situation.robot, problem.recording)
     for stage in MAKERS[kind](room, 3, 1):
         m = stage.motion
@@ -82,7 +82,7 @@ def test_motions_stay_where_the_robot_has_been(kind, problem):
 
 @pytest.mark.slow
 def test_a_payload_tells_a_torque_constant(problem):
-    """A wrong torque constant and a turned encoder are told apart by a known payload, as the literature has it."""
+    """A known payload separates a wrong torque constant from an encoder offset, as is known from the literature."""
     causes = [
         _guess(problem, "torque_constant_error", 4, (), 0.02),
         _guess(problem, "encoder_offset", 4, (), 0.02),
@@ -99,7 +99,7 @@ def test_a_payload_tells_a_torque_constant(problem):
 
 @pytest.mark.slow
 def test_heat_is_not_told_by_going_on_at_once(problem):
-    """A joint that lost friction by heat has not cooled where the same motion follows at once: a pause must."""
+    """Repeating the motion at once does not separate heat from a friction step, because the joint has not cooled."""
     end = float(problem.recording.t[-1])
     step = _guess(problem, "friction_step", 2, (0.5 * end,), 0.015)
     causes = [_guess(problem, "thermal_friction", 2, (0.2 * end, 0.0, 0.0), 0.015), step]
@@ -114,7 +114,7 @@ def test_heat_is_not_told_by_going_on_at_once(problem):
 
 
 def test_heat_of_the_logs_goes_on_in_the_experiment(problem):
-    """An experiment on a warm robot shows what it would as the last part of one that began with the logs' motion."""
+    """An experiment after the logs shows the same as the second part of one that begins with the logs' motion."""
     recording = problem.recording
     logged = Stage(motion=Motion(recording.t - recording.t[0], recording.q, recording.dq, recording.ddq))
     grams = Grams(problem, [_guess(problem, "thermal_friction", 2, (30.0, 0.0, 0.0), 0.02)])
@@ -127,7 +127,7 @@ def test_heat_of_the_logs_goes_on_in_the_experiment(problem):
 
 @pytest.mark.slow
 def test_levels_of_the_logs_are_not_those_of_experiments_to_come(problem):
-    """Logs with noise levels of their own say nothing of how noisy an experiment of more parts will be."""
+    """Noise levels of individual logs are not used for experiments with another number of parts."""
     louder = replace(problem, whitening=replace(problem.whitening, levels=np.full((1, problem.n), 0.5)))
     causes = [
         _guess(problem, "torque_constant_error", 4, (), 0.02),
@@ -140,7 +140,7 @@ def test_levels_of_the_logs_are_not_those_of_experiments_to_come(problem):
 
 @pytest.mark.slow
 def test_the_least_trouble_is_proposed_where_several_would_do(problem):
-    """Causes that any motion tells apart need only be repeated, not a payload or a tilted base."""
+    """Causes that any motion separates need only a repetition, not a payload or a tilted base."""
     causes = [
         _guess(problem, "stribeck", 4, (0.05, 1.0), 0.02),
         _guess(problem, "presliding_hysteresis", 4, (0.003,), 0.02),
@@ -150,7 +150,7 @@ def test_the_least_trouble_is_proposed_where_several_would_do(problem):
 
 @pytest.mark.slow
 def test_what_to_play_is_told(problem):
-    """A payload's experiment: the logged motion, once without and once with it, as files of their own would have it."""
+    """For an experiment with a payload the runs are the logged motion, first without and then with the payload."""
     causes = [_guess(problem, "torque_constant_error", 4, (), 0.02), _guess(problem, "encoder_offset", 4, (), 0.02)]
     plan = plan_next(problem, causes)
     assert len(plan.motions) == 1
@@ -163,7 +163,7 @@ def test_what_to_play_is_told(problem):
 
 
 def test_what_is_nearly_sure_goes_after_what_is(problem):
-    """A chance just short of enough is no better than enough, however the other causes stand."""
+    """An experiment with a sufficient chance is ranked before one with a chance slightly below."""
     grams, stages = np.zeros((1, 1)), ()
     chances = [np.full((2, 2), enough) for enough in (ENOUGH - 1e-3, ENOUGH)]
     nearly, enough = (_Choice("payload", stages, (grams,), each) for each in chances)
@@ -172,7 +172,7 @@ def test_what_is_nearly_sure_goes_after_what_is(problem):
 
 @pytest.mark.slow
 def test_what_once_does_not_tell_is_made_several_times(problem):
-    """Of an effect that hardly shows, motions are repeated until the chance is enough, and told as it is then."""
+    """For a small effect the motion is repeated until the chance is sufficient, and the plan states that chance."""
     names = (("stribeck", (0.05, 1.0)), ("presliding_hysteresis", (0.003,)))
     causes = [_guess(problem, name, 4, shape, 0.002) for name, shape in names]
     plan = plan_next(problem, causes)
@@ -188,7 +188,7 @@ def test_what_once_does_not_tell_is_made_several_times(problem):
 
 
 def test_a_payload_is_mounted_once_however_often_the_motion_is_made(problem):
-    """Stages come in a row with what is changed before them; the pause for it is made once."""
+    """Repeated stages are ordered by their payload, so the payload is mounted once, with one pause for it."""
     stages = MAKERS["payload"](motion_range(problem.situation.robot, problem.recording), 0, 0)
     four = repeat_stages(stages, 4)
     assert [stage.payload for stage in four] == [0.0] * 4 + [stages[1].payload] * 4
@@ -198,7 +198,7 @@ def test_a_payload_is_mounted_once_however_often_the_motion_is_made(problem):
 
 @pytest.mark.slow
 def test_where_two_causes_stay_alike_the_others_are_told_apart(problem):
-    """A torque constant twice is never told from itself; what tells most of the rest comes first, and that is said."""
+    """If two causes cannot be separated, the plan separates the others as well as possible and states this."""
     error = _guess(problem, "torque_constant_error", 2, (), 0.01)
     other = _guess(problem, "torque_constant_error", 3, (), 0.01)
     plan = plan_next(problem, [error, other, error])
@@ -220,13 +220,13 @@ def test_where_two_causes_stay_alike_the_others_are_told_apart(problem):
 
 
 def test_one_cause_needs_no_experiment(problem):
-    """With a single cause left there is nothing to tell apart."""
+    """With a single cause left, no experiment is proposed."""
     assert plan_next(problem, [_guess(problem, "stribeck", 4, (0.05, 1.0), 0.02)]) is None
 
 
 @pytest.mark.slow
 def test_the_plan_is_plain_data(problem):
-    """The plan as data is what a diagnosis file holds."""
+    """The plan converts to plain data for the diagnosis file."""
     causes = [
         _guess(problem, "thermal_friction", 4, (20.0, 0.0, 0.0), 0.01),
         _guess(problem, "friction_step", 4, (10.0,), 0.01),
@@ -237,7 +237,7 @@ def test_the_plan_is_plain_data(problem):
 
 
 def test_limits_of_zero_are_no_limits(problem):
-    """A description that leaves its limits at zero, and a joint that rested, still get their motions."""
+    """Velocity limits of zero and a joint at rest still give finite motions."""
     robot = problem.situation.robot
     zero = replace(robot, limits=replace(robot.limits, velocity=np.zeros(6)))
     q = problem.recording.q.copy()
@@ -251,7 +251,7 @@ def test_limits_of_zero_are_no_limits(problem):
 
 
 def test_the_experiment_starts_from_the_arm_itself(problem):
-    """A payload that the first log carried has no part in what an experiment without it shows."""
+    """A payload in the first log does not change the information of an experiment without it."""
     body = point_mass(6.0, (0.0, 0.1, 0.2))
     carried = replace(problem.recording, payloads=(body,))
     now = build_situation(carried, problem.situation.model, problem.situation.parameters)
@@ -264,12 +264,12 @@ def test_the_experiment_starts_from_the_arm_itself(problem):
     room = motion_range(problem.situation.robot, problem.recording)
     stages = MAKERS["payload"](room, 3, 0)
     expected, found = (Grams(some, causes).of(stages) for some in (problem, laden))
-    # The parameters were added and taken off again: rounding of sums.
+    # The payload's parameters were added and subtracted, so sums are rounded.
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 
 
 def test_a_tilted_base_counts_with_the_parameters_that_it_shows(problem):
-    """The first joint's first moments, which level logs leave open, take what they can of a cause."""
+    """With a tilted base, the first joint's first moments, which level logs do not determine, are fitted, too."""
     causes = [_guess(problem, "spring", 1, (0.0, 0.0), 0.02), _guess(problem, "torque_constant_error", 1, (), 0.02)]
     grams = Grams(problem, causes)
     names = {column.name for column in grams.base.columns} - {c.name for c in problem.baseline.base.columns}
@@ -283,7 +283,7 @@ def test_a_tilted_base_counts_with_the_parameters_that_it_shows(problem):
 
 @pytest.mark.slow
 def test_a_base_that_stands_otherwise_stays_there(problem):
-    """Without a pose of its own an experiment is made where the last log was; a second pose tilts from there."""
+    """Experiments are made in the base pose of the last log, and a second base pose is tilted from there."""
     wall = np.array([-9.81, 0.0, 0.0])
     stands = replace(problem, recording=replace(problem.recording, gravity_fields=(wall,)))
     causes = [_guess(problem, "stribeck", 4, (0.05, 1.0), 0.02), _guess(problem, "spring", 4, (0.0, 0.0), 0.02)]

@@ -1,4 +1,4 @@
-"""A rival is fitted anew after the next experiment: the chance to tell it counts with the form that imitates best."""
+"""Tests of rival shapes: the chance of an experiment counts with the shape in which a rival fits best."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ JOINT = 2
 
 @pytest.fixture(scope="module")
 def problem() -> Problem:
-    """A UR10 that follows slow sines."""
+    """Returns the planned problem of a UR10 that follows slow sines."""
     robot = replace(load_robot("ur10"), friction=np.tile([10.0, 15.0, 0.0, 0.0], (6, 1)))
     t = 0.008 * np.arange(3000)
     rates = np.array([0.7, 1.1, 1.3, 1.7, 2.1, 2.6])
@@ -35,7 +35,7 @@ def problem() -> Problem:
 
 
 def _cause(problem: Problem, name: str, shape: tuple[float, ...], size: float) -> RivalShape:
-    """An effect of one column, of a root mean square torque [N m]."""
+    """Builds an effect with one column and a given torque RMS [N m]."""
     X = EFFECTS[name].columns(problem.situation, JOINT, shape)
     return RivalShape(
         Hypothesis(EFFECTS[name], JOINT), shape, np.array([size / np.sqrt(np.mean(X[:, JOINT - 1] ** 2))])
@@ -44,7 +44,7 @@ def _cause(problem: Problem, name: str, shape: tuple[float, ...], size: float) -
 
 @pytest.mark.slow
 def test_the_chance_is_that_of_the_form_that_imitates_best(problem: Problem) -> None:
-    """Friction that breaks away otherwise imitates a grease that thins; dense trials find no much lower chance."""
+    """With the found rival shapes the chance is clearly lower, and close to the lowest over a dense grid of shapes."""
     thinning = _cause(problem, "shear_thinning", (0.3,), 8.0)
     stribeck = _cause(problem, "stribeck", (0.2, 2.0), 8.0)
     causes = [thinning, stribeck]
@@ -67,7 +67,7 @@ def test_the_chance_is_that_of_the_form_that_imitates_best(problem: Problem) -> 
 
 @pytest.mark.slow
 def test_a_plan_counts_with_such_forms(problem: Problem) -> None:
-    """What it promises is no more than of causes that keep the shapes in which they were fitted."""
+    """The planned chance is below that of causes with fixed shapes."""
     causes = [_cause(problem, "shear_thinning", (0.3,), 8.0), _cause(problem, "stribeck", (0.2, 2.0), 8.0)]
     plan = plan_next(problem, causes)
     assert plan is not None
@@ -75,7 +75,7 @@ def test_a_plan_counts_with_such_forms(problem: Problem) -> None:
 
 
 def test_what_has_no_other_form_is_taken_as_it_was_fitted(problem: Problem) -> None:
-    """Effects without a shape, and moments of the logs: those of an experiment to come are others."""
+    """Effects without shape parameters, and those with times in the logs, have no rival shapes."""
     end = float(problem.recording.t[-1])
     step = RivalShape(Hypothesis(EFFECTS["friction_step"], JOINT), (0.5 * end,), np.array([2.0, 1.0]))
     offset = RivalShape(Hypothesis(EFFECTS["encoder_offset"], JOINT), (), np.array([0.01]))

@@ -1,4 +1,4 @@
-"""A coefficient that all joints have alike: how much they agree on it, and what each says counts."""
+"""Tests of a coefficient that all joints share: the agreement of the joints, and the gain that counts."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _WAVES = ((0, np.sin), (1, np.cos), (2, lambda phase: -np.sin(phase)))
 
 
 def _shared(*coefficients: float, error: float = 0.01) -> tuple[float, float]:
-    """What a shared coefficient explains, and what of it counts, where joints tell these values to an error."""
+    """Returns the gain of a shared coefficient, and the part that counts, for given estimates of the joints."""
     gram = np.full(len(coefficients), error**-2)
     cross = gram * coefficients
     return float(cross.sum() ** 2 / gram.sum()), shared_coefficient_gain(gram, cross)
 
 
 def test_joints_that_agree_within_the_formula_count_in_full() -> None:
-    """Values a fifth apart, each known to a hundredth, are one: no delay is so exact as the noise is low."""
+    """Estimates that differ by a fifth count in full, because the formula is not more accurate."""
     gain, agreed = _shared(0.9, 1.0, 1.1, 1.05)
     assert agreed == pytest.approx(gain)
     few, count = _shared(0.9, 1.1)
@@ -38,14 +38,14 @@ def test_joints_that_agree_within_the_formula_count_in_full() -> None:
 
 
 def test_one_joint_at_odds_counts_for_nothing_and_the_rest_in_full() -> None:
-    """Where another effect is left on one of four joints, three still tell the coefficient."""
+    """If one of four joints contradicts, the gain of the other three counts."""
     _, agreed = _shared(1.0, 1.0, 1.0, -4.0)
     rest, _ = _shared(1.0, 1.0, 1.0)
     assert agreed == pytest.approx(rest)
 
 
 def test_what_one_joint_alone_tells_is_no_common_coefficient() -> None:
-    """A value on one joint, and none on the others that would have told it, hardly counts."""
+    """An estimate on one joint, with none on the others, hardly counts."""
     gain, agreed = _shared(1.0, 0.0, 0.0, 0.0)
     assert agreed < 0.1 * gain
     _, agreed = _shared(1.0, -1.0, 1.0, -1.0)
@@ -53,7 +53,7 @@ def test_what_one_joint_alone_tells_is_no_common_coefficient() -> None:
 
 
 def test_reversals_tell_a_delay_no_better_than_their_moments_are_known() -> None:
-    """Of information g beside them, 1 / (1 / g + m^2) is sure; what other rows tell is so in full."""
+    """Information g from reversals with time error m is reduced to 1 / (1 / g + m^2); other rows count in full."""
     robot = load_robot("ur10")
     t = 0.004 * np.arange(3000)
     phase = 2 * np.pi * 0.3 * t[:, None] * (1 + 0.1 * np.arange(6))
@@ -85,19 +85,19 @@ def test_reversals_tell_a_delay_no_better_than_their_moments_are_known() -> None
 
 
 def test_a_joint_whose_other_effects_formula_may_hide_it_need_not_agree() -> None:
-    """A gear that gives way by forty times the delay, and is 5 % off, leaves its joints any delay of its own."""
+    """A joint where another effect's formula error is larger than the coefficient need not agree."""
     gram, own = np.array([1e4, 1e4, 2e3, 1e3]), np.array([2.0, 2.0, 0.1, -0.6])
     cross, apart = gram * own, np.array([0.0, 0.0, 2.0, 2.0]) ** 2
     whole = float(cross.sum() ** 2 / gram.sum())
     assert shared_coefficient_gain(gram, cross, apart) > 0.9 * whole
     assert shared_coefficient_gain(gram, cross) < 0.3 * whole
-    # What such joints alone tell is no delay either.
+    # An estimate on these joints only is no delay either.
     alone = gram * np.array([0.0, 0.0, 1.0, 1.0])
     assert shared_coefficient_gain(gram, alone, apart) < 0.02 * float(alone.sum() ** 2 / gram.sum())
 
 
 def test_what_other_effects_explain_on_a_joint_makes_its_own_coefficient_doubtful() -> None:
-    """Five hundredths of the torque of effects accepted there, over the size of the column."""
+    """The formula variance of a joint's coefficient is from 5 % of the torque of accepted effects there."""
     robot = load_robot("ur10")
     t = 0.004 * np.arange(3000)
     motion = Motion(t, *(np.outer(f(2.0 * t), 2.0**k * np.linspace(0.4, 1.0, 6)) for k, f in _WAVES))

@@ -1,4 +1,4 @@
-"""The chances of finding and of naming, against simulated least squares."""
+"""Tests of the probabilities of detection and attribution, against simulated least squares."""
 
 from __future__ import annotations
 
@@ -21,31 +21,31 @@ DRAWS = 20_000
 
 @pytest.mark.parametrize(("degrees", "tries"), [(1, 1), (2, 127), (4, 420)])
 def test_an_effect_of_the_detectable_energy_is_found_as_often_as_said(degrees, tries):
-    """Least squares of noise and an effect of that energy exceeds the false-alarm level with the stated chance."""
+    """An effect with the detectable energy exceeds the false-alarm level with the stated probability."""
     energy = detectable_energy(degrees, tries)
     random = np.random.default_rng(0)
     mean = np.sqrt(energy) * np.eye(degrees)[0]
     found = (
         ((mean + random.standard_normal((DRAWS, degrees))) ** 2).sum(axis=1) > chi2.isf(0.01 / tries, degrees)
     ).mean()
-    # Five standard errors of a share of 20,000 draws: it fails wrongly once in two million.
+    # Five standard errors of a fraction of 20,000 draws: the test fails by chance once in two million.
     assert found == pytest.approx(POWER, abs=5 * np.sqrt(POWER * (1 - POWER) / DRAWS))
 
 
 def test_a_penalty_asks_for_more():
-    """What the selection charges for parameters must be exceeded, too."""
+    """A penalty for parameters increases the detectable energy."""
     assert detectable_energy(2, 100, penalty=60.0) > detectable_energy(2, 100) > detectable_energy(1, 1)
 
 
 @pytest.mark.parametrize("margin", [0.0, 10.0])
 def test_a_rival_falls_out_as_often_as_said(margin):
-    """Of two models fitted to the true one's data, the wrong one is worse by the margin with the stated chance."""
+    """The wrong one of two models is worse by the margin with the stated probability."""
     random = np.random.default_rng(1)
     energy = resolving_energy(margin)
     a, b = np.array([1.0, 0.0, 0.0]), np.array([0.6, 0.8, 0.0])
     left = energy / (1 - (a @ b) ** 2)
     y = np.sqrt(left) * a + random.standard_normal((DRAWS, 3))
-    # Twice the log-likelihood ratio with the true coefficient known: the noise of the fit cancels between the two.
+    # Twice the log-likelihood ratio for the true coefficient; the noise of the fit cancels between both models.
     difference = (y @ a) ** 2 - (y @ b) ** 2
     assert (difference > margin).mean() == pytest.approx(POWER, abs=0.02)  # normal to second order in 1 / energy
     assert chance_to_resolve(energy, margin) == pytest.approx(POWER, abs=1e-9)
@@ -53,7 +53,7 @@ def test_a_rival_falls_out_as_often_as_said(margin):
 
 
 def test_what_a_rival_leaves_is_a_projection():
-    """The energy beside a rival is that of the columns projected off the rival's."""
+    """The energy that a rival leaves is that of the columns projected off the rival's columns."""
     random = np.random.default_rng(2)
     A, B = random.normal(size=(50, 2)), random.normal(size=(50, 3))
     A[:, 0] += B[:, 0]
@@ -64,7 +64,7 @@ def test_what_a_rival_leaves_is_a_projection():
 
 
 def test_the_size_of_one_column_is_its_root_mean_square():
-    """A column of energy E and mean square s has the size sqrt(s / E) per unit of energy, whatever its scale."""
+    """A column with energy E and mean square s has the size sqrt(s / E) per unit energy, for any scale."""
     assert size_per_energy(unit_mixtures(np.array([[4.0]])), np.array([[25.0]])) == pytest.approx(0.4)
     assert size_per_energy(unit_mixtures(1e6 * np.array([[4.0]])), 1e6 * np.array([[25.0]])) == pytest.approx(0.4)
     assert size_per_energy(unit_mixtures(np.array([[4.0]])), np.array([[0.0]])) == np.inf

@@ -1,4 +1,4 @@
-"""Specification of the whitened regression: scores against least squares written out, bounds, null, projections."""
+"""Tests of the whitened regression: scores against plain least squares, bounds, null distribution, projections."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from robots.terms.effects import EFFECTS
 
 @pytest.fixture(scope="module")
 def problem(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]) -> Problem:
-    """A log of the arm without effects, white."""
+    """Returns the whitened problem of a log without effects."""
     return pose_arm(build_recording(arm, [arm_log(torque_noise=0.02)]))
 
 
 def _written_out(problem: Problem, extra: np.ndarray) -> tuple[float, float]:
-    """Squared white residual of the base model without and with more columns, by numpy's least squares."""
+    """Computes the squared white residual of the base model without and with more columns, by numpy's least squares."""
     root = np.linalg.cholesky(problem.whitening.precision)
     base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
     tau = (problem.whitening.all(problem.recording.tau) @ root).reshape(-1)
@@ -35,7 +35,7 @@ def _written_out(problem: Problem, extra: np.ndarray) -> tuple[float, float]:
         white = np.einsum("jk,njb->nkb", root, problem.whitening.all(columns))
         flat = white.reshape(len(tau), -1)
         norms = np.linalg.norm(flat, axis=0)
-        # Of what acts in rows of unknown direction alone, rounding is left: another one on another machine.
+        # Columns that act only in rows with an unknown sign are rounding errors, which differ between machines.
         flat = flat[:, norms > 1e-6] / norms[norms > 1e-6]
         left.append(float(np.sum((tau - flat @ np.linalg.lstsq(flat, tau, rcond=1e-9)[0]) ** 2)))
     return left[0], left[1]
@@ -43,7 +43,7 @@ def _written_out(problem: Problem, extra: np.ndarray) -> tuple[float, float]:
 
 @pytest.mark.parametrize("name", ["asymmetric_friction", "payload_change", "torque_sensor_drift"])
 def test_a_score_is_the_fall_of_the_squared_residual(problem: Problem, name: str) -> None:
-    """What a hypothesis gains is what least squares with its columns gains, on one joint or on all."""
+    """The gain of a hypothesis is the decrease of the squared residual in plain least squares."""
     effect = EFFECTS[name]
     joint = None if effect.whole_robot else 1
     hypothesis = Hypothesis(effect, joint)
@@ -56,12 +56,12 @@ def test_a_score_is_the_fall_of_the_squared_residual(problem: Problem, name: str
         dense[:, j] = part
     before, after = _written_out(problem, dense)
     assert problem.energy == pytest.approx(before, rel=1e-6)
-    # Columns are kept in single precision, and directions that hardly show are left out.
+    # Columns are stored in single precision, and directions with almost no energy are left out.
     assert result.gain == pytest.approx(before - after, abs=0.02 * (before - after) + 0.3)
 
 
 def test_accepted_effects_are_projected_out(problem: Problem) -> None:
-    """Beside itself an effect explains nothing; beside another, the two explain what they explain together."""
+    """Beside itself an effect has no gain; beside another, gains add up to that of both together."""
     groups = []
     for name, shape in (("asymmetric_friction", ()), ("load_dependent_friction", (1.0, 0.0))):
         joints, columns = problem.columns_of(Hypothesis(EFFECTS[name], 1), shape)
@@ -73,7 +73,7 @@ def test_accepted_effects_are_projected_out(problem: Problem) -> None:
 
 
 def test_bounds_hold_a_coefficient_back(problem: Problem) -> None:
-    """A coefficient far beyond its bounds is held there, and explains less than a free one."""
+    """A coefficient with far bounds stays there, and has a lower gain than a free one."""
     joints, columns = problem.columns_of(Hypothesis(EFFECTS["asymmetric_friction"], 1), ())
     result = score(problem, problem.group(joints, columns), accept(problem, ()))
     free = result.coefficients()
@@ -84,7 +84,7 @@ def test_bounds_hold_a_coefficient_back(problem: Problem) -> None:
 
 
 def test_a_coefficient_of_the_wrong_sign_explains_nothing(problem: Problem) -> None:
-    """Where the data ask for a negative value of what can only be positive, its gain is zero: it raises no alarm."""
+    """A coefficient that must be positive, but would be negative, has no gain."""
     entry = next(e for e in measure(problem, [Hypothesis(EFFECTS["asymmetric_friction"], 1)]) if e.groups)
     result = score(problem, entry.groups[0], accept(problem, ()))
     c = result.coefficients()
@@ -95,9 +95,9 @@ def test_a_coefficient_of_the_wrong_sign_explains_nothing(problem: Problem) -> N
 
 
 def test_the_null_has_the_size_it_promises(problem: Problem) -> None:
-    """Scores of drawn noise follow the chi-square distribution: their 90 % quantile is passed by 10 % of 300 draws.
+    """Scores of simulated noise exceed the 90 % quantile of the chi-square distribution in 10 % of 300 draws.
 
-    The standard error of the share is 1.7 %.
+    The standard error of this fraction is 1.7 %.
     """
     joints, columns = problem.columns_of(Hypothesis(EFFECTS["asymmetric_friction"], 2), ())
     group = problem.group(joints, columns)
@@ -115,7 +115,7 @@ def test_the_null_has_the_size_it_promises(problem: Problem) -> None:
 
 
 def test_a_log_without_effects_raises_no_alarm(problem: Problem) -> None:
-    """The family-wise p-value of the strongest of some fifteen hypotheses is above 1 %, as 99 of 100 such are."""
+    """Without an effect, the family-wise p-value of the best of some fifteen hypotheses is above 1 %."""
     names = ("asymmetric_friction", "load_dependent_friction", "friction_step", "payload_change", "spring")
     hypotheses = [
         Hypothesis(EFFECTS[name], joint) for name in names for joint in EFFECTS[name].joints(problem.situation.robot)
@@ -125,7 +125,7 @@ def test_a_log_without_effects_raises_no_alarm(problem: Problem) -> None:
 
 
 def test_surprise_is_the_logarithm_of_the_chi_square_tail() -> None:
-    """It equals scipy's where that has digits, and follows the tail where it has none."""
+    """The negative log p-value equals scipy's, and stays finite beyond scipy's range."""
     for degrees in (1, 2, 6, 16):
         for x in (0.0, 1.0, 20.0, 300.0, 1200.0):
             assert neg_log_p(x, degrees) == pytest.approx(-chi2.logsf(x, degrees), rel=0.02, abs=1e-9)
@@ -133,7 +133,7 @@ def test_surprise_is_the_logarithm_of_the_chi_square_tail() -> None:
 
 
 def test_base_parameters_come_back(arm_plant: Callable[..., Plant], problem: Problem) -> None:
-    """Fitted values predict the plant's torque within a third of its noise of 2 %."""
+    """The fitted base model predicts the plant's torque within a third of its noise of 2 %."""
     plant = arm_plant()
     recording = problem.recording
     clean = plant.model.torque(recording.q, recording.dq, recording.ddq, plant.parameters)

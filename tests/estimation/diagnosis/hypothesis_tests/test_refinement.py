@@ -1,4 +1,4 @@
-"""Specification of what parameters cost: Schwarz's criterion, by the rows that tell them."""
+"""Tests of the BIC penalty by the rows in which an effect acts, and of the refinement of shapes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _member(name: str, joint: int | None, columns: tuple[np.ndarray, ...]) -> Fi
 
 
 def _boxes(size: float = 1.0) -> tuple[np.ndarray, ...]:
-    """A column of `ACTING` equal rows on each of two joints, as a push of both has."""
+    """Returns a column of `ACTING` equal rows on each of two joints, like a short contact."""
     columns = np.zeros((2, ROWS, 2))
     for j in range(2):
         columns[j, 100 : 100 + ACTING, j] = size
@@ -42,31 +42,31 @@ def _boxes(size: float = 1.0) -> tuple[np.ndarray, ...]:
 
 
 def _price(member: FittedEffect) -> float:
-    """What a degree of freedom costs."""
+    """Computes the penalty per degree of freedom."""
     return (GAIN - member.local_bic_gain) / DEGREES
 
 
 @pytest.mark.parametrize("size", [1.0, 0.02, 300.0])
 def test_a_contact_is_paid_for_by_the_rows_it_acts_on(size: float) -> None:
-    """A box of m rows among N costs log m a degree, whatever its height."""
+    """A transient effect that acts in m of N rows has the penalty log m per degree, for any size."""
     assert _price(_member("external_contact", None, _boxes(size))) == pytest.approx(np.log(ACTING), rel=1e-6)
 
 
 def test_a_lasting_effect_is_paid_for_by_all_rows_of_its_joints() -> None:
-    """The same box as a function of the state costs log(N joints): where it is zero the data say so."""
+    """A permanent effect with the same columns has the penalty log(N joints), because rows with zeros count, too."""
     assert _price(_member("base_tilt", None, _boxes())) == pytest.approx(np.log(2 * ROWS))
     assert _price(_member("spring", 1, _boxes()[:1])) == pytest.approx(np.log(ROWS))
 
 
 def test_a_passing_effect_that_acts_at_all_times_costs_no_more_than_a_lasting_one() -> None:
-    """Columns of one size throughout, on both joints, count each row of each joint once; columns of zeros as well."""
+    """A transient effect that acts in all rows, or in none, has the penalty of a permanent one."""
     for value in (1.0, 0.0):
         columns = np.full((2, ROWS, 1), value)
         assert _price(_member("external_contact", None, tuple(columns))) == pytest.approx(np.log(2 * ROWS))
 
 
 def test_columns_of_different_length_cost_their_mean_and_two_rows_at_least() -> None:
-    """Of 20 and 60 rows the mean is 40; a spike is two rows, for what one row tells would cost nothing."""
+    """The number of rows is the mean over the columns, and at least two, because log 1 would be no penalty."""
     columns = np.zeros((1, ROWS, 2))
     columns[0, :20, 0] = columns[0, 200:260, 1] = 1.0
     assert _price(_member("external_contact", None, tuple(columns))) == pytest.approx(np.log(40))
@@ -76,14 +76,14 @@ def test_columns_of_different_length_cost_their_mean_and_two_rows_at_least() -> 
 
 
 def test_a_rare_effect_has_to_explain_more() -> None:
-    """Its odds are paid for beside its parameters."""
+    """A rare effect has an additional penalty."""
     columns = _boxes()[:1]
     difference = _member("stribeck", 1, columns).local_bic_gain - _member("load_stribeck", 1, columns).local_bic_gain
     assert difference == pytest.approx(RARE_ODDS)
 
 
 def test_a_push_leaves_other_rows_alone() -> None:
-    """Of a torque at all times, a contact has next to nothing beside it; of itself all; on other joints nothing."""
+    """The share of a permanent effect beside a contact is the fraction of rows; it is one beside itself."""
     push = _member("external_contact", None, _boxes())
     always = _member("base_tilt", None, tuple(np.ones((2, ROWS, 1))))
     assert always.share_beside(push, 0) == pytest.approx(ACTING / ROWS)
@@ -93,7 +93,7 @@ def test_a_push_leaves_other_rows_alone() -> None:
 
 
 def test_what_errors_of_the_motion_may_make_of_a_gain_says_nothing_of_its_being_there() -> None:
-    """It is not counted to say whether an effect is there, alone or beside others, but against what may be instead."""
+    """The part of a gain that motion errors may cause counts for acceptance, but not in the local BIC gain."""
     delay = _member("time_delay", None, _boxes())
     doubted = replace(delay, motion_error_chi2=GAIN - 40.0)
     assert doubted.bic_gain == delay.bic_gain
@@ -105,9 +105,9 @@ def test_what_errors_of_the_motion_may_make_of_a_gain_says_nothing_of_its_being_
 
 
 def test_a_contact_that_cannot_win_is_not_searched() -> None:
-    """Twice its gain at the grid, all its parameters paid for, is less than the best's worth: it is left out.
+    """A transient effect is not refined if twice its gain, minus its penalty, is below the best hypothesis.
 
-    What lasts is searched all the same.
+    Permanent effects are always refined.
     """
 
     def outcome(name: str, joint: int | None, gain: float, degrees: int) -> Outcome:
@@ -116,7 +116,7 @@ def test_a_contact_that_cannot_win_is_not_searched() -> None:
     situation = SimpleNamespace(t=np.array([0.0, 60.0]), robot=SimpleNamespace(n=2))
     problem = SimpleNamespace(rows=ROWS, situation=situation, state_for=lambda effect: situation)
     best = outcome("asymmetric_friction", 1, 400.0, 3)
-    # Of 6 coefficients; the moment, the duration and the hardness of a push are fitted too.
+    # Six coefficients; start, duration and hardness of a contact are fitted, too.
     weak, strong = (outcome("external_contact", None, gain, 6) for gain in (215.0, 250.0))
     lasting = outcome("stribeck", 1, 180.0, 1)
 
@@ -130,7 +130,7 @@ def test_a_contact_that_cannot_win_is_not_searched() -> None:
 
 
 def test_what_a_log_shows_by_itself_is_no_leftover() -> None:
-    """Beside an effect of a hundred times its gain, a further one counts where tops are flat, and nowhere else."""
+    """Beside an effect of fifty times its gain, a further effect counts only if it is clipping with flat tops."""
     rng = np.random.default_rng(5)
     tau = rng.normal(size=(ROWS, 2))
     flat = np.clip(tau, -1.0, 1.0)
@@ -152,17 +152,17 @@ def test_what_a_log_shows_by_itself_is_no_leftover() -> None:
     ("beside", "chance", "gain", "sure"),
     [
         ((), 0.5, 25.0, True),
-        ((1,), 0.5, 25.0, False),  # where another acts, its formula may leave as much
+        ((1,), 0.5, 25.0, False),  # the other effect's formula error on this joint may be as large
         ((2,), 0.5, 25.0, True),
         ((2,), 2.0, 25.0, False),  # by chance that often
         ((2,), 0.5, 10.0, False),  # not worth its parameters
-        ((2, None), 0.5, 25.0, False),  # a push is felt by all joints
+        ((2, None), 0.5, 25.0, False),  # a contact acts on all joints
     ],
 )
 def test_what_is_far_from_chance_is_sure_on_a_joint_of_its_own(
     beside: tuple[int | None, ...], chance: float, gain: float, sure: bool
 ) -> None:
-    """Joint 1's friction by load, beside effects of other joints, at so many times the chance that is asked for."""
+    """An effect is certain without a BIC gain of 10 if its p-value is low and no other effect acts on its joint."""
     rng = np.random.default_rng(7)
 
     def on(joint: int | None) -> FittedEffect:
@@ -179,16 +179,16 @@ def test_what_is_far_from_chance_is_sure_on_a_joint_of_its_own(
 @pytest.mark.parametrize(
     ("gains", "other", "counts"),
     [
-        ((500.0, 1.0), 1000.0, False),  # what the other effect left, and nothing else
-        ((500.0, 80.0), 1000.0, True),  # the second joint tells it by itself
+        ((500.0, 1.0), 1000.0, False),  # only what the other effect leaves on its joint
+        ((500.0, 80.0), 1000.0, True),  # the second joint alone supports it
         ((500.0, 400.0), 100.0, True),  # both do
-        ((500.0, 1.0), 0.0, False),  # the joints are at odds
+        ((500.0, 1.0), 0.0, False),  # the joints contradict each other
     ],
 )
 def test_what_all_joints_share_is_told_by_those_without_a_stronger_effect(
     gains: tuple[float, float], other: float, counts: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A common coefficient beside an effect of the first joint that explains so much."""
+    """A shared coefficient counts beside a stronger effect on one joint only if the other joint supports it."""
     rng = np.random.default_rng(6)
     column = rng.normal(size=(ROWS, 1))
     delay = replace(_member("time_delay", None, (column, column)), gain=sum(gains))
@@ -203,7 +203,7 @@ def test_what_all_joints_share_is_told_by_those_without_a_stronger_effect(
 
 
 class _Summits(Stribeck):
-    """One shape parameter, and what its search is told of other summits."""
+    """An effect with one shape parameter and a given list of other optima."""
 
     shapes = (Shape("place", "rad", 1e-4, 1.0, "log", (0.08,)),)
 
@@ -214,13 +214,13 @@ class _Summits(Stribeck):
         return ()
 
     def other_optima(self, *_: object) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        # Too far from the other summit, and near it.
+        # One start is too far from the other optimum, and one is near it.
         return (((0.02,), (0.0013,)),) if self.far else ()
 
 
 @pytest.mark.parametrize(("far", "expected"), [(False, 0.1), (True, 0.001)])
 def test_a_search_starts_again_from_other_summits(far: bool, expected: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Gains of 50 and 80 on summits a hundred times apart, a third of a decade wide each."""
+    """The search finds the better of two narrow optima only from a start near it."""
 
     def score(problem: object, shape: tuple[float, ...], accepted: object) -> SimpleNamespace:
         at = float(np.log10(shape[0]))
@@ -242,7 +242,7 @@ def test_a_search_starts_again_from_other_summits(far: bool, expected: float, mo
 
 
 class _More(Stribeck):
-    """A shape parameter, and one that the effect is whole without."""
+    """An effect with an optional shape parameter."""
 
     shapes = (
         Shape("place", "rad", 1e-4, 1.0, "log", (0.08,)),
@@ -260,7 +260,7 @@ class _More(Stribeck):
 def test_what_an_effect_is_whole_without_is_a_parameter_only_where_it_pays(
     brings: float, place: float, more: float, degrees: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With more of it the place is another: worth ln 5000 = 8.5 it is fitted, else the place is as without it."""
+    """An optional shape parameter is fitted if its gain exceeds the penalty ln 5000 = 8.5, else it is unused."""
 
     def score(problem: object, shape: tuple[float, ...], accepted: object) -> SimpleNamespace:
         top = -1.0 + shape[1] * (np.log10(0.03) + 1.0)
@@ -284,7 +284,7 @@ def test_what_an_effect_is_whole_without_is_a_parameter_only_where_it_pays(
 def test_friction_that_turns_round_over_no_way_is_no_presliding(
     best: float, worth: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A gain of 300 that is largest below the shortest travel is what a delay would bring: it counts for nothing."""
+    """Presliding whose best travel is below the lower bound resembles a delay, so its gain does not count."""
 
     def score(problem: object, shape: tuple[float, ...], accepted: object) -> SimpleNamespace:
         gain = 300 - 10 * np.log(shape[0] / best) ** 2

@@ -1,4 +1,4 @@
-"""What a single column explains, told without a decomposition, and columns that act, told by some of their rows."""
+"""Tests of the score of a single column, and of the check which columns are not zero."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from estimation.diagnosis.hypothesis_tests.scoring import Score, visible_root
 
 @pytest.mark.parametrize("share", [0.9, 1.01 * MIN_VISIBLE_ENERGY, 0.99 * MIN_VISIBLE_ENERGY, 0.0])
 def test_one_column_shows_as_it_does_beside_one_that_has_nothing_to_do_with_it(share: float) -> None:
-    """The root of a diagonal matrix has that of each of its parts; below the least share there is none."""
+    """One column has the same root as beside an orthogonal one; below the least visible energy it has none."""
     raw = np.array([7.0, 3.0])
     alone = visible_root(np.array([[share * raw[0]]]), raw[:1])
     both = visible_root(np.diag([share * raw[0], raw[1]]), raw)
@@ -22,13 +22,13 @@ def test_one_column_shows_as_it_does_beside_one_that_has_nothing_to_do_with_it(s
 
 
 def test_a_column_of_which_nothing_is_known_does_not_show() -> None:
-    """Energy that is all beside reversals is infinite before the projection."""
+    """A column with infinite energy before the projection does not show."""
     assert visible_root(np.ones((1, 1)), np.array([np.inf])).shape == (0, 1)
 
 
 @pytest.mark.parametrize("bounds", [(-10.0, 10.0), (-10.0, 0.5), (2.0, 10.0), (0.0, np.inf), (-np.inf, 0.0)])
 def test_one_coefficient_stops_at_its_bound(bounds: tuple[float, float]) -> None:
-    """Gain and coefficient of a column are those of scipy's bounded least squares."""
+    """Gain and coefficient of one bounded column are those of scipy's bounded least squares."""
     rng = np.random.default_rng(0)
     x = rng.normal(size=200)
     y = 1.2 * x + rng.normal(size=200)
@@ -42,7 +42,7 @@ def test_one_coefficient_stops_at_its_bound(bounds: tuple[float, float]) -> None
 
 @pytest.mark.parametrize("rows", [0, 1, GLANCE, 10 * GLANCE + 7])
 def test_a_column_that_acts_in_one_row_acts(rows: int) -> None:
-    """Wherever that row is, also between those that are looked at first."""
+    """A column with a single nonzero row is found, also between the rows that are sampled first."""
     columns = np.zeros((rows, 2, 3))
     for row in range(rows):
         columns[:] = 0.0

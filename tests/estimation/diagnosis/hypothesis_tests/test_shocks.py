@@ -1,4 +1,4 @@
-"""Specification of what heavy tails may not be taken for: an innovation of the noise that is far out is no push."""
+"""Tests that a single large innovation of the noise is not named as a contact."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from estimation.diagnosis.noise_models.frequency_bands import low_pass
 from robots.robot import Robot
 from robots.signals import Log
 
-# The noise's memory from sample to sample, and its standard deviation [N m].
+# Correlation of the noise between consecutive samples (two values), and its standard deviation [N m].
 MEMORY, SHORT, NOISE = 0.97, 0.85, np.array([0.1, 0.05])
-# Encoders as coarse as this [rad] leave a band of some hertz, in which a shock is a bump of several rows.
+# Encoder resolution [rad] that leaves a band of some hertz, in which a shock covers several rows.
 COARSE = 1e-4
-# A push of the elbow: its moment, duration [s] and peak [N m].
+# A push on the elbow: its time [s], duration [s] and peak [N m].
 MOMENT, DURATION, PUSH = 6.0, 0.3, 0.5
 
 
@@ -33,7 +33,7 @@ MOMENT, DURATION, PUSH = 6.0, 0.3, 0.5
 def test_a_shock_is_no_push(
     arm: Robot, arm_log: Callable[..., Log], seed: int, tails: float | None, push: float, found: list[str]
 ) -> None:
-    """Of t with three degrees of freedom the largest explains as much as a push does; but it has others of its kind."""
+    """The largest shock of heavy-tailed noise is not named, because others are similar; a true contact is."""
     log = arm_log()
     rng = np.random.default_rng(seed)
     shape = log.tau.shape
@@ -47,7 +47,7 @@ def test_a_shock_is_no_push(
 
 @pytest.mark.parametrize("rows", [25, 400])
 def test_a_shock_is_found_where_it_is_and_as_large_as_it_is(rows: int) -> None:
-    """Also in a log that is shorter than the band's filter; a row that counts for less is as large as it was."""
+    """Time and size of a shock are estimated, also in short logs and in rows with a low weight."""
     band, weights = low_pass(2.0, 10.0, 2), np.ones((rows, 1))
     problem = SimpleNamespace(rows=rows, whitening=SimpleNamespace(bands=(band,), stride=2, weights=weights))
     bump = _bump(problem, 0, 0.5)
@@ -63,7 +63,7 @@ def test_a_shock_is_found_where_it_is_and_as_large_as_it_is(rows: int) -> None:
 
 @pytest.mark.slow
 def test_a_shock_of_one_joint_is_a_glitch_however_unlikely(arm: Robot, arm_log: Callable[..., Log]) -> None:
-    """A single innovation of eighty standard errors in normal noise, of which nothing else in the log comes near."""
+    """A single innovation of eighty standard deviations on one joint is not a finding."""
     log = arm_log()
     innovations = np.random.default_rng(7).standard_normal(log.tau.shape)
     innovations[round(MOMENT / 0.004), 1] += 80.0

@@ -1,4 +1,4 @@
-"""Specification of what is told of a push whose torques are not those of its formula."""
+"""Tests of the time window of a contact whose torques do not follow the formula."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_a_push_that_goes_on_has_no_edge_there(
     after: float,
     open_: tuple[int, ...],
 ) -> None:
-    """Of a push for a second, told as such, with shares of it for as long before and after: 20 of its noise each."""
+    """If a push continues with a smaller torque before or after its window, the error of that edge is infinite."""
     recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     start = float(recording.t[len(recording) // 2])
     since = recording.t - start
@@ -54,7 +54,7 @@ def test_a_push_that_goes_on_has_no_edge_there(
 def test_a_push_at_the_log_s_end_and_what_is_no_push_have_their_errors(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
-    """Beyond the last row nothing is to be seen; a change of friction goes on for good."""
+    """Edges at the end of the log keep their errors, and so does the time of a friction step."""
     recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     problem = pose_arm(recording)
     last = float(recording.t[-1])
@@ -69,7 +69,7 @@ def test_a_push_at_the_log_s_end_and_what_is_no_push_have_their_errors(
 def test_a_push_on_a_moving_arm_is_told_from_its_first_to_its_last_moment(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], begin: float, end: float
 ) -> None:
-    """A constant force on the last body, known as a pulse in its middle, by the arm's geometry has both its edges."""
+    """A constant force on a moving arm, found as a short pulse, gets its full window by the body's Jacobian."""
     recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     first, last = recording.t[[int(share * len(recording)) for share in (begin, end)]]
     problem = pose_arm(recording)
@@ -88,7 +88,7 @@ def test_a_push_on_a_moving_arm_is_told_from_its_first_to_its_last_moment(
     assert found.shape[0] == pytest.approx(first, abs=0.1)
     assert found.shape[0] + found.shape[1] == pytest.approx(last, abs=0.1)
     assert found.gain > pulse.gain
-    # It is of that form now, and no other effect has one.
+    # It already has the formula for a moving arm, and other effects have none.
     assert refit_event_window(problem, found, beside) is found
     step = refine(problem, STEP, (first,), beside, effort=0)
     assert refit_event_window(problem, step, beside) is step

@@ -1,4 +1,4 @@
-"""Specification of the fit of base model and effects together: what is said to be known of their coefficients."""
+"""Tests of the joint fit of base model and effects: coefficients, standard errors, and the saved model."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ MIDDLE = 10.0
 
 @pytest.fixture(scope="module")
 def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
-    """A log of the arm without effects."""
+    """Returns a recording of the arm without effects."""
     return build_recording(arm, [arm_log(torque_noise=0.02)])
 
 
 def _estimable(problem: Problem, member: FittedEffect) -> np.ndarray:
-    """Which coefficients the rows determine: those whose unit row lies in the span of the scaled columns' rows."""
+    """Returns which coefficients the rows determine, by the null space of all columns."""
     blocks = [problem.baseline.regressor, problem.baseline.nuisance]
     known = np.concatenate([*blocks, dense(problem, member.hypothesis, member.shape)], axis=2)[::7]
     flat = known.reshape(-1, known.shape[2])
@@ -57,7 +57,7 @@ def test_what_a_log_leaves_open_has_no_interval(
     joint: int | None,
     shape: tuple[float, ...] | None,
 ) -> None:
-    """An arm of parallel axes feels nothing of a moment along them, and a line's later stretches never begin."""
+    """Coefficients that the log does not determine are zero and have infinite errors; all others have finite ones."""
     hypothesis = Hypothesis(EFFECTS[name], joint)
     problem = pose_arm(recording)
     point = shape or hypothesis.effect.grid(problem.situation, joint)[1]
@@ -88,7 +88,7 @@ def test_a_change_between_two_logs_is_within_the_pause(
     known: tuple[float, ...],
     size: tuple[float, ...],
 ) -> None:
-    """Its interval is the pause, whichever end of it the search came to."""
+    """The time of a change between two logs has the pause as its interval."""
     first, hypothesis = arm_log(torque_noise=0.02), Hypothesis(EFFECTS[effect], joint)
     logs = build_recording(arm, [first, replace(first, t=first.t + float(np.ptp(first.t)) + 30.0)])
     ends, begins = (float(logs.t[at]) for at in (logs.starts[1] - 1, logs.starts[1]))
@@ -105,10 +105,10 @@ def test_a_change_between_two_logs_is_within_the_pause(
 def test_the_model_is_what_was_fitted(
     arm: Robot, recording: Recording, pose_arm: Callable[..., Problem], tmp_path: Path, name: str
 ) -> None:
-    """Its torque, from its file too, is that of base model and effect together, whatever the two take from each other.
+    """The model's torque, also after saving, is that of base model and effect together.
 
-    A function of the load, as gravity is: the fit shares a torque between the two, and the base model's load is then
-    another than the one that the function was fitted in.
+    For effects of the load, the base model's share of the load depends on the fit; the model evaluates them with the
+    load used in the fit.
     """
     effect = find_effect(name)
     hypothesis, problem = Hypothesis(effect, 1), pose_arm(recording)
@@ -134,7 +134,7 @@ def test_the_model_is_what_was_fitted(
 def test_a_vibration_keeps_its_phase_in_a_later_motion(
     recording: Recording, pose_arm: Callable[..., Problem], tmp_path: Path
 ) -> None:
-    """What vibrates whatever the robot does is as far on its way in a log that begins later, from the file too."""
+    """A vibration has the right phase in a motion that begins later, also after saving."""
     effect = find_effect("pattern:vibration:0:even")
     hypothesis, problem = Hypothesis(effect, 1), pose_arm(recording)
     wave = 0.2 * recording.tau[:, 0].std() * np.sin(2 * np.pi * 3.3 * recording.t + 0.4)
@@ -152,7 +152,7 @@ def test_a_vibration_keeps_its_phase_in_a_later_motion(
 
 
 def _rows(recording: Recording, rows: slice) -> dict[str, object]:
-    """A recording's fields on some of its rows."""
+    """Returns a recording's fields on some of its rows."""
     names = ("t", "q", "dq", "ddq", "tau", "sign_unknown", "sign_known_from_velocity")
     return {"starts": (0,), **{name: getattr(recording, name)[rows] for name in names}}
 
@@ -160,7 +160,7 @@ def _rows(recording: Recording, rows: slice) -> dict[str, object]:
 def test_no_log_knows_a_delay_better_than_its_formula(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
-    """A delay of 10 ms that the noise tells to three per cent is stated to the formula's 5 % and the noise's own."""
+    """The standard error of a delay contains the formula's 5 % and the noise."""
     recording = build_recording(arm, [arm_log(torque_noise=0.002)])
     hypothesis = Hypothesis(EFFECTS["time_delay"], None)
     delay = 0.01
@@ -176,7 +176,7 @@ def test_no_log_knows_a_delay_better_than_its_formula(
 
 
 def test_a_column_that_is_hardly_one_is_left_open() -> None:
-    """Two columns as if alone, and a third of 1e-170 that the data say nothing of, without an overflow."""
+    """A column of size 1e-170 counts as not determined, without an overflow."""
     matrix = np.random.default_rng(0).normal(size=(50, 3)) * [1.0, 1.0, 1e-170]
     covariance, lost = _covariance(matrix)
     assert covariance[:2, :2] == pytest.approx(np.linalg.inv(matrix[:, :2].T @ matrix[:, :2]))
@@ -186,7 +186,7 @@ def test_a_column_that_is_hardly_one_is_left_open() -> None:
 
 @pytest.mark.parametrize("variance", [4.0, 0.01, np.inf])
 def test_what_is_one_quantity_told_twice_is_known_as_well_as_the_other(variance: float) -> None:
-    """The error of the second falls to what it may be, none rises, and the covariance stays one."""
+    """A tie reduces the second variance to the given value at most, and the covariance stays positive definite."""
     covariance = np.array([[0.25, 0.1 if np.isinf(variance) else 0.4 * np.sqrt(variance)], [0.0, variance]])
     covariance[1, 0] = covariance[0, 1]
     narrowed = _narrowed(covariance, 1, 0.3)
@@ -200,7 +200,7 @@ def test_what_is_one_quantity_told_twice_is_known_as_well_as_the_other(variance:
 
 @pytest.mark.parametrize("name", ["time_delay", "current_lag"])
 def test_a_delay_and_its_reversals_differ_by_what_a_factor_allows(name: str) -> None:
-    """A factor of 1.6 either way of 2 ms, 1.25 to 3.2 ms, is an interval of 95 %."""
+    """A factor of 1.6 around 2 ms, 1.25 to 3.2 ms, counts as a 95 % interval."""
     ((coefficient, shape, apart),) = EFFECTS[name].ties(np.array([2e-3]))
     assert (coefficient, shape) == (0, 0)
     assert apart == pytest.approx((3.2e-3 - 1.25e-3) / 2 / 1.96)

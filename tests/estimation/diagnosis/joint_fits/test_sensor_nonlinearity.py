@@ -1,4 +1,4 @@
-"""A reading that outgrows the torque, which a base model fitted to readings has followed."""
+"""Tests of nonlinear torque readings, which bias a base model that is fitted to them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SATURATION, TILT = Hypothesis(EFFECTS["torque_constant_saturation"], 1), Hypothe
 def test_base_model_and_a_false_reading_are_told_apart(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], error: float
 ) -> None:
-    """The base model, once off by much of the error, by a sixth of that at most; and the error is told to a tenth."""
+    """The joint fit reduces the base model's error to less than a sixth, and estimates the distortion to 10 %."""
     recording = build_recording(arm, [arm_log(torque_noise=0.05)])
     true = pose_arm(recording).situation.torque[:, 0]
     top = float(np.abs(true).max())
@@ -52,7 +52,7 @@ def test_base_model_and_a_false_reading_are_told_apart(
 def test_what_distorts_no_reading_is_left_as_it_is(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
-    """Neither problem nor members are touched."""
+    """Without a distorting effect, problem and effects do not change."""
     problem = pose_arm(build_recording(arm, [arm_log(torque_noise=0.05)]))
     member = refine(problem, TILT, (0.0,), accept(problem, ()))
     same, members = fit_sensor_nonlinearity(problem, [member])
@@ -63,7 +63,7 @@ def test_what_distorts_no_reading_is_left_as_it_is(
 def test_slopes_of_a_reading_are_exact(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
-    """Derivatives by the torque and by the exponent are those of differences of the columns."""
+    """Derivatives by the torque and by the exponent agree with finite differences."""
     situation = pose_arm(build_recording(arm, [arm_log()])).situation
     effect, c = SATURATION.effect, np.array([0.4])
     assert isinstance(effect, StaticJointEffect)
@@ -81,7 +81,7 @@ def test_slopes_of_a_reading_are_exact(
 def test_a_reading_is_undone(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], error: float
 ) -> None:
-    """The torque that was read comes back, from another one as well."""
+    """The inversion of a reading returns the true torque, also from another start."""
     situation = pose_arm(build_recording(arm, [arm_log()])).situation
     effect, c, shape = SATURATION.effect, np.array([error]), (2.0, float(np.abs(situation.torque[:, 0]).max()))
     assert isinstance(effect, StaticJointEffect)

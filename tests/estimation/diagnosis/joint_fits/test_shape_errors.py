@@ -1,4 +1,4 @@
-"""Specification of how well shapes are known: a velocity whose exponent is open too."""
+"""Tests of the standard errors of shape parameters."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ BOUND = 3.84  # of twice the logarithm of the likelihood ratio: 95 %
 def test_a_velocity_is_as_uncertain_as_its_exponent_lets_it_be(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], size: float
 ) -> None:
-    """Its interval is that of the likelihood on a grid of both, and wider than with the exponent held."""
+    """A Stribeck velocity's interval is that of the profile likelihood, wider than with a fixed exponent."""
     recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     extra = np.zeros_like(recording.tau)
     speed = np.abs(recording.dq[:, 0])
@@ -63,7 +63,7 @@ def test_a_velocity_is_as_uncertain_as_its_exponent_lets_it_be(
 def test_a_choice_is_told_where_the_other_explains_less(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], share: float, told: bool
 ) -> None:
-    """A ripple by the load is told from one by the motor's torque; one that does not grow with either is not."""
+    """The choice between load and motor torque has no error if the data determine it, and an infinite one if not."""
     recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     ripple = Hypothesis(EFFECTS["torque_ripple"], 1)
     now = pose_arm(recording).situation
@@ -80,7 +80,7 @@ def test_a_choice_is_told_where_the_other_explains_less(
 def test_a_moment_while_the_drive_is_at_its_limit_may_be_anywhere_there(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
-    """A joint whose torque is cut off shows no change of it; before, after, and of another joint, it is as it was."""
+    """A change time while the same joint's torque is clipped has an interval over the whole clipping."""
     recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     tau = recording.tau.copy()
     level = float(np.quantile(np.abs(tau[:, 0]), 0.8))
@@ -112,7 +112,7 @@ def test_a_moment_while_the_drive_is_at_its_limit_may_be_anywhere_there(
 def test_a_moment_while_the_arm_stands_may_be_anywhere_there(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
-    """Friction holds what pushes then; and how long it lasts from there is known as badly."""
+    """The start of a contact during rest has an interval over the rest, and so has its duration."""
     recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     stands = recording.sign_unknown.copy()
     stands[1000:1200] = True
@@ -134,7 +134,7 @@ def test_a_moment_while_the_arm_stands_may_be_anywhere_there(
 def test_a_change_between_two_logs_may_have_come_at_any_time_there(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
-    """From the last row that shows it has not come to the first that shows it has, rests at either end included."""
+    """The interval of a change between logs contains the pause and rests at its ends."""
     first = arm_log(torque_noise=0.02)
     recording = build_recording(arm, [first, replace(first, t=first.t + 500.0)])
     border = recording.starts[1]
@@ -150,7 +150,7 @@ def test_a_change_between_two_logs_may_have_come_at_any_time_there(
         assert 1.96 * error == pytest.approx((begins - ends) / 2, abs=0.02)
     before = replace(step, shape=(ends - 1.0,))
     assert spread_over_pauses(problem, before, []) is before
-    # A push has its own beginning and end.
+    # A contact has its own start and end.
     push = refine(
         problem, Hypothesis(EFFECTS["external_contact"], None), (begins, 1.0, 0.5, 0.0, 0.0), accept(problem, ())
     )
@@ -159,7 +159,7 @@ def test_a_change_between_two_logs_may_have_come_at_any_time_there(
 
 @pytest.mark.parametrize("edge", [0.9, 3.17, 11.0])
 def test_a_moment_may_be_as_far_as_the_likelihood_drops_at_once(edge: float) -> None:
-    """As at the end of a rest: the last place of it is found to a hundredth, on either side."""
+    """The interval reaches to a sudden drop of the likelihood, found to 2 %, on either side."""
     for way in (-1, 1):
         told = _reach(lambda x, way=way: 30.0 if way * x > edge or way * x < -0.3 else 3.0, 0.0, 0.2, (-50.0, 50.0))
         assert told == pytest.approx(edge, rel=0.02)

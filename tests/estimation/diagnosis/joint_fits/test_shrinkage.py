@@ -1,4 +1,4 @@
-"""Specification of what holds the coefficients of effects that were found, and of gains joint by joint."""
+"""Tests of the regularisation of effects' coefficients by empirical Bayes, and of gains per joint."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from estimation.regressions.parameter_priors import GaussianPrior
 
 
 def _score(X: np.ndarray, base: np.ndarray, y: np.ndarray) -> Score:
-    """What columns explain beside a base model, noise of unit variance."""
+    """Computes the score of columns beside a base model, for noise of unit variance."""
     Q = np.linalg.qr(base)[0]
     left = X - Q @ (Q.T @ X)
     gram, raw = left.T @ left, (X**2).sum(axis=0)
@@ -25,12 +25,12 @@ def _score(X: np.ndarray, base: np.ndarray, y: np.ndarray) -> Score:
 
 
 def test_the_energy_makes_the_data_likeliest() -> None:
-    """Of all a-priori energies of a column the chosen one has the largest marginal likelihood, written out."""
+    """The chosen prior precision maximises the marginal likelihood of the data."""
     rng = np.random.default_rng(0)
     base, X = rng.standard_normal((300, 4)), rng.standard_normal((300, 3)) * [1.0, 5.0, 0.2]
     y = X @ [0.4, -0.05, 1.0] + base @ [3.0, 1.0, -2.0, 0.5] + rng.standard_normal(300)
     precision = shrinkage_precision(_score(X, base, y))
-    Q = np.linalg.qr(base, mode="complete")[0][:, 4:]  # what the base model leaves
+    Q = np.linalg.qr(base, mode="complete")[0][:, 4:]  # complement of the base model
     beside, rest = Q.T @ X, Q.T @ y
 
     def likelihood(scale: float) -> float:
@@ -40,12 +40,12 @@ def test_the_energy_makes_the_data_likeliest() -> None:
     best = likelihood(1.0)
     assert best > likelihood(0.8)
     assert best > likelihood(1.25)
-    # Every column may make a torque of the same energy.
+    # The prior energy of the torque is the same for all columns.
     assert precision / (X**2).sum(axis=0) == pytest.approx(np.full(3, precision[0] / (X[:, 0] ** 2).sum()))
 
 
 def test_what_is_well_measured_stays_and_what_two_columns_share_is_shared() -> None:
-    """A column alone keeps its least-squares value; of two alike, neither grows large against the other."""
+    """A well-determined coefficient keeps its least-squares value; two similar columns share theirs equally."""
     rng = np.random.default_rng(1)
     base = rng.standard_normal((2000, 3))
     x = np.sin(np.linspace(0, 40, 2000))
@@ -61,12 +61,12 @@ def test_what_is_well_measured_stays_and_what_two_columns_share_is_shared() -> N
     assert fit(alone, True) == pytest.approx(fit(alone, False), rel=0.01)
     both = np.column_stack([x, twin])
     free, kept = fit(both, False), fit(both, True)
-    assert np.abs(free).max() > 3.0  # chance alone, for each is to be a half of one
+    assert np.abs(free).max() > 3.0  # by chance; each should be 0.5
     assert kept == pytest.approx([0.5, 0.5], abs=0.1)
 
 
 def test_a_column_that_never_acts_stays_at_zero() -> None:
-    """A stretch of drift after the end of the log is no reason for any value, however small its precision."""
+    """A column of zeros keeps the coefficient zero."""
     rng = np.random.default_rng(2)
     base, X = rng.standard_normal((200, 2)), np.column_stack([rng.standard_normal(200), np.zeros(200)])
     y = 2 * X[:, 0] + rng.standard_normal(200)
@@ -78,7 +78,7 @@ def test_a_column_that_never_acts_stays_at_zero() -> None:
 
 
 def test_a_gain_is_shared_by_the_energy_on_each_joint() -> None:
-    """An effect that makes nine parts of its torque's energy on one joint has nine tenths of its gain there."""
+    """A gain is distributed over the joints by the energy of the torque on each."""
     rows = np.ones((100, 1), dtype=np.float32)
     group = Group((0, 2), (3 * rows, rows), np.zeros((1, 1)), np.eye(1), np.ones(1), np.ones(1))
     member = FittedEffect(SimpleNamespace(), (), group, 50.0, np.array([2.0]), 1, 1.0)

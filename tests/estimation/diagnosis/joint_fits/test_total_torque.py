@@ -1,4 +1,4 @@
-"""What acts on all of the torque: a limit of current beside an effect of the same joint."""
+"""Tests of effects on the total torque: a current limit beside another effect of the same joint."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ CLIPPING, OTHER = Hypothesis(EFFECTS["current_clipping"], 1), Hypothesis(EFFECTS
 def hidden(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> tuple[Problem, np.ndarray, float]:
-    """A log whose shoulder has asymmetric friction and a limit of torque; its torque without noise and limit; that."""
+    """Returns a problem with asymmetric friction and a torque limit, the true torque (N,), and the limit."""
     recording = build_recording(arm, [arm_log(torque_noise=0.05)])
     plain = pose_arm(recording)
     (_,), (X,) = OTHER.columns(plain.situation, ())
@@ -44,7 +44,7 @@ def hidden(
 
 
 def test_all_of_the_torque_is_known_beside_what_cuts_it_off(hidden: tuple[Problem, np.ndarray, float]) -> None:
-    """To a few hundredths of what is cut off, at its peaks too; a base model fitted to all that is logged is not."""
+    """The total torque is known to 3 % of the clipped part; a base model fitted to the clipped log is not."""
     problem, true, limit = hidden
     flags = CLIPPING.effect.gate(problem.situation, 1, problem.recording.tau)
     other = refine(problem, OTHER, (), accept(problem, ()))
@@ -62,7 +62,7 @@ def test_all_of_the_torque_is_known_beside_what_cuts_it_off(hidden: tuple[Proble
     assert error(sharp.total_torque_state.whole[:, 0]) < 0.03 * most
     assert error(rough.total_torque_state.whole[:, 0]) < 0.1 * most
     assert error(problem.situation.torque[:, 0]) > 0.3 * most
-    # All of what is beyond the limit is lost, and the limit is that of the log.
+    # All torque beyond the limit is lost, and the limit is that of the log.
     again = refine(sharp, CLIPPING, clipping.shape, accept(problem, (other.group,)))
     assert again.shape == (limit,)
     assert again.coefficients[0] == pytest.approx(1.0, abs=0.05)
@@ -71,13 +71,13 @@ def test_all_of_the_torque_is_known_beside_what_cuts_it_off(hidden: tuple[Proble
 def test_a_problem_whose_torque_nothing_cuts_off_stays_as_it_is(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
-    """No flat tops, nothing to know."""
+    """Without flat tops the problem does not change."""
     problem = pose_arm(build_recording(arm, [arm_log(torque_noise=0.05)]))
     assert with_total_torque(problem, [], [CLIPPING, OTHER]) is problem
 
 
 def test_noise_that_is_cut_off_is_lost_on_average(hidden: tuple[Problem, np.ndarray, float]) -> None:
-    """The column is the mean of what draws of the noise lose, to three of its standard errors, at every torque."""
+    """The column is the mean loss of noisy torques, to three standard errors, at every level."""
     problem, _, limit = hidden
     levels = limit * np.array([-1.2, -1.01, -0.98, 0.5, 0.97, 1.0, 1.02, 1.3])
     rows = np.repeat(levels, 400)
@@ -97,7 +97,7 @@ def test_noise_that_is_cut_off_is_lost_on_average(hidden: tuple[Problem, np.ndar
 
 
 def test_an_extended_model_cuts_off_all_of_its_torque(hidden: tuple[Problem, np.ndarray, float]) -> None:
-    """In whatever order its extensions are: clip(base + other) is what it says, without any noise."""
+    """A model clips the sum of base model and other effects, in any order of its extensions."""
     problem, _, limit = hidden
     state = replace(problem.situation, measured=None)
     other = Extension(effect=OTHER.name, joint=1, shape=(), coefficients=np.array([2.0, 1.0]), covariance=np.eye(2))
@@ -110,7 +110,7 @@ def test_an_extended_model_cuts_off_all_of_its_torque(hidden: tuple[Problem, np.
 
 
 def test_flat_tops_stay_flat_where_a_log_is_thinned() -> None:
-    """A low-pass rings over them: what it passed keeps under the top, and is the top where the log is."""
+    """A low-pass that overshoots flat tops is limited to their level."""
     t = 0.004 * np.arange(2000)
     tau = np.column_stack([np.clip(np.sin(3 * t), -0.8, 0.8), np.sin(5 * t)])
     passed = tau + 0.01 * np.sin(200 * t)[:, None]

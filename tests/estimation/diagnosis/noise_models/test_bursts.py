@@ -1,4 +1,4 @@
-"""Moments at which a residual is none of its noise, and a push that hides in noise that was told by itself."""
+"""Tests of short events in a residual that must not count as noise."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ STEP = 0.02
 
 
 def coloured(rng: np.random.Generator, rows: int, memory: float) -> np.ndarray:
-    """Noise (rows, 2) of unit variance whose neighbours correlate so much."""
+    """Draws noise (rows, 2) of unit variance with a given correlation between consecutive samples."""
     drawn = rng.standard_normal((rows + 500, 2))
     return lfilter([np.sqrt(1 - memory**2)], [1, -memory], drawn, axis=0)[500:]
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.9, 0.98])
 def test_noise_has_no_bursts(memory: float) -> None:
-    """None in 100 logs of a minute, fast or slow; one by chance in less than a hundredth of such tests."""
+    """No burst is found in 100 logs of a minute, for fast and slow noise."""
     for seed in range(100):
         noise = coloured(np.random.default_rng(seed), 3000, memory)
         assert not find_bursts([noise], np.ones(noise.shape, dtype=bool), STEP).any()
 
 
 def test_a_push_is_marked_on_its_joint() -> None:
-    """Its rows and half a second about them, in the log and joint that has it; spikes and what comes often are not."""
+    """A push is flagged with half a second around it on its joint; spikes and frequent events are not."""
     noise = coloured(np.random.default_rng(1), 3000, 0.5)
     pushed = noise.copy()
     pushed[1000:1060, 1] += 8.0
@@ -50,7 +50,7 @@ def test_a_push_is_marked_on_its_joint() -> None:
 
 
 def test_rows_that_do_not_count_are_no_measure() -> None:
-    """A joint that rests most of the time is judged by the rest of it; one that never counts has none."""
+    """The level is estimated from rows that count; a joint without such rows has no bursts."""
     noise = coloured(np.random.default_rng(2), 3000, 0.5)
     measured = np.zeros((3000, 2), dtype=bool)
     measured[:600, 0] = True
@@ -61,7 +61,7 @@ def test_rows_that_do_not_count_are_no_measure() -> None:
 def test_a_hard_push_does_not_hide_in_its_own_noise(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable[..., Motion]
 ) -> None:
-    """A second and a half of constant torque on one joint, 2 % of its RMS over the log beside 2.5 % of noise."""
+    """A constant torque of 1.5 s on one joint is found as a contact, with its time."""
     log = simulate(arm_plant(torque_noise=0.0), fourier_motion(arm, 5, duration=40.0), seed=5)
     during = (log.t > 21.3) & (log.t < 22.8)
     tau = log.tau + 0.025 * log.tau.std(axis=0) * coloured(np.random.default_rng(5), len(log.t), 0.8)

@@ -1,4 +1,4 @@
-"""Specification of the band: what it passes, up to where accelerations bias no fit, and where their kicks drown."""
+"""Tests of the usable frequency band: its filter, and the frequency at which acceleration errors bias the fit."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COUNT, NOISE = 2 * np.pi / 2**14, 0.3
 
 @pytest.fixture(scope="module")
 def counted() -> tuple[Recording, np.ndarray, np.ndarray]:
-    """A joint of an inertia of 1 kg m2 that moves at random up to 2 Hz, its coarse encoder, and the torque's noise."""
+    """Returns a joint of 1 kg m2 with a coarse encoder and random motion up to 2 Hz, true acceleration, and noise."""
     rng = np.random.default_rng(3)
     slow = np.fft.rfftfreq(ROWS, STEP) < 2.0
     q = 0.3 * np.fft.irfft(slow * np.fft.rfft(rng.standard_normal(ROWS)), ROWS)
@@ -52,7 +52,7 @@ def _second_derivative(x: np.ndarray) -> np.ndarray:
 
 
 def _left(recording: Recording, true: np.ndarray, frequency: float) -> float:
-    """What a fit of the inertia leaves of its noise-free torque below a frequency, in units of the noise's variance."""
+    """Computes the torque energy that a fit of the inertia leaves below a frequency, in units of the noise variance."""
     taps = firwin(2001, frequency, fs=1 / STEP)
     measured, torque = (fftconvolve(x, taps, mode="valid") for x in (recording.ddq[:, 0], true))
     inertia = float(measured @ torque / (measured @ measured))
@@ -60,9 +60,10 @@ def _left(recording: Recording, true: np.ndarray, frequency: float) -> float:
 
 
 def test_inertia_is_fitted_without_a_bias_that_shows(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
-    """Up to the frequency that is found, noisy accelerations leave what is allowed; up to twice of it, far more.
+    """Up to the found frequency the bias is the allowed one; up to twice the frequency it is far larger.
 
-    The frequencies are an eighth of a hertz apart, and what is left grows with their tenth power: by a factor of two.
+    Frequencies are an eighth of a hertz apart, and the bias grows with their tenth power, so a factor of two is
+    allowed.
     """
     recording, true, noise = counted
     (frequency,) = unbiased_frequencies(recording, np.eye(1), noise)
@@ -72,13 +73,13 @@ def test_inertia_is_fitted_without_a_bias_that_shows(counted: tuple[Recording, n
 
 
 def test_a_larger_inertia_is_known_further(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
-    """With the torque, the error grows, and its share of it does not: what it leaves grows with the square."""
+    """A larger inertia gives a lower frequency, because the bias grows with its square."""
     recording, _, noise = counted
     assert unbiased_frequencies(recording, 3 * np.eye(1), noise) < unbiased_frequencies(recording, np.eye(1), noise)
 
 
 def test_without_encoder_noise_nothing_is_biased(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
-    """Accelerations without error are known at all frequencies; so are those of a joint that has no torque of them."""
+    """Without acceleration errors, or without inertia, the frequency is infinite."""
     recording, _, noise = counted
     assert unbiased_frequencies(replace(recording, floor=np.zeros(1)), np.eye(1), noise) == np.inf
     assert unbiased_frequencies(recording, np.zeros((1, 1)), noise) == np.inf
@@ -86,7 +87,7 @@ def test_without_encoder_noise_nothing_is_biased(counted: tuple[Recording, np.nd
 
 
 def test_logs_of_any_length_count(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
-    """Cut into two halves and a few rows, a log says the same; a few rows alone say nothing."""
+    """Splitting a log hardly changes the frequency; a few rows alone give no limit."""
     recording, _, noise = counted
     whole = unbiased_frequencies(recording, np.eye(1), noise)
     pieces = replace(recording, starts=(0, ROWS // 2, ROWS - 10))
@@ -96,7 +97,7 @@ def test_logs_of_any_length_count(counted: tuple[Recording, np.ndarray, np.ndarr
 
 
 def test_rows_at_rest_are_told_apart(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
-    """A joint that stands for as long again is known as far as it was: to two steps of the frequencies."""
+    """Adding an equally long rest does not change the frequency."""
     recording, _, noise = counted
     still = np.zeros((ROWS, 1))
     longer = replace(
@@ -111,19 +112,19 @@ def test_rows_at_rest_are_told_apart(counted: tuple[Recording, np.ndarray, np.nd
 
 
 def test_the_band_passes_slow_signals_and_stops_fast_ones() -> None:
-    """Below three quarters of the cut-off a signal comes through unchanged, above 1.1 times it is gone."""
+    """The filter passes signals below three quarters of the cut-off unchanged, and stops those above 1.1 times."""
     whitening = estimate_whitening(recording_of(), noise_of(10_000), 0, np.eye(2))
     band = whitening.bands[0]
     t = STEP * np.arange(10_000)
     for frequency, factor in ((0.7 * band.cutoff, 1.0), (1.15 * band.cutoff, 0.0)):
         wave = np.sin(2 * np.pi * frequency * t)
         passed = band.passed(wave)[50:-50]
-        # The Kaiser window of shape 6 leaves ripples of 63 dB.
+        # The Kaiser window of shape 6 has ripples of -63 dB.
         assert np.abs(passed - factor * wave[:: band.stride][50:-50]).max() < 2e-3
 
 
 def test_filtering_columns_together_is_filtering_each() -> None:
-    """Columns of very different size, and of zeros, come out as convolution written out has them."""
+    """Filtering columns together equals plain convolution of each, for very different sizes and zeros."""
     rng = np.random.default_rng(0)
     band = estimate_whitening(recording_of(), noise_of(10_000), 0, np.eye(2)).bands[0]
     columns = rng.standard_normal((1000, 5)) * [1.0, 1e9, 0.0, 1e-9, 1.0]
@@ -132,30 +133,30 @@ def test_filtering_columns_together_is_filtering_each() -> None:
     half = len(band.taps) // 2
     for column, result in zip(columns.T, together.T, strict=True):
         full = np.convolve(column, band.taps)
-        # The first rows feel what the filter puts before the log.
+        # The first rows depend on how the filter extends the log.
         lead = full[half % band.stride :: band.stride]
         first = half // band.stride
         expected = np.convolve(lead, after)[first : first + len(result)]
         assert result == pytest.approx(expected, abs=1e-12 * max(np.abs(column).max(), 1e-300))
         assert result == pytest.approx(band.passed(column, after), abs=1e-12 * np.abs(column).max())
     assert not together[:, 2].any()
-    # A number so small that one over it is none: the cube of a joint's position that stands at zero.
+    # A subnormal number, whose inverse overflows, such as the cube of a position near zero.
     tiny = band.passed(np.stack([columns[:, 0], np.full(1000, 7e-314)], axis=1), single=True)
     assert tiny[:, 0] == pytest.approx(band.passed(columns[:, 0]), abs=1e-5)
     assert not tiny[:, 1].any()
 
 
 def test_a_band_without_filter_only_thins() -> None:
-    """Without taps every stride-th row is kept as it is."""
+    """Without taps every stride-th row is kept unchanged."""
     series = np.arange(10.0)
     assert Band(np.zeros(0), 2, 1.0).passed(series) == pytest.approx(series[::2])
 
 
 def test_kicks_drown_where_their_torque_is_below_the_noise() -> None:
-    """Torque per acceleration times the accelerations' error, over a sample's noise: 0.9 drowns, 1.1 does not."""
+    """A joint is quiet if the torque of its acceleration error at reversals is below the noise."""
     residual = np.random.default_rng(0).standard_normal((10_000, 2)) * [3.0, 0.5]
     slow = 100.0 * np.sin(0.5 * STEP * np.arange(10_000))[:, None]
     recording = replace(recording_of(), reversal_acceleration_error=np.array([0.9 * 3.0 / 20.0, 1.1 * 0.5 / 2.0]))
-    # 10 000 samples tell the noise to 1 %.
+    # With 10,000 samples the noise level is known to 1 %.
     assert quiet_joints(recording, residual + slow, np.diag([20.0, 2.0])).tolist() == [True, False]
     assert quiet_joints(recording, 2.0 * residual + slow, np.diag([20.0, 2.0])).tolist() == [True, True]

@@ -1,4 +1,4 @@
-"""Specification of the frequencies above the bands: what shows there, how much it tells, and noise that repeats."""
+"""Tests of the frequencies above the usable band: what effects gain there, and noise that repeats."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ from robots.terms.effects import EFFECTS
 RIPPLE = Hypothesis(EFFECTS["torque_ripple"], 1)
 SHAPE = (150.0, 0.0, 0.0)
 NOISE = 0.1  # of the torque, white [N m]
-SIZE = 0.02  # of the ripple, a fifth of it
+SIZE = 0.02  # amplitude of the ripple, a fifth of the noise
 SHAKEN = 17.3  # [Hz]
 
 
 @pytest.fixture(scope="module")
 def clean(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
-    """A log of the arm without torque noise that passes as one of a coarse encoder."""
+    """Returns a recording without torque noise, with the position noise floor of a coarse encoder."""
     return replace(build_recording(arm, [arm_log(torque_noise=0.0)]), floor=np.full(2, 1e-11), cycles=(None,))
 
 
 @pytest.fixture(scope="module")
 def recording(clean: Recording) -> Recording:
-    """The same with white torque noise of a known size."""
+    """Returns the same recording with white torque noise of known size."""
     return replace(clean, tau=clean.tau + NOISE * np.random.default_rng(1).standard_normal(clean.tau.shape))
 
 
@@ -51,16 +51,16 @@ def _rippled(recording: Recording) -> Recording:
 
 
 def _cosine(problem: Problem) -> tuple[float, float]:
-    """Size of the ripple's cosine beside the base model, that of nothing else, and its standard error."""
+    """Estimates the size of the ripple's cosine beside the base model, and its standard error."""
     group = problem.measured(RIPPLE, SHAPE)
     return float(group.cross[0] / group.gram[0, 0]), float(group.gram[0, 0] ** -0.5)
 
 
 def test_a_ripple_tells_its_energy_over_the_noise(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
-    """What is told above the band is the wave's energy between the two cut-offs, over the noise's.
+    """The information above the band is the wave's energy between both cut-offs over the noise density.
 
-    In the rows that count: not where the direction of motion is not known, nor at the ends, where the filter begins. A
-    quarter is lost where white noise happens to look like a burst of it.
+    Rows with an unknown sign and log ends, where the filter starts, do not count. A quarter is lost, because white
+    noise sometimes resembles a burst.
     """
     below, both = (pose_arm(_rippled(recording), wider=wider) for wider in (None, MAX_HIGH_BAND_ERROR))
     cutoffs = below.whitening.bands[0].cutoff, both.high_band.whitening.bands[0].cutoff  # type: ignore[union-attr]
@@ -82,21 +82,21 @@ def test_a_ripple_tells_its_energy_over_the_noise(recording: Recording, pose_arm
 def test_the_slope_has_the_products_of_an_effect_with_the_residual(
     recording: Recording, pose_arm: Callable[..., Problem], name: str
 ) -> None:
-    """In the bands, and above them of what is fast: what moments and orders are ranked by is what they explain."""
+    """The score gradient gives the products of an effect's columns with the whitened residual, also above the band."""
     problem = pose_arm(_rippled(recording), wider=MAX_HIGH_BAND_ERROR)
     hypothesis, shape = (RIPPLE, SHAPE) if name == "torque_ripple" else (Hypothesis(EFFECTS[name], 1), ())
     slope = problem.score_gradient_for(hypothesis.effect)
     joints, columns = problem.columns_of(hypothesis, shape)
     products = np.sum([part.T @ slope[:, j] for j, part in zip(joints, columns, strict=True)], axis=0)
     group = problem.measured(hypothesis, shape)
-    # The first rows of a log are filtered another way.
+    # The first rows of a log are filtered differently.
     np.testing.assert_allclose(products, group.cross, atol=0.05 * np.sqrt(np.diag(group.gram)).max())
     if hypothesis is RIPPLE:
         assert abs(group.cross[0]) > 4 * np.sqrt(group.gram[0, 0])
 
 
 def test_what_shakes_the_arm_is_no_inertia(arm: Robot, recording: Recording, pose_arm: Callable[..., Problem]) -> None:
-    """The arm answers to a vibration above the band: an inertia that was fitted to the answer would take most of it."""
+    """A vibration above the band keeps its energy, because the arm's response does not count as inertia torque."""
     model = default_model(arm)
     wave = np.sin(2 * np.pi * SHAKEN * recording.t)
     answer = np.zeros_like(recording.ddq)
@@ -116,13 +116,13 @@ def test_what_shakes_the_arm_is_no_inertia(arm: Robot, recording: Recording, pos
         accept(problem, ()),
     )
     assert found.shape[0] == pytest.approx(SHAKEN, abs=0.01)
-    # As if nothing but noise were about it: by the wave's own energy, over that of the noise.
+    # The gain is the wave's own energy over that of the noise.
     assert found.gain == pytest.approx(SIZE**2 * np.sum(known**2), rel=0.3)
-    assert found.gain > 30.0  # noise does as much once in 10,000
+    assert found.gain > 30.0  # noise exceeds this once in 10,000
 
 
 def test_only_fast_effects_are_measured_there(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
-    """An effect by acceleration has no rows above the band; what is slow has next to nothing of its energy there."""
+    """An effect by acceleration has no rows above the band, and a slow signal has almost no energy there."""
     problem = pose_arm(recording, wider=MAX_HIGH_BAND_ERROR)
     assert problem.measured(RIPPLE, SHAPE).high_band_columns[0].shape[1] == 4
     assert not problem.measured(Hypothesis(EFFECTS["encoder_offset"], 1), ()).high_band_columns
@@ -132,7 +132,7 @@ def test_only_fast_effects_are_measured_there(recording: Recording, pose_arm: Ca
 
 
 def test_found_beside_it_a_ripple_is_taken_off(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
-    """Once accepted, it leaves nothing of itself."""
+    """An accepted ripple has no gain left."""
     problem = pose_arm(_rippled(recording), wider=MAX_HIGH_BAND_ERROR)
     group = problem.measured(RIPPLE, SHAPE)
     accepted = accept(problem, (group,))
@@ -141,7 +141,7 @@ def test_found_beside_it_a_ripple_is_taken_off(recording: Recording, pose_arm: C
 
 
 def test_the_extended_model_knows_it_as_well(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
-    """What is above the band makes the standard errors of coefficients smaller, by as much as in a score or more."""
+    """Rows above the band reduce the standard errors of coefficients at least as much as in a score."""
     energies, extended = [], []
     for wider in (None, MAX_HIGH_BAND_ERROR):
         problem = pose_arm(_rippled(recording), wider=wider)
@@ -150,7 +150,7 @@ def test_the_extended_model_knows_it_as_well(recording: Recording, pose_arm: Cal
         extension = fit_extended(problem, [member], {}).model.extensions[0]
         extended.append(np.sqrt(np.diag(extension.covariance)[:4]))
     assert np.all(energies[1] < 0.5 * energies[0])
-    # They count what is not known of the shape, too, which is less above the band.
+    # Standard errors include the uncertainty of the shape, which is smaller with the rows above the band.
     assert np.all(extended[1] / extended[0] < 1.4 * energies[1] / energies[0])
 
 
@@ -159,10 +159,10 @@ def test_the_extended_model_knows_it_as_well(recording: Recording, pose_arm: Cal
 def test_noise_that_repeats_with_the_motion_tells_less(
     clean: Recording, pose_arm: Callable[..., Problem], same: bool, cut_off: int
 ) -> None:
-    """Rounding that is alike in five repetitions counts as one: what a ripple tells is a fifth.
+    """If the noise is the same in five repetitions, the information above the band is a fifth.
 
-    So it is where the ends of the log were cut off, and the fifth is not whole. The noise of some 60 frequencies is
-    known to 13 %; the chance of more than a half is 1 in 10,000.
+    This also holds if the ends of the log are cut off. The noise of some 60 frequencies is known to 13 %; the chance of
+    an error above a half is 1 in 10,000.
     """
     period = len(clean) // 5
     noise = np.random.default_rng(3).standard_normal((5 * period, 2))
@@ -181,9 +181,9 @@ def test_noise_that_repeats_with_the_motion_tells_less(
 
 @pytest.mark.parametrize("periods", [0.0, 2.95])
 def test_noise_is_levelled(clean: Recording, pose_arm: Callable[..., Problem], periods: float) -> None:
-    """Noise that grows with the frequency, as unknown accelerations make it, is of unit density above the band.
+    """Noise that grows with frequency has unit density above the band after whitening.
 
-    So it is in a log that repeats its motion, but not a whole number of times.
+    This also holds in a log with a number of repetitions that is not whole.
     """
     rng = np.random.default_rng(5)
     noise = NOISE * rng.standard_normal(clean.tau.shape)
@@ -203,7 +203,7 @@ def test_noise_is_levelled(clean: Recording, pose_arm: Callable[..., Problem], p
 
 
 def test_a_log_in_which_a_joint_stands_levels_no_noise(clean: Recording, pose_arm: Callable[..., Problem]) -> None:
-    """Twice as long a log of the other joint's motion after it: this one's noise above its band is of unit density.
+    """A longer log in which a joint rests does not change that joint's noise level above the band.
 
     The mean of some 500 frequencies has a standard error of 5 %.
     """
@@ -232,7 +232,7 @@ def test_a_log_in_which_a_joint_stands_levels_no_noise(clean: Recording, pose_ar
 
 
 def test_a_vibration_above_the_band_is_told(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
-    """A steady torque between the two cut-offs shows beside accelerations that are not known there."""
+    """A steady oscillation between both cut-offs is significant with the rows above the band only."""
     size = 0.03
     cutoffs = [pose_arm(recording, wider=MAX_HIGH_BAND_ERROR).whitening.bands[0].cutoff]
     cutoffs.append(pose_arm(recording, wider=MAX_HIGH_BAND_ERROR).high_band.whitening.bands[0].cutoff)  # type: ignore[union-attr]
@@ -248,8 +248,8 @@ def test_a_vibration_above_the_band_is_told(recording: Recording, pose_arm: Call
         gains.append(found.gain)
     energy = len(recording) * size**2 / 2 / NOISE**2
     assert gains[0] < 20.0
-    # A log of 20 s is too short to tell a line from the noise about it, of which it then is a part: that is a few times
-    # as strong. What is left is more than any noise explains, eight functions having 8 of that on average.
+    # In a log of 20 s the line counts partly as noise, whose level is then a few times as high. The gain is still
+    # significant: for pure noise the mean of eight functions' gain is 8.
     assert 35.0 < gains[1] < energy
     coefficients = found.bounded(np.full(8, -np.inf), np.full(8, np.inf))[1]
     energies = problem.situation, 1, (frequency,)

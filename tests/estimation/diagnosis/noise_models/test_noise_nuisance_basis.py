@@ -1,4 +1,4 @@
-"""Specification of a noise model that effects do not colour, nor times at rest."""
+"""Tests of the noise model: neither effects nor rests change it."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from robots.robot import Robot
 from robots.signals import Motion
 
 SLOW = np.array([0.3, 1.0, 1.5, 2.0, 3.0])  # [Hz]
-NOISE = 0.1  # [N m], of samples that remember .8 of the last
+NOISE = 0.1  # [N m], with a correlation of 0.8 between consecutive samples
 
 
 def _moves(seed: int) -> Motion:
-    """Sixty seconds of quintic moves between random points, one in .8 s, with pauses of .1 to .8 s between."""
+    """Builds sixty seconds of quintic moves between random points, with pauses of 0.1 to 0.8 s."""
     rng = np.random.default_rng(seed)
     t = 0.004 * np.arange(15_000)
     q, dq, ddq = np.zeros((3, len(t), 2))
@@ -43,7 +43,7 @@ def _moves(seed: int) -> Motion:
 
 
 def _density(whitening: Whitening, recording: Recording, joint: int) -> np.ndarray:
-    """What the noise model says at some frequencies [N^2 m^2 / Hz]."""
+    """Evaluates the noise model's power density at some frequencies [N^2 m^2 / Hz]."""
     step, a = recording.step * whitening.bands[joint].stride, whitening.coefficients[joint]
     lags = np.exp(-2j * np.pi * step * SLOW[:, None] * np.arange(1, len(a) + 1))
     return np.asarray(2 * step * whitening.scale[joint] ** 2 / np.abs(1 - lags @ a) ** 2)
@@ -51,10 +51,10 @@ def _density(whitening: Whitening, recording: Recording, joint: int) -> np.ndarr
 
 @pytest.mark.parametrize("stiffness", [0.0, 1.5])
 def test_neither_rests_nor_effects_colour_the_noise(arm: Robot, arm_plant: Callable, stiffness: float) -> None:
-    """Beside pauses in a third of the time and a cubic spring of ten times the noise, its density is true to a half.
+    """With rests and a cubic spring of ten times the noise, the density is right to a factor of 1.5.
 
-    Left in the residual, that spring makes 50 times the noise at 1 Hz. Some 60 frequencies a hertz: the standard error
-    of what is extrapolated below 1 Hz is 20 %.
+    The spring in the residual would be 50 times the noise at 1 Hz. With some 60 frequencies per hertz, the standard
+    error of the extrapolation below 1 Hz is 20 %.
     """
     motion = _moves(0)
     log = simulate(arm_plant(torque_noise=0.0), motion, seed=0)
@@ -78,7 +78,7 @@ def test_neither_rests_nor_effects_colour_the_noise(arm: Robot, arm_plant: Calla
 
 
 def test_a_short_log_has_no_free_functions(arm: Robot, arm_plant: Callable) -> None:
-    """Of ten seconds they would take the noise itself."""
+    """A log of ten seconds has no nuisance functions, because they would absorb the noise."""
     log = simulate(arm_plant(torque_noise=0.01), _moves(0), seed=0)
     short = replace(log, t=log.t[:2500], q=log.q[:2500], tau=log.tau[:2500])
     recording = build_recording(arm, [short])

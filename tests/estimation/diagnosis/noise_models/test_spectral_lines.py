@@ -1,4 +1,4 @@
-"""Specification of lines in a spectrum: what vibrates is no colour of the noise."""
+"""Tests of spectral lines, which must not count as noise."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ROWS, STEP = 15_000, 0.004
 
 
 def _noise(rng: np.random.Generator) -> np.ndarray:
-    """Two joints of noise, half of it of a memory of ten samples."""
+    """Draws noise of two joints, half of it correlated over ten samples."""
     slow = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], rng.normal(size=(ROWS, 2)), axis=0)
     return slow + rng.normal(size=(ROWS, 2))
 
@@ -23,7 +23,7 @@ def _power(series: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("period", [None, 10.0])
 def test_noise_has_no_lines(period: float | None) -> None:
-    """Of 450,000 places of 30 logs fewer than fifty are touched: the level about each is itself noise."""
+    """In 30 logs of noise with 450,000 frequencies, fewer than fifty are changed."""
     rng = np.random.default_rng(0)
     touched = 0
     for _ in range(30):
@@ -36,9 +36,9 @@ def test_noise_has_no_lines(period: float | None) -> None:
     ("frequency", "period"), [(3.3, None), (3.31, None), (11.2, None), (47.0, None), (3.31, 10.0), (11.23, 10.0)]
 )
 def test_a_vibration_is_levelled_to_the_noise_about_it(frequency: float, period: float | None) -> None:
-    """A third of the noise: what is left is within two fifths of the noise.
+    """A vibration is removed down to the noise level, to 40 %.
 
-    Between two places of the spectrum a line reaches far to either side.
+    A line between two frequencies of the spectrum spreads over many of them.
     """
     noise = _noise(np.random.default_rng(1))
     t = STEP * np.arange(ROWS)
@@ -51,7 +51,7 @@ def test_a_vibration_is_levelled_to_the_noise_about_it(frequency: float, period:
 
 
 def test_what_repeats_with_the_motion_is_no_line() -> None:
-    """An error at all harmonics of a period of 10 s is a model's; without the period it would be taken for lines."""
+    """An error at the harmonics of the motion's period is not removed; without the known period it would be."""
     rng = np.random.default_rng(2)
     noise = _noise(rng)
     error = np.tile(rng.normal(size=(2500, 2)), (6, 1))
@@ -62,6 +62,6 @@ def test_what_repeats_with_the_motion_is_no_line() -> None:
 
 @pytest.mark.parametrize("rows", [1000, 4000])
 def test_a_short_log_tells_no_line(rows: int) -> None:
-    """Of 4 and 16 s: a spectrum of few places may be a colour that is as steep."""
+    """No lines are removed in logs of 4 and 16 s, where a line may be steep coloured noise."""
     power = _power(_noise(np.random.default_rng(3))[:rows] + 5 * np.sin(70.0 * STEP * np.arange(rows))[:, None])
     assert remove_lines(power, 1 / (rows * STEP)) is power

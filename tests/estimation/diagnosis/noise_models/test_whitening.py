@@ -1,4 +1,4 @@
-"""Specification of the noise model, and of rows whose direction of motion is unknown."""
+"""Tests of the noise model, and of rows whose direction of motion is unknown."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from tests.estimation.diagnosis.noisy_logs import STEP, noise_of, recording_of
 
 
 def test_coloured_noise_becomes_white_and_of_unit_density_in_the_band() -> None:
-    """Half AR(1), half white noise has the same power at all frequencies that the band passes, one per row.
+    """Half coloured, half white noise has unit density at all frequencies of the band after whitening.
 
-    Each of five stretches of the band holds some 700 frequencies: the standard error of its mean power is 4 %.
+    Each of five parts of the band has some 700 frequencies: the standard error of its mean power is 4 %.
     """
     residual = noise_of(10_000)
     whitening = estimate_whitening(recording_of(), residual, 0, np.eye(2))
@@ -37,7 +37,7 @@ def test_coloured_noise_becomes_white_and_of_unit_density_in_the_band() -> None:
 
 
 def _level(whitening: Whitening, residual: np.ndarray, rows: slice = slice(None)) -> np.ndarray:
-    """Mean power of some white rows of the noise from 1.5 to 8 Hz (2,)."""
+    """Computes the mean power (2,) from 1.5 to 8 Hz of some rows of the whitened noise."""
     white = replace(whitening, weights=None).all(residual)[rows]
     power = np.abs(np.fft.rfft(white, axis=0)) ** 2 / len(white)
     f = np.fft.rfftfreq(len(white), STEP * whitening.stride)
@@ -45,9 +45,10 @@ def _level(whitening: Whitening, residual: np.ndarray, rows: slice = slice(None)
 
 
 def test_a_slow_effect_is_not_taken_for_noise() -> None:
-    """With an effect four times as large as the noise below 1 Hz, the noise model stays what it is without.
+    """An effect below 1 Hz, four times as large as the noise, does not change the noise model.
 
-    The mean over some 500 frequencies has a standard error of 4.5 %; at rest a process fitted above 1 Hz says a fifth.
+    The mean over some 500 frequencies has a standard error of 4.5 %. At zero frequency a process fitted above 1 Hz is
+    accurate to a fifth.
     """
     noise = noise_of(20_000)
     t = STEP * np.arange(20_000)[:, None]
@@ -64,10 +65,11 @@ def test_a_slow_effect_is_not_taken_for_noise() -> None:
 
 @pytest.mark.parametrize("memory", [0.98, 0.995])
 def test_noise_that_wanders_is_noise(memory: float) -> None:
-    """Half white noise and half correlated over .2 s or .8 s: what it has at rest is told, or more than that.
+    """The level at zero frequency of noise correlated over 0.2 or 0.8 s is not underestimated by more than a fifth.
 
-    Forty coefficients of 10,000 rows tell it to a tenth (Berk 1974), but hardly where it bends at .2 Hz: a memory of
-    .3 s is short for that. The order that predicts best, above 1 Hz, has three quarters and a fifth of it.
+    Forty coefficients estimate it to a tenth from 10,000 rows (Berk 1974), but hardly where the spectrum bends at 0.2
+    Hz, because they cover only 0.3 s. The order with the best prediction above 1 Hz finds three quarters and a fifth of
+    it.
     """
     rng = np.random.default_rng(1)
     rows = 20_000
@@ -82,14 +84,14 @@ def test_noise_that_wanders_is_noise(memory: float) -> None:
 
 
 def test_kicks_at_reversals_and_times_at_rest_do_not_change_the_level() -> None:
-    """Rows of unknown direction, short or long, whatever is in them, leave the level of the noise as it is."""
+    """Impulses at reversals and rests do not change the noise level."""
     noise = noise_of(20_000)
     unsure = np.zeros((20_000, 2), dtype=bool)
     residual = noise.copy()
     for start in range(100, 10_000, 200):
         unsure[start : start + 6, 0] = True
         residual[start : start + 6, 0] += 50 * noise[:, 0].std()
-    unsure[10_000:18_000] = True  # both joints stand for two fifths of the time, held by brakes
+    unsure[10_000:18_000] = True  # both joints rest for two fifths of the time, held by brakes
     residual[10_000:18_000] = 0.0
     whitening = estimate_whitening(recording_of(20_000, unsure=unsure), residual, 0, np.eye(2))
     stride = whitening.stride
@@ -100,7 +102,7 @@ def test_kicks_at_reversals_and_times_at_rest_do_not_change_the_level() -> None:
 
 
 def test_rows_of_unknown_direction_do_not_count() -> None:
-    """A torque of any size within a short gap leaves no trace behind the whitening."""
+    """A torque of any size within a short gap vanishes in the whitened residual."""
     unsure = np.zeros((10_000, 2), dtype=bool)
     unsure[3000:3006, 0] = True
     recording = recording_of(unsure=unsure)
@@ -113,9 +115,9 @@ def test_rows_of_unknown_direction_do_not_count() -> None:
 
 
 def test_the_adjoint_has_the_products_of_the_filter() -> None:
-    """What torque in some rows has to do with white rows is the product of the filtered torque with them.
+    """The adjoint filter gives the products of filtered torques with whitened rows.
 
-    Beside rests and reversals, in logs of two levels of noise, thinned.
+    It is tested next to rests and reversals, in thinned logs with two noise levels.
     """
     rng = np.random.default_rng(3)
     rows = 6_000
@@ -138,18 +140,18 @@ def test_the_adjoint_has_the_products_of_the_filter() -> None:
 
 
 def test_where_in_a_gap_friction_turns_round_does_not_matter() -> None:
-    """Signs that change within rows of unknown direction, one here, one there, are one and the same when white."""
+    """The row of a sign change within a gap does not change the whitened sign."""
     unsure = np.zeros((10_000, 2), dtype=bool)
     unsure[3000:3016, 0] = True
     whitening = estimate_whitening(recording_of(unsure=unsure), noise_of(10_000), 0, np.eye(2))
     early, late = (np.where(np.arange(10_000) < turn, -1.0, 1.0) for turn in (3002, 3013))
     assert whitening.apply(early, 0) == pytest.approx(whitening.apply(late, 0), abs=1e-12)
-    # But not where the direction is known.
+    # Where the sign is known, its row matters.
     assert np.abs(whitening.apply(early, 1) - whitening.apply(late, 1)).max() > 0.1
 
 
 def test_a_long_gap_is_bridged_within_its_log() -> None:
-    """A joint at rest is bridged by a straight line; at the end of a log the last known value stands."""
+    """A rest is bridged by a straight line; at the end of a log the last known value is kept."""
     unsure = np.zeros((100, 1), dtype=bool)
     unsure[20:30], unsure[45:50] = True, True
     gaps = find_masked_rows(unsure, (0, 50), 3)
@@ -163,7 +165,7 @@ def test_a_long_gap_is_bridged_within_its_log() -> None:
 
 
 def test_differences_between_repetitions_hold_the_noise_and_nothing_that_repeats() -> None:
-    """The variance of the differences is that of the noise, whatever repeats; the mean is what repeats."""
+    """Differences between repetitions have the variance of the noise, and their mean is the repeating part."""
     rng = np.random.default_rng(0)
     wave = np.tile(100 * rng.standard_normal((250, 1)), (8, 1))
     series = wave + rng.standard_normal(wave.shape)
@@ -174,7 +176,7 @@ def test_differences_between_repetitions_hold_the_noise_and_nothing_that_repeats
 
 
 def test_what_reversals_leave_does_not_repeat_as_an_effect_does() -> None:
-    """Ten periods of noise: a sign that errs beside reversals adds nothing, a wave as large as the noise half."""
+    """Errors next to reversals do not count as repeating; a wave as large as the noise is half of the residual."""
     rows, period = 10_000, 1000
     recording = replace(recording_of(rows), cycles=(Cycle(0, rows, period * STEP, 10),))
     noise, phase = np.random.default_rng(4).standard_normal((rows, 2)), np.arange(rows) % period
@@ -188,7 +190,7 @@ def test_what_reversals_leave_does_not_repeat_as_an_effect_does() -> None:
 
 
 def test_an_orthonormal_basis_leaves_out_what_is_not_determined() -> None:
-    """Of two equal columns one direction is kept."""
+    """Of two equal columns the basis has one direction."""
     x = np.random.default_rng(0).standard_normal((50, 2))
     basis = orthonormal(np.column_stack([x, x[:, :1]]), 1e-7)
     assert basis.shape == (50, 2)
@@ -196,7 +198,7 @@ def test_an_orthonormal_basis_leaves_out_what_is_not_determined() -> None:
 
 
 def test_a_push_counts_and_a_kick_at_a_reversal_does_not() -> None:
-    """A push of a sixth of a second, twenty times the noise, keeps its weight; beside a reversal the same loses it."""
+    """A large push keeps its weight; next to a reversal the same torque loses it."""
     noise = noise_of(20_000)
     unsure = np.zeros((20_000, 2), dtype=bool)
     unsure[12_000:12_006] = True
@@ -214,10 +216,9 @@ def test_a_push_counts_and_a_kick_at_a_reversal_does_not() -> None:
 
 @pytest.mark.parametrize("seen", [0, 5])
 def test_a_log_in_which_a_joint_stands_takes_nothing_from_the_others(seen: int) -> None:
-    """A motion of one joint after one of two: what is known of the other's noise stays, however long it stands.
+    """A log in which one joint rests does not change that joint's noise model.
 
-    Not more than a few rows of it are seen to move, by an encoder that flickers: they tell no level. Standard errors of
-    the powers are 5 %.
+    A few rows that move by encoder flicker give no noise level. Standard errors of the powers are 5 %.
     """
     noise = noise_of(30_000)
     unsure = np.zeros((30_000, 2), dtype=bool)

@@ -1,4 +1,4 @@
-"""At constant speed an encoder's steps are no motion, and elsewhere nothing is changed."""
+"""Tests of the removal of encoder lines at constant speed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _differentiated(q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArra
 
 
 def test_lines_of_steps_are_taken_out_of_a_ramp() -> None:
-    """A start over two seconds, then 0.1037 rad/s: accelerations of counted positions fall to a thousandth."""
+    """At constant speed, acceleration errors of a counted position fall to a thousandth; the start is unchanged."""
     t = STEP * np.arange(5000)
     true = 0.1037 * np.where(t < 2.0, 0.25 * t**2, t - 1.0)
     q = (COUNT * np.round(true / COUNT))[:, None]
@@ -32,7 +32,7 @@ def test_lines_of_steps_are_taken_out_of_a_ramp() -> None:
 
 
 def test_motion_that_bends_is_left_alone() -> None:
-    """A slow sine, whose acceleration passes through zero, keeps its derivatives; so does what has no steps."""
+    """A slow sine, and a joint without encoder steps, keep their derivatives."""
     t = STEP * np.arange(5000)
     q = np.column_stack([np.sin(0.6 * t), 0.1 * t])
     dq, ddq = _differentiated(q)
@@ -43,7 +43,7 @@ def test_motion_that_bends_is_left_alone() -> None:
 
 @pytest.mark.parametrize("rows", [10, 200])
 def test_short_logs_are_left_alone(rows: int) -> None:
-    """Two times the lag and less have no line to be on."""
+    """Logs that are too short for a line do not change."""
     q = 0.1 * STEP * np.arange(rows)[:, None]
     dq, ddq = _differentiated(q)
     for got, given in zip(remove_encoder_lines(q, dq, ddq, np.array([COUNT]), STEP), (dq, ddq), strict=True):

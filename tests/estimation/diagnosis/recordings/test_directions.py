@@ -1,4 +1,4 @@
-"""Specification of the rows of a log in which the direction of motion is not known."""
+"""Tests of the rows in which the direction of motion is unknown."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def _counted(motion: Motion, q: Array, counts: float) -> Log:
 
 
 def _kicked(motion: Motion, friction: float = KICK, loop: float = 1.0) -> tuple[Array, Array, Array]:
-    """Motion, velocity and acceleration of which the shoulder's jumps where it reverses.
+    """Simulates a motion whose shoulder acceleration jumps at each reversal, and its derivatives.
 
-    Friction [rad/s2] under a position loop [Hz], whose acceleration is constant within each sixteenth of a step.
+    Friction [rad/s2] acts under a position loop [Hz]; the acceleration is constant within a sixteenth of a step.
     """
     q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
     wanted = CubicSpline(motion.t, np.column_stack([motion.q[:, 0], motion.dq[:, 0], motion.ddq[:, 0]]))
@@ -50,12 +50,12 @@ def _kicked(motion: Motion, friction: float = KICK, loop: float = 1.0) -> tuple[
 
 
 def _trusting(arm: Robot, log: Log) -> Recording:
-    """A recording of which all rows count that are clear."""
+    """Builds a recording in which all rows with a clear sign count."""
     return build_recording(arm, [log]).with_trusted(np.ones(2, dtype=bool))
 
 
 def _beside(log: Log, arm: Robot) -> float:
-    """Rows flagged at each reversal of the shoulder, slow ones not counted."""
+    """Returns the median number of rows flagged at a reversal of the shoulder, without slow reversals."""
     recording = _trusting(arm, log)
     dq, unsure = recording.dq[:, 0], recording.sign_unknown[:, 0]
     turns = np.flatnonzero(dq[1:] * dq[:-1] < 0)
@@ -65,13 +65,13 @@ def _beside(log: Log, arm: Robot) -> float:
 
 
 def _beside_reversals(v: Array) -> NDArray[np.intp]:
-    """Rows from two before to three after each change of a velocity's (N,) sign."""
+    """Returns the rows from two before to three after each sign change of a velocity (N,)."""
     turns = np.flatnonzero(v[1:] * v[:-1] < 0)
     return np.unique(np.clip(turns[:, None] + np.arange(-2, 4), 0, len(v) - 1))
 
 
 def test_few_rows_are_lost(arm: Robot, fourier_motion: Callable) -> None:
-    """Of a coarse encoder all rows beside a reversal, of which there are few."""
+    """With a coarse encoder all rows next to a reversal are flagged, less than 15 % in total."""
     motion = fourier_motion(arm, duration=20.0)
     recording = _trusting(arm, _counted(motion, motion.q, 2**12))
     turned = recording.dq[1:] * recording.dq[:-1] < 0
@@ -80,10 +80,9 @@ def test_few_rows_are_lost(arm: Robot, fourier_motion: Callable) -> None:
 
 
 def test_no_more_rows_are_lost_at_a_reversal_than_a_kick_spreads_to(arm: Robot, fourier_motion: Callable) -> None:
-    """None where the motion has no kicks; two where they are known to a sample; six where they are not.
+    """Without jumps of acceleration no row is flagged; with a fine encoder two, with a coarse one six or more.
 
-    A position known up to 12 Hz only has a kick spread over a dozen rows of 4 ms, one known up to 100 Hz has it within
-    a row.
+    A position known up to 12 Hz spreads a jump over a dozen rows of 4 ms; one known up to 100 Hz keeps it within a row.
     """
     motion = _aperiodic(fourier_motion, arm)
     kicked, _, _ = _kicked(motion)
@@ -96,10 +95,10 @@ def test_no_more_rows_are_lost_at_a_reversal_than_a_kick_spreads_to(arm: Robot, 
 def test_rows_that_count_beside_a_reversal_have_a_velocity_that_is_known(
     arm: Robot, fourier_motion: Callable, counts: float
 ) -> None:
-    """Within three rows of a reversal, kicked or not, no velocity that counts errs by more than a small part of itself.
+    """Velocities that count within three rows of a reversal have a small relative error.
 
-    The rule bounds the error by one part in `MIN_SHARP_SPEED_SIGMAS` of the velocity; a third more is allowed to single
-    rows, and what the velocity changes by while two clocks are one.
+    The rule bounds the error by one part in `MIN_SHARP_SPEED_SIGMAS` of the velocity. A third more is allowed for
+    single rows, and the change of velocity within the time error of two clocks.
     """
     motion = _aperiodic(fourier_motion, arm)
     for q, dq, _ in ((motion.q, motion.dq, motion.ddq), _kicked(motion)):
@@ -115,7 +114,7 @@ def test_rows_that_count_beside_a_reversal_have_a_velocity_that_is_known(
 
 
 def test_rows_beside_a_reversal_count_of_joints_that_are_trusted_alone(arm: Robot, fourier_motion: Callable) -> None:
-    """Before that is said of a joint, and of the others, no row beside a reversal counts."""
+    """Rows next to a reversal count only on trusted joints."""
     motion = _aperiodic(fourier_motion, arm)
     plain = build_recording(arm, [_counted(motion, motion.q, 2**40)])
     turned = np.zeros(plain.dq.shape, dtype=bool)
@@ -136,16 +135,16 @@ def test_rows_beside_a_reversal_count_of_joints_that_are_trusted_alone(arm: Robo
         (2.0**20, 1.0, 3.0),
         (2.0**26, 1.0, 3.0),
         (2.0**17, 1.0, 20.0),
-        # A loop of 12 Hz leaves next to nothing of a kick at the few Hz where this motion ends: it hides in the noise.
+        # With a loop of 12 Hz, a jump has almost no energy at the few hertz where this motion's spectrum ends.
         (2.0**17, 12.0, 20.0),
     ],
 )
 def test_a_jolt_is_what_a_kick_may_leave_of_the_acceleration(
     arm: Robot, fourier_motion: Callable, counts: float, loop: float, most: float
 ) -> None:
-    """It is told within a factor of three, or as what the noise may hide: never as less than half of what it is.
+    """The acceleration error at reversals is not underestimated by more than a factor of two.
 
-    That of a joint whose motion has no kicks is told as a thirtieth of the others' at most.
+    For a motion without jumps it is at most a thirtieth of that.
     """
     motion = _aperiodic(fourier_motion, arm)
     q, _, ddq = _kicked(motion, loop=loop)
@@ -162,7 +161,7 @@ def test_a_jolt_is_what_a_kick_may_leave_of_the_acceleration(
 
 @pytest.mark.parametrize("counts", [2.0**26, 2.0**30, 2.0**40])
 def test_moments_of_reversals_are_as_wrong_as_is_said(arm: Robot, fourier_motion: Callable, counts: float) -> None:
-    """Where kicks make a velocity change its sign late, by how much is told within a factor of three."""
+    """The error of reversal times is estimated within a factor of three."""
     motion = _aperiodic(fourier_motion, arm)
     q, dq, _ = _kicked(motion)
     recording = build_recording(arm, [_counted(motion, q, counts)])
@@ -176,13 +175,13 @@ def test_moments_of_reversals_are_as_wrong_as_is_said(arm: Robot, fourier_motion
 
 
 def _crossings(v: np.ndarray) -> np.ndarray:
-    """Rows, and parts of them, at which a velocity (N,) changes its sign."""
+    """Returns the fractional rows at which a velocity (N,) changes its sign."""
     at = np.flatnonzero(v[1:] * v[:-1] < 0)
     return at + v[at] / (v[at] - v[at + 1])
 
 
 def test_torque_between_samples_is_not_trusted_beside_a_reversal(arm: Robot, fourier_motion: Callable) -> None:
-    """Sampled at uneven times it is read off straight lines, across the sign's jump."""
+    """With uneven samples rows next to reversals are flagged, because torque is interpolated across the sign change."""
     motion = _aperiodic(fourier_motion, arm)
     shaken = motion.t + 1e-3 * np.random.default_rng(0).uniform(-1, 1, len(motion.t))
     spline = CubicSpline(motion.t, motion.q)
@@ -196,10 +195,10 @@ def test_torque_between_samples_is_not_trusted_beside_a_reversal(arm: Robot, fou
 def test_positions_beside_reversals_tell_how_well_those_are_known(
     arm: Robot, fourier_motion: Callable, friction: float, loop: float, counts: float
 ) -> None:
-    """In a slow motion's spectrum kicks drown in the encoder's noise; beside reversals they stand out, or are small.
+    """Rows that count have a velocity known to an eighth, except for 1 %, for any jump of acceleration and encoder.
 
-    Where nothing kicks, an encoder of a million counts tells all reversals to a third of a millisecond. Whatever does,
-    rows that count have a velocity that is known to an eighth of itself, but for one in a hundred.
+    In the spectrum of a slow motion the jumps are below the encoder's noise, but next to reversals they show, or are
+    small. Without jumps an encoder of a million counts gives reversal times to 0.3 ms.
     """
     motion = fourier_motion(arm, duration=59.9)
     q, dq, _ = _kicked(motion, friction=friction, loop=loop)

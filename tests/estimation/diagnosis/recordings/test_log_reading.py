@@ -1,4 +1,4 @@
-"""Specification of noise-free motion from counted positions."""
+"""Tests of the noise-free motion from counted positions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _aperiodic(motion: Callable[..., Motion], arm: Robot) -> Motion:
 
 
 def test_derivatives_of_a_single_pass_are_free_of_encoder_noise(arm: Robot, fourier_motion: Callable) -> None:
-    """With 2^17 counts a turn accelerations err by less than 2 % of their size; differences would by half of it."""
+    """With 2^17 counts per turn, accelerations have errors below 2 %; finite differences have 50 %."""
     motion = _aperiodic(fourier_motion, arm)
     recording = build_recording(arm, [_log(motion, 2**17)])
     first = int(np.argmin(np.abs(motion.t - recording.t[0])))
@@ -38,7 +38,7 @@ def test_derivatives_of_a_single_pass_are_free_of_encoder_noise(arm: Robot, four
 
 
 def test_a_repeated_motion_is_known_better_than_a_single_pass(arm: Robot, fourier_motion: Callable) -> None:
-    """Two passes and more are averaged: the cycle is found and accelerations err by less than 1 %."""
+    """For a repeated motion the period is found, and accelerations have errors below 1 %."""
     motion = fourier_motion(arm, duration=40.0)
     recording = build_recording(arm, [_log(motion, 2**17)])
     assert recording.periodic
@@ -50,7 +50,7 @@ def test_a_repeated_motion_is_known_better_than_a_single_pass(arm: Robot, fourie
 
 
 def test_a_log_that_begins_in_motion_is_known_to_its_ends(arm: Robot) -> None:
-    """A fine encoder's accelerations err no more at the ends of a log than in its middle."""
+    """With a fine encoder, acceleration errors at the ends are at most 1.5 times those in the middle."""
     rng = np.random.default_rng(0)
     t, f = 0.004 * np.arange(5000), np.linspace(0.1, 60.0, 600)[:, None]
     phases = 2 * np.pi * (f[:, :, None] * t[:, None] + rng.uniform(size=(600, 1, 2)))
@@ -65,9 +65,9 @@ def test_a_log_that_begins_in_motion_is_known_to_its_ends(arm: Robot) -> None:
 
 
 def test_a_slow_motion_is_known_to_the_ends_of_a_log_that_cuts_it(arm: Robot) -> None:
-    """Sines below .8 Hz under a cut-off of 2 Hz: at the ends accelerations err ten times as much as within at most.
+    """For sines below 0.8 Hz, acceleration errors at the ends are at most ten times those in the middle.
 
-    A filter that takes the motion for turned round at the ends errs there 500 times as much (chance to fail 1e-3).
+    A filter that mirrors the motion at the ends has 500 times the error there. The test fails by chance once in 1,000.
     """
     rng = np.random.default_rng(1)
     t, w = 0.004 * np.arange(15000), 2 * np.pi * rng.uniform(0.1, 0.8, size=(3, 1, 2))
@@ -84,7 +84,7 @@ def test_a_slow_motion_is_known_to_the_ends_of_a_log_that_cuts_it(arm: Robot) ->
 
 
 def test_logs_share_one_clock(arm: Robot, fourier_motion: Callable) -> None:
-    """Logs are put in the order of their times; two at one time are refused, naming the column."""
+    """Logs are ordered by their times; overlapping logs are refused."""
     log = _log(fourier_motion(arm, duration=20.0), 2**20)
     later = replace(log, t=np.asarray(log.t) + 60.0)
     recording = build_recording(arm, [later, log])

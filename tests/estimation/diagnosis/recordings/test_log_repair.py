@@ -1,4 +1,4 @@
-"""Specification of logs with lost messages, gaps, and other faults of their recording."""
+"""Tests of logs with lost messages, gaps and other recording faults."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ FEW = ("external_contact", "friction_step", "payload_change", "spring", "stribec
 
 @pytest.fixture(scope="module")
 def log(arm_log: Callable[..., Log]) -> Log:
-    """Twenty seconds of the arm, with noise of torque and nothing else."""
+    """Returns twenty seconds of the arm with torque noise."""
     return arm_log(torque_noise=0.02)
 
 
 def _glitched(log: Log, rows: tuple[int, ...]) -> Log:
-    """The log with a garbled torque of the second joint in some rows, three times its range."""
+    """Returns the log with outliers of the second joint's torque in some rows, three times its range."""
     tau = np.array(log.tau)
     for row in rows:
         tau[row, 1] += 3.0 * np.ptp(tau[:, 1])
@@ -32,20 +32,20 @@ def _glitched(log: Log, rows: tuple[int, ...]) -> Log:
 
 
 def _holed(log: Log, *holes: tuple[float, float]) -> Log:
-    """The log without what lies within some times."""
+    """Returns the log without the rows within some times."""
     t = log.t - log.t[0]
     return log.rows(np.flatnonzero(~np.any([(t > low) & (t < high) for low, high in holes], axis=0)))
 
 
 def test_a_sound_log_is_left_alone(arm: Robot, log: Log) -> None:
-    """It is the same object, and nothing is said of it."""
+    """A log without faults is returned unchanged, without notes."""
     result = repair_log(arm, log, "Log 1")
     assert result.logs == (log,)
     assert result.notes == ()
 
 
 def test_rows_that_stick_out_lie_between_their_neighbours(arm: Robot, log: Log) -> None:
-    """The torque is interpolated, the position by a cubic, all other rows are as they were; the note has the place."""
+    """Outliers are interpolated, all other rows do not change, and a note states the row."""
     rows = (1200, 3000)
     q = np.array(log.q)
     q[3000, 0] += 0.5 * np.ptp(q[:, 0])
@@ -55,29 +55,29 @@ def test_rows_that_stick_out_lie_between_their_neighbours(arm: Robot, log: Log) 
         np.testing.assert_array_equal(getattr(found, name)[others], getattr(log, name)[others])
     for row in rows:
         np.testing.assert_allclose(found.tau[row, 1], 0.5 * (log.tau[row - 1, 1] + log.tau[row + 1, 1]))
-        # The other joint's torque was right.
+        # The other joint's torque does not change.
         assert found.tau[row, 0] == log.tau[row, 0]
-    # A cubic errs by h^4 q'''' / 24, an even smaller number than 4 ms squared by the acceleration.
+    # The error of a cubic is h^4 q'''' / 24, which is below the acceleration times the squared 4 ms.
     np.testing.assert_allclose(found.q[3000], log.q[3000], atol=2e-5)
     assert any("Log 1: joint 2" in note and "1201" in note for note in notes)
 
 
 def test_a_log_is_cut_at_its_gaps(arm: Robot, log: Log) -> None:
-    """Stretches keep their times and say which they are; one of less than two seconds is no stretch."""
+    """A log is cut at gaps into named parts; parts below two seconds are dropped, and short gaps are kept."""
     result = repair_log(arm, _holed(log, (6.0, 9.0), (10.5, 11.0)), "Log 1")
     spans = [(part.t[0] - log.t[0], part.t[-1] - log.t[0]) for part in result.logs]
     np.testing.assert_allclose(spans, [(0.0, 6.0), (11.0, log.duration)], atol=0.0041)
     assert "from 0 to 6 s" in result.logs[0].name
     assert any("gap" in note for note in result.notes)
-    # A network that hiccups is no gap.
+    # A short loss of messages is no gap.
     assert len(repair_log(arm, _holed(log, (6.0, 6.05)), "Log 1").logs) == 1
 
 
 @pytest.mark.slow
 def test_faults_of_a_recording_are_no_effects(arm: Robot, log: Log) -> None:
-    """Garbled rows and a gap leave a verdict of none and the errors of a sound log; unchecked rows spoil them.
+    """With outliers and a gap, the verdict is `none` and the errors are those of the log without faults.
 
-    A false alarm has a chance of 1 %, for these seeds once and for all.
+    Without the check the outliers increase the errors. The seeds are fixed; a false alarm has a chance of 1 %.
     """
     faulty = _holed(_glitched(log, (900, 3900)), (10.0, 12.0))
     sound, checked, taken = (
@@ -92,7 +92,7 @@ def test_faults_of_a_recording_are_no_effects(arm: Robot, log: Log) -> None:
 
 @pytest.mark.slow
 def test_stretches_of_a_log_are_told_as_one_log(arm: Robot, log: Log) -> None:
-    """Who gives one log of unseen data has not given two."""
+    """A held-out log with a gap counts as one log in two stretches."""
     half = len(log) // 2
     other = log.rows(slice(half, None))
     middle = (other.duration / 2, other.duration / 2 + 0.5)
@@ -103,7 +103,7 @@ def test_stretches_of_a_log_are_told_as_one_log(arm: Robot, log: Log) -> None:
 
 @pytest.mark.parametrize("field", ["held_out", "logs"])
 def test_a_log_in_other_units_is_refused(arm: Robot, log: Log, field: str) -> None:
-    """Times in milliseconds, of either kind of log: what the gate refuses for identification."""
+    """Times in milliseconds are refused, for logs and held-out logs."""
     wrong = replace(log.rows(slice(500, None)), t=1000.0 * (log.t[500:] + 100.0))
     logs = {"logs": log, "held_out": None, field: wrong}
     with pytest.raises(InputError, match="milliseconds"):
@@ -111,14 +111,14 @@ def test_a_log_in_other_units_is_refused(arm: Robot, log: Log, field: str) -> No
 
 
 def test_what_an_effect_may_look_like_is_told_and_not_refused(arm: Robot, log: Log) -> None:
-    """A torque of the wrong sign is a note: the quick fit of the gate knows no effect."""
+    """A wrong sign of the torque gives a note, because an effect may cause it."""
     result = repair_log(arm, replace(log, tau=-np.asarray(log.tau)), "Log 1")
     assert len(result.logs) == 1
     assert any("sign" in note for note in result.notes)
 
 
 def test_torques_of_another_unit_are_told_first(arm: Robot, log: Log) -> None:
-    """Where most joints' torques are far from the description's, a unit is likelier than anything of the robot."""
+    """If most joints' torques differ from the description by a factor, the first note says so."""
     result = repair_log(arm, replace(log, tau=log.tau / 100.0), "Log 1")
     assert result.notes[0].startswith(
         "Log 1: the torques of 2 of 2 joints are 0.01 times those of the robot's description"
@@ -128,7 +128,7 @@ def test_torques_of_another_unit_are_told_first(arm: Robot, log: Log) -> None:
 
 
 def test_torques_of_the_motors_are_refused(arm: Robot, log: Log) -> None:
-    """By two signs: joints do not agree on the links they share, and each is a gear ratio smaller than described."""
+    """Motor-side torques are refused if they differ from the joint torques by the gear ratios."""
     gears = np.array([100.0, 40.0])
     with pytest.raises(InputError, match="the motor's, not the joint's"):
         repair_log(replace(arm, gear_ratio=gears), replace(log, tau=log.tau / gears), "Log 1")

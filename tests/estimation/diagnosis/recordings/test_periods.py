@@ -1,4 +1,4 @@
-"""Specification of the search for repeated motion and its projection on harmonics."""
+"""Tests of the search for repeated motion, and of its projection on harmonics."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _motion(period: float, duration: float, seed: int = 0) -> tuple[np.ndarray, 
 
 @pytest.mark.parametrize("period", [10.0, 7.3219, 3.14159])
 def test_a_period_is_found_sharper_than_a_sample(period: float) -> None:
-    """The period of a repeated motion is found to a hundredth of a sample, whole multiple of the step or not."""
+    """The period is found to a hundredth of a sample, also if it is not a multiple of the sample period."""
     q, _, _ = _motion(period, 42.0)
     cycle = find_cycle(q, STEP)
     assert cycle is not None
@@ -34,13 +34,13 @@ def test_a_period_is_found_sharper_than_a_sample(period: float) -> None:
 
 
 def test_a_motion_that_never_returns_has_no_period() -> None:
-    """Harmonics whose common period is longer than the log are no repetition."""
+    """Harmonics with a period longer than the log are no repetition."""
     q, _, _ = _motion(100.0, 60.0)
     assert find_cycle(q, STEP) is None
 
 
 def test_a_period_is_found_behind_an_approach() -> None:
-    """An approach that does not repeat, before four repetitions, is left out of the cycle."""
+    """An approach before the repetitions is left out of the cycle."""
     q, _, _ = _motion(8.0, 32.0)
     approach = np.linspace(0, 1, 1000)[:, None] ** 2 * (q[0] - 0.5) + 0.5 * np.linspace(0, 1, 1000)[:, None] ** 2
     cycle = find_cycle(np.vstack([approach, q]), STEP)
@@ -50,7 +50,7 @@ def test_a_period_is_found_behind_an_approach() -> None:
 
 
 def test_the_projection_is_free_of_encoder_noise() -> None:
-    """Accelerations of the projection err by less than a hundredth of those of differences of the counted positions."""
+    """Acceleration errors of the projection are below a hundredth of those of finite differences."""
     q, dq, ddq = _motion(10.0, 60.0)
     count = 2 * np.pi / 2**17
     counted = np.round(q / count) * count
@@ -69,7 +69,7 @@ def test_the_projection_is_free_of_encoder_noise() -> None:
 @pytest.mark.parametrize("period", [10.0, 7.3219])
 @pytest.mark.parametrize("rounded", [True, False])
 def test_the_noise_of_the_mean_over_repetitions_is_told(period: float, rounded: bool) -> None:
-    """Its density is that of the error, within a third: an eighth of a single one's, but rounded alike it stays."""
+    """The noise density of the mean is estimated to a third, also if rounding is the same in all repetitions."""
     q, _, _ = _motion(period, 8 * period)
     count = 2 * np.pi / 2**17
     noise = count * np.random.default_rng(1).standard_normal(q.shape)
@@ -77,6 +77,6 @@ def test_the_noise_of_the_mean_over_repetitions_is_told(period: float, rounded: 
     cycle = find_cycle(counted, STEP)
     assert cycle is not None
     _, _, density = project_on_harmonics(counted, STEP, cycle)
-    # Where repetitions begin between samples each is rounded anew.
+    # If repetitions begin between samples, each is rounded differently.
     repeats = 1 if rounded and period == 10.0 else cycle.count
     assert density == pytest.approx(2 * STEP * (counted - q).var(axis=0) / repeats, rel=1 / 3)

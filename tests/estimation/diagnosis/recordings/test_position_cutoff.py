@@ -1,4 +1,4 @@
-"""Specification of the frequency up to which positions are motion."""
+"""Tests of the frequency up to which positions are motion."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from robots.signals import Log
 
 
 def smeared(log: Log, size: float) -> Log:
-    """A log whose positions have noise with a memory of 50 samples: its power falls with frequency, as motion's."""
+    """Adds position noise that is correlated over 50 samples, so that its spectrum falls like that of motion."""
     rng = np.random.default_rng(0)
     noise = lfilter([np.sqrt(1 - 0.98**2)], [1, -0.98], rng.standard_normal(log.q.shape), axis=0)
     return replace(log, q=log.q + size * noise)
@@ -28,13 +28,13 @@ def smeared(log: Log, size: float) -> Log:
 
 @pytest.fixture(scope="module")
 def logs(arm_plant: Callable, fourier_motion: Callable, arm: Robot) -> tuple[Log, Log]:
-    """A log with a fine encoder, and the same with coloured noise of half a milliradian."""
+    """Returns a log with a fine encoder, and the same with coloured position noise of 0.5 mrad."""
     log = simulate(arm_plant(torque_noise=0.02), fourier_motion(arm, 4))
     return log, smeared(log, 5e-4)
 
 
 def test_coloured_noise_is_kept_out_of_the_acceleration(arm: Robot, logs: tuple[Log, Log], fourier_motion) -> None:
-    """The acceleration's error is less than a third of what the spectrum's floor alone lets it be."""
+    """With coloured noise, the acceleration error is less than a third of that with the cut-off from the spectrum."""
     noisy = logs[1]
     prepared = prepare(arm, noisy)
     spectra = Spectra.of(prepared.positions)
@@ -52,12 +52,12 @@ def test_coloured_noise_is_kept_out_of_the_acceleration(arm: Robot, logs: tuple[
 
 
 def test_a_good_encoder_keeps_its_band(arm: Robot, logs: tuple[Log, Log]) -> None:
-    """Positions that spoil nothing are not low-passed further."""
+    """With a good encoder the cut-off is not lowered."""
     assert select_position_cutoff(arm, [prepare(arm, logs[0])], np.full(2, 40.0)) == np.inf
 
 
 def test_an_elastic_gear_is_no_noise(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:
-    """What an effect of 5 % leaves of the base model is not taken for noise of the positions."""
+    """A residual of 5 % by an effect does not count as position noise."""
     log = simulate(arm_plant(torque_noise=0.02), fourier_motion(arm, 5))
     late = replace(log, tau=np.column_stack([np.interp(log.t - 0.01, log.t, x) for x in log.tau.T]))
     assert select_position_cutoff(arm, [prepare(arm, late)], np.full(2, 40.0)) == np.inf

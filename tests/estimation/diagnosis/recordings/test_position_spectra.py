@@ -1,4 +1,4 @@
-"""Specification of what is motion and what an encoder's noise, on even samples and on others."""
+"""Tests of the separation of motion from encoder noise, for even and uneven samples."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PERIOD = 0.004
 
 
 def _logged(lost: float, jitter: float = 0.0) -> Resampled:
-    """A minute of motion up to 8 Hz, with white noise, without a share of its rows, or with a jitter of its times."""
+    """Builds a minute of motion up to 8 Hz with white noise, with lost rows or jitter of the times."""
     rng = np.random.default_rng(4)
     t = PERIOD * np.arange(15_000)
     t = np.sort(t + jitter * PERIOD * rng.uniform(-0.5, 0.5, t.shape))
@@ -28,24 +28,24 @@ def _logged(lost: float, jitter: float = 0.0) -> Resampled:
 
 @pytest.mark.parametrize(("lost", "jitter"), [(0.0, 0.0), (0.05, 0.0), (0.15, 0.0), (0.0, 0.6)])
 def test_lost_rows_and_jitter_make_no_motion_of_noise(lost: float, jitter: float) -> None:
-    """The cut-off is beyond the motion, and no octave beyond; the floor is the noise's, of the rows that are there.
+    """The cut-off is within an octave above the motion, and the floor is the noise density of the remaining rows.
 
-    Of fast motion a spline over lost rows errs, which counts as noise. Uncorrected, less than half of it would be seen.
+    The error of a spline over lost rows counts as noise.
     """
     positions = _logged(lost, jitter)
     spectrum = Spectra.of(positions).of_positions(positions.q[:, 0])
     assert 8.0 < spectrum.cutoff() < 16.0
-    # White noise of a standard deviation has 2 s^2 T up to half of the rate; fewer rows have as much up to less.
+    # White noise with standard deviation s has the density 2 s^2 T up to half of the sample rate.
     assert spectrum.floor == pytest.approx(2 * NOISE**2 * PERIOD / (1 - lost), rel=0.3, abs=0.0)
 
 
 def test_even_samples_are_taken_as_they_are() -> None:
-    """No noise is drawn for a log whose rows are the grid."""
+    """A log with even samples needs no noise simulation."""
     assert not len(Spectra.of(_logged(0.0)).f)
 
 
 def test_between_two_samples_a_joint_may_have_turned_round() -> None:
-    """Rows between the same two samples are as unsure as the least sure of them; samples stay as they are."""
+    """Interpolated rows have an unknown sign if one of the neighbouring samples has; samples do not change."""
     unsure = np.zeros((8, 2), dtype=bool)
     unsure[2, 0] = unsure[5, 1] = True
     known = Directions(unsure, unsure.copy(), np.zeros(2), np.zeros(2))
@@ -53,16 +53,16 @@ def test_between_two_samples_a_joint_may_have_turned_round() -> None:
     spread = known.spread(np.array([-1, 1, 1, 1, -1, -1, 2, -1]))
     assert np.flatnonzero(spread.sign_unknown[:, 0]).tolist() == [1, 2, 3]
     assert np.flatnonzero(spread.sign_unknown[:, 1]).tolist() == [5]
-    # What is told by the velocity must have been sampled.
+    # A sign from the velocity counts in sampled rows only.
     assert np.flatnonzero(spread.sign_known_from_velocity[:, 0]).tolist() == [2]
     assert known.spread(np.full(8, -1)) is known
 
 
 @pytest.mark.parametrize("noise", [1e-7, 1e-6, 1e-5])
 def test_a_motion_that_ends_at_an_edge_keeps_its_last_sine(noise: float) -> None:
-    """Of sines up to 6.6 Hz a low-pass loses less than it keeps of the encoder's noise, or a per cent in acceleration.
+    """For sines up to 6.6 Hz the cut-off loses less than noise adds, or less than 1 % of the acceleration.
 
-    One where the spectrum meets the noise, at 7 Hz, would lose a quarter of the last sine.
+    A cut-off at 7 Hz, where the spectrum meets the noise, would lose a quarter of the last sine.
     """
     rng = np.random.default_rng(2)
     t = PERIOD * np.arange(10_000)

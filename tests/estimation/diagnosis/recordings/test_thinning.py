@@ -1,4 +1,4 @@
-"""Specification of logs that are thinned: what jumps between samples goes the way of their torque."""
+"""Tests of thinned logs: signals that change between samples are filtered like the torque."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from robots.terms.effects import EFFECTS
 
 @pytest.fixture
 def thin_log(arm: Robot, arm_log: Callable[..., Log], monkeypatch: pytest.MonkeyPatch) -> Recording:
-    """A log of the arm, every second row kept."""
+    """Returns a recording of the arm with every second row."""
     log = arm_log(torque_noise=0.02)
     monkeypatch.setattr(log_reading, "MOST_ROWS", int(0.6 * len(log.t)))
     return build_recording(arm, [log])
@@ -31,7 +31,7 @@ def thin_log(arm: Robot, arm_log: Callable[..., Log], monkeypatch: pytest.Monkey
 
 @pytest.mark.parametrize("stride", [2, 3, 4, 8])
 def test_what_bands_let_through_passes_and_nothing_falls_onto_it(stride: int) -> None:
-    """Sines up to a fifth of the new rate keep their size to 2 %; those that would pass for them, a hundredth of it."""
+    """Sines up to a fifth of the new rate pass to 2 %, and their aliases are damped to a hundredth."""
     rows = np.arange(400 * stride)
     inner = slice(20 * stride, -20 * stride)
     for f in np.linspace(0.01, 0.2, 20):
@@ -41,7 +41,7 @@ def test_what_bands_let_through_passes_and_nothing_falls_onto_it(stride: int) ->
 
 
 def test_each_log_is_thinned_by_itself_and_straight_lines_stay_what_they_are() -> None:
-    """To their ends, whatever the other log is; a kick is seen two new rows off, and no farther."""
+    """Each log is thinned separately, straight lines are exact to its ends, and an impulse has a bounded reach."""
     rows = np.arange(41.0)
     both = np.concatenate([3.0 + rows[:20], 100.0 - rows[20:]])[:, None] * np.ones((1, 2))
     np.testing.assert_allclose(decimate(both, (0, 20), 2), np.concatenate([both[:20:2], both[20::2]]))
@@ -54,7 +54,7 @@ def test_each_log_is_thinned_by_itself_and_straight_lines_stay_what_they_are() -
 
 
 def test_rows_are_those_of_the_finer_recording(thin_log: Recording) -> None:
-    """Motion is that of every second row; a row's direction is in doubt where that of one beside is."""
+    """The motion is that of every second row; a row's sign is unknown if that of a neighbouring row is."""
     finer = thin_log.full_rate
     assert finer is not None
     assert thin_log.stride == 2
@@ -67,7 +67,7 @@ def test_rows_are_those_of_the_finer_recording(thin_log: Recording) -> None:
 
 
 def test_parts_of_a_thinned_log_keep_all_their_samples(thin_log: Recording) -> None:
-    """Cut and joined again."""
+    """Cutting and joining a thinned recording keeps its samples at full rate."""
     first, second = cut_recording(thin_log, slice(3, 1000)), cut_recording(thin_log, slice(1000, 1800))
     for part in (first, second):
         assert part.full_rate is not None
@@ -80,7 +80,7 @@ def test_parts_of_a_thinned_log_keep_all_their_samples(thin_log: Recording) -> N
 
 
 def test_signs_and_what_turns_round_are_low_passed_as_the_torque_is(arm: Robot, thin_log: Recording) -> None:
-    """Friction of every sample, filtered and thinned; so are the columns of an effect that passes within some rows."""
+    """Friction, signs and fast effects are evaluated at full rate, filtered and thinned."""
     finer = thin_log.full_rate
     assert finer is not None
     base = base_parameters(arm, "coulomb-viscous", (0.001, 0.001))
@@ -99,7 +99,7 @@ def test_signs_and_what_turns_round_are_low_passed_as_the_torque_is(arm: Robot, 
 
 
 def test_torque_of_other_effects_is_known_at_all_samples(arm: Robot, thin_log: Recording) -> None:
-    """What they add to the torque is late as that is, in thinned logs too."""
+    """A delay also acts on the torque of other effects in thinned logs."""
     base = base_parameters(arm, "coulomb-viscous", (0.001, 0.001))
     now = build_situation(thin_log, base.model, np.full(base.size, 0.7), base.independent)
     slow = 5.0 * np.sin(2.0 * thin_log.t)[:, None] * np.ones((1, arm.n))
@@ -112,7 +112,7 @@ def test_torque_of_other_effects_is_known_at_all_samples(arm: Robot, thin_log: R
 
 
 def test_rows_at_reversals_fit_where_signs_are_those_of_all_samples(arm: Robot, thin_log: Recording) -> None:
-    """Torque of a sharp friction, rows at reversals counted: the sign of every second row leaves far more of it."""
+    """With signs at full rate the residual of sharp friction is less than a tenth of that with thinned signs."""
     finer = thin_log.full_rate
     assert finer is not None
     model = base_parameters(arm, "coulomb-viscous", (0.001, 0.001)).model
@@ -132,7 +132,7 @@ def test_rows_at_reversals_fit_where_signs_are_those_of_all_samples(arm: Robot, 
 def test_presliding_of_a_thinned_log_is_found(
     arm: Robot, arm_log: Callable[..., Log], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Over a tenth of a milliradian: some rows at each reversal tell it, and every second of them would not."""
+    """Presliding over 0.1 mrad is found in a thinned log."""
     log = arm_log(torque_noise=0.02)
     monkeypatch.setattr(log_reading, "MOST_ROWS", int(0.6 * len(log.t)))
     model = base_parameters(arm, "coulomb-viscous", (0.001, 0.001)).model
@@ -151,7 +151,7 @@ def test_presliding_of_a_thinned_log_is_found(
 def test_torque_that_is_cut_off_in_a_thinned_log_is_found(
     arm: Robot, arm_log: Callable[..., Log], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With its limit: the flat tops stay flat when the torque is low-passed."""
+    """Clipping is found in a thinned log, with its limit."""
     log = arm_log(torque_noise=0.02)
     monkeypatch.setattr(log_reading, "MOST_ROWS", int(0.6 * len(log.t)))
     most = float(np.quantile(np.abs(log.tau[:, 0]), 0.95))

@@ -1,4 +1,4 @@
-"""Specification of logs that no base model explains."""
+"""Tests of logs that no base model explains."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from robots.signals import Log
 
 @pytest.fixture(scope="module")
 def logs(arm: Robot, arm_log: Callable[..., Log]) -> list[Log]:
-    """Three logs of unlike motions, a minute apart."""
+    """Returns three logs of different motions, a hundred seconds apart."""
     found: list[Log] = []
     for seed in range(3):
         log = arm_log(seed=seed, motion_seed=seed)
@@ -27,7 +27,7 @@ def logs(arm: Robot, arm_log: Callable[..., Log]) -> list[Log]:
 
 
 def _ringing(log: Log, joints: Sequence[int]) -> Log:
-    """The log with a torque on some joints that does not follow from its motion."""
+    """Returns the log with a torque on some joints that does not depend on its motion."""
     tau = np.array(log.tau)
     for j in joints:
         tau[:, j] = tau[:, j].std() * np.sign(np.sin(2 * np.pi * 1.7 * log.t + j))
@@ -40,7 +40,7 @@ def _found(arm: Robot, logs: Sequence[Log]) -> dict[int, float]:
 
 @pytest.mark.slow
 def test_only_a_log_that_no_parameters_explain_is_hopeless(arm: Robot, logs: list[Log]) -> None:
-    """A torque that rings on both joints is; that of one joint alone, or of good logs, is not."""
+    """A log is unusable if no joint's torque is explained; one unexplained joint is not enough."""
     assert not _found(arm, logs)
     assert not _found(arm, [logs[0], _ringing(logs[1], [0]), logs[2]])
     found = _found(arm, [logs[0], _ringing(logs[1], [0, 1]), logs[2]])
@@ -49,14 +49,14 @@ def test_only_a_log_that_no_parameters_explain_is_hopeless(arm: Robot, logs: lis
 
 
 def test_where_all_are_hopeless_none_is_left_out(arm: Robot, logs: list[Log]) -> None:
-    """A log alone, or logs that all ring, are diagnosed as they are: nothing better is at hand."""
+    """A single log is never left out, and neither are logs that are all unusable."""
     assert not _found(arm, [_ringing(logs[0], [0, 1])])
     assert not _found(arm, [_ringing(log, [0, 1]) for log in logs])
 
 
 @pytest.mark.slow
 def test_a_diagnosis_says_what_it_left_out(arm: Robot, logs: list[Log]) -> None:
-    """Given in any order, the other two are diagnosed as if the third were not there."""
+    """A diagnosis leaves out an unusable log, with a note, and gives the result of the others."""
     spoiled = diagnose(arm, [_ringing(logs[2], [0, 1]), logs[0], logs[1]], candidates=["stribeck"])
     alone = diagnose(arm, logs[:2], candidates=["stribeck"])
     assert any("Log 3 (run2) is left out" in note for note in spoiled.notes)

@@ -1,4 +1,4 @@
-"""Specification of the notes on a diagnosis that need no robot."""
+"""Tests of notes on a diagnosis."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from estimation.diagnosis.results.notes import LITTLE, beside_larger, turning_jo
 
 
 def test_joints_that_the_extension_makes_worse_are_told() -> None:
-    """By more than a tenth of their error and a thousandth of the torque; never joints that nobody has seen."""
+    """Joints whose held-out error grows by more than a tenth and 0.1 % of the torque are noted; others are not."""
     before = np.array([0.050, 0.050, 0.0005, 0.050, np.nan])
     after = np.array([0.051, 0.074, 0.0012, 0.080, np.nan])
     (note,) = worse_joints(before, after)
@@ -25,7 +25,7 @@ def test_joints_that_the_extension_makes_worse_are_told() -> None:
 
 
 def test_rows_at_rest_explain_an_error_that_is_far_larger_with_them() -> None:
-    """Where several rows do not count and the error of all is twice that of those that do, their share is told."""
+    """A note states the fraction of rows that do not count if the error over all rows is twice as large."""
     counts = np.ones((1000, 4), dtype=bool)
     counts[:400, 0] = counts[:350, 1] = counts[:400, 2] = counts[:2, 3] = False
     after = np.array([0.025, 0.025, 0.025, 0.025])
@@ -38,7 +38,7 @@ def test_rows_at_rest_explain_an_error_that_is_far_larger_with_them() -> None:
 
 
 def test_a_name_of_which_nothing_is_determined_is_no_more_than_likely() -> None:
-    """Where its gain is not sure either; not of one with a parameter that is determined, nor without a name."""
+    """A finding without a determined parameter or a significant gain is noted as the most likely cause only."""
 
     def finding(effect: str, *determined: bool) -> Finding:
         parameters = tuple(
@@ -57,10 +57,10 @@ def test_a_name_of_which_nothing_is_determined_is_no_more_than_likely() -> None:
 
 
 def test_what_is_as_small_as_formulas_leave_is_told_all_the_same() -> None:
-    """Beside the name that does most there, with the share; nothing where there is none, or nothing beside it."""
+    """An effect that is small beside a stronger one on its joint is noted, with its share of that one's gain."""
     step, delay, friction, spring = (
         SimpleNamespace(
-            hypothesis=SimpleNamespace(label=label, effect=SimpleNamespace(shared_coefficient=label == "a delay")),
+            hypothesis=SimpleNamespace(label=label, effect=SimpleNamespace(delays_all_torque=label == "a delay")),
             group=SimpleNamespace(joints=tuple(gains)),
             gain_on=lambda joints, gains=gains: sum(gains.get(j, 0.0) for j in joints),
         )

@@ -1,4 +1,4 @@
-"""Specification of what a finding says of its parameters and of its place."""
+"""Tests of the texts and intervals of a finding's parameters."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from robots.terms.effects import EFFECTS
         ("load_dependent_friction", 0, 0.8, (0.7, 0.9), False),
         ("friction_step", 0, 2000.0, (1999.9, 2000.1), False),
         ("friction_step", 0, 2.0, (1.7, 2.3), True),
-        # A dead centre is a place: a fifth of one near zero is nothing.
+        # A dead centre is a position, so its size is not relative to zero.
         ("spring", 1, 0.01, (-0.1, 0.1), False),
-        # Of what the data say nothing, the error itself tells.
+        # An infinite interval is stated elsewhere.
         ("thermal_friction", 0, 113.0, (-np.inf, np.inf), False),
     ],
 )
 def test_a_fifth_of_a_value_or_of_a_second(
     effect: str, shape: int, value: float, interval: tuple[float, float], roughly: bool
 ) -> None:
-    """A nonlinear parameter is known roughly where its interval is wider, a moment by the clock."""
+    """A nonlinear parameter is rough if its interval exceeds a fifth of its value; for a time, 0.2 s."""
     assert _roughly(EFFECTS[effect].shapes[shape], value, interval) is roughly
 
 
@@ -46,17 +46,17 @@ def test_a_fifth_of_a_value_or_of_a_second(
         ("presliding_hysteresis", 0, 0.2, True),
         ("presliding_hysteresis", 0, 1e-5, True),
         ("presliding_hysteresis", 0, 0.19, False),
-        ("backlash", 1, 0.3, False),  # what it is where nothing is said
-        ("torque_constant_saturation", 0, 1.0, False),  # a power, and no size
+        ("backlash", 1, 0.3, False),  # the default value
+        ("torque_constant_saturation", 0, 1.0, False),  # an exponent, not a size
     ],
 )
 def test_a_size_at_its_bound_is_not_determined(effect: str, shape: int, value: float, stopped: bool) -> None:
-    """However narrow its interval is, cut at the bound as it is."""
+    """A size at its bound is not determined, for any interval."""
     assert _stopped(EFFECTS[effect].shapes[shape], value) is stopped
 
 
 def test_an_interval_holds_what_machines_may_have(arm: Robot) -> None:
-    """What the data leave open below zero is no stiffness; a value that is rough stays so, however little is left."""
+    """Intervals are cut at physical bounds, and a rough value stays rough after that."""
     hypothesis = Hypothesis(EFFECTS["stribeck"], 1)
     member = FittedEffect(hypothesis, (0.05, 1.0), None, 100.0, np.array([7.9]), 3, 1.0)  # type: ignore[arg-type]
     extension = Extension(
@@ -75,7 +75,7 @@ def test_an_interval_holds_what_machines_may_have(arm: Robot) -> None:
 
 @pytest.mark.parametrize(("error", "told"), [(0.02, True), (0.3, False)])
 def test_levers_that_are_perhaps_none_have_no_dead_centre(arm: Robot, error: float, told: bool) -> None:
-    """An angle is told, however narrow its interval, where the ratio beside it is surely more than zero."""
+    """A dead centre is determined only if the lever ratio is significantly above zero."""
     coefficients = np.array([400.0, -300.0, 0.0, 900.0])
     member = FittedEffect(Hypothesis(EFFECTS["spring"], 1), (0.3, -2.9), None, 100.0, coefficients, 6, 1.0)  # type: ignore[arg-type]
     covariance = np.diag([4.0, 3.0, 0.0, 9.0, error, 0.1]) ** 2
@@ -90,7 +90,7 @@ def test_levers_that_are_perhaps_none_have_no_dead_centre(arm: Robot, error: flo
 
 
 def test_what_is_no_part_of_the_model_says_so() -> None:
-    """A free function that errs, and a name that unseen data refuted: neither may be taken for a cause."""
+    """A rejected finding is reported as unexplained, and its text says that the model does not contain it."""
     finding = Finding(
         effect="joint_elasticity",
         joint=2,
@@ -110,12 +110,12 @@ def test_what_is_no_part_of_the_model_says_so() -> None:
 
 
 def finding_of(pattern: str, finding: Finding) -> Finding:
-    """The same as an unexplained pattern."""
+    """Returns the finding as an unexplained pattern."""
     return replace(finding, effect="unexplained", pattern=pattern)
 
 
 def test_a_gain_elsewhere_is_told_with_its_joints() -> None:
-    """What is wrong with one joint and shows on others is told on those; on its own it needs no word."""
+    """A gain on other joints than the finding's own is stated with these joints."""
     gain = Gain(nrmse_before=0.02, nrmse_after=0.01, ci95=(0.0, 0.02))
     bare: Any = {"effect": "encoder_offset", "parameters": (), "p_value": 0.0, "delta_bic": 9.0, "rivals": ()}
     bare |= {"sentence": "", "visible": 1.0}
@@ -131,14 +131,14 @@ def test_a_gain_elsewhere_is_told_with_its_joints() -> None:
     ("falls", "believed"),
     [
         ((3.0, 1.0), True),
-        ((-1.0, 2.0), True),  # slow motion rubs more, fast motion less
+        ((-1.0, 2.0), True),  # more friction at low speed, less at high speed
         ((-3.3, -1.6), False),
-        ((-3.3, 0.2), False),  # more at all speeds of a joint of 10 rad/s
+        ((-3.3, 0.2), False),  # more friction at all speeds of a joint of 10 rad/s
         ((3.3, -0.2), True),
     ],
 )
 def test_what_warms_up_gains_no_friction(arm: Robot, effect: str, falls: tuple[float, float], believed: bool) -> None:
-    """One kind of friction may rise while the other falls; where it rises at all speeds, it is no heat."""
+    """Coulomb or viscous friction may rise with heat, but not the total friction at all speeds."""
     shape = tuple(400.0 if own.name == "time_constant" else 0.0 for own in EFFECTS[effect].shapes)
     fast = replace(arm, limits=replace(arm.limits, velocity=np.full(arm.n, 10.0)))
     assert EFFECTS[effect].is_plausible(fast, 1, np.array(falls), shape) is believed

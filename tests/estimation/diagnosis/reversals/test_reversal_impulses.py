@@ -1,4 +1,4 @@
-"""Specification of what changes of acceleration tell: beside reversals, where they are not known, and elsewhere."""
+"""Tests of effects by changes of acceleration, near reversals and elsewhere."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ ELASTIC, PLAY = Hypothesis(EFFECTS["joint_elasticity"], 2), Hypothesis(EFFECTS["
 
 @pytest.fixture(scope="module")
 def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
-    """A log of the arm without effects."""
+    """Returns a recording of the arm without effects."""
     return build_recording(arm, [arm_log(torque_noise=0.02)])
 
 
 @pytest.fixture(scope="module")
 def problem(recording: Recording, pose_arm: Callable[..., Problem]) -> Problem:
-    """The same, white, with the frequencies above its bands."""
+    """Returns the whitened problem with the frequencies above its bands."""
     return pose_arm(replace(recording, floor=np.full(2, 1e-11), cycles=(None,)), wider=MAX_HIGH_BAND_ERROR)
 
 
@@ -46,23 +46,23 @@ def _elastic(problem: Problem) -> FittedEffect:
 
 
 def _with(problem: Problem, member: FittedEffect, calm: float, beside: float) -> Problem:
-    """The same data with so many times an effect's torque in calm rows and beside reversals, and nothing else."""
+    """Returns the data of an effect with given sizes far from and near reversals, and nothing else."""
     return _sized(problem, member, np.where(problem.far_from_reversals, calm, beside))
 
 
 def _sized(problem: Problem, member: FittedEffect, sizes: np.ndarray) -> Problem:
-    """The same data with so many times an effect's torque in each white row (N,), and nothing else."""
+    """Returns the data of an effect with a given size in each whitened row (N,), and nothing else."""
     white = np.zeros_like(problem.white)
     for j, part in zip(member.group.joints, member.group.columns, strict=True):
         white[:, j] = sizes * (part @ member.coefficients)
     own = white @ problem.whitening.precision
     base = sum(problem.weighted_base_columns[j].T @ white[:, j] for j in range(problem.n))
-    # Less what the base model takes of it: <Q, r> is zero for a residual.
+    # Subtract the projection on the base model, because <Q, r> is zero for a residual.
     return replace(problem, residual=own - np.einsum("jnb,b->nj", problem.weighted_base_columns, base))
 
 
 def test_rows_beside_reversals_and_the_ends_of_rests_are_not_calm(recording: Recording) -> None:
-    """All joints are disturbed by one that turns round, for 50 ms before and after; while one rests, none is."""
+    """A reversal disturbs all joints for 50 ms before and after it; rows within a rest are undisturbed."""
     unsure = np.zeros_like(recording.sign_unknown)
     unsure[300:304, 0] = True
     unsure[1000:1400, 1] = True
@@ -79,7 +79,7 @@ def test_rows_beside_reversals_and_the_ends_of_rests_are_not_calm(recording: Rec
 def test_reversals_of_one_motion_in_several_logs_are_of_one_kind(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable[..., Motion], pose_arm: Callable[..., Problem]
 ) -> None:
-    """Played thrice they have the kinds of one log; another motion adds its own."""
+    """A repeated motion has the kinds of reversals of one log, and another motion adds its own."""
     plant = arm_plant(torque_noise=0.02)
 
     def kinds(*motions: int) -> int:
@@ -95,7 +95,7 @@ def test_reversals_of_one_motion_in_several_logs_are_of_one_kind(
 
 
 def test_the_parts_of_a_torque_are_the_whole(problem: Problem) -> None:
-    """Calm rows and others have the products of the group together, beside the base model."""
+    """Rows far from and near reversals have together the products of the whole group."""
     member = _elastic(problem)
     parts = problem.split(member.group, member.coefficients, problem.far_from_reversals)
     assert parts.cross.sum() == pytest.approx(float(member.coefficients @ member.group.cross), rel=1e-4)
@@ -106,13 +106,13 @@ def test_the_parts_of_a_torque_are_the_whole(problem: Problem) -> None:
 
 @pytest.mark.parametrize("size", [0.5, 1.0, 1.3])
 def test_an_effect_that_is_alike_everywhere_counts_whole(problem: Problem, size: float) -> None:
-    """Whatever the base model takes of its parts, each tells the same size of the whole."""
+    """An effect of equal size in all rows counts in full."""
     member = _elastic(problem)
     assert _reversal_scatter(_with(problem, member, size, size), member, accept(problem, ())) == 1.0
 
 
 def test_kicks_without_the_rest_are_no_effect(problem: Problem) -> None:
-    """What is there beside reversals alone is dropped where calm rows would show it; a part of it counts for less."""
+    """An effect that shows near reversals only is rejected; one with unequal sizes counts less."""
     member = _elastic(problem)
     nothing = accept(problem, ())
     parts = score(problem, problem.split(member.group, member.coefficients, problem.far_from_reversals), nothing)
@@ -123,7 +123,7 @@ def test_kicks_without_the_rest_are_no_effect(problem: Problem) -> None:
 
 @pytest.mark.parametrize(("aside", "told"), [(1.0, True), (0.0, False), (0.3, False)])
 def test_a_delay_must_be_told_aside_from_the_kicks_of_a_play(problem: Problem, aside: float, told: bool) -> None:
-    """What is late only where a link lands is the drives' answer to that, however much it explains."""
+    """A delay that shows only near the impacts of backlash is not supported."""
     shape = PLAY.effect.grid(problem.situation, 2)[0]
     play = FittedEffect(PLAY, shape, problem.measured(PLAY, shape), 1e3, np.array([1e-3]), 4, 1.0)
     torque = np.max([np.abs(part @ play.coefficients) for part in play.group.columns], axis=0)
@@ -136,12 +136,12 @@ def test_a_delay_must_be_told_aside_from_the_kicks_of_a_play(problem: Problem, a
     late = FittedEffect(lag, at, group, 1e4, np.array([50.0 / np.sqrt(group.gram[0, 0])]), 1, 1.0)
     data = _sized(problem, late, np.where(near, 1.0, aside))
     assert delay_supported_away_from_impacts(data, late, [play]) is told
-    # Beside nothing that kicks nothing is asked.
+    # Without an effect that causes impacts, no support is required.
     assert delay_supported_away_from_impacts(data, late, [])
 
 
 def test_above_the_bands_play_counts_in_calm_rows(problem: Problem) -> None:
-    """Its columns are zero where a joint turns round, before the base model is projected out."""
+    """Above the bands, the columns of backlash are zero near reversals before the projection off the base model."""
     assert problem.high_band is not None
     upper = problem.high_band
     series = problem.columns_of(PLAY, PLAY.effect.grid(problem.situation, 2)[0])[1][1]
@@ -152,17 +152,17 @@ def test_above_the_bands_play_counts_in_calm_rows(problem: Problem) -> None:
     assert not upper.far_from_reversals.all()
 
     def left(columns: np.ndarray) -> float:
-        """What columns have outside calm rows that no combination of the base model's has there."""
+        """Computes the fraction of columns near reversals that no combination of base columns there explains."""
         there, base = columns[~upper.far_from_reversals], own.base[~upper.far_from_reversals]
         return float(np.linalg.norm(there - base @ np.linalg.lstsq(base, there)[0]) / np.linalg.norm(there))
 
-    # The base model's share, which is orthogonal to what it was taken from, is all that is there.
+    # Near reversals only the projection on the base model is left.
     assert left(calm) < 1e-9
     assert left(whole) > 0.1
 
 
 def test_an_extension_is_fitted_in_the_rows_it_was_found_in(problem: Problem) -> None:
-    """Above the bands, the fit takes play in calm rows too, and a ripple beside it in all."""
+    """Above the bands, backlash is fitted far from reversals, and a ripple in all rows."""
     assert problem.high_band is not None
     play = problem.columns_of(PLAY, PLAY.effect.grid(problem.situation, 2)[0])[1][1]
     ripple = np.cos(40.0 * problem.recording.q[:, 1:])

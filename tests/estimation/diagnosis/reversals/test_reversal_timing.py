@@ -1,4 +1,4 @@
-"""Specification of how late torque is against reversals, by the balance of impulses there."""
+"""Tests of delays measured by the balance of impulses at reversals."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ COUNTS = 2.0**17
 
 @pytest.fixture(scope="module")
 def cases(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, bool], tuple[Case, Robot, Log]]:
-    """Draw a robot with friction fed forward and encoders of 2^17 counts a turn, its torque late or not."""
+    """Draws a robot with encoders of 2^17 counts per turn, with or without a delay."""
     kept: dict[tuple[int, bool], tuple[Case, Robot, Log]] = {}
 
     def build(seed: int, late: bool) -> tuple[Case, Robot, Log]:
@@ -56,7 +56,7 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, bool], tup
 
 @pytest.fixture(scope="module")
 def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
-    """A log of the arm without effects."""
+    """Returns a recording of the arm without effects."""
     return build_recording(arm, [arm_log(torque_noise=0.02)])
 
 
@@ -71,9 +71,9 @@ def _timed(robot: Robot, log: Log) -> ReversalTiming:
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "late"), [(1006, True), (1011, True), (1011, False)])
 def test_torque_that_is_late_is_told_by_each_joints_reversals(cases: Callable, seed: int, late: bool) -> None:
-    """Within four of their errors, and by all of them within three: one in a thousand true ones would fail.
+    """Each joint's delay is within four standard errors, and their mean within three, which fails once in a thousand.
 
-    These encoders tell reversals of low-passed motion to some milliseconds only.
+    With these encoders the reversals of low-passed motion are known to some milliseconds only.
     """
     case, robot, log = cases(seed, late)
     delay = case.effects[0].amount if late else 0.0
@@ -84,13 +84,13 @@ def test_torque_that_is_late_is_told_by_each_joints_reversals(cases: Callable, s
     assert np.abs(away).max() < 4.0
     weights = timing.errors[told] ** -2
     assert abs(weights @ (timing.lags - delay)[told]) < 3.0 * np.sqrt(weights.sum())
-    # Half a millisecond at the worst, where a sample is four.
+    # The error is at most 0.5 ms, with a sample period of 4 ms.
     assert weights.sum() ** -0.5 < 5e-4
 
 
 @pytest.mark.slow
 def test_a_delay_is_named_that_only_reversals_tell(cases: Callable) -> None:
-    """A third of a sample: rows beside reversals do not count, for nobody knows when these joints turn round."""
+    """A delay of a third of a sample is named, although no rows near reversals count."""
     case, robot, log = cases(1006, True)
     diagnosis = diagnose(robot, log, candidates=["time_delay", "thermal_friction"])
     (finding,) = diagnosis.findings
@@ -98,7 +98,7 @@ def test_a_delay_is_named_that_only_reversals_tell(cases: Callable) -> None:
     (delay,) = (p for p in finding.parameters if p.name == "delay")
     assert delay.ci95[0] < case.effects[0].amount < delay.ci95[1]
     assert delay.ci95[1] - delay.ci95[0] < 1.5e-3
-    # Beside the delay that was found first it is told as well as alone.
+    # The estimate is the same beside the delay that was found first.
     timing = _timed(robot, log)
     assert delay.value == pytest.approx(np.average(timing.lags, weights=timing.errors**-2.0), abs=2e-4)
     (note,) = (note for note in diagnosis.notes if "time_delay" in note)
@@ -107,7 +107,7 @@ def test_a_delay_is_named_that_only_reversals_tell(cases: Callable) -> None:
 
 @pytest.mark.slow
 def test_positions_that_say_too_little_of_reversals_say_nothing(cases: Callable) -> None:
-    """Of logs whose positions are not at the rows, of few reversals, and of a joint without friction."""
+    """Without position residuals, with few reversals, or without friction, no delay is measured."""
     _, robot, log = cases(1006, True)
     recording = build_recording(robot, [log])
     baseline, settled = fit_plain(base_parameters(robot, "polynomial", (0.001,) * robot.n), recording)
@@ -130,21 +130,21 @@ def test_positions_that_say_too_little_of_reversals_say_nothing(cases: Callable)
 
 @pytest.mark.parametrize(("cutoff", "step"), [(5.0, 0.004), (20.0, 0.004), (40.0, 0.01), (60.0, 0.001)])
 def test_a_table_is_the_motion_of_a_force_that_a_loop_undoes(cutoff: float, step: float) -> None:
-    """Acceleration integrates to velocity and to position; of a slow force next to nothing is beyond the low-pass."""
+    """The tabulated acceleration integrates to velocity and position, with little energy in the passed band."""
     edges = edges_of(cutoff, step)
     table = ImpulseResponse.of(cutoff, step, edges)
     dx = table.x[1] - table.x[0]
     position, velocity, acceleration = table.values
-    # Where a force begins, differences are off by what it does in one of them.
+    # At the start of a force, the error of finite differences is one step's change.
     off = dx * np.abs(acceleration).max()
     assert np.gradient(position, dx, axis=0)[1:-1] == pytest.approx(velocity[1:-1], abs=off)
     summed = np.cumsum(acceleration, axis=0) * dx
     assert summed - summed[0] == pytest.approx(velocity - velocity[0], abs=2.0 * off)
     assert len(edges) >= 4
     assert acceleration.shape[1] == 2 * (len(edges) - 1) - 2
-    # Between its points a table is straight.
+    # The table is interpolated linearly.
     assert table.at(table.x[5:6] + dx / 2)[0] == pytest.approx((position[5:6] + position[6:7]) / 2)
-    # Its spectrum is that of the whole force, less what passes.
+    # Its spectrum has little energy in the band that passes.
     f = np.fft.rfftfreq(len(table.x), dx)
     power = np.abs(np.fft.rfft(position, axis=0)) ** 2
     slow = low_pass_gain(f, cutoff) > 0.99
@@ -152,7 +152,7 @@ def test_a_table_is_the_motion_of_a_force_that_a_loop_undoes(cutoff: float, step
 
 
 def test_joints_whose_rows_count_are_timed_where_that_tells_far_more(recording: Recording) -> None:
-    """Else the same torque would tell twice."""
+    """A joint whose rows near reversals count is timed only if that is far more accurate, so no data count twice."""
     timing = ReversalTiming(np.array([1e-3, 1e-3]), np.array([2e-4, 2e-4]), np.zeros(2))
     everywhere = np.ones(recording.q.shape, dtype=bool)
     for late, kept in ((1e-3, [True, True]), (1e-4, [False, True])):
@@ -178,7 +178,7 @@ def test_joints_whose_rows_count_are_timed_where_that_tells_far_more(recording: 
 def test_what_reversals_tell_counts_as_one_row_for_each_joint(
     pose_arm: Callable[..., Problem], recording: Recording
 ) -> None:
-    """A delay's squares and products grow by 1 / s^2 and d / s^2 of each joint, a lag's and a spring's by nothing."""
+    """Reversal timing adds 1 / s^2 and d / s^2 per joint to a delay's products, and nothing to other effects."""
     plain = pose_arm(recording)
     timing = ReversalTiming(np.array([2e-3, 3e-3]), np.array([5e-4, np.inf]), np.zeros(2))
     problem = replace(plain, timing=timing)
@@ -193,7 +193,7 @@ def test_what_reversals_tell_counts_as_one_row_for_each_joint(
     delay = Hypothesis(EFFECTS["time_delay"], None)
     told = [per_joint_evidence(p, delay, (2e-3,), accept(p, ())) for p in (plain, problem)]
     assert told[1].gram - told[0].gram == pytest.approx([4e6, 0.0], abs=1e-3 * told[0].gram.max())
-    # The coefficient that is fitted, and the pull on it, are those of rows and reversals together.
+    # The fitted coefficient, and the prior on it, are those of rows and reversals together.
     member = refine(problem, delay, (2e-3,), accept(problem, ()))
     rows = score(plain, plain.measured(delay, member.shape), accept(plain, ()))
     both = float((rows.cross + 2e-3 * 4e6)[0] / (rows.gram[0, 0] + 4e6))
@@ -207,7 +207,7 @@ def test_what_reversals_tell_counts_as_one_row_for_each_joint(
 def test_reversals_of_a_thinned_log_are_timed_by_all_its_samples(
     cases: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A low-pass before thinning spreads what turns round; as the samples tell it, it stays where it is."""
+    """Reversals of a thinned log are timed at full rate, with the same delays."""
     case, robot, log = cases(1006, True)
     plain = _timed(robot, log)
     monkeypatch.setattr(log_reading, "MOST_ROWS", 8000)
@@ -219,7 +219,7 @@ def test_reversals_of_a_thinned_log_are_timed_by_all_its_samples(
     assert told.sum() >= 3
     assert np.abs((thinned.lags - case.effects[0].amount) / thinned.errors)[told].max() < 4.0
     both = told & np.isfinite(plain.errors)
-    # The base model is another, fitted to half of the rows: how sharp its signs are is another chance of the noise.
+    # The base model is fitted to half of the rows, so the width of its sign may differ by chance.
     assert np.all(np.abs(thinned.lags - plain.lags)[both] < np.hypot(plain.errors, thinned.errors)[both])
     monkeypatch.setattr(log_reading, "MOST_FINE", 10_000)
     assert build_recording(robot, [log]).full_rate is None

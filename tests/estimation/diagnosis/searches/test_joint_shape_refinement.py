@@ -1,4 +1,4 @@
-"""Specification of effects on one joint that are refined together."""
+"""Tests of the joint refinement of several effects on one joint."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SHARE = 0.12
 
 @pytest.fixture(scope="module")
 def problem(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]) -> Problem:
-    """Joint 2 with a gear that loses alike both ways, and iron that saturates by the square of the torque."""
+    """Returns a log of joint 2 with load-dependent friction and quadratic saturation of the torque constant."""
     recording = build_recording(arm, [arm_log(torque_noise=0.01)])
     situation = pose_arm(recording).situation
     top = float(np.abs(situation.torque[:, 1]).max())
@@ -35,7 +35,7 @@ def problem(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Pro
 
 
 def test_together_they_leave_the_valley_in_which_one_does_what_the_other_should(problem: Problem) -> None:
-    """Alone, the gear seems to lose less when driven back; beside the iron refined so, too: both are told together."""
+    """Joint refinement finds both true shapes, where refining one effect after the other does not."""
     alone = refine(problem, LOAD, (1.0, 0.0), accept(problem, ()))
     assert alone.shape[0] < 0.8
     second = refine(problem, IRON, IRON.effect.grid(problem.situation, 2)[0], accept(problem, (alone.group,)))
@@ -44,12 +44,12 @@ def test_together_they_leave_the_valley_in_which_one_does_what_the_other_should(
     assert iron.shape[0] == pytest.approx(2.0, abs=0.2)
     both = accept(problem, (load.group, iron.group)).gain
     assert both > accept(problem, (alone.group, second.group)).gain
-    # One that shares its joint with none stays as it is.
+    # An effect that is alone on its joint does not change.
     assert refine_shapes_jointly(problem, [alone]) == [alone]
 
 
 def test_what_explains_far_more_beside_another_form_is_taken_with_it(problem: Problem) -> None:
-    """The second explains little beside the first as that was; what changes nothing of the first is not taken."""
+    """A candidate is added with a refit of the first effect if that increases its gain much; otherwise it is not."""
     alone = refine(problem, LOAD, (1.0, 0.0), accept(problem, ()))
     second = refine(problem, IRON, IRON.effect.grid(problem.situation, 2)[0], accept(problem, (alone.group,)))
     formed = _refit_with_candidate(problem, second, [alone])

@@ -1,4 +1,4 @@
-"""Specification of gains where logs differ in noise, and of the hand that moved a pendulum."""
+"""Tests of gains when logs differ in noise, and of hand guiding on a real pendulum."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STEP = 0.004
 
 
 def test_the_profile_is_that_of_least_squares_with_a_level_for_each_log():
-    """Twice the log-likelihood ratio is sum N_r log(E_r / E_r'), residuals by least squares written out."""
+    """The profile gain is sum N_r log(E_r / E_r') with the squared residuals of each log from plain least squares."""
     rng = np.random.default_rng(0)
     runs = (slice(0, 400), slice(400, 1000))
     base = np.linalg.qr(rng.standard_normal((1000, 5)))[0]
@@ -47,12 +47,12 @@ def test_the_profile_is_that_of_least_squares_with_a_level_for_each_log():
         k * np.log((without[r] ** 2).sum() / (after[r] ** 2).sum()) for k, r in zip(counted, runs, strict=True)
     )
     assert profile_gain(problem, member) == pytest.approx(expected, rel=1e-5)
-    # In units of one noise for both logs the same effect is as good as nothing beside the first log's.
+    # With one noise level for both logs, the gain would be negligible.
     assert expected > 1000
 
 
 def test_logs_have_levels_of_their_own():
-    """A log with a tenth of the noise is white, of unit level, as the others are."""
+    """A log with a tenth of the noise is whitened to unit level like the others."""
     rng = np.random.default_rng(1)
     rows = 5000
     residual = rng.standard_normal((2 * rows, 2)) * [1.0, 3.0]
@@ -78,13 +78,13 @@ def test_logs_have_levels_of_their_own():
     assert whitening.levels[0] / whitening.levels[1] == pytest.approx([10.0, 10.0], rel=0.15)
     white = replace(whitening, weights=None).all(residual)
     half = len(white) // 2
-    # Some 1600 frequencies of the band in each: their mean power scatters by 2.5 %.
+    # Each has some 1600 frequencies in the band: the standard error of their mean power is 2.5 %.
     assert white[:half].std(axis=0) == pytest.approx(white[half:].std(axis=0), rel=0.15)
 
 
 @pytest.mark.slow
 def test_a_hand_that_moved_the_arm_is_found(data):
-    """Of three runs of a pendulum one was moved by hand under gravity compensation: it is named, and its time told."""
+    """In three runs of a pendulum, hand guiding in the third is named, with its time."""
     folder = data("simple_pendulum_dfki")
     logs = on_one_clock([read_log(folder / f"{name}.parquet") for name in ("ddp", "dircol", "gravity_comp")])
     said = diagnose(load_robot(folder / "simple_pendulum.urdf"), logs)
@@ -92,7 +92,7 @@ def test_a_hand_that_moved_the_arm_is_found(data):
     (finding,) = said.findings
     assert finding.effect == "hand_guiding"
     times = {parameter.name: parameter.value for parameter in finding.parameters}
-    # The hand was there during the third run, and moved it in most of that.
+    # The hand acted during most of the third run.
     assert times["start"] > logs[1].t[-1]
     assert times["end"] <= logs[2].t[-1] + 1.0
     assert times["end"] - times["start"] > 0.7 * logs[2].duration
@@ -102,7 +102,7 @@ def test_a_hand_that_moved_the_arm_is_found(data):
 
 @pytest.mark.slow
 def test_logs_that_contradict_each_other_are_not_passed_over(data):
-    """Two short runs that no model fitted to one predicts in the other get a word on that, whatever the verdict."""
+    """Two short runs that contradict each other give a note, whatever the verdict."""
     folder = data("simple_pendulum_dfki")
     logs = on_one_clock([read_log(folder / f"{name}.parquet") for name in ("dircol", "gravity_comp")])
     said = diagnose(load_robot(folder / "simple_pendulum.urdf"), logs)

@@ -1,4 +1,4 @@
-"""Specification of how base model and effects found are brought into line before the next search."""
+"""Tests of the joint refit of base model and effects before the next search."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ LOST = 0.25
 def test_torque_that_is_cut_off_does_not_draw_the_base_model(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
-    """Fitted to a log with flat tops, the base model is too low there; settled, it is right to a hundredth.
+    """After the refit with a torque limit, the base model is accurate in clipped rows, where the first fit is too low.
 
-    The log is cut with its noise, of which the tops then keep what is negative.
+    The log is clipped with its noise, so flat tops contain only negative noise.
     """
     recording = build_recording(arm, [arm_log(torque_noise=0.05)])
     true = recording.tau[:, 0]
@@ -45,7 +45,7 @@ def test_torque_that_is_cut_off_does_not_draw_the_base_model(
     whole = pose_arm(recording)
 
     def error(torque: np.ndarray) -> float:
-        """Root mean square difference from the fit to the whole torque where it was cut off [N m]."""
+        """Computes the RMS difference [N m] in clipped rows from the base model fitted to unclipped torque."""
         return float(np.sqrt(np.mean((torque - whole.situation.torque[:, 0])[cut] ** 2)))
 
     assert error(fitted) > 1.0
@@ -63,7 +63,7 @@ def test_torque_that_is_cut_off_does_not_draw_the_base_model(
 def test_little_is_searched_anew_where_it_changes_what_was_found(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
-    """Tops of the torque, cut off by a seventh, move the base model by less than counts, and the cut by more."""
+    """A small clipping changes the base torque by less than counts, but the clipped part by more."""
     recording = build_recording(arm, [arm_log(torque_noise=0.05)])
     limit = 0.85 * np.abs(recording.tau[:, 0]).max()
     tau = recording.tau.copy()
@@ -82,14 +82,14 @@ def test_little_is_searched_anew_where_it_changes_what_was_found(
 def test_a_search_is_done_again_where_the_slow_part_of_the_noise_is_smaller(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable[..., Motion], pose_arm: Callable[..., Problem]
 ) -> None:
-    """Noise as fast as before, of a quarter less power at rest, is calmer; a change of some per cent is none."""
+    """Noise with a quarter less power at zero frequency has decreased; with a tenth less it has not."""
     problem = pose_arm(
         build_recording(arm, [simulate(arm_plant(torque_noise=0.05), fourier_motion(arm, duration=30.0))])
     )
     known = problem.whitening
 
     def less(power: float) -> Whitening:
-        """The same noise but for what the first joint has at rest."""
+        """Returns the noise model with a given power of the first joint at zero frequency, over the known power."""
         first = known.coefficients[0]
         gain = (1.0 - first.sum()) / np.sqrt(power)
         return replace(known, coefficients=(first + (1.0 - first.sum() - gain) / len(first), *known.coefficients[1:]))

@@ -1,4 +1,4 @@
-"""Specification of the search for several effects: it ends, whatever refining makes of them."""
+"""Tests of the search for several effects: it terminates, whatever the refinement changes."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def _all_but(problem: object, members: Members, i: int) -> tuple[object, ...]:
 def _searching(
     monkeypatch: pytest.MonkeyPatch, polished: Callable[[Members], Members], *, showing: Sequence[Hypothesis]
 ) -> list[set[Hypothesis]]:
-    """Replaces all that is measured: hypotheses that are not in the model show, the first listed most of all.
+    """Replaces all measurements: hypotheses outside the model are significant, the first one most.
 
-    Returns what each scan is given; more than `MOST_SCANS` are taken for a circle.
+    Returns the arguments of each scan. More than `MOST_SCANS` scans count as an endless loop.
     """
     scans: list[set[Hypothesis]] = []
 
@@ -65,13 +65,13 @@ def _selected() -> set[Hypothesis]:
 
 
 def test_effects_are_added_while_they_show(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where refining drops none, all that show are found."""
+    """If the refinement drops nothing, all significant effects are found."""
     _searching(monkeypatch, lambda members: members, showing=(A, B, C))
     assert _selected() == {A, B, C}
 
 
 def test_what_the_others_make_unnecessary_is_not_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """B goes as soon as A is refined beside it, shows again, and does not keep C from being found."""
+    """A dropped effect that becomes significant again is not tried again, and does not prevent another one."""
 
     def without_b(members: Members) -> Members:
         return [m for m in members if m.hypothesis != B]
@@ -82,7 +82,7 @@ def test_what_the_others_make_unnecessary_is_not_tried_again(monkeypatch: pytest
 
 
 def test_two_that_drop_each_other_end_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whichever comes last takes the place of the other: one is found, in as many scans as there are sets."""
+    """If two effects replace each other, the search ends with one of them."""
     scans = _searching(monkeypatch, lambda members: members[-1:], showing=(A, B))
     assert len(_selected()) == 1
     assert len(scans) <= 4
@@ -90,13 +90,13 @@ def test_two_that_drop_each_other_end_the_search(monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.parametrize("shown", [False, True])
 def test_what_the_torque_shows_by_itself_has_no_rivals(monkeypatch: pytest.MonkeyPatch, shown: bool) -> None:
-    """Flat tops are a current limit, though they cost next to nothing and another cause explains that as well."""
+    """Clipping shown by flat tops has no rivals."""
     rivals = _rivals(monkeypatch, bic=-7.0, worth=-7.0, seen={A} if shown else set())
     assert [rival.hypothesis for rival, _ in rivals] == ([] if shown else [B])
 
 
 def test_rivals_of_a_moment_s_cause_are_as_much_worse_as_it_is_worth_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A push is found by the rows of its moment; by all of a log's, others would seem better."""
+    """Rivals of a transient effect are compared by the better of its BIC gain and its local BIC gain."""
     ((rival, worse),) = _rivals(monkeypatch, bic=-33.0, worth=16.0)
     assert rival.hypothesis == B
     assert worse == pytest.approx(16.0 + 7.0)
@@ -107,7 +107,7 @@ def test_rivals_of_a_moment_s_cause_are_as_much_worse_as_it_is_worth_more(monkey
 def _rivals(
     monkeypatch: pytest.MonkeyPatch, *, bic: float, worth: float, seen: Collection[Hypothesis] = ()
 ) -> tuple[tuple[SimpleNamespace, float], ...]:
-    """Rivals of A, which has such a BIC and worth, where B is a contender of BIC -7 and like gain."""
+    """Computes the rivals of A with given BIC and local BIC gain; B is a candidate with a BIC gain of -7."""
 
     def member(hypothesis: Hypothesis, bic: float, worth: float) -> SimpleNamespace:
         values = {"group": hypothesis, "shape": (), "gain": 5.0}

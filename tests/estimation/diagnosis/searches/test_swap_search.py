@@ -1,4 +1,4 @@
-"""Specification of effects that are refined beside each other, each against what else could be in its place."""
+"""Tests of the refinement of effects beside each other, with rivals tried in their place."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DELAY = Hypothesis(EFFECTS["time_delay"], None)
 
 
 def test_a_shape_that_is_known_is_refined_from_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of two tops of one effect, the one that is higher counts, whichever start leads to it; others start once."""
+    """A candidate is also refined from its known shape, and the better result counts."""
     starts = []
 
     def refine(problem, hypothesis, shape, accepted):
@@ -47,9 +47,9 @@ def test_a_shape_that_is_known_is_refined_from_too(monkeypatch: pytest.MonkeyPat
 def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
     gain: float, tried: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An effect that won with a gain of 100, and one beside it of its old gain, which is left in peace.
+    """Rivals of an effect are tried again if its gain has changed since its selection, and not otherwise.
 
-    A rival, twice as good now, takes the place of the first where it is looked at.
+    A rival with twice the gain then takes its place.
     """
 
     def member(hypothesis: Hypothesis, gain: float) -> SimpleNamespace:
@@ -96,7 +96,7 @@ def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
 
 @pytest.fixture(scope="module")
 def late(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]) -> Problem:
-    """Torque of all joints 6 ms late, and a large ripple on joint 2 that hides that there."""
+    """Returns a log with a delay of 6 ms on all joints, and a large ripple on joint 2 that hides it there."""
     recording = build_recording(arm, [arm_log(torque_noise=0.01)])
     situation = pose_arm(recording).situation
     tau = recording.tau + DELAY.effect.columns(situation, None, (0.006,))[:, :, 0] * 0.006
@@ -105,7 +105,7 @@ def late(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Proble
 
 
 def test_a_rival_on_the_joint_of_the_newest_takes_the_place_of_one_that_won(late: Problem) -> None:
-    """A lag of joint 1 won while the ripple hid that joint 2 is as late: beside the ripple all torque is late."""
+    """A lag of joint 1 is replaced by a delay of all joints, once the ripple on joint 2 is in the model."""
     lag = refine(late, LAG, (0.003,), accept(late, ()))
     ripple = refine(late, RIPPLE, (40.0, 0.0, 0.0), accept(late, (lag.group,)))
     lag = refine(late, LAG, lag.shape, accept(late, (ripple.group,)))
@@ -120,7 +120,7 @@ def test_a_rival_on_the_joint_of_the_newest_takes_the_place_of_one_that_won(late
 def test_a_rival_is_tried_with_the_others_refined_beside_it(
     together: float, chosen: list[Hypothesis], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """C explains less than A beside B as that is; refined beside C, B takes a form that leaves both more or less."""
+    """A rival is accepted or rejected with the other effects refined beside it."""
 
     def member(hypothesis: Hypothesis, gain: float, form: str = "") -> SimpleNamespace:
         group = SimpleNamespace(joints={A: (0,), B: (1,), C: (0, 1)}[hypothesis], form=(hypothesis, form))

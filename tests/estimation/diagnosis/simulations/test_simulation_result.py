@@ -1,4 +1,4 @@
-"""Specification of the closed-loop simulation of a diagnosis."""
+"""Tests of the closed-loop simulation of a diagnosis."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from robots.terms.effects import EFFECTS
 
 
 def member(effect: str, joint: int | None, shape: tuple[float, ...], coefficients: list[float]) -> FittedEffect:
-    """An effect as a diagnosis would have found it."""
+    """Builds an effect as a diagnosis would have found it."""
     return FittedEffect(Hypothesis(EFFECTS[effect], joint), shape, None, 0.0, np.array(coefficients), 1, 1.0)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")
 def found(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> Diagnosis:
-    """The diagnosis of an arm with a spring on joint 2."""
+    """Returns the diagnosis of an arm with a spring on joint 2."""
     plant = arm_plant(torque_noise=0.01)
     spring = {"stiffness": 1.5, "stiffness_2": 1.0, "stiffness_3": -1.5}
     plant = replace(plant, effects=(plant_effect(arm, "spring", 2, spring),))
@@ -43,7 +43,7 @@ def found(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> Diagnosi
 
 @pytest.mark.slow
 def test_the_simulated_robot_comes_nearer_with_what_was_found(found: Diagnosis) -> None:
-    """On the joint with the spring both numbers fall by more than half; on the others nothing is lost."""
+    """On the joint with the spring, correction and position error fall by more than half."""
     assert found.verdict == "named"
     simulation = found.simulation
     assert simulation is not None
@@ -57,7 +57,7 @@ def test_the_simulated_robot_comes_nearer_with_what_was_found(found: Diagnosis) 
 
 
 def test_what_grows_worse_is_told_before_what_hardly_grows_better() -> None:
-    """The sentence is of the joint that changes most, whichever way."""
+    """The summary describes the joint that changes most, for better or worse."""
     still = np.zeros(2)
     torque = (np.array([0.0231, 0.042]), np.array([0.0230, 0.051]))
     made = Simulation(start=0.0, end=5.0, loop=Loop(), torque=torque, motion=(still, still))
@@ -70,7 +70,7 @@ def test_what_grows_worse_is_told_before_what_hardly_grows_better() -> None:
 
 
 def test_it_is_written_and_read(found: Diagnosis, tmp_path: object) -> None:
-    """`diagnosis.json` holds its numbers, and gives them back."""
+    """`diagnosis.json` contains the simulation's numbers, and they are loaded again."""
     found.save(tmp_path)  # type: ignore[arg-type]
     again = Diagnosis.load(tmp_path).simulation  # type: ignore[arg-type]
     assert again is not None
@@ -82,7 +82,7 @@ def test_it_is_written_and_read(found: Diagnosis, tmp_path: object) -> None:
 
 @pytest.mark.slow
 def test_where_nothing_is_found_nothing_is_simulated(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:
-    """A diagnosis without findings has none."""
+    """A diagnosis without findings has no simulation."""
     log = simulate(arm_plant(torque_noise=0.02), fourier_motion(arm, 0))
     result = diagnose(arm, log, candidates=("spring",), friction="coulomb-viscous")
     assert result.findings == ()
@@ -91,7 +91,7 @@ def test_where_nothing_is_found_nothing_is_simulated(arm: Robot, arm_plant: Call
 
 
 def planar(q: np.ndarray, v: np.ndarray, push: np.ndarray) -> np.ndarray:
-    """Accelerations of the arm by Lagrange's equations of two links in a vertical plane."""
+    """Computes the arm's accelerations by Lagrange's equations of two links in a vertical plane."""
     length, m2, x2, y2 = 0.4, 2.0, 0.3, 0.1
     c2, s2 = np.cos(q[1]), np.sin(q[1])
     shared = 0.1 + length * (x2 * c2 - y2 * s2)
@@ -108,16 +108,16 @@ def planar(q: np.ndarray, v: np.ndarray, push: np.ndarray) -> np.ndarray:
 def test_the_arm_moves_as_an_independent_solver_says(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable, stribeck: bool
 ) -> None:
-    """Base and extended robot deviate from the log as scipy's solution of Lagrange's equations does.
+    """The simulated deviations agree with scipy's solution of Lagrange's equations to 3 % of their RMS.
 
-    To 3 % of the deviation's RMS: friction turns round half a sample late, 2 ms, which moves joint 1 by up to
-    2 N m x 4 ms / (0.9 kg m2 x 19 / s) = 0.5 mrad/s / (19 / s), or 0.03 of its deviation of 1.1 mrad.
+    The sign of friction changes half a sample late, 2 ms. This moves joint 1 by up to 2 N m x 4 ms / (0.9 kg m2 x 19 /
+    s) = 0.5 mrad/s / (19 / s), or 0.03 of its deviation of 1.1 mrad.
     """
     width, size, speed = 0.02, 1.5, 0.3
     motion = fourier_motion(arm, 3, duration=8.0)
     log = simulate(arm_plant(velocity_scale=width, torque_noise=0.0, encoder_counts=0.0), motion)
     t = np.asarray(motion.t)
-    # A driving torque that nothing explains, smooth, so that both solvers see the same.
+    # An unexplained driving torque, smooth, so that both solvers see the same.
     torque = log.tau + 0.6 * np.sin(2 * np.pi * 0.7 * t)[:, None] * [1.0, -0.5]
     model = default_model(arm, friction="coulomb-viscous", velocity_scale=width)
     base = find_base_parameters(model)
@@ -130,7 +130,7 @@ def test_the_arm_moves_as_an_independent_solver_says(
     loop = Loop(bandwidth=3.0)
     simulation = simulate_both(before, after, whole, rows, loop)
     assert simulation.note == ""
-    # The loop is laid out for each joint's own mean inertia: the same as the simulation's, by its definition.
+    # The loop's gains are for each joint's mean inertia, as in the simulation.
     c2, s2 = np.cos(whole.q[:, 1]), np.sin(whole.q[:, 1])
     inertia = np.array([0.3 + 0.32 + 0.1 + 0.8 * np.mean(0.3 * c2 - 0.1 * s2) + 0.2, 0.2])
     stiffness, damping = loop.gains(inertia)
@@ -153,7 +153,7 @@ def test_the_arm_moves_as_an_independent_solver_says(
 
 
 def test_what_is_read_wrong_does_not_drive_the_arm(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:
-    """Read as half as much again at its largest, the torque moves the arm as the true one; noise is undone as well."""
+    """With a distorted torque reading, the extended model moves the arm like the true torque, with noise, too."""
     motion = fourier_motion(arm, 3, duration=8.0)
     log = simulate(arm_plant(velocity_scale=0.02, torque_noise=0.02, encoder_counts=0.0), motion)
     model = default_model(arm, friction="coulomb-viscous", velocity_scale=0.02)
@@ -174,7 +174,7 @@ def test_what_is_read_wrong_does_not_drive_the_arm(arm: Robot, arm_plant: Callab
 
 
 def test_the_file_says_what_is_assumed() -> None:
-    """Reading what was written gives the same."""
+    """The simulation's data contain the assumed loop, and are read back unchanged."""
     pair = (np.array([0.02, 0.01]), np.array([0.01, np.nan]))
     simulation = Simulation(start=1.0, end=6.0, loop=Loop(bandwidth=4.0), torque=pair, motion=pair, note="as it is")
     data = simulation.to_dict()

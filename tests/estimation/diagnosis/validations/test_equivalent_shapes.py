@@ -1,4 +1,4 @@
-"""Specification of the choice among forms of an effect that fit alike."""
+"""Tests of the choice among shapes of an effect that fit about equally well."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ NOISE = np.array([0.05, 0.1])
 
 
 def _balancer(q: np.ndarray) -> np.ndarray:
-    """Torque of a spring of 1 kN/m between levers of .12 and .4 m, by the slope of its energy."""
+    """Computes the torque of a spring of 1 kN/m between levers of 0.12 and 0.4 m, as the slope of its energy."""
 
     def energy(angle: np.ndarray) -> np.ndarray:
         length = np.sqrt(0.12**2 + 0.4**2 - 2 * 0.12 * 0.4 * np.cos(angle + 2.4))
@@ -46,7 +46,7 @@ def _balancer(q: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def narrow(arm: Robot, arm_log: Callable[..., Log]) -> tuple[Recording, Recording]:
-    """A motion of few angles, and the wide one, with the torque of one arm that is nearly as described."""
+    """Returns a motion over few angles, and one over many, with the torque of an arm that is nearly as described."""
     whole = build_recording(arm, [arm_log(torque_noise=0.02)])
     base = base_parameters(arm, "coulomb-viscous", (0.001, 0.001))
     small = replace(whole, q=NARROW * whole.q, dq=NARROW * whole.dq, ddq=NARROW * whole.ddq)
@@ -58,7 +58,7 @@ def narrow(arm: Robot, arm_log: Callable[..., Log]) -> tuple[Recording, Recordin
 def test_forms_of_a_spring_that_fit_alike_are_listed(
     pose_arm: Callable[..., Problem], narrow: tuple[Recording, Recording]
 ) -> None:
-    """Fitted within a third of the angles, several levers fit as the polynomial does; the likeliest come first."""
+    """After a fit to a third of the range, several levers fit as well as the polynomial; the likeliest come first."""
     small, wide = narrow
     rng = np.random.default_rng(4)
     extra = np.column_stack([_balancer(small.q[:, 0]), 0 * small.t])
@@ -67,7 +67,7 @@ def test_forms_of_a_spring_that_fit_alike_are_listed(
     forms = equivalent_shapes(problem, [plain], 0)
     assert len(forms) >= 2
     assert all(form.gain > plain.gain - MAX_SHAPE_CHI2 and form.shape != plain.shape for form in forms)
-    # The likeliest is the one that with the arm as described says most of the angles that were not seen.
+    # The likeliest shape, with the arm as described, predicts the unseen positions best.
     there = build_baseline(problem.baseline.base, wide)
     errors = []
     for form in (forms[0], forms[-1]):
@@ -81,7 +81,7 @@ def test_forms_of_a_spring_that_fit_alike_are_listed(
 def test_a_form_that_fits_worse_is_not_listed(
     pose_arm: Callable[..., Problem], narrow: tuple[Recording, Recording]
 ) -> None:
-    """A cable that stiffens over all angles is the polynomial that it is; an effect of one form has no other."""
+    """With data over the whole range a cable has no equivalent shape, and neither has an effect with one form."""
     _, wide = narrow
     q = wide.q[:, 0]
     rng = np.random.default_rng(5)
@@ -95,9 +95,9 @@ def test_a_form_that_fits_worse_is_not_listed(
 
 @pytest.mark.slow
 def test_a_tilt_is_told_beside_the_first_axis_own_moments() -> None:
-    """Moments that a search went without bend the angles: with them free, the angles are within 3 standard errors.
+    """With the first axis' moments fitted, tilt angles are within 3 standard errors; without them they are biased.
 
-    The chance that one of two is not is 1 in 180.
+    The chance that one of the two angles is not is 1 in 180.
     """
     robot, rng = load_robot("ur10"), np.random.default_rng(8)
     t = 0.004 * np.arange(5000)
@@ -111,15 +111,15 @@ def test_a_tilt_is_told_beside_the_first_axis_own_moments() -> None:
     plain = refine(posed, tilt, (0.0, 0.0), _nothing(), effort=0)  # type: ignore[arg-type]
     (completed,) = complete_effects(posed, [SelectedEffect(plain, 1e-9, ())])  # type: ignore[arg-type]
     assert plain.shape == (0.0, 0.0)
-    # With the moments free the angles are known as those beside four columns of them are.
+    # Standard errors of the angles beside the four columns of the moments.
     errors = np.sqrt(np.diag(np.linalg.pinv(posed.gram, rcond=1e-10, hermitian=True))[:2])
     assert np.all(np.abs(completed.effect.coefficients - angles) < 3 * errors)
     assert np.any(np.abs(plain.coefficients - angles) > 3 * errors)
-    # The search for the moments has come as far as the true ones are.
+    # The search for the moments reaches the gain of the true ones.
     true = refine(posed, tilt, moments, _nothing(), effort=0)  # type: ignore[arg-type]
     assert completed.effect.gain > true.gain - 0.1
     assert completed.effect.gain > plain.gain + 10.0
-    # What is hardly there is not worth two more parameters.
+    # A small tilt is not worth two more parameters.
     posed = _Tilted(problem, tilt, 0.02 * np.kron([1.0, *moments], angles), 0.02 * rng.normal(size=6))
     plain = refine(posed, tilt, (0.0, 0.0), _nothing(), effort=0)  # type: ignore[arg-type]
     assert complete_effects(posed, [SelectedEffect(plain, 1e-9, ())])[0].effect is plain  # type: ignore[arg-type]
@@ -130,9 +130,9 @@ def _nothing() -> Accepted:
 
 
 class _Tilted:
-    """A problem whose residual is a tilt's torque and noise: both as columns of the angles and of two moments see them.
+    """A problem whose residual is the torque of a tilt plus noise, projected on the angles' and moments' columns.
 
-    `values` (6,) are of the angles, and of the angles times each moment; `drawn` (6,) is standard normal.
+    `values` (6,) are coefficients of the angles, and of the angles times each moment; `drawn` (6,) is standard normal.
     """
 
     def __init__(self, problem: Problem, tilt: Hypothesis, values: np.ndarray, drawn: np.ndarray) -> None:

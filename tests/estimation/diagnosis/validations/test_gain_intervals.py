@@ -1,4 +1,4 @@
-"""Specification of the gain on unseen data and its interval."""
+"""Tests of the held-out gain and its interval."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _unseen(fall: float, seed: int) -> HeldOutErrors:
 
 
 def test_nrmse_counts_only_rows_that_count() -> None:
-    """Rows of unknown direction change neither the error nor the torque that it is a share of."""
+    """Rows that do not count change neither the error nor the torque that it is divided by."""
     counts = np.ones((4, 1), dtype=bool)
     counts[3] = False
     errors = np.array([[1.0], [-1.0], [1.0], [100.0]])
@@ -36,9 +36,9 @@ def test_nrmse_counts_only_rows_that_count() -> None:
 
 
 def test_the_interval_holds_the_fall_of_the_error() -> None:
-    """Of 20 logs with coloured errors the 95 % interval of the fall holds the true one in 15 or more.
+    """In at least 15 of 20 logs with coloured errors, the 95 % interval of the gain contains the true one.
 
-    Eighteen are to be expected of an interval by blocks of 24 s of data; fewer than 15 would come about once in 400.
+    With blocks of 24 s of data, eighteen are expected; fewer than 15 have a chance of about 1 in 400.
     """
     held = 0
     for seed in range(20):
@@ -48,18 +48,18 @@ def test_the_interval_holds_the_fall_of_the_error() -> None:
 
 
 def test_no_fall_has_an_interval_about_zero() -> None:
-    """Where the extension changes nothing, the interval is zero."""
+    """If the extension changes nothing, the interval is zero."""
     assert _unseen(0.0, 0).interval(1, 2, [0], np.random.default_rng(0)) == pytest.approx((0.0, 0.0), abs=1e-12)
 
 
 def test_each_effect_is_left_out_once() -> None:
-    """Models compared: the base alone, the whole less each effect, the whole."""
+    """The compared models are the base model, the whole model without each effect, and the whole model."""
     chosen = model_columns(3, [np.zeros((1, 1, 2)), np.zeros((1, 1, 1))])
     assert [c.tolist() for c in chosen] == [[0, 1, 2], [0, 1, 2, 5], [0, 1, 2, 3, 4], [0, 1, 2, 3, 4, 5]]
 
 
 def _of_sizes(errors: list[float], fitted: list[float] | None) -> HeldOutErrors:
-    """Errors of given RMS on one joint whose torque has an RMS of one."""
+    """Returns errors of given RMS on one joint whose torque has an RMS of one."""
     wave = np.sqrt(2) * np.sin(2 * np.pi * np.arange(1000) / 100)[:, None]
     seen = None if fitted is None else tuple(size * wave for size in fitted)
     counts = np.ones((1000, 1), dtype=bool)
@@ -67,16 +67,16 @@ def _of_sizes(errors: list[float], fitted: list[float] | None) -> HeldOutErrors:
 
 
 def test_what_is_kept_of_a_gain_is_its_share_of_the_fit_s() -> None:
-    """A fall of .02 where fits that have seen the rows fall by .05 keeps two fifths; without such fits, all."""
+    """The retained gain is the held-out gain over the gain in the fit's own rows; one without the latter."""
     errors = [0.30, 0.30, 0.28]
     assert _of_sizes(errors, [0.20, 0.20, 0.15]).retained_share(1, [0]) == pytest.approx(0.4)
     assert _of_sizes(errors, None).retained_share(1, [0]) == 1.0
-    # A fit that hardly gains says nothing of what should be left.
+    # A small gain in the fit gives no reference for the retained gain.
     assert _of_sizes(errors, [0.20, 0.20, 0.195]).retained_share(1, [0]) == 1.0
 
 
 def test_a_model_goes_astray_by_its_error_where_it_was_fitted() -> None:
-    """Four times the error of the fit, and a fifth of the torque, is astray; twice it, or a small error, is not."""
+    """A joint is unreliable if its held-out error is four times the fit's and a fifth of the torque, not otherwise."""
     assert _of_sizes([0.3, 0.2], [0.06, 0.05]).is_unreliable(0)
     assert not _of_sizes([0.3, 0.1], [0.06, 0.05]).is_unreliable(0)
     assert not _of_sizes([0.3, 0.08], [0.06, 0.01]).is_unreliable(0)
@@ -84,16 +84,16 @@ def test_a_model_goes_astray_by_its_error_where_it_was_fitted() -> None:
 
 
 class Rows(SimpleNamespace):
-    """Stands for a recording."""
+    """Replacement for a recording."""
 
     def __len__(self) -> int:
         return len(self.tau)
 
 
 def _other_motion(seed: int, effect: float, there: float) -> HeldOutErrors:
-    """A log whose two base columns differ by 3 % only, and another that shows each by itself; noise of size one.
+    """Simulates a log with nearly collinear base columns, and a held-out log that separates them; noise of size one.
 
-    The effect looks a little like their difference, and acts `there` times as much in the second log.
+    The effect is slightly correlated with their difference, and has the factor `there` in the second log.
     """
     rng = np.random.default_rng(seed)
     rows, t = 2000, np.arange(2000) / 100
@@ -119,7 +119,10 @@ def _other_motion(seed: int, effect: float, there: float) -> HeldOutErrors:
 
 
 def test_a_true_effect_is_seldom_called_harmful_by_a_log_that_leaves_the_base_open() -> None:
-    """Of 200 true effects 2.5 % at most (13 in 200: once in 500 tests), though errors are larger with many of them."""
+    """At most 12 of 200 true effects are called harmful, though many have a larger held-out error.
+
+    A chance of 2.5 % each is expected; 13 of 200 occur in one of 500 tests.
+    """
     draws = [_other_motion(seed, 0.08, 1.0) for seed in range(200)]
     assert sum(unseen.surely_worse(1) for unseen in draws) <= 12
     assert sum(unseen.nrmse(2)[0] > unseen.nrmse(1)[0] for unseen in draws) > 60
@@ -127,6 +130,6 @@ def test_a_true_effect_is_seldom_called_harmful_by_a_log_that_leaves_the_base_op
 
 @pytest.mark.parametrize("there", [-1.0, 0.0])
 def test_an_effect_that_is_not_there_elsewhere_is_called_harmful(there: float) -> None:
-    """It fits one log by sixteen standard errors or more, and the other one not at all, or the other way round."""
+    """An effect that is absent or reversed in the held-out log is called harmful."""
     draws = [_other_motion(seed, 0.5, there) for seed in range(20)]
     assert all(unseen.surely_worse(1) for unseen in draws)

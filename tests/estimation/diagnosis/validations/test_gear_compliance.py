@@ -1,4 +1,4 @@
-"""Specification of wind-up that encoders on both sides of a gear measure."""
+"""Tests of gear compliance measured by encoders on both sides of a gear."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ COMPLIANCE, DELAY, MOTION = 2e-4, 0.003, 2e-4
 
 
 def with_encoders(log: Log, compliance: np.ndarray, seed: int) -> Log:
-    """A log whose links lag by their load and its inertia's, seen 3 ms late, with eccentric and noisy encoders."""
+    """Adds link encoders to a log, with deflection, lost motion, a delay of 3 ms, eccentricity and noise."""
     rng = np.random.default_rng(seed)
     t, q = log.t, log.q
     dq = np.gradient(q, t, axis=0)
     friction = np.array([2.0, 1.0]) * np.tanh(dq / 1e-3) + np.array([1.5, 0.8]) * dq
-    # The load of the gear is the drive's torque less what friction and rotor take of it.
+    # The gear load is the drive's torque minus friction and rotor torque.
     load = log.tau - friction - np.array([0.2, 0.1]) * np.gradient(dq, t, axis=0)
     link = q - compliance * load - MOTION / 2 * np.sign(dq) * (compliance > 0)
     late = CubicSpline(t, link)(t - DELAY)
@@ -39,7 +39,7 @@ def with_encoders(log: Log, compliance: np.ndarray, seed: int) -> Log:
 
 
 def found_in(robot: Robot, log: Log, **options: object) -> tuple[MeasuredCompliance, ...]:
-    """What the wind-up shows, by a fit of the base model alone."""
+    """Measures the gear compliance with a fit of the base model only."""
     recording = build_recording(robot, [log])
     base = build_baseline(base_parameters(robot, "coulomb-viscous", (0.001,) * robot.n), recording)
     scale = recording.tau.std(axis=0)
@@ -48,9 +48,9 @@ def found_in(robot: Robot, log: Log, **options: object) -> tuple[MeasuredComplia
 
 
 def test_the_stiffness_of_a_gear_is_measured(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:
-    """Compliance, delay and lost motion lie within 3.5 standard errors, on the joint that has them and on no other.
+    """Compliance, delay and lost motion are within 3.5 standard errors, on the elastic joint only.
 
-    By ten blocks the chance that one of the three does not is 2 %.
+    The chance that one of the three is not is 2 %, with ten blocks.
     """
     log = simulate(arm_plant(torque_noise=0.02), fourier_motion(arm, 2, duration=40.0))
     (windup,) = found_in(arm, with_encoders(log, np.array([COMPLIANCE, 0.0]), 1))
@@ -60,7 +60,7 @@ def test_the_stiffness_of_a_gear_is_measured(arm: Robot, arm_plant: Callable, fo
     for name, truth in (("compliance", COMPLIANCE), ("encoder_delay", DELAY), ("lost_motion", MOTION)):
         assert abs(values[name].value - truth) < 3.5 * values[name].standard_error, name
         assert values[name].determined, name
-    # 3 % of the compliance, by 40 s of a load of 15 N m RMS against some 30 urad of noise.
+    # Accurate to 3 %: 40 s with a load of 15 N m RMS and a noise of some 30 urad.
     assert values["compliance"].value == pytest.approx(COMPLIANCE, rel=0.03)
     assert finding.gain.ci95[0] > 0
     assert finding.gain.nrmse_after < 0.2 * finding.gain.nrmse_before
@@ -72,9 +72,9 @@ def test_the_stiffness_of_a_gear_is_measured(arm: Robot, arm_plant: Callable, fo
 
 @pytest.mark.slow
 def test_stiff_gears_raise_no_alarm(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:
-    """Of 30 robots with late, eccentric and noisy encoders behind stiff gears at most two are called elastic.
+    """At most two of 30 robots with stiff gears and inaccurate encoders are called elastic.
 
-    At 1 % a robot that is 0.3; three and more come about once in 300.
+    With 1 % per robot, 0.3 are expected; three or more have a chance of 1 in 300.
     """
     alarms = 0
     for seed in range(30):
@@ -85,9 +85,9 @@ def test_stiff_gears_raise_no_alarm(arm: Robot, arm_plant: Callable, fourier_mot
 
 @pytest.mark.slow
 def test_intervals_hold(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:
-    """Of 20 short logs the 95 % interval of the compliance holds the true one in 16 or more.
+    """In at least 16 of 20 short logs the 95 % interval of the compliance contains the true value.
 
-    19 are to be expected; fewer than 16 come about once in 400.
+    19 are expected; fewer than 16 have a chance of 1 in 400.
     """
     held = 0
     for seed in range(20):
@@ -101,7 +101,7 @@ def test_intervals_hold(arm: Robot, arm_plant: Callable, fourier_motion: Callabl
 
 @pytest.fixture(scope="module")
 def twisted(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> Diagnosis:
-    """The diagnosis of an arm with an encoder behind its first gear alone, and a log that was held out."""
+    """Returns the diagnosis of an arm with a link encoder on its first joint only, with a held-out log."""
     logs = []
     for seed in (0, 1):
         log = simulate(arm_plant(torque_noise=0.02), fourier_motion(arm, seed), seed=seed)
@@ -114,7 +114,7 @@ def twisted(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> Diagno
 
 @pytest.mark.slow
 def test_a_diagnosis_says_what_the_encoders_measured(twisted: Diagnosis, tmp_path: object) -> None:
-    """It names the elastic gear with the gain on the held-out log, extends the model by it, and is read again."""
+    """The elastic gear is named with its held-out gain and added to the model, and the result can be loaded."""
     assert twisted.verdict == "named"
     (finding,) = [f for f in twisted.findings if f.measured_by]
     assert finding.joint == 1
@@ -129,5 +129,5 @@ def test_a_diagnosis_says_what_the_encoders_measured(twisted: Diagnosis, tmp_pat
 
 
 def test_without_encoders_nothing_is_measured(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:
-    """A log without positions behind the gears has no such finding."""
+    """A log without link positions gives no measured compliance."""
     assert found_in(arm, simulate(arm_plant(), fourier_motion(arm, 2))) == ()

@@ -1,4 +1,4 @@
-"""Specification of which names unseen data bear out, on measurements written by hand."""
+"""Tests of the held-out validation of findings, with given results instead of measurements."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ from tests.estimation.diagnosis.held_out_bench import (
     ],
 )
 def test_heat_before_the_unseen_data_is_not_held_against_a_cause(rise: float, kept: float, stays: bool) -> None:
-    """What a pause left of the heat is not known: sure errors leave a thermal cause alone unless they are large.
+    """A thermal effect is rejected only for a large increase of the error, because stored heat is unknown.
 
-    Where a rival is borne out, and it is not, that takes its place all the same.
+    A rival that passes the validation replaces it if its error increases by more than 5 %.
     """
     warm = member_of("thermal_friction", 2)
     bench = bench_with()
@@ -62,7 +62,7 @@ def test_heat_before_the_unseen_data_is_not_held_against_a_cause(rise: float, ke
 
 
 def test_another_form_of_a_cause_goes_before_a_rival() -> None:
-    """A polynomial that errs beyond the angles seen gives way to the first lever that does not; its name stays."""
+    """The first equivalent shape that passes the validation replaces a rejected one, before any rival."""
     rival, levers = (PRESLIDING, 2.0), [replace(SPRING, shape=(0.35, centre)) for centre in (0.0, 1.0, 2.0)]
     bench = bench_with(spring=HARMS)
     bench.shows |= {label_of(levers[0]): HARMS, label_of(levers[1]): HELPS, label_of(levers[2]): HELPS}
@@ -74,7 +74,7 @@ def test_another_form_of_a_cause_goes_before_a_rival() -> None:
 
 
 def test_a_form_that_does_no_harm_goes_after_a_rival_that_helps() -> None:
-    """Heat of another time constant that neither helps nor harms keeps a name that would be lost, no rival's place."""
+    """A shape that neither helps nor harms keeps a finding only if no rival passes the validation."""
     rival, levers = (PRESLIDING, 2.0), [replace(SPRING, shape=(0.35, centre)) for centre in (0.0, 1.0)]
     bench = bench_with(spring=HARMS, presliding_hysteresis=HARMS)
     bench.shows |= {label_of(levers[0]): HARMS, label_of(levers[1]): IDLE}
@@ -86,7 +86,7 @@ def test_a_form_that_does_no_harm_goes_after_a_rival_that_helps() -> None:
 
 
 def test_what_helps_stays_as_it_was_found() -> None:
-    """Names and free functions that unseen data bear out, or do not speak against, are kept in order."""
+    """Findings that held-out data support, or do not contradict, are kept in order."""
     founds = (SelectedEffect(SPRING, 1e-9, ((TILT, 3.0),)), SelectedEffect(STRIBECK, 1e-5, ()))
     bench = bench_with(stribeck=IDLE)
     result = validated(bench, *founds, free=[FREE], p_values=[1e-4])
@@ -99,7 +99,7 @@ def test_what_helps_stays_as_it_was_found() -> None:
 
 
 def test_a_name_that_surely_harms_is_left_out_with_a_note() -> None:
-    """Without a rival only the others stay, measured anew without it."""
+    """A rejected finding without a rival is left out with a note, and the others are measured again."""
     result = validated(bench_with(spring=HARMS), SelectedEffect(SPRING, 1e-9, ()), SelectedEffect(STRIBECK, 1e-5, ()))
     assert result.effects == (STRIBECK,)
     assert [found.effect for found in result.findings] == [STRIBECK]
@@ -124,9 +124,10 @@ def test_a_name_that_surely_harms_is_left_out_with_a_note() -> None:
 def test_a_faint_free_function_that_unseen_data_deny_is_noise(
     p_value: float, kind: str, named: bool, told: bool
 ) -> None:
-    """Where nothing else stands out, and it is no function of time, of which other logs say nothing.
+    """A free function with a weak p-value and contradicting held-out data is dropped as noise if nothing else is found.
 
-    Nor where in its swing what swings by itself is then; but such a function finds its frequency in any noise.
+    Functions of time are exempt, because other logs say nothing about them. Oscillations need a lower p-value, because
+    they find a frequency in any noise.
     """
     free = member_of(f"pattern:{kind}:0:even", 3)
     bench = bench_with()
@@ -140,7 +141,7 @@ def test_a_faint_free_function_that_unseen_data_deny_is_noise(
 
 @pytest.mark.parametrize("shown", [HELPS, HARMS])
 def test_what_a_refuted_name_was_for_is_told_as_unexplained(shown: Shown) -> None:
-    """A free function takes its place: in the model where unseen data bear it out, else beside it."""
+    """A free function replaces a rejected finding; it is in the model only if it passes the validation."""
     free = member_of("pattern:load:0:odd", 2)
     bench = bench_with(spring=HARMS)
     bench.shows[free.hypothesis.label] = shown
@@ -157,28 +158,28 @@ def test_what_a_refuted_name_was_for_is_told_as_unexplained(shown: Shown) -> Non
 @pytest.mark.parametrize(
     ("shown", "stays"),
     [
-        (Shown(-0.002, 0.001, MAX_RMSE_RATIO + 0.01), False),  # much larger errors, if not surely
+        (Shown(-0.002, 0.001, MAX_RMSE_RATIO + 0.01), False),  # much larger errors, though not significantly
         (Shown(-0.002, 0.001, MAX_RMSE_RATIO - 0.01), True),
-        (Shown(kept=MIN_RETAINED_GAIN - 0.01), False),  # it fits the rows that it was fitted to, and few others
+        (Shown(kept=MIN_RETAINED_GAIN - 0.01), False),  # it fits only the rows of its fit
         (Shown(kept=MIN_RETAINED_GAIN + 0.01), True),
         (
             Shown(kept=MIN_RETAINED_GAIN - 0.1, speaks=MIN_RETAINED_GAIN + 0.01),
             True,
-        ),  # what the base model errs by hides what rows say
+        ),  # errors of the base model hide the support of the rows
         (Shown(kept=MIN_RETAINED_GAIN - 0.1, speaks=MIN_RETAINED_GAIN - 0.01), False),
         (Shown(-0.001, 0.003, kept=MIN_RETAINED_GAIN - 0.1, speaks=MIN_RETAINED_GAIN + 0.01), False),
-        (Shown(astray=True), False),  # a joint whose base model the logs do not tell
+        (Shown(astray=True), False),  # a joint whose base model is not determined
     ],
 )
 def test_reasons_to_leave_a_name_out(shown: Shown, stays: bool) -> None:
-    """Errors a twentieth larger, less than a fifth of the gain kept, a joint that goes astray."""
+    """A finding is rejected for a 5 % larger error, less than a fifth of its gain, or an unreliable joint."""
     result = validated(bench_with(spring=shown), SelectedEffect(SPRING, 1e-9, ()), held_out=False)
     assert bool(result.effects) is stays
     assert bool(result.changes) is not stays
 
 
 def test_what_comes_and_goes_need_not_last_on_other_stretches() -> None:
-    """A contact or a step has most of its energy in few stretches: what is kept of it there says nothing."""
+    """The retained gain is ignored for effects in time, whose energy is in few stretches."""
     step = member_of("friction_step", 2)
     bench = bench_with()
     bench.shows[step.hypothesis.label] = Shown(kept=0.0)
@@ -186,7 +187,7 @@ def test_what_comes_and_goes_need_not_last_on_other_stretches() -> None:
 
 
 def test_a_close_rival_that_helps_takes_the_place() -> None:
-    """It keeps place and p-value, and the rivals after it, counted from it; the note names both."""
+    """A rival that passes the validation takes place and p-value, with the remaining rivals, and a note names both."""
     rivals = ((STRIBECK, 2.0), (TILT, 5.0), (PRESLIDING, CLOSE_RIVAL_BIC + 1.0))
     bench = bench_with(spring=HARMS, stribeck=HARMS)
     result = validated(bench, SelectedEffect(SPRING, 1e-9, rivals), free=[FREE], p_values=[1e-4])
@@ -204,7 +205,7 @@ def test_a_close_rival_that_helps_takes_the_place() -> None:
 
 @pytest.mark.parametrize("shown", [HARMS, IDLE, Shown(kept=0.1), Shown(rise=1.1)])
 def test_a_rival_that_is_not_borne_out_takes_no_place(shown: Shown) -> None:
-    """One that harms too, or that may as well not help, is no better name."""
+    """A rival that harms, or does not significantly help, does not replace a finding."""
     result = validated(
         bench_with(spring=HARMS, stribeck=shown), SelectedEffect(SPRING, 1e-9, ((STRIBECK, 1.0),)), held_out=False
     )
@@ -214,14 +215,14 @@ def test_a_rival_that_is_not_borne_out_takes_no_place(shown: Shown) -> None:
 
 
 def test_a_rival_that_fits_far_worse_takes_no_place() -> None:
-    """Were it to help, the data of the fit still speak against it."""
+    """A rival beyond the BIC limit does not replace a finding."""
     bench = bench_with(spring=HARMS)
     assert validated(bench, SelectedEffect(SPRING, 1e-9, ((STRIBECK, CLOSE_RIVAL_BIC),))).effects == ()
     assert all(LABELS["stribeck"] not in asked for asked in bench.asked)
 
 
 def test_the_surest_goes_first_and_others_are_measured_anew() -> None:
-    """A name that harms only beside another that is no cause stays, once that is gone."""
+    """The clearest contradiction is rejected first; a finding that harms only beside it stays."""
     bench = bench_with(spring=HARMS)
     bench.beside[LABELS["stribeck"], LABELS["spring"]] = Shown(-0.002, -0.0005, 1.0)
     result = validated(bench, SelectedEffect(STRIBECK, 1e-9, ()), SelectedEffect(SPRING, 1e-5, ()))
@@ -231,7 +232,7 @@ def test_the_surest_goes_first_and_others_are_measured_anew() -> None:
 
 
 def test_a_free_function_that_errs_is_told_and_no_part_of_the_model() -> None:
-    """It is handed on with p-value and gain, for that something is unexplained is as true as before."""
+    """A rejected free function is reported with p-value and gain, but not part of the model."""
     bench = bench_with(load=HARMS)
     result = validated(bench, SelectedEffect(SPRING, 1e-9, ()), free=[FREE, SWING], p_values=[1e-4, 1e-3])
     assert result.effects == (SPRING, SWING)
@@ -243,7 +244,7 @@ def test_a_free_function_that_errs_is_told_and_no_part_of_the_model() -> None:
 
 
 def test_a_free_function_that_brings_nothing_beside_others_is_no_part_of_the_model() -> None:
-    """It claims no cause, and what it adds to the unseen error is no gain; all that was found by itself stays."""
+    """A free function without a held-out gain is left out beside other findings, and kept alone."""
     slightly = Shown(-0.003, 0.001, 1.0)
     result = validated(bench_with(load=slightly), SelectedEffect(SPRING, 1e-9, ()), free=[FREE], p_values=[1e-4])
     assert result.effects == (SPRING,)
@@ -254,10 +255,7 @@ def test_a_free_function_that_brings_nothing_beside_others_is_no_part_of_the_mod
 
 @pytest.mark.parametrize(("extra", "kept"), [(0.004, 1), (0.0, 2)])
 def test_free_functions_that_harm_together_are_left_out_until_they_do_not(extra: float, kept: int) -> None:
-    """Beside the others each brings a little, not surely, and all of them more error than the base model has.
-
-    The one that may bring least goes.
-    """
+    """If free functions together increase the held-out error, the one with the least gain is left out."""
     other = member_of("pattern:acceleration:0:odd", 3)
     bench = bench_with(load=Shown(-0.001, 0.0015, 1.0))
     bench.shows[other.hypothesis.label] = Shown(-0.001, 0.003, 1.0)
@@ -268,32 +266,32 @@ def test_free_functions_that_harm_together_are_left_out_until_they_do_not(extra:
 
 
 def test_what_errs_on_all_joints_is_told_of_the_whole_robot() -> None:
-    """What swings at the flange has no joint to name."""
+    """A rejected function of all joints is reported for the whole robot."""
     result = validated(bench_with(swinging=HARMS), free=[SWING], p_values=[1e-10])
     assert [member for member, _, _ in result.rejected_discrepancies] == [SWING]
     assert state_change(result.changes[0]).startswith("Part of the residual of the whole robot is unexplained")
 
 
 def test_a_passing_effect_is_not_judged_on_other_logs() -> None:
-    """A push belongs to the log in which it came: other logs say nothing of it, stretches left out do."""
+    """A transient effect is validated on stretches left out, not on other logs."""
     found = SelectedEffect(PUSH, 1e-9, ((STRIBECK, 1.0),))
     assert validated(bench_with(external_contact=HARMS), found).effects == (PUSH,)
     assert validated(bench_with(external_contact=HARMS), found, held_out=False).effects == (STRIBECK,)
-    # For the same reason other logs cannot make it take another's place.
+    # For the same reason it cannot replace another finding by other logs.
     bench = bench_with(stribeck=HARMS, external_contact=HARMS)
     assert validated(bench, SelectedEffect(STRIBECK, 1e-9, ((PUSH, 1.0),))).effects == ()
 
 
 @pytest.mark.parametrize(("shown", "stays"), [(HELPS, True), (IDLE, True), (HARMS, False)])
 def test_a_faint_name_needs_unseen_data_that_speak_for_it(shown: Shown, stays: bool) -> None:
-    """What hardly stood out is noise unless its gain is positive, sure or not; what clearly did is refuted surely."""
+    """A weak finding needs a positive held-out gain; a strong one is rejected only by a significant contradiction."""
     slightly = Shown(-0.003, 0.002, 1.001)
     for said, faint, kept in ((shown, False, stays), (slightly, False, True), (slightly, True, False)):
         result = validated(bench_with(spring=said), SelectedEffect(SPRING, 1e-3, ()), faint=[SPRING] if faint else [])
         assert (result.effects == (SPRING,)) is kept
         assert [member for member, *_ in result.refuted] == ([] if kept or faint else [SPRING])
         assert bool(result.changes) is (not kept)
-    # A push is over when the unseen log begins.
+    # A contact has ended before the held-out log begins.
     assert validated(bench_with(external_contact=slightly), SelectedEffect(PUSH, 1e-3, ()), faint=[PUSH]).effects == (
         PUSH,
     )
@@ -312,7 +310,10 @@ def test_a_faint_name_needs_unseen_data_that_speak_for_it(shown: Shown, stays: b
 def test_a_name_that_is_slight_beside_another_needs_unseen_data_that_speak_for_it(
     strength: float, shown: Shown, stays: bool
 ) -> None:
-    """As much as a tenth of it may be what the stronger one's formula leaves: clear of the noise, and no cause."""
+    """A finding that is minor beside a stronger one needs held-out support.
+
+    It may be an error of the stronger one's formula.
+    """
     bench = bench_with(stribeck=shown)
     for own, kept in ((0.9 * MINOR_BIC_GAIN, stays), (1.1 * MINOR_BIC_GAIN, True)):
         worths = {SPRING: strength * own / MINOR_SHARE, STRIBECK: own}
@@ -322,20 +323,20 @@ def test_a_name_that_is_slight_beside_another_needs_unseen_data_that_speak_for_i
 
 @pytest.mark.parametrize(("speaks", "stays"), [(-0.9 * CONTRADICTION_SHARE, True), (-1.1 * CONTRADICTION_SHARE, False)])
 def test_unseen_data_speak_against_a_cause_by_a_share_of_its_gain(speaks: float, stays: bool) -> None:
-    """Where the base model errs on them, too, a true cause may bring a little less than nothing there, surely so."""
+    """A contradiction counts only beyond a fraction of the gain, because the base model has errors there, too."""
     bench = bench_with(spring=Shown(-0.004, -0.001, 1.02, speaks=speaks))
     assert (validated(bench, SelectedEffect(SPRING, 1e-9, ())).effects == (SPRING,)) is stays
 
 
 @pytest.mark.parametrize(("speaks", "stays"), [(0.6, True), (MIN_RETAINED_GAIN - 0.1, False), (-0.5, False)])
 def test_a_name_that_unseen_rows_speak_for_stays_whatever_base_parameters_do_there(speaks: float, stays: bool) -> None:
-    """An error a sixth larger on faster motion, to which friction's polynomial is carried on, is no word against it."""
+    """With enough held-out support a finding stays despite an error that is 17 % larger."""
     bench = bench_with(spring=Shown(-0.008, -0.0002, 1.17, speaks=speaks))
     assert bool(validated(bench, SelectedEffect(SPRING, 1e-9, ())).findings) is stays
 
 
 def test_a_name_that_ruins_unseen_data_is_left_out_whatever_rows_say() -> None:
-    """A spring that was a ripple: unseen rows speak for it, and beyond the fitted positions it errs by a fifth more."""
+    """A finding that increases the error by more than 20 % is rejected despite support, unless its gain is positive."""
     ruins = Shown(low=-0.018, high=0.004, rise=1.23, speaks=0.46)
     assert validated(bench_with(spring=ruins), SelectedEffect(SPRING, 1e-9, ())).effects == ()
     for shown in (Shown(low=-0.004, high=0.001, rise=1.1, speaks=0.46), Shown(low=0.001, rise=1.23, speaks=0.46)):
@@ -343,7 +344,7 @@ def test_a_name_that_ruins_unseen_data_is_left_out_whatever_rows_say() -> None:
 
 
 def test_a_name_that_unseen_rows_plainly_speak_for_stays() -> None:
-    """Where base parameters of other logs err by more than it brings, what all logs say together counts."""
+    """With strong support a finding stays, although it retains no gain on stretches left out."""
     plain = Shown(low=-0.003, high=0.001, rise=1.02, kept=-0.4, speaks=0.48)
     assert validated(bench_with(spring=plain), SelectedEffect(SPRING, 1e-9, ()), held_out=False).effects == (SPRING,)
     for shown in (Shown(low=-0.003, high=0.001, rise=1.02, kept=-0.4, speaks=0.25),):
@@ -351,7 +352,7 @@ def test_a_name_that_unseen_rows_plainly_speak_for_stays() -> None:
 
 
 def test_what_was_undone_before_the_unseen_data_stays() -> None:
-    """A payload that is put down: unseen data speak against it, and for it where they are taken to be without it."""
+    """A payload change that is absent in the held-out data is kept, with a note; other effects are not."""
     payload = member_of("payload_change", None)
     bench = bench_with()
     bench.shows["payload_change"] = HARMS
@@ -362,6 +363,6 @@ def test_what_was_undone_before_the_unseen_data_stays() -> None:
     assert "absent from the held-out data" in note
     bench.without["payload_change"] = IDLE
     assert validated(bench, SelectedEffect(payload, 1e-9, ())).effects == ()
-    # A spring does not come and go.
+    # A spring is permanent.
     bench.shows["spring of joint 2"], bench.without["spring of joint 2"] = HARMS, HELPS
     assert validated(bench, SelectedEffect(SPRING, 1e-9, ())).effects == ()

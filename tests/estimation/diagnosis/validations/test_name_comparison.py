@@ -1,4 +1,4 @@
-"""Specification of names against free functions in their place."""
+"""Tests of the comparison of named effects with free functions in their place."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _compared(
     left: Sequence[FittedEffect] = (),
     retained: float = 1.0,
 ) -> ComparedNames:
-    """Names beside functions that explain as much `in_place` of them, and others that explain what they have `left`."""
+    """Compares named effects with free functions `in_place` of them, and others for what they have `left`."""
     adding(monkeypatch, {id(m.group): m.gain for m in (*names, *in_place, *left)})
 
     def free(
@@ -54,16 +54,16 @@ def _compared(
     ("gain", "degrees", "stands"),
     [
         (500.0, 6, True),  # as much, with more parameters
-        (545.0, 4, True),  # more, but formulas are true to some per cent only
-        (600.0, 6, False),  # clearly more, and worth its parameters
-        (600.0, 30, True),  # clearly more, for far more parameters
-        (900.0, 90, False),  # whatever it costs, the name leaves a third of it
+        (545.0, 4, True),  # more, but within the formula error
+        (600.0, 6, False),  # clearly more, with a better BIC
+        (600.0, 30, True),  # clearly more, but with far more parameters
+        (900.0, 90, False),  # at any number of parameters, because the finding leaves a third
     ],
 )
 def test_a_name_stands_where_no_function_in_its_place_is_clearly_better(
     gain: float, degrees: int, stands: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A name of a gain of 500 and two parameters, beside one free function."""
+    """An effect with a gain of 500 and two parameters is compared with one free function."""
     name, function = member_of("stribeck", 1, 500.0, 2), _function("drag", 1, gain, degrees)
     excess, most = 498.0, gain - degrees
     assert stands is (
@@ -75,7 +75,7 @@ def test_a_name_stands_where_no_function_in_its_place_is_clearly_better(
 
 
 def test_of_several_names_on_a_joint_the_weakest_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two names that a function outperforms together are left out one by one; a name elsewhere stays."""
+    """If a function outperforms two findings of a joint, they are left out one by one; others stay."""
     names = [member_of("stribeck", 3, 300.0, 3), member_of("spring", 3, 90.0, 4), member_of("spring", 2, 80.0, 4)]
     here = _function("turns", 3, 700.0, 8)
     asked: list[tuple[str, ...]] = []
@@ -101,7 +101,7 @@ def test_of_several_names_on_a_joint_the_weakest_goes_first(monkeypatch: pytest.
 def test_what_names_leave_is_unexplained_if_it_is_much(
     left: float, unexplained: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Formulas leave some of what they explain; three tenths of all is something else."""
+    """A remainder of more than 30 % of all is unexplained; a smaller one is formula error."""
     name, rest = member_of("stribeck", 1, 500.0, 2), _function("angle", 2, left, 4)
     result = _compared(monkeypatch, [name], left=[rest])
     assert result.free_functions == ((rest,) if unexplained else ())
@@ -114,7 +114,7 @@ def test_what_names_leave_is_unexplained_if_it_is_much(
 def test_a_name_that_borrows_from_what_is_unexplained_is_left_out(
     retained: float, kept: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A formula may be named on one joint for what acts on another, through the base parameters that they share."""
+    """A finding that keeps too little of its gain beside a free function on another joint is left out."""
     name, rest = member_of("encoder_offset", 1, 100.0, 1), _function("angle", 2, 80.0, 15)
     result = _compared(monkeypatch, [name], left=[rest], retained=retained)
     assert result.free_functions == (rest,)
@@ -122,6 +122,6 @@ def test_a_name_that_borrows_from_what_is_unexplained_is_left_out(
 
 
 def test_without_names_and_functions_nothing_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A log without effects: no names, no functions, all explained."""
+    """Without findings and functions everything is explained."""
     result = _compared(monkeypatch, [])
     assert (result.named, result.free_functions, result.p_values, result.explained) == ((), (), (), 1.0)

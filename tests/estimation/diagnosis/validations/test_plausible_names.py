@@ -1,4 +1,4 @@
-"""Specification of the names that are kept: forms that no machine has, and rivals that leave a name open."""
+"""Tests of implausible values of named effects, and of rivals that make a finding ambiguous."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from tests.estimation.diagnosis.comparison_bench import ROWS, accepting, member_
 def test_a_value_at_the_edge_of_what_machines_have_is_no_name(
     name: str, value: float, believed: bool, arm: Robot
 ) -> None:
-    """An encoder half a radian off wants to be more than that; all of a torque may be cut off; teeth have some play."""
+    """Values at their limits are implausible, except for clipping, and so is a very small backlash."""
     problem = SimpleNamespace(situation=SimpleNamespace(robot=arm))
     member = replace(member_of(name, 1, 300.0, 1), coefficients=np.array([value]))
     assert name_comparison._is_plausible(problem, member) is believed  # type: ignore[arg-type]
@@ -46,15 +46,15 @@ def test_a_value_at_the_edge_of_what_machines_have_is_no_name(
 @pytest.mark.parametrize(
     ("worth", "believed", "kept"),
     [
-        (90.0, True, True),  # with reversals as late as all else it explains nearly as much: a machine may have that
-        (60.0, True, False),  # without its torn reversals it is another effect
-        (90.0, False, False),  # that form is no machine's either
+        (90.0, True, True),  # with equal delays it explains nearly as much, which is plausible
+        (60.0, True, False),  # with equal delays it explains far less
+        (90.0, False, False),  # the usual shape is not plausible either
     ],
 )
 def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
     worth: float, believed: bool, kept: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A delay of a gain of 100 stands at the end of the range that its reversals allow it."""
+    """A delay at the limit of its range is kept only if a usual shape is plausible and fits nearly as well."""
     torn = replace(member_of("time_delay", None, 100.0, 0), shape=(0.004,), coefficients=np.array([near(0.004)[0][1]]))
 
     def refined(
@@ -79,14 +79,14 @@ def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
     [
         ("spring", CLOSE_RIVAL_BIC - 1.0, True),
         ("spring", CLOSE_RIVAL_BIC + 1.0, False),
-        ("load_heat", RARE_ODDS - 1.0, True),  # as rare as it is, the data speak for it as much
+        ("load_heat", RARE_ODDS - 1.0, True),  # within the penalty of a rare effect
         ("load_heat", RARE_ODDS + 1.0, False),
     ],
 )
 def test_a_rare_rival_leaves_a_name_open_where_the_data_alone_speak_for_it(
     rival: str, worse: float, stays_open: bool
 ) -> None:
-    """Its BIC is that much worse beforehand."""
+    """A rare rival counts with its penalty: it is close if its BIC is worse by less than that."""
     other = member_of(rival, 1, 100.0, 2)
     assert (
         name_comparison.has_close_rivals(

@@ -1,4 +1,4 @@
-"""An extended model predicts another log with the smoothing that suits its own, and says how far it may be off."""
+"""Tests of an extended model's settings for prediction: cut-off, error band, and sharpness of the sign."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from robots.terms import FrictionPolynomial
 def test_a_model_predicts_unseen_motion_about_as_well_as_any_smoothing_lets_it(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable
 ) -> None:
-    """Whatever it was given before: a joint's coarse encoder is noise that the other one's fine one is not."""
+    """The model's cut-off predicts a held-out log nearly as well as the best of several cut-offs."""
     log, other = (
         replace(seen, q=seen.q + np.random.default_rng(4).normal(size=seen.q.shape) * [1e-3, 1e-6])
         for seen in (arm_log(torque_noise=0.02), arm_log(torque_noise=0.02, motion_seed=5, seed=5))
@@ -50,9 +50,9 @@ def test_a_model_predicts_unseen_motion_about_as_well_as_any_smoothing_lets_it(
 def test_its_band_holds_most_errors_on_other_unseen_motions(
     arm: Robot, arm_log: Callable[..., Log], held_out: bool
 ) -> None:
-    """Known by held-out logs, or by how errors grow on parts left out: 95 % of four other motions, within 5 %.
+    """The 95 % band contains 90 to 100 % of the errors on four other motions, with and without held-out logs.
 
-    One motion of 20 s holds 3 % more or fewer by its noise alone; four, which are fixed, half of that.
+    The noise of one motion of 20 s changes this by 3 %; that of four fixed motions, by half as much.
     """
     log, other, *more = (arm_log(torque_noise=0.05, motion_seed=k, seed=k) for k in range(6))
     model = diagnose(arm, log, held_out=other if held_out else None).model
@@ -67,7 +67,7 @@ def test_its_band_holds_most_errors_on_other_unseen_motions(
 
 @pytest.mark.slow
 def test_heat_of_the_logs_before_counts_in_its_errors(arm: Robot, arm_log: Callable[..., Log]) -> None:
-    """A joint that loses friction by its heat: the error on what follows is that of the joint as it was left, warm."""
+    """The held-out error of a thermal effect counts with the heat of the logs before."""
     first, other = (arm_log(torque_noise=0.02, motion_seed=k, seed=k) for k in range(2))
     other = replace(other, t=other.t + first.t[-1] + 5.0)
     plain = diagnose(arm, first).model
@@ -89,7 +89,7 @@ def test_heat_of_the_logs_before_counts_in_its_errors(arm: Robot, arm_log: Calla
 
 @pytest.mark.slow
 def test_its_band_grows_as_errors_do_on_parts_left_out(arm: Robot, arm_log: Callable[..., Log]) -> None:
-    """By the joints' own factors, and never narrower than the errors of the fit."""
+    """The band grows by each joint's ratio of held-out to fit error, and is at least that of the fit."""
     log = arm_log(torque_noise=0.05)
     model = diagnose(arm, log).model
     seen = np.quantile(np.abs(log.tau - predict(model, log).predicted), 0.95, axis=0)
@@ -103,9 +103,9 @@ def test_its_band_grows_as_errors_do_on_parts_left_out(arm: Robot, arm_log: Call
 
 @pytest.mark.slow
 def test_friction_turns_round_as_sharply_as_all_rows_say(arm: Robot, arm_log: Callable[..., Log]) -> None:
-    """A sign that is too gradual or too sharp gets its sharpness back from rows about reversals, and predicts better.
+    """The width of the sign is restored from rows near reversals, and improves the prediction.
 
-    A diagnosis gives up those rows. The plant's sign is tanh(dq / 1 mrad/s), and its log has 2 % of noise.
+    A diagnosis does not use these rows. The plant's sign is tanh(dq / 1 mrad/s), and its log has 2 % of noise.
     """
     log, other = (arm_log(torque_noise=0.02, motion_seed=k, seed=k) for k in range(2))
     model = diagnose(arm, log).model
@@ -119,6 +119,6 @@ def test_friction_turns_round_as_sharply_as_all_rows_say(arm: Robot, arm_log: Ca
         assert again.provenance["velocity_scales"] == pytest.approx([1e-3, 1e-3], rel=0.5)
         before, after = predict(wrong, other).nrmse, predict(again, other).nrmse
         assert np.all(after <= before)
-        # Friction is most of the second joint's torque, a little of the first's.
+        # Friction is most of the second joint's torque, but little of the first joint's.
         assert before[1] > worse * after[1]
     assert model.provenance["velocity_scales"] == pytest.approx([1e-3, 1e-3], rel=0.5)
