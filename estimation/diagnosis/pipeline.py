@@ -64,7 +64,7 @@ def diagnose(
         false_alarm: chance of finding an effect in logs that have none.
         check: whether each log passes the gate first, which rejects unusable logs. Outlier rows are then interpolated,
             and logs are cut at gaps.
-        seed: of the noise that is drawn.
+        seed: of the resampling behind the gains' intervals.
         progress: receives the progress.
 
     Returns:
@@ -106,7 +106,7 @@ def diagnose(
         if unusable:
             data = [log for k, log in enumerate(data) if k not in unusable]
             recording = subtract_known_payload(robot, build_recording(robot, data))
-        searched = search(base, recording, effects, false_alarm, seed, bar)
+        searched = search(base, recording, effects, false_alarm, bar)
         problem, selection, entries = searched.problem, searched.selection, searched.entries
         bar.update(0.75, "detection limits")
         limits = find_limits(problem, entries, false_alarm=false_alarm)
@@ -115,7 +115,7 @@ def diagnose(
         give_back()
         bar.update(0.83, "unexplained residual")
         patterns = measure(problem, all_hypotheses(robot, list(all_patterns(robot))))
-        judgement = decide_verdict(problem, selection, patterns, false_alarm, np.random.default_rng(seed + 2))
+        judgement = decide_verdict(problem, selection, patterns, false_alarm)
         bar.update(0.93, "validation on held-out data")
         del patterns
         give_back()

@@ -99,7 +99,7 @@ def planned_problem(
     # The parameters are known: the motion's own torque gives them back, and nothing is to hold them elsewhere.
     size = baseline.base.size + baseline.nuisance.shape[2]
     free = GaussianPrior(np.zeros((size, size)), np.zeros(size))
-    return build_problem(recording, baseline, whitening, draws=0, rng=np.random.default_rng(0), pull=free)
+    return build_problem(recording, baseline, whitening, pull=free)
 
 
 def _at_reversals(dq: Array, starts: tuple[int, ...]) -> NDArray[np.bool_]:
@@ -131,5 +131,4 @@ def expected_whitening(recording: Recording, noise: Sensors, level: Array | None
         starts=recording.starts,
         masked=no_masked_rows(n),
         bands=(Band(np.zeros(0), 1, 0.5 / recording.step),) * recording.n,
-        innovations=np.random.default_rng(0).standard_normal((1024, n)),
     )

@@ -46,7 +46,6 @@ class Problem:
         residual: P times the white residual of the base model (N, n).
         white: the white residual of the base model (N, n).
         energy: <r, r> of the residual.
-        nulls: P times white noise (n, N, draws), and its products with Q (b, draws).
         base_residual: torque less base model (N0, n) [N m or N], at the recording's own rows.
         prior: what holds base parameters that the data leave open, in units of rows over the noise's scale.
         high_band: the frequencies above the bands; None where nothing is asked of them.
@@ -66,7 +65,6 @@ class Problem:
     residual: Array
     white: Array
     energy: float
-    nulls: tuple[Small, Array]
     base_residual: Array
     prior: GaussianPrior
     high_band: HighBand | None = None

@@ -1,4 +1,4 @@
-"""Poses the whitened regression: fits the base model, projects it out, and prepares the null."""
+"""Sets up the whitened regression: fits the base model and projects it out."""
 
 from __future__ import annotations
 
@@ -23,22 +23,18 @@ def build_problem(
     baseline: Baseline,
     whitening: Whitening,
     *,
-    draws: int,
-    rng: np.random.Generator,
     extra: Array | None = None,
     pull: GaussianPrior | None = None,
     upper: HighBand | None = None,
     followed: Array | None = None,
     bearing: ExtraGearLoad | None = None,
 ) -> Problem:
-    """Fits the base model to white data and prepares the null.
+    """Fits the base model to white data.
 
     Args:
         recording: the data.
         baseline: the base model.
         whitening: makes the noise white.
-        draws: noise drawn for the null; 0 for none.
-        rng: draws it.
         extra: torque (N, n) of effects that are known already, taken off before the base model's situation is computed.
         pull: what holds base parameters that the data leave open; by default `base_model_prior`, loosened.
         upper: the frequencies above the bands.
@@ -59,15 +55,6 @@ def build_problem(
     tau = whitening.all(recording.tau)
     tilted = tau @ root
     tilted = tilted - np.einsum("nkb,b->nk", Q, np.einsum("nkb,nk->b", Q, tilted, optimize=True), optimize=True)
-    noise = whitening.draw(N, draws, rng) if draws else np.zeros((N, n, 0), np.float32)
-    projected = np.zeros((Q.shape[2], draws))
-    pressed = np.empty((n, N, draws), np.float32)
-    P, L = whitening.precision.astype(np.float32), root.astype(np.float32)
-    for k in range(n):
-        part = sum(L[j, k] * noise[:, j] for j in range(n) if L[j, k])
-        if draws:
-            projected += (Q[:, k].astype(np.float32).T @ part).astype(float)
-        pressed[k] = sum(P[j, k] * noise[:, j] for j in range(n) if P[j, k])
     scales = whitening.scales(len(recording))
     own = recording.tau if extra is None else recording.tau - extra
     gram, cross = normal_equations(baseline, ~recording.sign_unknown / scales, own)
@@ -89,7 +76,6 @@ def build_problem(
         residual=tilted @ root.T,
         white=np.linalg.solve(root.T, tilted.T).T,
         energy=float(np.sum(tilted**2)),
-        nulls=(pressed, projected),
         base_residual=remainder,
         prior=pull,
         high_band=upper,

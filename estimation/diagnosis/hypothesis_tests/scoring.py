@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from estimation.diagnosis.hypothesis_tests.groups import Group
-from estimation.diagnosis.hypothesis_tests.null_products import null_products
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 
 Array = NDArray[np.float64]
@@ -26,13 +25,11 @@ class Accepted:
         groups: the groups.
         root: L^-1 with L L' their joint Gram matrix (a, a): makes their columns orthonormal.
         cross: orthonormal columns with the residual (a,).
-        nulls: with the noise (a, draws).
     """
 
     groups: tuple[Group, ...]
     root: Array
     cross: Array
-    nulls: Array
 
     @property
     def gain(self) -> float:
@@ -51,15 +48,13 @@ class Accepted:
 
 def accept(problem: Problem, groups: tuple[Group, ...]) -> Accepted:
     """Joins groups into one set of orthonormal columns."""
-    draws = problem.nulls[1].shape[1]
     if not groups:
-        return Accepted((), np.zeros((0, 0)), np.zeros(0), np.zeros((0, draws)))
+        return Accepted((), np.zeros((0, 0)), np.zeros(0))
     gram = np.block([[problem.product(a, b) for b in groups] for a in groups])
     raw = np.concatenate([group.raw for group in groups])
     root = visible_root(gram, raw)
     cross = np.concatenate([group.cross for group in groups])
-    nulls = np.concatenate([null_products(problem, [group])[0] for group in groups])
-    return Accepted(groups, root, root @ cross, root @ nulls)
+    return Accepted(groups, root, root @ cross)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import Literal, overload
 
 import numpy as np
@@ -27,6 +28,8 @@ WINDOW, FEWEST, QUIETEST = 8.0, 16, 1e-100
 # Slowest low-pass [Hz], fastest as a share of the sampling rate: above, a sampled kick is no longer what it was.
 SLOWEST, FASTEST = 4.0, 0.2
 TRANSITION = 0.25  # of the low-pass, as a share of its cut-off
+# A stride this near below a whole number is one: steps are rounded.
+WHOLE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,55 +50,91 @@ class Band:
     cutoff: float
 
     @overload
-    def passed(self, series: Array, after: Array | None = None, *, single: Literal[False] = False) -> Array: ...
+    def passed(
+        self,
+        series: Array,
+        after: Array | None = None,
+        *,
+        starts: tuple[int, ...] = (0,),
+        single: Literal[False] = False,
+    ) -> Array: ...
     @overload
-    def passed(self, series: Array, after: Array | None = None, *, single: Literal[True]) -> Small: ...
-    def passed(self, series: Array, after: Array | None = None, *, single: bool = False) -> Array | Small:
-        """Filters and thins rows (N,) or (N, k) of one log; `after` (p,) filters what is left.
+    def passed(
+        self, series: Array, after: Array | None = None, *, starts: tuple[int, ...] = (0,), single: Literal[True]
+    ) -> Small: ...
+    def passed(
+        self, series: Array, after: Array | None = None, *, starts: tuple[int, ...] = (0,), single: bool = False
+    ) -> Array | Small:
+        """Filters and thins rows (N,) or (N, k) of logs that begin at `starts`, each by itself.
 
-        Columns that lie one after the other in memory (Fortran's order) are filtered several times as fast; with
-        `single` precision twice as fast again, their rounding then 1e-7 of the largest.
+        A filter `after` (p,) acts on what is left. Columns that lie one after the other in memory (Fortran's order) are
+        filtered several times as fast; with `single` precision twice as fast again, their rounding then 1e-7 of the
+        largest.
         """
         kind: type = np.float32 if single else np.float64
+        runs = [slice(*run) for run in pairwise((*starts, len(series)))]
+        lengths = [-(-(run.stop - run.start) // self.stride) for run in runs]
         if not len(self.taps) and after is None:
-            return series[:: self.stride].astype(kind, copy=False)
-        rows = -(-len(series) // self.stride)
+            thinned = [series[run][:: self.stride] for run in runs]
+            return (thinned[0] if len(runs) == 1 else np.concatenate(thinned)).astype(kind, copy=False)
         if not series.size:  # a joint that does not move has no columns
-            return np.zeros((rows, *series.shape[1:]), dtype=kind)
-        columns = np.ascontiguousarray(series.T if series.ndim > 1 else series[None])
+            return np.zeros((sum(lengths), *series.shape[1:]), dtype=kind)
+        columns = series.T if series.ndim > 1 else series[None]
+        # Between logs there are as many zeros as the filters reach.
+        size, response, reach = _response(self, sum(lengths), len(runs), 0 if after is None else len(after))
+        places = np.cumsum([0, *lengths[:-1]]) + reach * np.arange(len(runs))
         # Two real columns are one complex one, the filters being real; as large as each other, so that the rounding of
         # neither shows in the other, and zeros stay zeros.
         sizes = np.maximum(columns.max(axis=1, initial=0.0), -columns.min(axis=1, initial=0.0))[:, None]
         units = 1.0 / np.where(sizes > QUIETEST, sizes, 1.0)
-        packed = np.zeros((-(-len(columns) // 2), len(series)), dtype=np.complex64 if single else np.complex128)
-        np.multiply(columns[::2], units[::2], out=packed.real)
-        np.multiply(columns[1::2], units[1::2], out=packed.imag[: len(columns) // 2])
-        size, response = _response(self, len(series), 0 if after is None else len(after))
-        spectrum = scipy.fft.fft(packed, size, axis=1)
+        half = len(columns) // 2
+        packed = np.zeros((len(columns) - half, size), dtype=np.complex64 if single else np.complex128)
+        for run, place in zip(runs, places * self.stride, strict=True):
+            there = slice(place, place + run.stop - run.start)
+            np.multiply(columns[::2, run], units[::2], out=packed.real[:, there], casting="same_kind")
+            np.multiply(columns[1::2, run], units[1::2], out=packed.imag[:half, there], casting="same_kind")
+        spectrum = scipy.fft.fft(packed, axis=1, overwrite_x=True)
         if response is not None:
             spectrum *= response.astype(spectrum.dtype, copy=False)
         # Thinned rows have the mean of the spectra that fall onto each other.
-        folded = spectrum.reshape(len(packed), self.stride, -1).sum(axis=1) / self.stride
+        folded = spectrum
+        if self.stride > 1:
+            folded = spectrum.reshape(len(packed), self.stride, -1).sum(axis=1) / self.stride
         if after is not None:
             folded *= scipy.fft.fft(after, folded.shape[1]).astype(folded.dtype, copy=False)
-        thin = scipy.fft.ifft(folded, axis=1, overwrite_x=True)[:, :rows]
-        result: Array | Small = np.empty((len(columns), rows), dtype=kind)
-        np.multiply(thin.real, sizes[::2], out=result[::2])
-        np.multiply(thin.imag[: len(columns) // 2], sizes[1::2], out=result[1::2])
+        thin = scipy.fft.ifft(folded, axis=1, overwrite_x=True)
+        result: Array | Small = np.empty((len(columns), sum(lengths)), dtype=kind)
+        first = 0
+        for place, length in zip(places, lengths, strict=True):
+            own, there = slice(first, first + length), slice(place, place + length)
+            np.multiply(thin.real[:, there], sizes[::2], out=result[::2, own], casting="same_kind")
+            np.multiply(thin.imag[:half, there], sizes[1::2], out=result[1::2, own], casting="same_kind")
+            first += length
         return result[0] if series.ndim == 1 else result.T
 
 
 @lru_cache(maxsize=64)
-def _response(band: Band, rows: int, after: int) -> tuple[int, NDArray[np.complex128] | None]:
-    """The length of transforms in which nothing wraps round, and the filter's response with no delay."""
+def _response(band: Band, rows: int, logs: int, after: int) -> tuple[int, NDArray[np.complex128] | None, int]:
+    """The length of transforms in which nothing wraps round, the filter's response with no delay, and its reach.
+
+    Args:
+        band: its filter is the first.
+        rows: thinned ones of all logs.
+        logs: how many.
+        after: length of the filter of thinned rows.
+
+    Returns:
+        Length, response, and how many thinned rows apart logs must be.
+    """
     half = len(band.taps) // 2
-    size = band.stride * scipy.fft.next_fast_len(-(-(rows + 2 * half) // band.stride) + after)
+    reach = -(-2 * half // band.stride) + after
+    size = band.stride * scipy.fft.next_fast_len(rows + logs * reach)
     if not half:
-        return size, None
+        return size, None, reach
     centred = np.zeros(size)
     centred[: half + 1] = band.taps[half:]
     centred[-half:] = band.taps[:half]
-    return size, scipy.fft.fft(centred)
+    return size, scipy.fft.fft(centred), reach
 
 
 def find_bands(
@@ -116,7 +155,7 @@ def find_bands(
     error = np.maximum(inertia**2 @ recording.floor, 1e-300)
     limits = np.minimum((share * torque_density / error) ** 0.25 / (2 * np.pi), highest)
     cutoffs = np.clip(limits, min(SLOWEST, FASTEST * rate), FASTEST * rate)
-    stride = max(1, int(rate / (2.5 * cutoffs.max())))
+    stride = max(1, int(rate / (2.5 * cutoffs.max()) + WHOLE))
     return tuple(low_pass(float(cutoff), rate, stride) for cutoff in cutoffs)
 
 

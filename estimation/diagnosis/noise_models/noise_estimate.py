@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from estimation.diagnosis.noise_models.bursts import find_bursts
@@ -106,18 +107,18 @@ def estimate_whitening(
     innovations = np.concatenate([noise.whitened(piece)[min(trimmed, len(piece) // 2) :] for piece in pieces])
     # White noise has as much power at each frequency: what effects add to the slow ones is left out, and above the band
     # there is nothing.
-    spectrum = np.fft.rfft(innovations, axis=0)
-    f = np.fft.rfftfreq(len(innovations), step)
+    size = next_fast_len(len(innovations), real=True)
+    spectrum = np.fft.rfft(innovations, size, axis=0)
+    f = np.fft.rfftfreq(size, step)
     inside = (f[:, None] >= slowest) & (f[:, None] < fastest)
     power = remove_lines(np.abs(spectrum) ** 2, f[1], period)
     spectrum *= np.sqrt(power) / np.maximum(np.abs(spectrum), np.finfo(float).tiny)
     spectrum[~inside] = 0.0
-    power = np.where(inside, power / beside.kept(len(innovations), counts), 0.0)
+    power = np.where(inside, power / beside.kept(size, counts), 0.0)
     scale = np.maximum(np.sqrt(power.sum(axis=0) / np.maximum(inside.sum(axis=0), 1) / counts), 1e-12)
-    white = _unit(spectrum, len(innovations))
     # Joints correlate in the frequencies that all of them know.
     spectrum[~inside.all(axis=1)] = 0.0
-    shared = _unit(spectrum, len(innovations))
+    shared = _unit(spectrum, size)
     correlation = np.atleast_2d(shared.T @ shared / len(shared))
     # Too few rows make correlations of nothing; a tenth towards none keeps the inverse tame.
     correlation = 0.95 * correlation + 0.05 * np.eye(residual.shape[1])
@@ -126,7 +127,6 @@ def estimate_whitening(
         scale=scale,
         precision=np.asarray(np.linalg.inv(correlation), dtype=np.float64),
         starts=recording.starts,
-        innovations=white,
         masked=gaps,
         bands=bands,
         levels=levels,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import rfft
 
 from estimation.diagnosis.base_models.baseline import Baseline
 from estimation.diagnosis.noise_models.frequency_bands import Band
@@ -60,7 +61,7 @@ class NuisanceProjection:
         """Gives the share of white noise's power that is left (size // 2 + 1, n), of `counts` rows (n,)."""
         result = np.ones((size // 2 + 1, len(counts)))
         for j, own in enumerate(self.pieces):
-            taken = sum((np.abs(np.fft.rfft(X, size, axis=0)) ** 2).sum(axis=1) for X in own)
+            taken = sum((np.abs(rfft(np.ascontiguousarray(X.T), size)) ** 2).sum(axis=0) for X in own)
             result[:, j] = np.maximum(1.0 - taken / counts[j], LEAST_KEPT)
         return result
 

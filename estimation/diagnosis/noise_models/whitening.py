@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Literal, overload
+from typing import Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,6 @@ class Whitening:
         scale: standard deviation of the innovations (n,) [N m or N].
         precision: inverse correlation of the innovations of the joints (n, n).
         starts: rows at which a log begins: the filters start anew.
-        innovations: what the noise looks like when white (M, n), for drawing more of it.
         masked: rows of each joint that do not count.
         bands: each joint's: where motion is known. Rows are thinned alike.
         weights: of the white rows (N, n): those that no noise explains count less; None for ones.
@@ -42,7 +41,6 @@ class Whitening:
     scale: Array
     precision: Array
     starts: tuple[int, ...]
-    innovations: Array
     masked: MaskedRows
     bands: tuple[Band, ...]
     weights: Array | None = None
@@ -92,18 +90,21 @@ class Whitening:
     def filtered(self, series: Array, joint: int, *, single: bool = False) -> Array | Small:
         """Does what `apply` does, rows that do not count included; in `single` precision twice as fast."""
         series = self.masked.bridged(series, joint)
-        taps = self.taps(joint)
-        parts: list[Any] = []
+        taps, band = self.taps(joint), self.bands[joint]
+        white = (
+            band.passed(series, taps, starts=self.starts, single=True)
+            if single
+            else band.passed(series, taps, starts=self.starts)
+        )
+        # Before a log there is nothing to predict from: its first rows would weigh as if they were shocks.
+        rise = np.linspace(0, 1, len(taps))[1:, *(None,) * (series.ndim - 1)]
+        first = 0
         for run, (start, stop) in enumerate(pairwise((*self.starts, len(series)))):
-            filters, piece = taps / self.level(run, joint), series[start:stop]
-            band = self.bands[joint]
-            white = band.passed(piece, filters, single=True) if single else band.passed(piece, filters)
-            # Before the log there is nothing to predict from: its first rows would weigh as if they were shocks.
-            lead = min(len(taps) - 1, len(white))
-            white[:lead] *= np.linspace(0, 1, len(taps))[1 : lead + 1, *(None,) * (series.ndim - 1)]
-            parts.append(white)
-        whole: Array | Small = np.concatenate(parts) if len(parts) > 1 else parts[0]
-        return whole
+            own = white[first : (first := first + -(-(stop - start) // band.stride))]
+            own[: len(rise)] *= rise[: len(own)]
+            if self.levels is not None:
+                own /= self.level(run, joint)
+        return white
 
     def counted(self, white: NDArray[Real], joint: int) -> NDArray[Real]:
         """Leaves out of white columns what is in rows that do not count."""
@@ -144,15 +145,6 @@ class Whitening:
         root = np.linalg.cholesky(self.precision)  # P = L L'
         mixed = np.einsum("jk,nj...->nk...", root, self.all(series), optimize=True)
         return np.asarray(mixed.reshape(-1, *series.shape[2:]))
-
-    def draw(self, rows: int, draws: int, rng: np.random.Generator) -> NDArray[np.float32]:
-        """Draws white noise (N, n, draws) from the innovations themselves: their tails, their correlation."""
-        at = rng.integers(0, len(self.innovations), (rows, draws))
-        source = self.innovations.astype(np.float32)
-        result = np.empty((rows, source.shape[1], draws), np.float32)
-        for j in range(source.shape[1]):
-            result[:, j] = source[at, j]
-        return result
 
 
 def free_columns(

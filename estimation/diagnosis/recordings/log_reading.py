@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 _Part = tuple[Array, Array, Array, Array, Array, Cycle | None, Array, Directions, Array, Array | None]
 
 # More rows than this only cost time: the logs are then thinned by a whole number, torque low-passed before.
-MOST_ROWS = 40_000
+MOST_ROWS = 20_000
 # What jumps is evaluated at all rows, where they are no more than this.
 MOST_FINE = 130_000
 FASTEST = 260.0  # [Hz] sampling beyond which no effect of the catalogue gains

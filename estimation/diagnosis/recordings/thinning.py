@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -90,11 +91,16 @@ def evaluate_at_full_rate(recording: Recording, evaluate: Callable[[Recording], 
 def low_pass_rows(series: Array, ratio: float, kept: int = 1) -> Array:
     """Low-passes rows (N, ...) of one log without delay for a period `ratio` times as long; gives every `kept`-th."""
     half = int(np.ceil(REACH * ratio))
-    taps = firwin(2 * half + 1, min(1.0 / ratio, 0.99), window=("kaiser", WINDOW))
+    taps = _low_pass(half, ratio)
     # Beyond its ends a log goes on as it does when it is turned about them.
     beyond = np.pad(series, ((half, half), *((0, 0),) * (series.ndim - 1)), mode="reflect", reflect_type="odd")
     first = 2 * half // kept
     return np.asarray(upfirdn(taps, beyond, down=kept, axis=0))[first : first + -(-len(series) // kept)]
+
+
+@lru_cache(maxsize=16)
+def _low_pass(half: int, ratio: float) -> Array:
+    return np.asarray(firwin(2 * half + 1, min(1.0 / ratio, 0.99), window=("kaiser", WINDOW)))
 
 
 def keep_clipped_level(tau: Array, passed: Array) -> Array:

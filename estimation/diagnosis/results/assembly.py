@@ -25,12 +25,14 @@ from estimation.diagnosis.results.notes import (
     farther_joints,
     faster_joints,
     notes_of,
+    state_change,
     turning_joints,
     worse_joints,
 )
 from estimation.diagnosis.results.wording import no_part, word_finding
 from estimation.diagnosis.searches.selection import SelectedEffect, Selection
 from estimation.diagnosis.validations.comparison import has_close_rivals
+from estimation.diagnosis.validations.decision import Reason, decide
 from estimation.diagnosis.validations.equivalent_shapes import complete_effects, equivalent_shapes
 from estimation.diagnosis.validations.free_functions import strongest_pattern
 from estimation.diagnosis.validations.gain_intervals import HeldOutErrors
@@ -89,15 +91,16 @@ def assemble(robot: Robot, inputs: DiagnosisInputs) -> Diagnosis:
     )
     members, selected, seen = held.effects, held.findings, held.measured
     compliances = _compliances(inputs, seen)
-    # If no finding is left, an effect rejected by held-out data still shows where the residual is unexplained.
-    rejected_functions = held.rejected_discrepancies or (() if members or compliances else held.refuted)
-    verdict = judged.verdict
-    if len(members) > len(selected) or rejected_functions:
-        verdict = "unexplained"
-    elif held.notes:
-        # The residual was significant even if the held-out data rejected its name.
-        verdict = "ambiguous" if any(map(has_close_rivals, selected)) else "named"
-        verdict = verdict if members else "unexplained" if held.refuted else "none"
+    decision = decide(
+        causes=len(selected) + len(compliances),
+        close_rivals=any(map(has_close_rivals, selected)),
+        free_functions=len(members) - len(selected),
+        rejected_free_functions=len(held.rejected_discrepancies),
+        rejected_causes=len(held.refuted),
+    )
+    # An effect that held-out data reject still shows where the residual is unexplained.
+    refuted = held.refuted if decision.reason is Reason.REJECTED_CAUSES else ()
+    rejected_functions = held.rejected_discrepancies or refuted
     fitted = fit_extended(problem, members, _provenance(inputs))
     findings = tuple(
         word_finding(
@@ -121,8 +124,6 @@ def assemble(robot: Robot, inputs: DiagnosisInputs) -> Diagnosis:
             for i, (member, p_value, gain) in enumerate(rejected_functions, start=len(members))
         )
     unseen, apart = seen.errors, findings[len(members) :]
-    if compliances and not members and not rejected_functions:
-        verdict = "named"
     findings += tuple(windup.finding for windup in compliances)
     known = {extension.joint for extension in fitted.model.extensions if extension.effect == ELASTICITY}
     added = [windup.extension for windup in compliances if windup.extension.joint not in known]
@@ -136,14 +137,14 @@ def assemble(robot: Robot, inputs: DiagnosisInputs) -> Diagnosis:
     shown = unseen.counts.any(axis=0)
     before, after = (np.where(shown, unseen.nrmse(model), np.nan) for model in (0, len(unseen.errors) - 1))
     return Diagnosis(
-        verdict=verdict,
+        verdict=decision.verdict,
         findings=findings,
         baseline=before,
         extended=after,
         explained=judged.explained,
         excess=inputs.excess,
         limits=inputs.limits,
-        next_experiment=_next(problem, selected) if verdict == "ambiguous" else None,
+        next_experiment=_next(problem, selected) if decision.reason is Reason.CLOSE_RIVALS else None,
         model=model,
         how_unseen=unseen.how,
         notes=_each_once(
@@ -153,7 +154,7 @@ def assemble(robot: Robot, inputs: DiagnosisInputs) -> Diagnosis:
             *turning_joints(all_row_errors(model), after, unseen.counts),
             *faster_joints(problem, seen),
             *farther_joints(problem, seen, findings),
-            *held.notes,
+            *map(state_change, held.changes),
             *beside_larger(inputs.selection.strongest_unaccepted, members),
             *lost,
         ),
@@ -186,8 +187,7 @@ def _unnamed(
     own = member.hypothesis.joint
     wanted = [h for h in all_hypotheses(robot, list(all_patterns(robot))) if own is None or h.joint == own]
     entries = measure(inputs.problem, wanted)
-    rng = np.random.default_rng(inputs.seed + 4)
-    return strongest_pattern(inputs.problem, entries, beside, inputs.false_alarm, rng)
+    return strongest_pattern(inputs.problem, entries, beside, inputs.false_alarm)
 
 
 _LOST = (

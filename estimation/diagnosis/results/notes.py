@@ -13,8 +13,10 @@ from estimation.diagnosis.findings import Finding
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.recordings.recording import cut_recording
+from estimation.diagnosis.validations.decision import Change, ChangedFinding
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
 from robots.terms.base import force_unit
+from robots.terms.discrepancies.patterns import PREFIX
 from robots.terms.effects import EFFECTS
 from robots.terms.effects.current_clipping import CERTAIN, CurrentClipping
 
@@ -242,3 +244,28 @@ _NOT_ALIKE = (
     "{0} is significant too, but not reported as a finding. The formula error of {1}, or the drives' response to it, "
     "can produce the same residual on these joints."
 )
+
+
+def state_change(changed: ChangedFinding) -> str:
+    """States what held-out data changed in a finding."""
+    place = f"joint {changed.effect.joint}" if changed.effect.joint else "the whole robot"
+    free = changed.effect.name.startswith(PREFIX)
+    label = f"a free function of {place}" if free else changed.effect.label
+    return _CHANGES[changed.change].format(label, changed.instead and changed.instead.label, place)
+
+
+_CHANGES = {
+    Change.INSIGNIFICANT: "{0} was rejected: it was barely significant, and the held-out data do not support it.",
+    Change.REJECTED: ("{0} was rejected: it was significant in the fit, but does not improve the held-out prediction."),
+    Change.REPLACED: (
+        "{0} was replaced by {1}: both fit about equally well, but only {1} improves the held-out prediction."
+    ),
+    Change.ABSENT: (
+        "{0} seems to be absent from the held-out data, for example because a payload was removed before. The held-out "
+        "errors are computed without it. The model keeps it from the time of the change on."
+    ),
+    Change.FREE_FUNCTION_REJECTED: (
+        "Part of the residual of {2} is unexplained. The free function fitted to it did not improve the held-out "
+        "prediction, so the extended model does not contain it."
+    ),
+}

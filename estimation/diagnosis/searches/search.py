@@ -31,7 +31,6 @@ from robots.common.memory import give_back
 from robots.common.progress import Progress
 from robots.terms.effects import Effect
 
-DRAWS = 200
 SEARCHES = 2
 # The base model alone is fitted again while what is left of a joint's torque falls below this share of what it was.
 ROUNDS, SETTLED = 4, 0.9
@@ -61,7 +60,6 @@ def search(
     recording: Recording,
     effects: Sequence[Effect],
     false_alarm: float,
-    seed: int,
     bar: Progress,
 ) -> Search:
     """Searches the catalogue; once more where what was found had been taken for noise."""
@@ -87,13 +85,10 @@ def search(
             give_back()
             if blurred:
                 baseline = build_baseline(base, recording, known=settled.delayed_motion(recording, members))
-        rng = np.random.default_rng(seed)
         posed = build_problem(
             recording,
             baseline,
             whitening,
-            draws=DRAWS,
-            rng=rng,
             extra=settled.extra,
             followed=settled.delayed,
             bearing=settled.gear_load.extra_load,
@@ -111,7 +106,6 @@ def search(
             posed,
             hypotheses,
             false_alarm,
-            rng,
             bar,
             share,
             known,
@@ -123,7 +117,7 @@ def search(
         # A delay made the sign of friction look less sharp than it is.
         blurred = any(found.effect.hypothesis.effect.smooths_friction_sign for found in last.selection.found)
     assert last is not None
-    with_alternatives = with_rivals(last.searched_problem, last.entries, last.selection, np.random.default_rng(seed))
+    with_alternatives = with_rivals(last.searched_problem, last.entries, last.selection)
     return replace(last, selection=with_alternatives)
 
 
@@ -173,7 +167,6 @@ def _searched(
     problem: Problem,
     hypotheses: Sequence[Hypothesis],
     false_alarm: float,
-    rng: np.random.Generator,
     bar: Progress,
     share: float,
     known: Mapping[Hypothesis, tuple[float, ...]],
@@ -181,7 +174,7 @@ def _searched(
     entries = measure(problem, hypotheses, _scan_progress(bar, share, 0.2))
     give_back()
     advance = _note_progress(bar, share + 0.25)
-    selection = select(problem, entries, false_alarm=false_alarm, rng=rng, advance=advance, known=known)
+    selection = select(problem, entries, false_alarm=false_alarm, advance=advance, known=known)
     members = [found.effect for found in selection.found]
     return Search(problem, with_total_torque(problem, members, hypotheses), entries, selection)
 

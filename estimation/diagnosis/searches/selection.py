@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
 
-import numpy as np
-
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, refine
@@ -29,7 +27,6 @@ from estimation.diagnosis.searches.swap_search import refine_candidates, refine_
 
 MOST = 4  # effects at once
 FAR_MORE = 1.5  # times the gain
-SHOWN = 40  # outcomes whose p-values are computed
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +72,6 @@ def select(
     entries: Sequence[Entry],
     *,
     false_alarm: float,
-    rng: np.random.Generator,
     advance: Callable[[str], None] = lambda note: None,
     known: Mapping[Hypothesis, tuple[float, ...]] | None = None,
 ) -> Selection:
@@ -85,7 +81,7 @@ def select(
     they are refined beside it is not tried again, and no set of effects is built on twice: the search would go round in
     a circle.
     """
-    members, p_values = _visible_in_torque(problem, entries, false_alarm, rng, ())
+    members, p_values = _visible_in_torque(problem, entries, false_alarm, ())
     seen = {member.hypothesis for member in members}
     spurned: set[Hypothesis] = set()
     visited = [seen]
@@ -94,11 +90,11 @@ def select(
     slight: FittedEffect | None = None
     while True:
         accepted = accept(problem, tuple(member.group for member in members))
-        result = scan(problem, entries, accepted, rng)
+        result = scan(problem, entries, accepted)
         first = first or result
         if len(members) == MOST or not result.outcomes:
             break
-        chances = {o.hypothesis: result.p_value(o.evidence) for o in result.outcomes[:SHOWN]}
+        chances = {o.hypothesis: result.p_value(o) for o in result.outcomes}
         if not chances[result.outcomes[0].hypothesis] <= false_alarm:
             break
         advance(f"{result.outcomes[0].hypothesis.label}")
@@ -124,11 +120,11 @@ def select(
         p_values.append(chance[candidates[0].hypothesis])
         won[candidates[0].hypothesis] = candidates[0].gain
         # What is known of the torque now may come near what the log shows.
-        more, sure = _visible_in_torque(problem, entries, false_alarm, rng, members)
+        more, sure = _visible_in_torque(problem, entries, false_alarm, members)
         seen |= {member.hypothesis for member in more}
         members, p_values = [*members, *more], [*p_values, *sure]
         if len(members) > 1:
-            members, p_values = refine_with_swaps(problem, entries, members, p_values, seen, won, rng, false_alarm)
+            members, p_values = refine_with_swaps(problem, entries, members, p_values, seen, won, false_alarm)
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
         # What was found before kicks were known may have been the drives' answers to those.
@@ -161,9 +157,7 @@ def select(
     return Selection(tuple(order), frozenset(seen), first, last, joined, slight)
 
 
-def with_rivals(
-    problem: Problem, entries: Sequence[Entry], selection: Selection, rng: np.random.Generator
-) -> Selection:
+def with_rivals(problem: Problem, entries: Sequence[Entry], selection: Selection) -> Selection:
     """Measures what else could be in each effect's place, beside the others.
 
     What was seen in the torque as logged has no rivals, whatever else explains as little of it.
@@ -176,7 +170,7 @@ def with_rivals(
             # It was found by what it is worth: a moment's cause has not all rows to pay for, in sight of others either.
             beside, own = accept_all_but(problem, members, i), found.effect
             reference = max(own.bic_gain(problem.rows), own.local_bic_gain(problem.rows))
-            result = scan(problem, entries, beside, rng, nulls=False)
+            result = scan(problem, entries, beside)
             near = screen_candidates(problem, result, [*members[:i], *members[i + 1 :]], reference)
             rest = [o for o in near if o.hypothesis != found.effect.hypothesis]
             able = [
@@ -191,7 +185,6 @@ def _visible_in_torque(
     problem: Problem,
     entries: Sequence[Entry],
     false_alarm: float,
-    rng: np.random.Generator,
     members: Sequence[FittedEffect],
 ) -> tuple[list[FittedEffect], list[float]]:
     """Refines what the torque as logged shows by itself, beside members and each other, with the chance of it.
@@ -207,7 +200,7 @@ def _visible_in_torque(
         chance = hypothesis.effect.chance(state, hypothesis.joint, problem.recording.tau) * len(entries)
         if chance < SURE * false_alarm:
             beside = accept(problem, tuple(member.group for member in (*members, *found)))
-            for outcome in scan(now, measure(now, [hypothesis]), beside, rng, nulls=False).outcomes:
+            for outcome in scan(now, measure(now, [hypothesis]), beside).outcomes:
                 member = refine(now, hypothesis, outcome.shape, beside) if outcome.degrees else None
                 if member is not None and member.gain > 0:
                     # Once more, beside all of the torque as it is when that is known to be so.

@@ -6,8 +6,6 @@ from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
-import numpy as np
-
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
@@ -31,7 +29,6 @@ def refine_with_swaps(
     p_values: list[float],
     seen: Collection[Hypothesis],
     won: dict[Hypothesis, float],
-    rng: np.random.Generator,
     false_alarm: float,
 ) -> tuple[list[FittedEffect], list[float]]:
     """Refines each member beside the others, lets its rivals take its place, and drops what is no longer needed.
@@ -54,7 +51,7 @@ def refine_with_swaps(
             if (still and not cleared) or members[i].hypothesis in seen:
                 members[i] = refine(now, members[i].hypothesis, members[i].shape, beside)
                 continue
-            result = scan(problem, entries, beside, rng, nulls=False)
+            result = scan(problem, entries, beside)
             near = screen_candidates(problem, result, others, reached.bic_gain(problem.rows))
             rest = [o for o in near if o.hypothesis != members[i].hypothesis]
             if still:

@@ -28,7 +28,6 @@ def free_functions(
     patterns: Sequence[Entry],
     named: Sequence[FittedEffect],
     false_alarm: float,
-    rng: np.random.Generator,
     *,
     alone: bool = False,
 ) -> tuple[list[FittedEffect], list[float]]:
@@ -40,10 +39,10 @@ def free_functions(
     p_values: list[float] = []
     while len(members) < MOST_PATTERNS:
         accepted = accept(problem, tuple(m.group for m in (*named, *members)))
-        result = scan(problem, patterns, accepted, rng)
+        result = scan(problem, patterns, accepted)
         if not result.outcomes:
             break
-        p = result.p_value(result.outcomes[0].evidence)
+        p = result.p_value(result.outcomes[0])
         if not p <= false_alarm:
             break
         near = [refine(problem, o.hypothesis, o.shape, accepted) for o in result.outcomes[:CONTENDERS] if o.degrees]
@@ -63,10 +62,9 @@ def strongest_pattern(
     patterns: Sequence[Entry],
     named: Sequence[FittedEffect],
     false_alarm: float,
-    rng: np.random.Generator,
 ) -> tuple[FittedEffect, float] | None:
     """Gives the free function that explains most beside names, and its p-value; None where noise explains as much."""
-    members, p_values = free_functions(problem, patterns, named, false_alarm, rng, alone=True)
+    members, p_values = free_functions(problem, patterns, named, false_alarm, alone=True)
     return (members[0], p_values[0]) if members else None
 
 

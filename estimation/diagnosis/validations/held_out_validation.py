@@ -12,6 +12,7 @@ from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.searches.selection import SelectedEffect
+from estimation.diagnosis.validations.decision import Change, ChangedFinding
 from estimation.diagnosis.validations.free_functions import SURE
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
 from estimation.diagnosis.validations.verdict import Verdict
@@ -44,7 +45,7 @@ class ValidatedFindings:
         p_values: of the effects.
         measured: held-out results of the effects.
         rejected_discrepancies: free functions rejected by held-out data, with p-value and gain.
-        notes: rejected and replaced effects, in words.
+        changes: rejected and replaced effects.
         refuted: significant named effects that held-out data contradict, with p-value and gain. The residual they
             explained is still significant.
     """
@@ -54,7 +55,7 @@ class ValidatedFindings:
     p_values: tuple[float, ...]
     measured: HeldOutResult
     rejected_discrepancies: tuple[tuple[FittedEffect, float, Gain], ...]
-    notes: tuple[str, ...]
+    changes: tuple[ChangedFinding, ...]
     refuted: tuple[tuple[FittedEffect, float, Gain], ...]
 
 
@@ -84,7 +85,7 @@ def validate_on_held_out(
     members = [*(found.effect for found in selected), *judgement.patterns]
     p_values = [*(found.p_value for found in selected), *judgement.p_values]
     rejected_functions: list[tuple[FittedEffect, float, Gain]] = []
-    notes: list[str] = []
+    changes: list[ChangedFinding] = []
     refuted: list[tuple[FittedEffect, float, Gain]] = []
     absent: set[Hypothesis] = set()
     cooling_explains: set[Hypothesis] = set()
@@ -95,7 +96,7 @@ def validate_on_held_out(
     seen = measure_members(members)
     strongest = max((worth(found.effect) for found in selected), default=0.0)
     while idle := [i for i in range(len(selected)) if _is_insignificant(seen, i, members[i], beyond, worth, strongest)]:
-        notes.append(_FAINT.format(members[idle[0]].hypothesis.label))
+        changes.append(ChangedFinding(Change.INSIGNIFICANT, members[idle[0]].hypothesis))
         for items in (selected, members, p_values):
             items.pop(idle[0])
         seen = measure_members(members)
@@ -104,11 +105,10 @@ def validate_on_held_out(
         or _harmful_free_functions(seen, members, len(selected))
     ):
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
-        label = members[worst].hypothesis.label
+        own = members[worst].hypothesis
         if len(members) == 1 > len(selected) and _is_weak(members[0].hypothesis.effect, p_values[0]):
             # The only finding is barely significant, and held-out data contradict it: it counts as noise.
-            own = members[0].hypothesis.joint
-            notes.append(_FAINT.format(f"a free function of {f'joint {own}' if own else _WHOLE}"))
+            changes.append(ChangedFinding(Change.INSIGNIFICANT, own))
             members.clear()
             p_values.clear()
         elif worst >= len(selected):
@@ -116,13 +116,13 @@ def validate_on_held_out(
             rejected_functions.append((members.pop(worst), p_values.pop(worst), seen.gains[worst]))
         elif (undone := _without_change(members, worst, absent, measure_members)) is not None:
             seen = undone
-            notes.append(_UNDONE.format(label))
+            changes.append(ChangedFinding(Change.ABSENT, own))
             continue
         elif instead := _alternative(selected[worst], worst, members, measure_members, beyond, forms):
             selected[worst], seen = instead
             members[worst] = selected[worst].effect
-            if members[worst].hypothesis.label != label:
-                notes.append(_REPLACED.format(label, members[worst].hypothesis.label))
+            if members[worst].hypothesis != own:
+                changes.append(ChangedFinding(Change.REPLACED, own, members[worst].hypothesis))
             continue
         elif _explained_by_cooling(seen, worst, members[worst]):
             cooling_explains.add(members[worst].hypothesis)
@@ -131,30 +131,22 @@ def validate_on_held_out(
             selected.pop(worst)
             rejected = members.pop(worst)
             refuted.append((rejected, p_values.pop(worst), seen.gains[worst]))
-            notes.append(_DROPPED.format(label))
+            changes.append(ChangedFinding(Change.REJECTED, own))
             if (free := unnamed(rejected, members)) is not None:
                 members.append(free[0])
                 p_values.append(free[1])
         seen = measure_members(members)
-    joints = sorted({member.hypothesis.joint or 0 for member, _, _ in rejected_functions})
-    notes += [_SPOILING.format(f"joint {joint}" if joint else _WHOLE) for joint in joints]
+    lost = {member.hypothesis.joint or 0: member.hypothesis for member, _, _ in rejected_functions}
+    changes += [ChangedFinding(Change.FREE_FUNCTION_REJECTED, lost[joint]) for joint in sorted(lost)]
     return ValidatedFindings(
-        tuple(selected), tuple(members), tuple(p_values), seen, tuple(rejected_functions), tuple(notes), tuple(refuted)
+        findings=tuple(selected),
+        effects=tuple(members),
+        p_values=tuple(p_values),
+        measured=seen,
+        rejected_discrepancies=tuple(rejected_functions),
+        changes=tuple(changes),
+        refuted=tuple(refuted),
     )
-
-
-_FAINT = "{} was rejected: it was barely significant, and the held-out data do not support it."
-_DROPPED = "{} was rejected: it was significant in the fit, but does not improve the held-out prediction."
-_REPLACED = "{0} was replaced by {1}: both fit about equally well, but only {1} improves the held-out prediction."
-_UNDONE = (
-    "{} seems to be absent from the held-out data, for example because a payload was removed before. The held-out "
-    "errors are computed without it. The model keeps it from the time of the change on."
-)
-_WHOLE = "the whole robot"
-_SPOILING = (
-    "Part of the residual of {} is unexplained. The free function fitted to it did not improve the held-out "
-    "prediction, so the extended model does not contain it."
-)
 
 
 def _without_change(

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry
@@ -55,7 +53,6 @@ def decide_verdict(
     selection: Selection,
     patterns: Sequence[Entry],
     false_alarm: float,
-    rng: np.random.Generator,
 ) -> Verdict:
     """Weighs the named effects against functions of the motion, joint by joint.
 
@@ -63,7 +60,7 @@ def decide_verdict(
     explain much more; several names on one joint must fit better than free functions do, all parameters counted.
     """
     named = [found.effect for found in selection.found]
-    left, p_values = free_functions(problem, patterns, named, false_alarm, rng, alone=True)
+    left, p_values = free_functions(problem, patterns, named, false_alarm, alone=True)
     explained, rest = selection.accepted.gain, sum(map(excess_chi2, left))
     share = explained / (explained + rest) if explained + rest > 0 else 1.0
     able = [_plausible_form(problem, found, named) for found in selection.found]
@@ -71,16 +68,14 @@ def decide_verdict(
     kept = tuple(_plausible_rivals(problem, found) for found in able if found is not None)
     if share < ENOUGH:
         kept = tuple(found for found in kept if found.effect.hypothesis.joint is not None)
-    kept = tuple(
-        found for found in kept if _outperforms_free_functions(problem, found, named, patterns, false_alarm, rng)
-    )
-    if not _better_than_one_cause(problem, named, patterns, false_alarm, rng):
+    kept = tuple(found for found in kept if _outperforms_free_functions(problem, found, named, patterns, false_alarm))
+    if not _better_than_one_cause(problem, named, patterns, false_alarm):
         kept = ()
     lost = set()
     for j in sorted({found.effect.hypothesis.joint for found in kept if found.effect.hypothesis.joint is not None}):
-        if _explains_joint(problem, j, named, patterns, left, false_alarm, rng):
+        if _explains_joint(problem, j, named, patterns, left, false_alarm):
             continue
-        if (fewer := _drop_weakest(problem, j, named, patterns, false_alarm, rng)) is None:
+        if (fewer := _drop_weakest(problem, j, named, patterns, false_alarm)) is None:
             lost.add(j)
         else:
             named = fewer
@@ -93,7 +88,7 @@ def decide_verdict(
     while len(kept) < len(named):
         # Names that do not fit would only distort the patterns: those start anew, beside the names that hold.
         beside = [found.effect for found in kept]
-        members, p_values = free_functions(problem, patterns, beside, false_alarm, rng, alone=True)
+        members, p_values = free_functions(problem, patterns, beside, false_alarm, alone=True)
         # What is unexplained reaches other joints: names that explain less than it does are not to be trusted.
         strong = tuple(found for found in kept if found.effect.gain > max(map(excess_chi2, members), default=0.0))
         if len(strong) == len(kept):
@@ -103,7 +98,7 @@ def decide_verdict(
         # A formula may have been named for what is unexplained on all joints, or on another one that it reaches.
         wide = any(member.hypothesis.joint is None for member in members)
         spread = [found for found in kept if wide or len(found.effect.group.joints) > 1]
-        borrowed = [f for f in spread if not _is_robust(problem, f, kept, patterns, false_alarm, rng)]
+        borrowed = [f for f in spread if not _is_robust(problem, f, kept, patterns, false_alarm)]
         # So may one that acts on its own joint alone, if base parameters have taken another's torque for it.
         for found in (found for found in kept if found not in spread):
             elsewhere = [member for member in members if member.hypothesis.joint != found.effect.hypothesis.joint]
@@ -114,7 +109,7 @@ def decide_verdict(
         weakest = min(borrowed, key=lambda found: found.effect.gain)
         kept = tuple(found for found in kept if found is not weakest)
         beside = [found.effect for found in kept]
-        members, p_values = free_functions(problem, patterns, beside, false_alarm, rng, alone=True)
+        members, p_values = free_functions(problem, patterns, beside, false_alarm, alone=True)
     verdict = "none" if not kept else "ambiguous" if any(map(has_close_rivals, kept)) else "named"
     return Verdict(verdict, kept, (), (), float(share))
 
@@ -158,7 +153,6 @@ def _explains_joint(
     patterns: Sequence[Entry],
     left: Sequence[FittedEffect],
     false_alarm: float,
-    rng: np.random.Generator,
 ) -> bool:
     """Whether the names on a joint explain what is there, beside the names on others."""
     own = [member for member in named if member.hypothesis.joint == joint]
@@ -168,7 +162,7 @@ def _explains_joint(
     degrees = sum(member.degrees for member in own)
     rest = sum(excess_chi2(member) for member in left if member.hypothesis.joint == joint)
     here = [entry for entry in patterns if entry.hypothesis.joint == joint]
-    free, _ = free_functions(problem, here, others, false_alarm, rng)
+    free, _ = free_functions(problem, here, others, false_alarm)
     if gain - degrees < ENOUGH * max(gain - degrees + rest, sum(map(excess_chi2, free))):
         return False
     if is_outperformed(problem, gain, degrees, free):
@@ -181,12 +175,12 @@ def _explains_joint(
         # Waves over a joint's range are no more than one place of it where that explains nearly as much with less.
         waves = own[0].hypothesis.effect.oscillates_over_range
         spots = [entry for entry in here if waves and isinstance(entry.hypothesis.effect, LocalFault)]
-        free = free_functions(problem, spots, others, false_alarm, rng)[0] if spots else []
+        free = free_functions(problem, spots, others, false_alarm)[0] if spots else []
         if free and free[0].degrees < degrees and excess_chi2(free[0]) > NEARLY * (gain - degrees):
             return False
         # Nor is anything what another place, or a position that counts less and less, explains more of, and better.
         plain = [entry for entry in here if is_plain(entry.hypothesis.effect)]
-        free, _ = free_functions(problem, plain, others, false_alarm, rng)
+        free, _ = free_functions(problem, plain, others, false_alarm)
         if (
             free
             and excess_chi2(free[0]) > gain - degrees + LEAST
@@ -196,7 +190,7 @@ def _explains_joint(
     if any(member.hypothesis.effect.transient for member in own):
         # What comes and goes follows nearly any torque: functions of the motion that do so with less refute it.
         moving = [entry for entry in here if not is_of_time(entry.hypothesis.effect)]
-        free, _ = free_functions(problem, moving, others, false_alarm, rng)
+        free, _ = free_functions(problem, moving, others, false_alarm)
         if not has_better_bic(problem, own, others, free):
             return False
     whole = [member for member in others if member.hypothesis.joint is None]
@@ -204,7 +198,7 @@ def _explains_joint(
         return True
     # What acts on all joints may have been named for what the name on this one left.
     single = [member for member in others if member.hypothesis.joint is not None]
-    free, _ = free_functions(problem, here, single, false_alarm, rng)
+    free, _ = free_functions(problem, here, single, false_alarm)
     return retains_gain(problem, whole, [*single, *free]) or has_better_bic(problem, [*own, *whole], single, free)
 
 
@@ -214,7 +208,6 @@ def _drop_weakest(
     named: Sequence[FittedEffect],
     patterns: Sequence[Entry],
     false_alarm: float,
-    rng: np.random.Generator,
 ) -> list[FittedEffect] | None:
     """Leaves out the weakest of several names on a joint, as many as it takes for the others to hold; None if none do.
 
@@ -228,8 +221,8 @@ def _drop_weakest(
         for i, member in enumerate(own):
             beside = accept(problem, tuple(m.group for m in (*rest, *own[:i], *own[i + 1 :])))
             own[i] = refine(problem, member.hypothesis, member.shape, beside)
-        left, _ = free_functions(problem, here, [*rest, *own], false_alarm, rng, alone=True)
-        if _explains_joint(problem, joint, [*rest, *own], patterns, left, false_alarm, rng):
+        left, _ = free_functions(problem, here, [*rest, *own], false_alarm, alone=True)
+        if _explains_joint(problem, joint, [*rest, *own], patterns, left, false_alarm):
             return [*rest, *own]
     return None
 
@@ -240,18 +233,17 @@ def _outperforms_free_functions(
     named: Sequence[FittedEffect],
     patterns: Sequence[Entry],
     false_alarm: float,
-    rng: np.random.Generator,
 ) -> bool:
     """Whether a name of the whole robot explains what free functions would in its place."""
     own = found.effect
     if own.hypothesis.joint is not None:
         return True
     others = [member for member in named if member is not own]
-    free, _ = free_functions(problem, patterns, others, false_alarm, rng)
+    free, _ = free_functions(problem, patterns, others, false_alarm)
     if is_outperformed(problem, own.gain, own.degrees, free):
         return False
     plain = [entry for entry in patterns if is_plain(entry.hypothesis.effect) and entry.hypothesis.joint is None]
-    free = free_functions(problem, plain, others, false_alarm, rng)[0] if plain else []
+    free = free_functions(problem, plain, others, false_alarm)[0] if plain else []
     return not free or excess_chi2(free[0]) <= own.gain - own.degrees + LEAST
 
 
@@ -260,11 +252,10 @@ def _better_than_one_cause(
     named: Sequence[FittedEffect],
     patterns: Sequence[Entry],
     false_alarm: float,
-    rng: np.random.Generator,
 ) -> bool:
     """Whether names fit better than one cause of all joints' torque that no name is for, all parameters counted."""
     whole = [entry for entry in patterns if entry.hypothesis.joint is None]
-    free, _ = free_functions(problem, whole, [], false_alarm, rng)
+    free, _ = free_functions(problem, whole, [], false_alarm)
     single = all(member.hypothesis.joint is not None for member in named)
     reached = {j for member in named for j in member.group.joints}
     # On the names' joints alone, a cause of all joints explains no more than they do, and is rarer in machines.
@@ -278,7 +269,6 @@ def _is_robust(
     kept: Sequence[SelectedEffect],
     patterns: Sequence[Entry],
     false_alarm: float,
-    rng: np.random.Generator,
 ) -> bool:
     """Whether a name keeps its gain beside free functions that were chosen without it, or does more than they do.
 
@@ -286,7 +276,7 @@ def _is_robust(
     does half of what the name does. A name that borrows does so from one.
     """
     others = _others(kept, found)
-    free, _ = free_functions(problem, patterns, others, false_alarm, rng, alone=True)
+    free, _ = free_functions(problem, patterns, others, false_alarm, alone=True)
     own = found.effect
     each = [excess_chi2(member) / max(excess_chi2(own), 1e-300) for member in free]
     if sum(each) < NEARLY and max(each, default=0.0) < HALF and has_better_bic(problem, [own], others, free):

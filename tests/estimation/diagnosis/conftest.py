@@ -25,7 +25,7 @@ from robots.terms.effects import Situation, situation
 def pose_arm(arm: Robot) -> Callable[..., Problem]:
     """Fit the arm's base model to a recording, estimate the noise, and pose the whitened regression."""
 
-    def build(recording: Recording, draws: int = 0, wider: float | None = None) -> Problem:
+    def build(recording: Recording, wider: float | None = None) -> Problem:
         baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
         pull = base_model_prior(baseline, recording)
         values = fit_values(baseline, recording.tau.std(axis=0), recording.sign_unknown, recording.tau, pull)
@@ -37,7 +37,7 @@ def pose_arm(arm: Robot) -> Callable[..., Problem]:
         if wider is not None:
             wide = estimate_whitening(recording, residual, baseline.base.size, inertia, wider, spared)
             upper = build_high_band(recording, baseline, residual, residual, whitening.bands, wide)
-        return build_problem(recording, baseline, whitening, draws=draws, rng=np.random.default_rng(0), upper=upper)
+        return build_problem(recording, baseline, whitening, upper=upper)
 
     return build
 

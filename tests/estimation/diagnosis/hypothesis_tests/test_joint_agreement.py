@@ -105,7 +105,7 @@ def test_what_other_effects_explain_on_a_joint_makes_its_own_coefficient_doubtfu
     problem = planned_problem(model, model.nominal, [motion], noise=Sensors(torque_noise=0.025))
     friction = problem.measured(Hypothesis(EFFECTS["stribeck"], 2), (0.3, 1.0))
     root = 1.0 / np.sqrt(friction.gram)
-    accepted = Accepted((friction,), root, np.array([100.0]), np.zeros((1, 0)))
+    accepted = Accepted((friction,), root, np.array([100.0]))
     evidence = per_joint_evidence(problem, Hypothesis(EFFECTS["time_delay"], None), (2e-4,), accepted)
     np.testing.assert_array_equal(evidence.formula_variance[[0, 2, 3, 4, 5]], 0.0)
     coefficients = root.T @ accepted.cross

@@ -45,7 +45,7 @@ def test_a_push_that_goes_on_has_no_edge_there(
         [before, 1.0, after],
         0.0,
     )
-    problem = pose_arm(replace(recording, tau=recording.tau + SIZE * course[:, None]), draws=4)
+    problem = pose_arm(replace(recording, tau=recording.tau + SIZE * course[:, None]))
     member = refine(problem, PUSH, (start, 1.0, 0.05, 0.0, 0.0), accept(problem, ()), effort=0)
     wanted = [np.inf if k in open_ else error for k, error in enumerate(ERRORS)]
     assert open_event_edges(problem, member, [], ERRORS) == wanted
@@ -56,7 +56,7 @@ def test_a_push_at_the_log_s_end_and_what_is_no_push_have_their_errors(
 ) -> None:
     """Beyond the last row nothing is to be seen; a change of friction goes on for good."""
     recording = build_recording(arm, [arm_log(torque_noise=0.02)])
-    problem = pose_arm(recording, draws=4)
+    problem = pose_arm(recording)
     last = float(recording.t[-1])
     member = refine(problem, PUSH, (last - 1.0, 1.0, 0.05, 0.0, 0.0), accept(problem, ()), effort=0)
     assert open_event_edges(problem, member, [], ERRORS) == ERRORS
@@ -72,14 +72,14 @@ def test_a_push_on_a_moving_arm_is_told_from_its_first_to_its_last_moment(
     """A constant force on the last body, known as a pulse in its middle, by the arm's geometry has both its edges."""
     recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     first, last = recording.t[[int(share * len(recording)) for share in (begin, end)]]
-    problem = pose_arm(recording, draws=4)
+    problem = pose_arm(recording)
     on_body = (first, last - first, 0.01, 0.0, float(arm.n))
     X = PUSH.effect.columns(problem.situation, None, on_body)
     assert X[0].any() == X[-1].any() == np.False_
     force = np.zeros(X.shape[2])
     force[:3] = [2.0, 3.0, 1.0]
     force[3:] = np.outer([0.2, 0.1, -0.1], force[:3]).ravel()
-    problem = pose_arm(replace(recording, tau=recording.tau + X @ force), draws=4)
+    problem = pose_arm(replace(recording, tau=recording.tau + X @ force))
     beside = accept(problem, ())
     quarter = (last - first) / 4
     pulse = refine(problem, PUSH, (first + quarter, 2 * quarter, 0.05, 0.0, 0.0), beside, effort=0)

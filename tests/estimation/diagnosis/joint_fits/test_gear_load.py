@@ -65,7 +65,7 @@ def test_a_friction_by_the_load_is_asked_for_with_the_spring_that_the_gear_bears
     recording: Recording, pose_arm: Callable[..., Problem]
 ) -> None:
     """With a load that lacks the spring, friction was told by the position; with it, a share of the load does more."""
-    problem = pose_arm(recording, draws=2)
+    problem = pose_arm(recording)
     found = _members(problem, SPRING, BY_PLACE)
     load_found = find_gear_load(problem, found, fit_jointly(problem, found)[0])
     assert load_found.improves_fit
@@ -81,7 +81,7 @@ def test_the_load_is_what_base_model_and_spring_have_together(
     pinocchio_torque: Callable[..., np.ndarray],
 ) -> None:
     """However much of the hose's pull gravity takes: the load with it is right to a fiftieth, without it by far not."""
-    problem = pose_arm(recording, draws=2)
+    problem = pose_arm(recording)
     found = _members(problem, SPRING, BY_LOAD)
     values = fit_jointly(problem, found)[0]
     load_found = find_gear_load(problem, found, values)
@@ -101,7 +101,7 @@ def test_the_model_is_what_was_fitted_with_a_load_that_the_gear_bears(
     recording: Recording, pose_arm: Callable[..., Problem], tmp_path: Path
 ) -> None:
     """Its torque, from its file too, is that of base model, spring and friction together; the share is the true one."""
-    problem = pose_arm(recording, draws=2)
+    problem = pose_arm(recording)
     found = _members(problem, SPRING, BY_LOAD)
     values, left, full = fit_jointly(problem, found)
     extra = full[:, :, len(problem.prior.target) :] @ values[len(problem.prior.target) :]
@@ -109,8 +109,6 @@ def test_the_model_is_what_was_fitted_with_a_load_that_the_gear_bears(
         recording,
         problem.baseline,
         problem.whitening,
-        draws=2,
-        rng=np.random.default_rng(0),
         extra=extra,
         bearing=find_gear_load(problem, found, values).extra_load,
     )
@@ -149,7 +147,7 @@ def test_the_model_is_what_was_fitted_with_a_load_that_the_gear_bears(
 
 def test_nothing_is_borne_of_what_no_gear_feels(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """Friction alone loads no gear; a spring that nothing depends on is borne, and shows no other cause."""
-    problem = pose_arm(recording, draws=2)
+    problem = pose_arm(recording)
     (friction,) = _members(problem, BY_LOAD)
     assert find_gear_load(problem, [friction], fit_jointly(problem, [friction])[0]) is NO_GEAR_LOAD
     (spring,) = _members(problem, SPRING)

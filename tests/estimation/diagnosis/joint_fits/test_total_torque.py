@@ -40,7 +40,7 @@ def hidden(
     tau, true = recording.tau.copy(), plain.situation.torque[:, 0] + extra
     limit = 0.75 * float(np.abs(true).max())
     tau[:, 0] = np.clip(tau[:, 0] + extra, -limit, limit)
-    return pose_arm(replace(recording, tau=tau), draws=2), true, limit
+    return pose_arm(replace(recording, tau=tau)), true, limit
 
 
 def test_all_of_the_torque_is_known_beside_what_cuts_it_off(hidden: tuple[Problem, np.ndarray, float]) -> None:

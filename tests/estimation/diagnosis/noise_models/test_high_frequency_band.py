@@ -132,13 +132,11 @@ def test_only_fast_effects_are_measured_there(recording: Recording, pose_arm: Ca
 
 
 def test_found_beside_it_a_ripple_is_taken_off(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
-    """Once accepted, it leaves nothing of itself, neither in the data nor in the null."""
-    problem = pose_arm(_rippled(recording), wider=WIDER, draws=200)
+    """Once accepted, it leaves nothing of itself."""
+    problem = pose_arm(_rippled(recording), wider=WIDER)
     group = problem.measured(RIPPLE, SHAPE)
     accepted = accept(problem, (group,))
     assert accepted.gain > 15.0
-    # Its noise is of unit variance: the error of a variance of 800 numbers is 5 %.
-    assert accepted.nulls.var() == pytest.approx(1.0, abs=0.2)
     assert score(problem, group, accepted).gain == pytest.approx(0.0, abs=1e-3)
 
 

@@ -133,8 +133,7 @@ def test_a_delay_must_be_told_aside_from_the_kicks_of_a_play(problem: Problem, a
     at = lag.effect.grid(problem.state_for(lag.effect), None)[0]
     group = problem.measured(lag, at)
     late = FittedEffect(lag, at, group, 1e4, np.array([50.0 / np.sqrt(group.gram[0, 0])]), 1, 1.0)
-    noise = np.zeros((problem.n, problem.rows, 1), np.float32), np.zeros((problem.weighted_base_columns.shape[2], 1))
-    data = replace(_sized(problem, late, np.where(near, 1.0, aside)), nulls=noise)
+    data = _sized(problem, late, np.where(near, 1.0, aside))
     assert delay_supported_away_from_impacts(data, late, [play]) is told
     # Beside nothing that kicks nothing is asked.
     assert delay_supported_away_from_impacts(data, late, [])

@@ -31,7 +31,7 @@ def problem(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Pro
     top = float(np.abs(situation.torque[:, 1]).max())
     gear = LOAD.effect.columns(situation, 2, (1.0, 0.0))[:, :, 0] * SHARE
     iron = IRON.effect.columns(situation, 2, (2.0, top))[:, :, 0] * SHARE
-    return pose_arm(replace(recording, tau=recording.tau + gear + iron), draws=20)
+    return pose_arm(replace(recording, tau=recording.tau + gear + iron))
 
 
 def test_together_they_leave_the_valley_in_which_one_does_what_the_other_should(problem: Problem) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
@@ -30,11 +29,11 @@ def _searching(
     """
     scans: list[set[Hypothesis]] = []
 
-    def scan(problem, entries, accepted, rng):
+    def scan(problem, entries, accepted):
         scans.append(set(accepted))
         assert len(scans) < MOST_SCANS, "goes round in a circle"
         outcomes = [SimpleNamespace(hypothesis=h, evidence=1.0) for h in showing if h not in accepted]
-        return SimpleNamespace(outcomes=outcomes, p_value=lambda evidence: 1e-9)
+        return SimpleNamespace(outcomes=outcomes, p_value=lambda outcome: 1e-9)
 
     def replace(name: str, value: Callable) -> None:
         monkeypatch.setattr(selection, name, value)
@@ -61,7 +60,7 @@ def _searching(
 
 
 def _selected() -> set[Hypothesis]:
-    result = selection.select(None, [], false_alarm=0.01, rng=np.random.default_rng(0))  # type: ignore[arg-type]
+    result = selection.select(None, [], false_alarm=0.01)  # type: ignore[arg-type]
     return {found.effect.hypothesis for found in result.found}
 
 
@@ -130,5 +129,5 @@ def _rivals(
         last=None,  # type: ignore[arg-type]
         accepted=None,  # type: ignore[arg-type]
     )
-    told = selection.with_rivals(SimpleNamespace(rows=1000), [], chosen, np.random.default_rng(0))  # type: ignore[arg-type]
+    told = selection.with_rivals(SimpleNamespace(rows=1000), [], chosen)  # type: ignore[arg-type]
     return told.found[0].rivals  # type: ignore[return-value]

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
@@ -65,7 +64,7 @@ def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
     looked: list[int] = []
     gains = {A: gain, B: 100.0, C: 2 * gain}
 
-    def scan(problem, entries, accepted, rng, *, nulls):
+    def scan(problem, entries, accepted):
         looked.append(1)
         return SimpleNamespace(outcomes=[])
 
@@ -87,7 +86,6 @@ def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
         [0.0, 0.0],
         set(),
         won,
-        np.random.default_rng(0),
         0.01,
     )
     assert len(looked) == int(tried)
@@ -102,7 +100,7 @@ def late(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Proble
     situation = pose_arm(recording).situation
     tau = recording.tau + DELAY.effect.columns(situation, None, (0.006,))[:, :, 0] * 0.006
     ripple = RIPPLE.effect.columns(situation, 2, (40.0, 0.006, 0.0))[:, :, 0] * 0.5
-    return pose_arm(replace(recording, tau=tau + ripple), draws=20)
+    return pose_arm(replace(recording, tau=tau + ripple))
 
 
 def test_a_rival_on_the_joint_of_the_newest_takes_the_place_of_one_that_won(late: Problem) -> None:
@@ -110,9 +108,9 @@ def test_a_rival_on_the_joint_of_the_newest_takes_the_place_of_one_that_won(late
     lag = refine(late, LAG, (0.003,), accept(late, ()))
     ripple = refine(late, RIPPLE, (40.0, 0.0, 0.0), accept(late, (lag.group,)))
     lag = refine(late, LAG, lag.shape, accept(late, (ripple.group,)))
-    won, rng = {LAG: lag.gain, RIPPLE: ripple.gain}, np.random.default_rng(0)
+    won = {LAG: lag.gain, RIPPLE: ripple.gain}
     entries = measure(late, [LAG, RIPPLE, DELAY])
-    members, _ = swap_search.refine_with_swaps(late, entries, [lag, ripple], [0.0, 0.0], set(), won, rng, 0.01)
+    members, _ = swap_search.refine_with_swaps(late, entries, [lag, ripple], [0.0, 0.0], set(), won, 0.01)
     assert [m.hypothesis for m in members] == [DELAY, RIPPLE]
     assert members[0].coefficients[0] == pytest.approx(0.006, rel=0.25)
 
@@ -154,7 +152,7 @@ def test_a_rival_is_tried_with_the_others_refined_beside_it(
         "with_total_torque": lambda problem, members, hypotheses: problem,
         "refine": refined,
         "remeasure": lambda problem, m, beside: m,
-        "scan": lambda *args, nulls: None,
+        "scan": lambda *args: None,
         "screen_candidates": lambda *args: [SimpleNamespace(hypothesis=C)],
         "refine_candidates": lambda problem, rest, beside: [refined(problem, o.hypothesis, (), beside) for o in rest],
         "_acts_on": lambda problem, hypothesis: (0, 1),
@@ -167,7 +165,6 @@ def test_a_rival_is_tried_with_the_others_refined_beside_it(
         [0.0, 0.0],
         set(),
         {A: 100.0, B: 100.0},
-        np.random.default_rng(0),
         0.01,
     )
     assert [m.hypothesis for m in members] == chosen

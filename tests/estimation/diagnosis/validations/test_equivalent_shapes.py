@@ -125,7 +125,7 @@ def test_a_tilt_is_told_beside_the_first_axis_own_moments() -> None:
 
 
 def _nothing() -> Accepted:
-    return Accepted((), np.zeros((0, 0)), np.zeros(0), np.zeros((0, 0)))
+    return Accepted((), np.zeros((0, 0)), np.zeros(0))
 
 
 class _Tilted:

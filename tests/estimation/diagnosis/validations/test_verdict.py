@@ -43,7 +43,7 @@ def test_a_name_of_the_whole_robot_may_be_what_a_name_on_a_joint_left(
     found = replace(ripple, gain=free, degrees=8, group=replace(ripple.group))
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments: ([found] if push not in arguments[2] else [], []))
     problem = SimpleNamespace(rows=ROWS)
-    assert verdict._explains_joint(problem, 1, [ripple, push], [], [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
+    assert verdict._explains_joint(problem, 1, [ripple, push], [], [], 0.01) is holds  # type: ignore[arg-type]
     assert (free - 8 * PRICE < 400.0 - 10 * PRICE) is (free == 310.0)
 
 
@@ -75,7 +75,7 @@ def test_waves_are_no_catch_at_one_angle(
 
     monkeypatch.setattr(verdict, "free_functions", patterns)
     problem = SimpleNamespace(rows=ROWS)
-    assert verdict._explains_joint(problem, 1, [own], spots, [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
+    assert verdict._explains_joint(problem, 1, [own], spots, [], 0.01) is holds  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_a_cause_of_all_joints_is_told_by_more_than_the_joint_of_a_name(
     accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments: ([tilt], []))
     problem = SimpleNamespace(rows=ROWS)
-    assert verdict._better_than_one_cause(problem, [drift], [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
+    assert verdict._better_than_one_cause(problem, [drift], [], 0.01) is holds  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ def test_a_drift_is_a_free_function_of_time(
     monkeypatch.setattr(verdict, "free_functions", patterns)
     problem = SimpleNamespace(rows=ROWS)
     entries = [SimpleNamespace(hypothesis=pattern)]
-    assert verdict._explains_joint(problem, 2, [drift], entries, [], 0.01, np.random.default_rng(0)) is holds  # type: ignore[arg-type]
+    assert verdict._explains_joint(problem, 2, [drift], entries, [], 0.01) is holds  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_a_formula_is_not_named_for_what_is_unexplained_on_joints_that_it_reache
     monkeypatch.setattr(verdict, "_is_plausible", lambda *arguments: True)
     found = SelectedEffect(offset, 1e-9, ())
     selection = SimpleNamespace(found=(found,), accepted=SimpleNamespace(gain=100.0))
-    said = verdict.decide_verdict(SimpleNamespace(rows=ROWS), selection, [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
+    said = verdict.decide_verdict(SimpleNamespace(rows=ROWS), selection, [], 0.01)  # type: ignore[arg-type]
     assert said.verdict == "unexplained"
     assert said.patterns == (free,)
     assert said.named == ((found,) if kept else ())
@@ -180,7 +180,7 @@ def test_a_name_of_the_whole_robot_is_weighed_against_functions_of_a_joint(
     monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: ([other], [1e-30]))
     found = SelectedEffect(tilt, 1e-9, ())
     problem = SimpleNamespace(rows=ROWS)
-    held = verdict._outperforms_free_functions(problem, found, [tilt], [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
+    held = verdict._outperforms_free_functions(problem, found, [tilt], [], 0.01)  # type: ignore[arg-type]
     assert held is holds
 
 
@@ -194,7 +194,7 @@ def test_several_names_on_one_joint_must_fit_better_than_one_free_function(monke
 
     def held(functions: list[FittedEffect]) -> bool:
         monkeypatch.setattr(verdict, "free_functions", lambda *arguments, **kind: (functions, []))
-        return verdict._explains_joint(problem, 1, pair, [], [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
+        return verdict._explains_joint(problem, 1, pair, [], [], 0.01)  # type: ignore[arg-type]
 
     assert 309.0 - 5 * PRICE - (299.0 - 4 * PRICE) < verdict.LEAST
     assert not held([free])
@@ -218,7 +218,7 @@ def test_what_does_more_than_free_functions_does_not_borrow_from_them(
     monkeypatch.setattr(comparison, "score", lambda problem, group, beside: SimpleNamespace(gain=450.0))
     found = SelectedEffect(delay, 1e-9, ())
     problem: Any = SimpleNamespace(rows=ROWS)
-    assert verdict._is_robust(problem, found, (found,), [], 0.01, np.random.default_rng(0)) is stays
+    assert verdict._is_robust(problem, found, (found,), [], 0.01) is stays
 
 
 def test_small_names_beside_one_that_holds_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -241,7 +241,7 @@ def test_small_names_beside_one_that_holds_are_left_out(monkeypatch: pytest.Monk
     monkeypatch.setattr(verdict, "_is_plausible", lambda *arguments: True)
     found = tuple(SelectedEffect(member, 1e-9, ()) for member in (stribeck, spring, push))
     selection = SimpleNamespace(found=found, accepted=SimpleNamespace(gain=800.0))
-    said = verdict.decide_verdict(SimpleNamespace(rows=ROWS), selection, [], 0.01, np.random.default_rng(0))  # type: ignore[arg-type]
+    said = verdict.decide_verdict(SimpleNamespace(rows=ROWS), selection, [], 0.01)  # type: ignore[arg-type]
     assert said.verdict == "named"
     assert [(f.effect.hypothesis.label, f.effect.gain) for f in said.named] == [
         ("stribeck of joint 3", 705.0),
@@ -263,5 +263,5 @@ def test_a_tank_that_empties_is_no_step(gain: float, holds: bool, monkeypatch: p
     monkeypatch.setattr(verdict, "free_functions", free)
     problem = SimpleNamespace(rows=ROWS)
     found = SelectedEffect(step, 1e-9, ())
-    held = verdict._outperforms_free_functions(problem, found, [step], [entry], 0.01, np.random.default_rng(0))  # type: ignore[arg-type,list-item]
+    held = verdict._outperforms_free_functions(problem, found, [step], [entry], 0.01)  # type: ignore[arg-type,list-item]
     assert held is holds
