@@ -7,16 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.calibration import OTHER_FORMULA_ERROR, SHARED_FORMULA_ERROR
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 
 Array = NDArray[np.float64]
-
-# Share of a coefficient that all joints have alike by which each may differ: so far its formula is true.
-ROUGH = 0.25
-# Share of what other effects explain on a joint by which their formulas may be wrong there.
-ASIDE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +69,7 @@ def per_joint_evidence(
                 squares = np.where(late > 0, group.columns[0][:, 0], 0.0) ** 2
                 usual = np.sum(squares * late**2) / max(float(np.sum(squares)), 1e-300)
                 sure[k] = (energies[0] / (1.0 + usual * energies[0]) + energies[1] + timed) / (energies.sum() + timed)
-    apart = ASIDE**2 * explained[list(joints)] / np.where(gram > 0, gram, np.inf)
+    apart = OTHER_FORMULA_ERROR**2 * explained[list(joints)] / np.where(gram > 0, gram, np.inf)
     return PerJointEvidence(gram, cross, sure, apart)
 
 
@@ -99,6 +95,6 @@ def shared_coefficient_gain(gram: Array, cross: Array, apart: Array | None = Non
 def _over_scatter(gram: Array, cross: Array, apart: Array) -> float:
     own, variance = cross / gram, 1.0 / gram + apart
     mean = np.sum(own / variance) / np.sum(1.0 / variance)
-    squares = np.sum((own - mean) ** 2 / (variance + (ROUGH * mean) ** 2))
+    squares = np.sum((own - mean) ** 2 / (variance + (SHARED_FORMULA_ERROR * mean) ** 2))
     explained = mean * (2.0 * cross.sum() - mean * gram.sum())
     return max(float(explained / max(1.0, squares / (len(gram) - 1))), 1e-300)

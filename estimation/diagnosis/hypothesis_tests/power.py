@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2, norm
 
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, POWER
+
 Array = NDArray[np.float64]
 
-POWER = 0.95
-"""Chance with which an effect of the stated size is found, and told from its rival."""
-MARGIN = 10.0
-"""Difference in BIC up to which a rival stays in the set of possible causes."""
 DIRECTIONS = 32
 """Mixtures of its coefficients that an effect of several is judged by."""
 
@@ -37,7 +35,7 @@ def detectable_energy(degrees: int, tries: int, *, false_alarm: float = 0.01, pe
 
 
 @lru_cache
-def resolving_energy(margin: float = MARGIN) -> float:
+def resolving_energy(margin: float = CLOSE_RIVAL_BIC) -> float:
     """Gives the energy at which the wrong cause falls out of the possible ones with the chance `POWER`.
 
     Twice the log-likelihood ratio of the true and the wrong cause is normal, of mean lambda and variance 4 lambda,
@@ -47,7 +45,7 @@ def resolving_energy(margin: float = MARGIN) -> float:
     return float(root**2)
 
 
-def chance_to_resolve(energy: float, margin: float = MARGIN) -> float:
+def chance_to_resolve(energy: float, margin: float = CLOSE_RIVAL_BIC) -> float:
     """Gives the chance that a wrong cause, which leaves `energy` of the true effect, falls out of the possible ones."""
     return float(norm.cdf((energy - margin) / (2.0 * np.sqrt(energy)))) if energy > 0 else 0.0
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import Baseline
+from estimation.diagnosis.calibration import MIN_COUNTED_ENERGY, MIN_DISTANT_ENERGY
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis, acting
 from estimation.diagnosis.noise_models.high_frequency_band import HighBand
@@ -24,10 +25,6 @@ from robots.terms.situations.flange_body import with_body
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
-# A column must have this share of its energy in rows whose direction of motion is known: what leaks from the others is
-# mostly the error of the motion there. One that is far larger in those, and on which all joints must agree (a late
-# torque, at reversals), must owe this share of what counts to rows that are not beside them.
-COUNTED, KNOWN = 0.02, 0.5
 FAINT = 1e-5
 
 
@@ -173,11 +170,11 @@ class Problem:
             above = above if any(map(len, above)) else []
         # What acts above the bands counts there, however little of it those let through.
         power = [own + sum(map(_squares, above)) for own in power]
-        raw = np.where(power[0] > COUNTED * power[1], power[0], np.inf)
+        raw = np.where(power[0] > MIN_COUNTED_ENERGY * power[1], power[0], np.inf)
         doubtful = np.flatnonzero(np.isinf(raw) & (power[0] > FAINT * power[1]))
         if effect is not None and effect.shared_coefficient and len(doubtful):
             known = self._known(joints, [part[:, doubtful] for part in columns])
-            raw[doubtful] = np.where(known > KNOWN * power[0][doubtful], power[0][doubtful], np.inf)
+            raw[doubtful] = np.where(known > MIN_DISTANT_ENERGY * power[0][doubtful], power[0][doubtful], np.inf)
         against, cross, gram = self._products(joints, white, count)
         for j, part in zip(joints, above, strict=False):
             assert self.high_band is not None

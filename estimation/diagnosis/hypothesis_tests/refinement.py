@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from estimation.diagnosis.calibration import ABSENT_CHI2, MAX_REVERSAL_CHI2, RARE_ODDS, REVERSAL_FORMULA_ERROR
+from estimation.diagnosis.hypothesis_tests.evidence import Evidence
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
@@ -29,14 +32,8 @@ WIDE = (101, 6.0)
 FACTOR, SHARE = 1.5, 0.04
 # An effect acts where its torque is more than this share of its largest.
 ACTS = 0.02
-# What an effect is beside reversals and elsewhere may differ by this share, for its formula is no better where it is
-# large, and by so many squared standard errors; at so much of twice the log of the odds that there is none elsewhere it
-# is none: one that is there has this in 2 % of logs at most.
-FORMULA, AGREES, ABSENT = 0.35, 2.0, 4.0
 # Friction that would turn round over a shorter way than any, by this factor, turns round at once: late, if anything.
 SHORT_TRAVEL_FACTOR = 1.05
-# Twice the log of the odds against an effect that robots seldom have.
-RARE = 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,21 +65,37 @@ class FittedEffect:
     birge_ratio: float = 1.0
     motion_error_chi2: float = 0.0
 
-    def bic_gain(self, rows: int) -> float:
-        """Gain less what its parameters are worth: Schwarz's criterion, larger is better."""
-        return self._penalised_gain(rows * len(self.group.joints))
+    @property
+    def evidence(self) -> Evidence:
+        """For it against other effects in its place."""
+        prior = RARE_ODDS if self.hypothesis.effect.rare else 0.0
+        rows = len(self.group.columns[0]) * len(self.group.joints)
+        return Evidence(self.gain / self.birge_ratio, self.degrees, rows, prior)
 
-    def local_bic_gain(self, rows: int) -> float:
-        """Does what `bic_gain` does, to say whether it is there at all, not whether another is there instead.
+    @cached_property
+    def local_evidence(self) -> Evidence:
+        """For it against no effect at all.
 
-        A transient effect is measured by the rows in which it acts: the others are no data for its parameters.
+        A transient effect counts the rows in which it acts: the others are no data for its parameters.
         """
-        acting_rows = self._acting_rows() if self.hypothesis.effect.transient else np.inf
-        return self._penalised_gain(min(rows * len(self.group.joints), acting_rows)) - self.motion_error_chi2
+        known = self.evidence
+        rows = min(known.rows, self._acting_rows()) if self.hypothesis.effect.transient else known.rows
+        return replace(known, chi2=known.chi2 - self.motion_error_chi2, rows=rows)
 
-    def _penalised_gain(self, rows: float) -> float:
-        prior = RARE if self.hypothesis.effect.rare else 0.0
-        return self.gain / self.birge_ratio - self.degrees * float(np.log(rows)) - prior
+    @property
+    def bic_gain(self) -> float:
+        """Of `evidence`."""
+        return self.evidence.bic_gain
+
+    @property
+    def local_bic_gain(self) -> float:
+        """Of `local_evidence`."""
+        return self.local_evidence.bic_gain
+
+    @property
+    def excess_chi2(self) -> float:
+        """What it explains above as many columns of noise; not negative."""
+        return max(self.gain - self.degrees, 0.0)
 
     def _acting_rows(self) -> float:
         """Rows that the columns act on: (sum x^2)^2 / sum x^4, mean over columns, two at least."""
@@ -109,6 +122,13 @@ class FittedEffect:
         own, size = (np.abs(m.group.columns[m.group.joints.index(joint)] @ m.coefficients) for m in (self, other))
         acts = size > ACTS * size.max(initial=0.0)
         return float(np.sum(own[acts] ** 2) / max(np.sum(own**2), 1e-300))
+
+
+def set_bic_gain(problem: Problem, members: Sequence[FittedEffect], beside: Sequence[FittedEffect] = ()) -> float:
+    """BIC gain of members together, beside others that are in the model already."""
+    cost = sum(member.gain - member.bic_gain for member in members)
+    known = accept(problem, tuple(m.group for m in beside)).gain if beside else 0.0
+    return accept(problem, tuple(m.group for m in (*beside, *members))).gain - known - cost
 
 
 def accept_all_but(problem: Problem, members: Sequence[FittedEffect], i: int) -> Accepted:
@@ -139,8 +159,8 @@ def refine(
         result = score(problem, group, accepted)
         gain, coefficients = result.bounded(*hypothesis.coefficient_bounds(situation.robot, shape))
         member = FittedEffect(hypothesis, shape, group, gain, coefficients, result.degrees + fitted, result.visible)
-        worth = member.bic_gain(problem.rows)
-        if not best or worth > best[0].bic_gain(problem.rows):
+        worth = member.bic_gain
+        if not best or worth > best[0].bic_gain:
             best[:] = [member]
         # What is climbed has no step where a parameter that costs begins to count.
         return gain
@@ -228,10 +248,14 @@ def _reversal_scatter(problem: Problem, member: FittedEffect, accepted: Accepted
     if (expected <= 0).any():
         return 1.0
     sizes = parts.cross / expected
-    if (1.0 - 2.0 * sizes[0]) / (parts.gram[0, 0] / expected[0] ** 2 + FORMULA**2) > ABSENT:
+    if (1.0 - 2.0 * sizes[0]) / (parts.gram[0, 0] / expected[0] ** 2 + REVERSAL_FORMULA_ERROR**2) > ABSENT_CHI2:
         return np.inf
     difference = np.array([1.0, -1.0]) / expected
-    return max(1.0, float((sizes[0] - sizes[1]) ** 2 / (difference @ parts.gram @ difference + FORMULA**2)) / AGREES)
+    return max(
+        1.0,
+        float((sizes[0] - sizes[1]) ** 2 / (difference @ parts.gram @ difference + REVERSAL_FORMULA_ERROR**2))
+        / MAX_REVERSAL_CHI2,
+    )
 
 
 def _spacing(grid: Sequence[tuple[float, ...]], k: int, start: tuple[float, ...]) -> float:

@@ -8,13 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from estimation.diagnosis.calibration import MIN_VISIBLE_ENERGY
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 
 Array = NDArray[np.float64]
-
-# A direction of a hypothesis shows only where this share of its energy is left beside the base model.
-VISIBLE = 2e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +123,8 @@ def score(problem: Problem, group: Group, accepted: Accepted) -> Score:
 def visible_root(gram: Array, raw: Array) -> Array:
     """Gives R (k', k) with R gram R' the identity on the directions that show beside what was projected out."""
     if len(raw) == 1:
-        return gram**-0.5 if gram[0, 0] > VISIBLE * max(raw[0], 1e-300) else np.zeros((0, 1))
+        return gram**-0.5 if gram[0, 0] > MIN_VISIBLE_ENERGY * max(raw[0], 1e-300) else np.zeros((0, 1))
     scale = np.sqrt(np.maximum(raw, 1e-300))
     values, vectors = np.linalg.eigh(gram / scale[:, None] / scale)
-    kept = values > VISIBLE
+    kept = values > MIN_VISIBLE_ENERGY
     return np.asarray((vectors[:, kept] / np.sqrt(values[kept])).T / scale)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import correlate
 
+from estimation.diagnosis.calibration import MAX_GLITCH_SHARE, SHOCK_COUNT
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
@@ -20,9 +21,7 @@ Array = NDArray[np.float64]
 BETWEEN = 9
 # The largest shocks elsewhere tell the noise's tail: this share of all, so many at least and at most. Where as many as
 # this are likely as large, it may be one.
-TAIL, FEWEST, MOST, LIKELY = 0.02, 5, 20, 0.01
-# However unlikely by those, it is a shock of one joint where that leaves less than this share: a push acts on several.
-GLITCH = 0.1
+TAIL, FEWEST, MOST = 0.02, 5, 20
 
 
 def gain_beside_shock(problem: Problem, member: FittedEffect, accepted: Accepted) -> FittedEffect:
@@ -43,14 +42,14 @@ def gain_beside_shock(problem: Problem, member: FittedEffect, accepted: Accepted
     reach = max(len(_bump(problem, j, 0.0)) for j in joints)
     elsewhere = np.where(maximum_filter1d(acts, reach)[:, None], 0.0, sizes[BETWEEN // 2])
     offset, largest = float(offsets[best]), int(np.argmax(sizes[best, place]))
-    likely = _chance(problem, elsewhere, joints, float(sizes[best, place].max())) >= LIKELY
+    likely = _chance(problem, elsewhere, joints, float(sizes[best, place].max())) >= SHOCK_COUNT
     struck = joints if likely else joints[largest : largest + 1]
     beside = accept(problem, (*accepted.groups, _shock(problem, struck, place, offset)))
     situation = problem.state_for(member.hypothesis.effect)
     gain, _ = score(problem, member.group, beside).bounded(
         *member.hypothesis.coefficient_bounds(situation.robot, member.shape)
     )
-    return replace(member, gain=gain) if likely or gain < GLITCH * member.gain else member
+    return replace(member, gain=gain) if likely or gain < MAX_GLITCH_SHARE * member.gain else member
 
 
 def _bump(problem: Problem, joint: int, offset: float) -> Array:

@@ -6,15 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.calibration import MIN_BIC_GAIN, MIN_WINDOW_GAIN
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
 from estimation.diagnosis.hypothesis_tests.time_windows import best_window
 from robots.common.parallel import threaded
-
-# A window that is known to some hundredths of a second leaves less than this share of the gain to a finer search.
-NEAR = 0.1
 
 
 def open_event_edges(
@@ -47,10 +44,10 @@ def refit_event_window(problem: Problem, member: FittedEffect, beside: Accepted)
     windows = threaded(lambda shape: best_window(problem, hypothesis, shape, beside, (start, start + duration)), shapes)
     forms = [(own.gain, (own.start, own.duration, *shape[2:])) for own, shape in zip(windows, shapes, strict=True)]
     near = refine(problem, hypothesis, max(forms)[1], beside, effort=0)
-    if near.bic_gain(problem.rows) + NEAR * near.gain < member.bic_gain(problem.rows):
+    if near.bic_gain + MIN_WINDOW_GAIN * near.gain < member.bic_gain:
         return member
     best = refine(problem, hypothesis, near.shape, beside)
-    return best if best.bic_gain(problem.rows) > member.bic_gain(problem.rows) + MIN_BIC_GAIN else member
+    return best if best.bic_gain > member.bic_gain + MIN_BIC_GAIN else member
 
 
 def _open(problem: Problem, member: FittedEffect, beside: Accepted) -> set[int]:
@@ -60,4 +57,4 @@ def _open(problem: Problem, member: FittedEffect, beside: Accepted) -> set[int]:
         return set()
     rest = accept(problem, (member.group, *beside.groups))
     more = ((k, refine(problem, member.hypothesis, shape, rest, effort=0)) for k, shape in further)
-    return {k for k, form in more if form.local_bic_gain(problem.rows) > MIN_BIC_GAIN}
+    return {k for k, form in more if form.local_bic_gain > MIN_BIC_GAIN}

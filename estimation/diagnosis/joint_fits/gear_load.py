@@ -8,18 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.calibration import MIN_BIC_GAIN, MIN_GEAR_LOAD
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine, set_bic_gain
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from robots.terms.effect_bases.gear_load import ExtraGearLoad, LoadPath, LoadSource
 from robots.terms.effects import EFFECTS
 
 Array = NDArray[np.float64]
 
-# A joint feels what is borne that is more than this share of its own load.
-FELT = 0.01
 # What a friction by load may explain that was named otherwise for want of the load.
 BY_LOAD = EFFECTS["load_dependent_friction"]
 
@@ -66,16 +64,16 @@ def find_gear_load(problem: Problem, members: Sequence[FittedEffect], values: Ar
     extra = bearings[0].on(state).extra_load
     assert extra is not None
     size, other = (np.sqrt(np.mean(torque**2, axis=0)) for torque in (extra, state.load))
-    felt = set((np.flatnonzero(size > FELT * other) + 1).tolist())
+    felt = set((np.flatnonzero(size > MIN_GEAR_LOAD * other) + 1).tolist())
     on_them = [m for m in members if m.hypothesis.joint in felt and not m.hypothesis.effect.loads_gear]
     if not on_them:
         return GearLoad(bearings[0])
-    before = _set_bic_gain(problem, members)
+    before = set_bic_gain(problem, members)
     best, most = GearLoad(bearings[0]), before
     for bearing in bearings:
         now = replace(problem, situation=bearing.on(state), extra_load=bearing)
         for alternative in _alternatives(now, members, on_them):
-            worth = _set_bic_gain(now, alternative)
+            worth = set_bic_gain(now, alternative)
             if worth > most + (0.0 if best.improves_fit else MIN_BIC_GAIN):
                 best, most = GearLoad(bearing, improves_fit=True), worth
     return best
@@ -97,10 +95,3 @@ def _alternatives(
             beside = accept(problem, tuple(m.group for m in rest))
             result.append([*rest, *(refine(problem, place, shape, beside) for place, shape in new)])
     return result
-
-
-def _set_bic_gain(problem: Problem, members: Sequence[FittedEffect]) -> float:
-    """Squared residual that members explain together, less what their parameters cost."""
-    rows = problem.rows
-    cost = sum(m.degrees * float(np.log(rows * len(m.group.joints))) for m in members)
-    return accept(problem, tuple(m.group for m in members)).gain - cost

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, climb
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
@@ -27,8 +28,6 @@ CHANGED = 7.35
 FIRST, GROWING, MANY, LOST = 1.5, 1.3, 24, 3
 # What lies between the last of them and the next is halved so often.
 HALVINGS = 4
-# A choice is made where another explains less by so much: strong evidence.
-CHOSEN = 10.0
 # Of two shapes one is followed in steps that grow by this, so often at most, the other refitted in so many evaluations.
 WIDENING, FEW, REFITTED = 1.5, 10, 12
 # A moment within this time [s] of rows that show no change may be anywhere in them.
@@ -90,7 +89,7 @@ def _chosen(problem: Problem, member: FittedEffect, k: int, others: Accepted) ->
     """Whether the data tell the only value that a shape parameter may have from others that machines have."""
     rest = [value for value in member.hypothesis.effect.shapes[k].choices if value != member.shape[k]]
     gains = [_gain(problem, member, with_value(member.shape, k, value), others) for value in rest]
-    return max(gains, default=-np.inf) < _gain(problem, member, member.shape, others) - CHOSEN
+    return max(gains, default=-np.inf) < _gain(problem, member, member.shape, others) - MIN_BIC_GAIN
 
 
 def _assumed(

@@ -8,16 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
+from estimation.diagnosis.calibration import BURST_SIGMAS, MAX_BURST_SHARE, SPIKE_SIGMAS
+
 Array = NDArray[np.float64]
 
 WIDTHS = (0.3, 1.0)
 """Over which a residual is averaged [s]: a push lasts as long, and spikes of noise do not."""
-FAR = 6.0
-"""Standard deviations of such means, by their median, from which one is none of the noise's: once in 5e8 of its own."""
-SPIKE = 5.0
-"""Standard deviations of single rows, by their median, that count of one: tails are no push."""
-SELDOM = 0.1
-"""Share of the rows up to which it is for moments; more is what the residual is like."""
 
 
 def find_bursts(pieces: Sequence[Array], measured: NDArray[np.bool_], step: float) -> NDArray[np.bool_]:
@@ -31,16 +27,16 @@ def find_bursts(pieces: Sequence[Array], measured: NDArray[np.bool_], step: floa
     marked = np.zeros_like(measured)
     rows_of = np.abs(np.concatenate(pieces))
     usual = [float(np.median(x[rows])) if rows.any() else 0.0 for x, rows in zip(rows_of.T, measured.T, strict=True)]
-    most = SPIKE * np.array(usual) / 0.6745
+    most = SPIKE_SIGMAS * np.array(usual) / 0.6745
     pieces = [np.clip(piece, -most, most) for piece in pieces]
     for width in WIDTHS:
         size = max(1, round(width / step))
         means = np.concatenate([uniform_filter1d(piece, size, axis=0, mode="constant") for piece in pieces])
         for j, (mean, counts) in enumerate(zip(np.abs(means).T, measured.T, strict=True)):
             if counts.any():
-                far = mean > FAR * float(np.median(mean[counts])) / 0.6745
+                far = mean > BURST_SIGMAS * float(np.median(mean[counts])) / 0.6745
                 # What a mean says is of all its rows.
                 marked[:, j] |= maximum_filter1d(far.astype(np.int8), size) > 0
     marked &= measured
-    seldom = marked.sum(axis=0) <= SELDOM * measured.sum(axis=0)
+    seldom = marked.sum(axis=0) <= MAX_BURST_SHARE * measured.sum(axis=0)
     return np.asarray(marked & seldom)

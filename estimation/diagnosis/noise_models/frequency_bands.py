@@ -12,17 +12,12 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.signal import firwin, welch
 
+from estimation.diagnosis.calibration import MAX_BIAS_CHI2, MAX_MOTION_ERROR
 from estimation.diagnosis.recordings.log_reading import Recording
 
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
-# The error of the acceleration may make this share of the torque noise's power; above, both are filtered away.
-SHARE = 0.2
-# Errors of accelerations make the inertia that is fitted too small: of its torque some stays, low-passed, and effects
-# are taken for it. On its own the column of an inertia leaves no more of that than this, in units of a squared standard
-# deviation; beside the other columns of a base model it is some ten times as much.
-BIAS = 0.1
 # Spectra are taken over so long [s], of so many rows at least; a power density, or a column, below this is none.
 WINDOW, FEWEST, QUIETEST = 8.0, 16, 1e-100
 # Slowest low-pass [Hz], fastest as a share of the sampling rate: above, a sampled kick is no longer what it was.
@@ -138,7 +133,11 @@ def _response(band: Band, rows: int, logs: int, after: int) -> tuple[int, NDArra
 
 
 def find_bands(
-    recording: Recording, inertia: Array, torque_density: Array, share: float = SHARE, highest: float | Array = np.inf
+    recording: Recording,
+    inertia: Array,
+    torque_density: Array,
+    share: float = MAX_MOTION_ERROR,
+    highest: float | Array = np.inf,
 ) -> tuple[Band, ...]:
     """Finds each joint's band: up to where the error of all accelerations, as a torque, comes near the torque noise.
 
@@ -186,7 +185,7 @@ def unbiased_frequencies(recording: Recording, inertia: Array, residual: Array, 
     energies = 2 * recording.duration * f[1] * moving / np.maximum(noise, QUIETEST)
     column = np.cumsum(density(recording.ddq @ inertia.T)[1] * energies, axis=0)
     error = np.cumsum((2 * np.pi * f[:, None]) ** 4 * (moving * (inertia**2 @ recording.floor)) * energies, axis=0)
-    shown = np.minimum(error / np.maximum(column, QUIETEST), 1.0) ** 2 * (column - error) > BIAS
+    shown = np.minimum(error / np.maximum(column, QUIETEST), 1.0) ** 2 * (column - error) > MAX_BIAS_CHI2
     return np.where(shown.any(axis=0), f[np.argmax(shown, axis=0)], np.inf)
 
 

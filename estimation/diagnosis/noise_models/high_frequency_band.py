@@ -12,6 +12,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.signal import firwin
 
 from estimation.diagnosis.base_models.baseline import FAINT, Baseline
+from estimation.diagnosis.calibration import MIN_HIGH_BAND
 from estimation.diagnosis.noise_models.frequency_bands import TRANSITION, Band, low_pass
 from estimation.diagnosis.noise_models.masked_rows import find_masked_rows
 from estimation.diagnosis.noise_models.spectral_lines import remove_lines
@@ -21,11 +22,6 @@ from estimation.linear_algebra.orthonormal import orthonormal
 
 Array = NDArray[np.float64]
 
-# A joint whose band ends within this share of the wider one has nothing above it.
-NEARLY = 0.75
-# Above the bands, the error of the accelerations may have so many times the power of the torque noise: it is part of
-# the noise there.
-WIDER = 50.0
 # Length [s] over which the noise there is taken to be as strong as it is, where that is more than usual.
 BURST = 0.4
 # Parts of the frequencies above a band whose noise is levelled, and the fewest frequencies that a part has.
@@ -132,7 +128,7 @@ def build_high_band(
     wide = replace(wide, masked=find_masked_rows(recording.sign_unknown, recording.starts, rest_rows(recording.step)))
     joints: list[JointHighBand | None] = []
     for j, (band, wider) in enumerate(zip(bands, wide.bands, strict=True)):
-        if band.cutoff > NEARLY * wider.cutoff:
+        if band.cutoff > MIN_HIGH_BAND * wider.cutoff:
             joints.append(None)
             continue
         length = len(low_pass(band.cutoff, 1 / (recording.step * wide.stride), 1).taps)

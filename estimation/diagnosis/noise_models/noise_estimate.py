@@ -10,8 +10,15 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
+from estimation.diagnosis.calibration import (
+    IMPACT_TIME,
+    MAX_MOTION_ERROR,
+    MAX_REVERSAL_ERROR,
+    MAX_ROW_SIGMAS,
+    MIN_PUSH_TIME,
+)
 from estimation.diagnosis.noise_models.bursts import find_bursts
-from estimation.diagnosis.noise_models.frequency_bands import SHARE, find_bands, unbiased_frequencies
+from estimation.diagnosis.noise_models.frequency_bands import find_bands, unbiased_frequencies
 from estimation.diagnosis.noise_models.masked_rows import find_masked_rows
 from estimation.diagnosis.noise_models.noise_nuisance_basis import NuisanceProjection
 from estimation.diagnosis.noise_models.noise_spectrum import ALL_FREQUENCIES, WITHOUT_LOW_FREQUENCIES, fit_noise_process
@@ -31,16 +38,10 @@ FEWEST = 4.0
 # A log's own level counts against that of all logs as its frequencies do against so many.
 FEW = 20.0
 QUIETEST = 1e-3
-# White rows beyond so many standard deviations weigh as if they were there (Huber): kicks that no filter undoes.
-HUBER = 3.5
-# But not where rows stick out for so long [s] together and no reversal is nearer than this [s].
-TOGETHER, KICKED = 0.05, 0.15
 # The noise's fast changes are taken from known rows where a joint has so many.
 FEWEST_ROWS = 100
 # Bridges of so many rows are short in any case; where fewer than this share of the rows remain, all bridges stay.
 SHORT, ENOUGH = 8, 0.3
-# What is not known of kicks drowns in the noise below this share of it: at each reversal it is different.
-DROWNED = 1.0
 
 
 def estimate_whitening(
@@ -48,7 +49,7 @@ def estimate_whitening(
     residual: Array,
     parameters: int,
     inertia: Array,
-    share: float = SHARE,
+    share: float = MAX_MOTION_ERROR,
     spared: Sequence[Array] = (),
 ) -> Whitening:
     """Estimates the noise.
@@ -73,7 +74,7 @@ def estimate_whitening(
     bridged = np.column_stack([gaps.bridged(column, j) for j, column in enumerate(residual.T)])
     pieces = [bridged[run] for run in recording.runs]
     moving = np.array([1.0 - len(rows) / len(residual) for rows, *_ in rests.bridges])
-    highest = unbiased_frequencies(recording, inertia, bridged, moving) if share == SHARE else np.inf
+    highest = unbiased_frequencies(recording, inertia, bridged, moving) if share == MAX_MOTION_ERROR else np.inf
     known = [~recording.sign_unknown[run] for run in recording.runs]
     bands = find_bands(recording, inertia, _density(pieces, recording.step, known), share, highest)
     pieces = [
@@ -135,7 +136,7 @@ def estimate_whitening(
     plain = replace(plain, masked=replace(gaps, free=free))
     white_left = np.where(resting, np.nan, np.abs(plain.all(residual)))
     level = np.array([np.nanmedian(column) if np.isfinite(column).any() else 1.0 for column in white_left.T]) / 0.6745
-    weights = np.minimum(1.0, HUBER * np.maximum(level, 0.1) / np.maximum(white_left, 1e-12))
+    weights = np.minimum(1.0, MAX_ROW_SIGMAS * np.maximum(level, 0.1) / np.maximum(white_left, 1e-12))
     weights[_pushed(weights < 1.0, recording, stride, cutoffs)] = 1.0
     return replace(plain, weights=np.where(resting, 0.0, weights))
 
@@ -159,10 +160,10 @@ def _pushed(outside: NDArray[np.bool_], recording: Recording, stride: int, cutof
 
     For longer than a kick that the band spreads: three quarters of a wave of its cut-off (n,) [Hz] to either side.
     """
-    step, reach = recording.step * stride, round(KICKED / recording.step)
+    step, reach = recording.step * stride, round(IMPACT_TIME / recording.step)
     crowded = np.empty_like(outside)
     for j, cutoff in enumerate(cutoffs):
-        width = max(3, round(max(TOGETHER, 1.5 / cutoff) / step))
+        width = max(3, round(max(MIN_PUSH_TIME, 1.5 / cutoff) / step))
         crowded[:, j] = uniform_filter1d(outside[:, j].astype(float), width) >= 0.5
     near = [
         maximum_filter1d(recording.sign_unknown[run].astype(np.int8), 2 * reach + 1, axis=0)[::stride]
@@ -210,7 +211,7 @@ def quiet_joints(recording: Recording, residual: Array, inertia: Array) -> NDArr
     density = _density([residual[run] for run in recording.runs], recording.step)
     # Of the samples themselves, which are as many as a kick lasts for.
     noise = np.sqrt(density * recording.stride / (2 * recording.step))
-    return np.asarray(np.diag(inertia) * recording.reversal_acceleration_error < DROWNED * noise)
+    return np.asarray(np.diag(inertia) * recording.reversal_acceleration_error < MAX_REVERSAL_ERROR * noise)
 
 
 def _density(pieces: Sequence[Array], step: float, known: Sequence[NDArray[np.bool_]] | None = None) -> Array:

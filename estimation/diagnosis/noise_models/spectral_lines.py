@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from estimation.diagnosis.calibration import LINE_FALSE_ALARM
+
 Array = NDArray[np.float64]
 
-# Chance that noise of a smooth density has any line in a spectrum.
-CHANCE = 1e-3
 # Frequencies [Hz] beside a line that tell what the noise is there, and the fewest places that do.
 BESIDE, FEWEST = 1.0, 41
 
@@ -38,7 +38,7 @@ def remove_lines(power: Array, width: float, period: float | None = None) -> Arr
     level = np.stack([median_filter(own, reach, mode="reflect") for own in power.T], axis=1) / np.log(2)
     result = np.array(power, dtype=float)
     for j in range(power.shape[1]):
-        lines = between & (power[:, j] > np.log(len(power) / CHANCE) * level[:, j])
+        lines = between & (power[:, j] > np.log(len(power) / LINE_FALSE_ALARM) * level[:, j])
         for place in np.flatnonzero(lines):
             # Between two places of the spectrum a line falls off with the square of the distance to either side.
             spread = int(0.5 * np.sqrt(power[place, j] / max(level[place, j], np.finfo(float).tiny)))

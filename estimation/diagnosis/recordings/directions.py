@@ -8,17 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
+from estimation.diagnosis.calibration import CREEP_SPEED, CREEP_TIME, MIN_SHARP_SPEED_SIGMAS, MIN_SPEED_SIGMAS
 from estimation.regressions.preparation import SLOW
 from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# Below so many standard errors of its velocity a joint's direction is not known.
-SURE = 4.0
-# A sign that is smooth over some velocity is wrong by 0.45 e / v at most, where the velocity v is wrong by e: whatever
-# its width, by less than what friction's share of noise hides from so many standard errors on.
-CLEAR = 12.0
 # A sign is tried as sharp as over this velocity [rad/s or m/s], a slow joint's over this share of its fastest. Rows
 # slower than so many times that count for nothing: friction that turns round at once has no value of the model's there.
 SHARP, SURELY = 0.0005, 3.0
@@ -36,8 +32,6 @@ LOOP = 25.0
 # A position's noise beside reversals and elsewhere is as good as drawn anew after so many rows: a slow joint stays on
 # a count of its encoder for some. It is compared where there are so many rows of each.
 ANEW, FEWEST = 5, 200
-# A joint slower than this share of its RMS speed for so long [s] creeps: its friction may have any value.
-CREEP, CREEPING = 0.03, 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +88,8 @@ def find_directions(
 
     Rows beside a reversal are not relied on, for a sharp sign turns round between samples: as many as a kick spreads
     to, and `BESIDE` of them where torque was not sampled at these rows. Clear are those where it was, and the velocity
-    changes from row to row by more than `CLEAR` errors and is itself as large: nearly all, with a fine encoder.
+    changes from row to row by more than `MIN_SHARP_SPEED_SIGMAS` errors and is itself as large: nearly all, with a fine
+    encoder.
 
     Args:
         dq: velocities (N, n) [rad/s or m/s].
@@ -119,7 +114,7 @@ def find_directions(
         kicked = largest > NO_KICK * float(np.sqrt(np.mean(a**2)))
         beside = int(np.clip(np.ceil(SPREAD / (cutoff * step)) if kicked else 1, 1, BESIDE)) if sampled else BESIDE
         near = maximum_filter1d(turned.astype(np.int8), 2 * beside, origin=0) > 0
-        unsure[:, j] = (np.abs(v) < np.maximum(SURE * error, SLOW * speed)) | near
+        unsure[:, j] = (np.abs(v) < np.maximum(MIN_SPEED_SIGMAS * error, SLOW * speed)) | near
         change = np.abs(a) * step
         # A kick that does not stand out of the noise where it is looked for is still there; a joint at rest has none.
         usual = float(np.sqrt(np.average(error**2, weights=np.where(turned, change, 0.0) + 1e-300)))
@@ -127,14 +122,14 @@ def find_directions(
         hidden = KICK * largest / (2 * np.pi * cutoff) * (LOOP / cutoff) ** 2
         usual = max(usual, hidden if rest is None else min(hidden, _bound_reversal_velocity(rest[:, j], turned, step)))
         jolts[j] = 2 * np.pi * max(cutoff, LOOP) * usual
-        error = CLEAR * np.maximum(error, usual)
+        error = MIN_SHARP_SPEED_SIGMAS * np.maximum(error, usual)
         least = np.maximum(error, np.maximum(ALIKE * change, SURELY * sharpest_sign_velocity(v)))
         clear[:, j] = sampled & (error < change) & (np.abs(v) > least)
         if (turned & (error < change)).any():
             # Reversals at which it is more do not count.
-            late[:, j] = np.minimum(usual / np.maximum(np.abs(a), 1e-300), step / CLEAR)
-        for start, stop in spans(np.abs(v) < CREEP * speed):
-            if (stop - start) * step > CREEPING:
+            late[:, j] = np.minimum(usual / np.maximum(np.abs(a), 1e-300), step / MIN_SHARP_SPEED_SIGMAS)
+        for start, stop in spans(np.abs(v) < CREEP_SPEED * speed):
+            if (stop - start) * step > CREEP_TIME:
                 unsure[start:stop, j], clear[start:stop, j] = True, False
     return Directions(unsure, unsure & clear, jolts, late)
 

@@ -9,16 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
+from estimation.diagnosis.calibration import REST_TIME, REVERSAL_MARGIN
 from estimation.diagnosis.recordings.periods import Cycle
 from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
-
-# A joint that has not moved on for so long [s] is at rest.
-REST_TIME = 0.3
-
-BESIDE = 0.05
-"""Time [s] about a row of unknown direction in which accelerations are not known to all of their kicks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,8 +146,8 @@ class Recording:
         return np.concatenate([late[run][::stride] for run in self.runs])
 
     def distant_from(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Marks rows of each log farther than `BESIDE` from marked ones, both (N, k)."""
-        reach = 2 * round(BESIDE / self.step) + 1
+        """Marks rows of each log farther than `REVERSAL_MARGIN` from marked ones, both (N, k)."""
+        reach = 2 * round(REVERSAL_MARGIN / self.step) + 1
         return np.concatenate([maximum_filter1d(rows[run].astype(np.int8), reach, axis=0) == 0 for run in self.runs])
 
     def with_trusted(self, joints: NDArray[np.bool_] | None) -> Recording:

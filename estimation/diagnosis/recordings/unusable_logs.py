@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from estimation.diagnosis.calibration import MAX_UNEXPLAINED_POWER
 from estimation.diagnosis.recordings.recording import Recording
 from robots.base_parameters import BaseParameters
 
-# A log of whose squared torque a fit to it alone leaves more than this share, on every joint, tells nothing of the arm.
-LEFT = 0.5
 # Rows of a log that are looked at, and how many numbers determine a parameter.
 ROWS, ENOUGH = 2000, 3
 
@@ -45,6 +44,6 @@ def find_unusable_logs(base: BaseParameters, recording: Recording) -> dict[int, 
         A, y = (Y * weights[:, None]).reshape(-1, Y.shape[2]), (tau * weights).reshape(-1)
         errors = (y - A @ np.linalg.lstsq(A, y, rcond=None)[0]).reshape(tau.shape)
         share = float((errors**2).sum(axis=0)[acts].min())
-        if share > LEFT:
+        if share > MAX_UNEXPLAINED_POWER:
             left[k] = float(np.sqrt(share))
     return left if len(left) < len(recording.runs) else {}

@@ -7,13 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.calibration import (
+    LARGE_HELD_OUT_ERROR,
+    MIN_HELD_OUT_ERROR,
+    MIN_HELD_OUT_RATIO,
+    MIN_RANGE_EXCESS,
+    MIN_SPEED_RATIO,
+    MIN_WORSE_RATIO,
+)
 from estimation.diagnosis.experiment_plans.detection_limits import STILL
 from estimation.diagnosis.experiment_plans.undetectable_springs import undetectable_springs
 from estimation.diagnosis.findings import Finding
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.recordings.recording import cut_recording
-from estimation.diagnosis.validations.decision import Change, ChangedFinding
+from estimation.diagnosis.validations.changes import Change, ChangedFinding
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
 from robots.terms.base import force_unit
 from robots.terms.discrepancies.patterns import PREFIX
@@ -22,14 +30,10 @@ from robots.terms.effects.current_clipping import CERTAIN, CurrentClipping
 
 Array = NDArray[np.float64]
 
-# A held-out error is reported above STRANGE times the fit error and FAR of the torque, or above ODD of the torque.
-STRANGE, FAR, ODD = 1.5, 0.035, 0.2
-# Held-out speeds above this factor of the fitted speeds are reported.
-FASTER = 1.3
 # So are positions outside the fitted range by this share of it, for this share of the time.
-FARTHER, PLACED = 0.05, ("spring", "unexplained")
+PLACED = ("spring", "unexplained")
 # So is a joint whose NRMSE grows with the extended model by this factor and by this difference.
-WORSE, LITTLE = 1.1, 0.001
+LITTLE = 0.001
 # So is a joint whose error in all rows is MUCH_MORE times that of the counted rows, if SEVERAL of them do not count.
 MUCH_MORE, SEVERAL = 2.0, 0.01
 CLIPPING = CurrentClipping()
@@ -75,7 +79,7 @@ def notes_of(
     notes += [
         f"Joint {j + 1}: the residual on held-out data is {100 * after[j]:.0f} % of the torque. Most of it "
         "is treated as noise, so effects may be missed. Diagnose each log separately."
-        for j in np.flatnonzero(after > ODD)
+        for j in np.flatnonzero(after > LARGE_HELD_OUT_ERROR)
         if j not in strange
     ]
     for finding in findings:
@@ -133,7 +137,7 @@ def _strange(problem: Problem, after: Array) -> dict[int, str]:
     number = np.maximum(counts.sum(axis=0), 1)
     torque = np.sqrt((problem.recording.tau**2 * counts).sum(axis=0) / number)
     fitted = np.sqrt((problem.base_residual**2 * counts).sum(axis=0) / number) / np.maximum(torque, 1e-12)
-    far = np.flatnonzero(after > np.maximum(STRANGE * fitted, FAR))
+    far = np.flatnonzero(after > np.maximum(MIN_HELD_OUT_RATIO * fitted, MIN_HELD_OUT_ERROR))
     return {int(j): _STRANGE.format(j + 1, 100 * after[j], 100 * fitted[j]) for j in far}
 
 
@@ -148,7 +152,7 @@ def worse_joints(before: Array, after: Array) -> list[str]:
 
     An effect on one joint can change the base parameters of others.
     """
-    worse = np.flatnonzero(after > np.maximum(WORSE * before, before + LITTLE))
+    worse = np.flatnonzero(after > np.maximum(MIN_WORSE_RATIO * before, before + LITTLE))
     if not len(worse):
         return []
     errors = ", ".join(f"{j + 1} ({100 * before[j]:.3g} -> {100 * after[j]:.3g} %)" for j in worse)
@@ -185,7 +189,7 @@ def faster_joints(problem: Problem, seen: HeldOutResult) -> list[str]:
     unseen = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
     known, there = (np.abs(recording.dq).max(axis=0) for recording in (problem.recording, unseen))
     ratio = there / np.maximum(known, 1e-9)
-    fast = np.flatnonzero(ratio > FASTER)
+    fast = np.flatnonzero(ratio > MIN_SPEED_RATIO)
     names = ", ".join(str(j + 1) for j in fast)
     return [_FASTER.format("s" if len(fast) > 1 else "", names, ratio[fast].max())] if len(fast) else []
 
@@ -201,8 +205,8 @@ def farther_joints(problem: Problem, seen: HeldOutResult, findings: Sequence[Fin
         known, there = (np.ptp(recording.q[:, joint - 1]) for recording in (problem.recording, unseen))
         low, high = (float(limit(problem.recording.q[:, joint - 1])) for limit in (np.min, np.max))
         q = unseen.q[:, joint - 1]
-        beyond = float(np.mean((q < low - FARTHER * known) | (q > high + FARTHER * known)))
-        if beyond > FARTHER:
+        beyond = float(np.mean((q < low - MIN_RANGE_EXCESS * known) | (q > high + MIN_RANGE_EXCESS * known)))
+        if beyond > MIN_RANGE_EXCESS:
             notes.append(_FARTHER.format(joint, 100 * beyond, there / max(known, 1e-9)))
     return notes
 

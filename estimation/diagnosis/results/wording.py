@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.calibration import MAX_RELATIVE_ERROR, MAX_TIME_ERROR
 from estimation.diagnosis.findings import Finding, Gain, Parameter
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
@@ -19,8 +20,6 @@ from robots.terms.discrepancies.patterns import PREFIX
 from robots.terms.effect_bases.base import Coefficient, Effect, Shape
 from robots.terms.effects import EFFECTS
 
-# A nonlinear parameter is determined if the half-width of its interval is at most WITHIN of its value (a time: MOMENT).
-WITHIN, MOMENT = 0.2, 0.2
 # Share of an effect's largest coefficient that counts as zero.
 NOTHING = 1e-6
 
@@ -64,7 +63,7 @@ def word_finding(
         joint=joint,
         parameters=parameters,
         p_value=p_value,
-        delta_bic=member.local_bic_gain(problem.rows),
+        delta_bic=member.local_bic_gain,
         gain=gain,
         rivals=tuple(
             (h.name if h.joint in (joint, None) else f"{h.name} of joint {h.joint}", float(worse))
@@ -175,5 +174,5 @@ def _roughly(shape: Shape, value: float, interval: tuple[float, float]) -> bool:
     if not np.isfinite(half):
         return False
     if shape.moment:
-        return bool(half > MOMENT)
-    return bool(shape.lower >= 0 and half > WITHIN * abs(value))
+        return bool(half > MAX_TIME_ERROR)
+    return bool(shape.lower >= 0 and half > MAX_RELATIVE_ERROR * abs(value))

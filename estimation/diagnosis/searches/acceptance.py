@@ -24,11 +24,7 @@ SURE = 0.2
 
 def passes_bic(problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]) -> bool:
     """Whether a candidate is worth its parameters beside members; the first one may have another size in each log."""
-    worth = (
-        candidate.bic_gain(problem.rows) - candidate.motion_error_chi2
-        if members
-        else candidate.local_bic_gain(problem.rows)
-    )
+    worth = candidate.bic_gain - candidate.motion_error_chi2 if members else candidate.local_bic_gain
     if worth <= MIN_BIC_GAIN and not members and len(problem.recording.runs) > 1:
         worth += profile_gain(problem, candidate) - candidate.gain
     return worth > MIN_BIC_GAIN
@@ -47,12 +43,12 @@ def is_certain(
     """Whether an effect on joints where no other acts is far from chance, and worth its parameters at all."""
     joints = set(candidate.group.joints)
     apart = not any(joints.intersection(other.group.joints) for other in others)
-    return apart and p_value < SURE * false_alarm and candidate.bic_gain(problem.rows) - candidate.motion_error_chi2 > 0
+    return apart and p_value < SURE * false_alarm and candidate.bic_gain - candidate.motion_error_chi2 > 0
 
 
 def exceeds_single_shock(problem: Problem, candidate: FittedEffect, accepted: Accepted) -> bool:
     """Whether what acts for a moment is more than one shock of the noise."""
-    return gain_beside_shock(problem, candidate, accepted).local_bic_gain(problem.rows) > MIN_BIC_GAIN
+    return gain_beside_shock(problem, candidate, accepted).local_bic_gain > MIN_BIC_GAIN
 
 
 def exceeds_leakage(problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]) -> bool:
@@ -81,7 +77,7 @@ def exceeds_leakage(problem: Problem, candidate: FittedEffect, members: Sequence
         )
     ]
     lost = candidate.gain - candidate.gain_on(able)
-    return not members or candidate.bic_gain(problem.rows) - lost > MIN_BIC_GAIN
+    return not members or candidate.bic_gain - lost > MIN_BIC_GAIN
 
 
 def delay_supported_away_from_impacts(

@@ -6,15 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from estimation.diagnosis.calibration import MAX_CANDIDATES, MIN_CANDIDATE_GAIN
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scan import Outcome, Scan
 from robots.terms.effects import Effect
 
-# Hypotheses refined at each step, the best by their point on the grid.
-MOST_CANDIDATES = 7
-# A hypothesis whose grid point explains less than this share of the best one's gain is no contender.
-NEAR = 0.3
 # What acts for a moment is no contender where twice its gain at the grid is too little: its search takes the longest.
 TWICE = 2.0
 
@@ -43,9 +40,9 @@ def screen_candidates(
         return float(times * outcome.gain - (outcome.degrees + free) * np.log(rows))
 
     ranked = sorted(able, key=worth, reverse=True)
-    best, top = max(o.gain for o in able), max(*map(reached, ranked[:MOST_CANDIDATES]), least)
+    best, top = max(o.gain for o in able), max(*map(reached, ranked[:MAX_CANDIDATES]), least)
     hopeless = {o.hypothesis for o in able if _of_a_moment(o.hypothesis.effect) and reached(o, TWICE) < top}
-    return [o for o in ranked if o.gain >= NEAR * best and o.hypothesis not in hopeless][:MOST_CANDIDATES]
+    return [o for o in ranked if o.gain >= MIN_CANDIDATE_GAIN * best and o.hypothesis not in hopeless][:MAX_CANDIDATES]
 
 
 def _of_a_moment(effect: Effect) -> bool:

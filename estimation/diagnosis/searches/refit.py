@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.calibration import MIN_BASE_CHANGE, MIN_EFFECT_CHANGE, MIN_NOISE_CHANGE, MIN_SLOW_NOISE_CHANGE
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
@@ -25,14 +26,6 @@ Array = NDArray[np.float64]
 
 # Rows in which more than this share of the most is cut off are useless as measurements.
 CUT = 0.01
-# The noise is another where its logarithm changes by more than this.
-CALMER = 0.03
-# So is that of its slowest part by this: an effect that was not known adds to that above all.
-SLOWLY = 0.1
-# So is the base model's torque beside the effects where it is different by more than this share.
-MOVED = 0.02
-# Or the torque of an effect by more than this.
-OTHER = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,10 +100,10 @@ def refit(problem: Problem, members: Sequence[FittedEffect]) -> RefitResult:
 def noise_decreased(problem: Problem, whitening: Whitening) -> bool:
     """Whether the noise without what was found is smaller than it was taken to be, or its slow part as far as known."""
     before = problem.whitening
-    if np.max(np.log(before.scale / whitening.scale)) > CALMER:
+    if np.max(np.log(before.scale / whitening.scale)) > MIN_NOISE_CHANGE:
         return True
     slower = np.log(before.at_rest / whitening.at_rest)
-    return bool(np.max(slower) > SLOWLY) and not is_short(problem.recording)
+    return bool(np.max(slower) > MIN_SLOW_NOISE_CHANGE) and not is_short(problem.recording)
 
 
 def base_torque_changed(problem: Problem, values: Array, members: Sequence[FittedEffect]) -> bool:
@@ -124,13 +117,13 @@ def base_torque_changed(problem: Problem, values: Array, members: Sequence[Fitte
     full[list(base.independent)] = values
     change = problem.baseline.regressor @ (full - problem.parameters_without_payload)[list(base.independent)]
     torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
-    if np.max(np.sqrt(np.mean(change**2, axis=0)) / np.maximum(torque, 1e-12)) > MOVED:
+    if np.max(np.sqrt(np.mean(change**2, axis=0)) / np.maximum(torque, 1e-12)) > MIN_BASE_CHANGE:
         return True
     state = problem.baseline.situation(problem.recording, values[: base.size])
     now = replace(problem, situation=with_gear_load(state, problem.extra_load))
     for member in members:
         before, after = (dense(p, member.hypothesis, member.shape) @ member.coefficients for p in (problem, now))
-        if np.sum((after - before) ** 2) > OTHER**2 * np.sum(before**2):
+        if np.sum((after - before) ** 2) > MIN_EFFECT_CHANGE**2 * np.sum(before**2):
             return True
     return False
 

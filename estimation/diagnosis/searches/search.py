@@ -14,12 +14,13 @@ from estimation.diagnosis.base_models.priors import (
     solve_least_squares,
     solve_map,
 )
+from estimation.diagnosis.calibration import MAX_HIGH_BAND_ERROR
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem, normal_equations
 from estimation.diagnosis.hypothesis_tests.scan import Entry, measure
 from estimation.diagnosis.joint_fits.total_torque import with_total_torque
-from estimation.diagnosis.noise_models.high_frequency_band import WIDER, build_high_band
+from estimation.diagnosis.noise_models.high_frequency_band import build_high_band
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening, quiet_joints
 from estimation.diagnosis.noise_models.noise_nuisance_basis import build_nuisance_projection, is_short
 from estimation.diagnosis.recordings.log_reading import Recording
@@ -94,7 +95,7 @@ def search(
             bearing=settled.gear_load.extra_load,
         )
         if any(effect.independent_of_acceleration for effect in effects):
-            wide = estimate_whitening(recording, settled.residual, fitted, inertia, WIDER, spared)
+            wide = estimate_whitening(recording, settled.residual, fitted, inertia, MAX_HIGH_BAND_ERROR, spared)
             # What is left by the base model as it is fitted alone: beside effects it may be far from that.
             upper = build_high_band(recording, baseline, posed.base_residual, settled.residual, whitening.bands, wide)
             posed = replace(posed, high_band=upper)

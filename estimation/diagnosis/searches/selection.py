@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
 
+from estimation.diagnosis.calibration import MAX_EFFECTS, MIN_CANDIDATE_GAIN
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, refine
@@ -21,11 +22,10 @@ from estimation.diagnosis.searches.acceptance import (
     is_accepted,
     is_certain,
 )
-from estimation.diagnosis.searches.candidate_screening import NEAR, screen_candidates
+from estimation.diagnosis.searches.candidate_screening import screen_candidates
 from estimation.diagnosis.searches.joint_shape_refinement import refine_shapes_jointly
 from estimation.diagnosis.searches.swap_search import refine_candidates, refine_with_swaps, remeasure
 
-MOST = 4  # effects at once
 FAR_MORE = 1.5  # times the gain
 
 
@@ -92,7 +92,7 @@ def select(
         accepted = accept(problem, tuple(member.group for member in members))
         result = scan(problem, entries, accepted)
         first = first or result
-        if len(members) == MOST or not result.outcomes:
+        if len(members) == MAX_EFFECTS or not result.outcomes:
             break
         chances = {o.hypothesis: result.p_value(o) for o in result.outcomes}
         if not chances[result.outcomes[0].hypothesis] <= false_alarm:
@@ -169,14 +169,16 @@ def with_rivals(problem: Problem, entries: Sequence[Entry], selection: Selection
         if found.effect.hypothesis not in selection.visible_in_torque:
             # It was found by what it is worth: a moment's cause has not all rows to pay for, in sight of others either.
             beside, own = accept_all_but(problem, members, i), found.effect
-            reference = max(own.bic_gain(problem.rows), own.local_bic_gain(problem.rows))
+            reference = max(own.bic_gain, own.local_bic_gain)
             result = scan(problem, entries, beside)
             near = screen_candidates(problem, result, [*members[:i], *members[i + 1 :]], reference)
             rest = [o for o in near if o.hypothesis != found.effect.hypothesis]
             able = [
-                rival for rival in refine_candidates(problem, rest, beside) if rival.gain >= NEAR * found.effect.gain
+                rival
+                for rival in refine_candidates(problem, rest, beside)
+                if rival.gain >= MIN_CANDIDATE_GAIN * found.effect.gain
             ]
-            rivals = [(rival, reference - rival.bic_gain(problem.rows)) for rival in able]
+            rivals = [(rival, reference - rival.bic_gain) for rival in able]
         effects.append(replace(found, rivals=tuple(rivals)))
     return replace(selection, found=tuple(effects))
 

@@ -9,9 +9,14 @@ from dataclasses import replace
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, refine
+from estimation.diagnosis.hypothesis_tests.refinement import (
+    FittedEffect,
+    accept_all_but,
+    refine,
+    set_bic_gain,
+)
 from estimation.diagnosis.hypothesis_tests.scan import Entry, Outcome, scan
-from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
+from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from estimation.diagnosis.joint_fits.total_torque import with_total_torque
 from estimation.diagnosis.searches.acceptance import is_certain
 from estimation.diagnosis.searches.candidate_screening import screen_candidates
@@ -52,7 +57,7 @@ def refine_with_swaps(
                 members[i] = refine(now, members[i].hypothesis, members[i].shape, beside)
                 continue
             result = scan(problem, entries, beside)
-            near = screen_candidates(problem, result, others, reached.bic_gain(problem.rows))
+            near = screen_candidates(problem, result, others, reached.bic_gain)
             rest = [o for o in near if o.hypothesis != members[i].hypothesis]
             if still:
                 rest = [o for o in rest if cleared.intersection(_acts_on(problem, o.hypothesis))]
@@ -60,7 +65,7 @@ def refine_with_swaps(
             with ThreadPoolExecutor(1) as apart:
                 own = apart.submit(refine, now, members[i].hypothesis, members[i].shape, beside)
                 rivals = refine_candidates(problem, rest[:RIVALS], beside)
-            first = max([own.result(), *rivals], key=lambda m: m.bic_gain(problem.rows))
+            first = max([own.result(), *rivals], key=lambda m: m.bic_gain)
             was, members[i] = members[i].hypothesis, first
             if first.hypothesis == was:
                 wide = [rival for rival in rivals if cleared.intersection(rival.group.joints)]
@@ -73,7 +78,7 @@ def refine_with_swaps(
         i
         for i, m in enumerate(members)
         if m.hypothesis in seen
-        or _again(problem, members, i).local_bic_gain(problem.rows) > MIN_BIC_GAIN
+        or _again(problem, members, i).local_bic_gain > MIN_BIC_GAIN
         or is_certain(problem, m, p_values[i], [*members[:i], *members[i + 1 :]], false_alarm)
     ]
     return [members[i] for i in keep], [p_values[i] for i in keep]
@@ -85,7 +90,7 @@ def _again(problem: Problem, members: Sequence[FittedEffect], i: int) -> FittedE
     Joints on which they had not found their forms yet may have seemed at odds.
     """
     m = members[i]
-    if m.local_bic_gain(problem.rows) > MIN_BIC_GAIN:
+    if m.local_bic_gain > MIN_BIC_GAIN:
         return m
     now = refine(problem, m.hypothesis, m.shape, accept_all_but(problem, members, i), effort=0)
     return replace(m, gain=now.gain, birge_ratio=now.birge_ratio, motion_error_chi2=now.motion_error_chi2)
@@ -108,13 +113,7 @@ def _with(
                 accept_all_but(problem, trial, k),
             )
     trial[i] = refine(problem, rival.hypothesis, rival.shape, accept_all_but(problem, trial, i))
-    return max(members, trial, key=lambda some: _set_bic_gain(problem, some))
-
-
-def _set_bic_gain(problem: Problem, members: Sequence[FittedEffect]) -> float:
-    """What members explain together, less what each is charged: Schwarz's criterion of them all."""
-    charged = sum(m.gain - m.bic_gain(problem.rows) for m in members)
-    return accept(problem, tuple(m.group for m in members)).gain - charged
+    return max(members, trial, key=lambda some: set_bic_gain(problem, some))
 
 
 def refine_candidates(
@@ -128,7 +127,7 @@ def refine_candidates(
     starts += [(o.hypothesis, known[o.hypothesis]) for o in outcomes if known and o.hypothesis in known]
     refined = threaded(lambda start: refine(problem, start[0], start[1], accepted), starts)
     tops: dict[Hypothesis, FittedEffect] = {}
-    for member in sorted(refined, key=lambda member: -member.bic_gain(problem.rows)):
+    for member in sorted(refined, key=lambda member: -member.bic_gain):
         tops.setdefault(member.hypothesis, member)
     return list(tops.values())
 

@@ -5,32 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-
-
-class Change(Enum):
-    """What held-out data changed in the findings."""
-
-    INSIGNIFICANT = "insignificant"
-    REJECTED = "rejected"
-    REPLACED = "replaced"
-    ABSENT = "absent"
-    FREE_FUNCTION_REJECTED = "free function rejected"
-
-
-@dataclass(frozen=True)
-class ChangedFinding:
-    """One change.
-
-    Attributes:
-        change: its kind.
-        effect: the effect as it was found.
-        instead: what replaced it; None for nothing.
-    """
-
-    change: Change
-    effect: Hypothesis
-    instead: Hypothesis | None = None
+from estimation.diagnosis.validations.held_out_validation import ValidatedFindings
+from estimation.diagnosis.validations.name_comparison import has_close_rivals
 
 
 class Reason(Enum):
@@ -57,24 +33,16 @@ class Decision:
     reason: Reason
 
 
-def decide(
-    *, causes: int, close_rivals: bool, free_functions: int, rejected_free_functions: int, rejected_causes: int
-) -> Decision:
-    """Decides the verdict; nothing else does.
-
-    Args:
-        causes: named effects in the model, measured gear compliances included.
-        close_rivals: whether another cause fits about as well as one of them.
-        free_functions: functions without a name in the model.
-        rejected_free_functions: significant ones that held-out data rejected.
-        rejected_causes: significant effects that held-out data rejected and nothing replaced.
-    """
-    if free_functions:
+def decide(validated: ValidatedFindings) -> Decision:
+    """Decides the verdict; nothing else does."""
+    if len(validated.effects) > len(validated.findings):
         return Decision("unexplained", Reason.FREE_FUNCTION)
-    if rejected_free_functions:
+    if validated.rejected_discrepancies:
         return Decision("unexplained", Reason.REJECTED_FREE_FUNCTION)
-    if causes:
-        return Decision("ambiguous", Reason.CLOSE_RIVALS) if close_rivals else Decision("named", Reason.CAUSES_FOUND)
-    if rejected_causes:
+    if validated.findings or validated.compliances:
+        if any(map(has_close_rivals, validated.findings)):
+            return Decision("ambiguous", Reason.CLOSE_RIVALS)
+        return Decision("named", Reason.CAUSES_FOUND)
+    if validated.refuted:
         return Decision("unexplained", Reason.REJECTED_CAUSES)
     return Decision("none", Reason.NOTHING_SIGNIFICANT)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.diagnosis.base_models.priors import explained_chi2
-from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.calibration import MAX_SHAPE_CHI2, MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
@@ -21,9 +21,6 @@ from estimation.diagnosis.joint_fits.shrinkage import effects_prior
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.regressions.parameter_priors import GaussianPrior
 
-# Forms whose fits differ by less than this, twice a log-likelihood, are alike to the log.
-ALIKE = 3.0
-
 
 def equivalent_shapes(problem: Problem, members: Sequence[FittedEffect], i: int) -> list[FittedEffect]:
     """Lists the other forms of a member that fit about as well beside the rest, the likeliest first."""
@@ -31,7 +28,7 @@ def equivalent_shapes(problem: Problem, members: Sequence[FittedEffect], i: int)
     shapes = own.hypothesis.effect.forms(problem.situation, own.hypothesis.joint)
     beside = accept(problem, tuple(m.group for m in others))
     forms = [refine(problem, own.hypothesis, shape, beside, effort=0) for shape in shapes if shape != own.shape]
-    forms = [form for form in forms if form.gain > own.gain - ALIKE]
+    forms = [form for form in forms if form.gain > own.gain - MAX_SHAPE_CHI2]
     return sorted(forms, key=_evidence(problem, others), reverse=True) if forms else []
 
 
@@ -48,7 +45,7 @@ def complete_effects(problem: Problem, founds: Sequence[SelectedEffect]) -> tupl
         shape = own.hypothesis.effect.complete(problem.situation, own.hypothesis.joint, own.shape)
         if shape != own.shape:
             form = refine(problem, own.hypothesis, shape, accept_all_but(problem, members, i))
-            found = replace(found, effect=form) if form.local_bic_gain(problem.rows) > MIN_BIC_GAIN else found
+            found = replace(found, effect=form) if form.local_bic_gain > MIN_BIC_GAIN else found
         whole.append(found)
     return tuple(whole)
 

@@ -4,23 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
+from estimation.diagnosis.calibration import FREE_P_VALUE, MAX_FREE_FUNCTIONS, MIN_BIC_GAIN, MIN_FREE_SHARE
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry, scan
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 
-MOST_PATTERNS = 3
 # A grid tells narrow functions of few parameters less well than wide ones of many: so many are refined and compared.
 CONTENDERS = 3
-# A pattern beside named effects counts when it explains this share of what they do on its joint: formulas are true to
-# some per cent.
-BEYOND = 0.05
-# A pattern is a flexible thing: beside what is named it must be worth its parameters by this much (Schwarz), strong
-# evidence, for formulas are not exact. Where nothing is named it must be no more than sure.
-LEAST = 10.0
-SURE = 1e-9
 
 
 def free_functions(
@@ -37,7 +28,7 @@ def free_functions(
     """
     members: list[FittedEffect] = []
     p_values: list[float] = []
-    while len(members) < MOST_PATTERNS:
+    while len(members) < MAX_FREE_FUNCTIONS:
         accepted = accept(problem, tuple(m.group for m in (*named, *members)))
         result = scan(problem, patterns, accepted)
         if not result.outcomes:
@@ -46,11 +37,11 @@ def free_functions(
         if not p <= false_alarm:
             break
         near = [refine(problem, o.hypothesis, o.shape, accepted) for o in result.outcomes[:CONTENDERS] if o.degrees]
-        member = max(near, key=lambda m: m.bic_gain(problem.rows))
+        member = max(near, key=lambda m: m.bic_gain)
         before = (*named, *members)
-        if excess_chi2(member) < BEYOND * sum(m.gain_on(member.group.joints) for m in before):
+        if member.excess_chi2 < MIN_FREE_SHARE * sum(m.gain_on(member.group.joints) for m in before):
             break
-        if member.bic_gain(problem.rows) < LEAST and (before or not alone or p > SURE):
+        if member.bic_gain < MIN_BIC_GAIN and (before or not alone or p > FREE_P_VALUE):
             break
         members.append(member)
         p_values.append(p)
@@ -66,13 +57,3 @@ def strongest_pattern(
     """Gives the free function that explains most beside names, and its p-value; None where noise explains as much."""
     members, p_values = free_functions(problem, patterns, named, false_alarm, alone=True)
     return (members[0], p_values[0]) if members else None
-
-
-def set_bic_gain(problem: Problem, free: Sequence[FittedEffect]) -> float:
-    """What functions explain together, each beside those before, less what their parameters are worth (Schwarz)."""
-    return sum(member.gain - member.degrees * float(np.log(problem.rows)) for member in free)
-
-
-def excess_chi2(member: FittedEffect) -> float:
-    """What a member explains more than as many columns of noise would."""
-    return max(member.gain - member.degrees, 0.0)

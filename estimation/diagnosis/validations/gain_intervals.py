@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.priors import explained_chi2, solve_map
+from estimation.diagnosis.calibration import MAX_ERROR_RATIO, MIN_FIT_GAIN, MIN_UNRELIABLE_ERROR
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.regressions.parameter_priors import GaussianPrior
@@ -18,11 +19,6 @@ Array = NDArray[np.float64]
 
 PARTS = 5
 RESAMPLES = 500
-# Below this fall in error, as a share of it, a fit says nothing of what should be left of it on unseen data.
-WORTH = 0.05
-# A model that errs on unseen rows by so many times its error on seen ones, and by this share of the torque, is not told
-# by the log.
-ASTRAY, FAR = 3.0, 0.1
 SURELY = 1.96  # standard errors
 BLOCK = 1.0  # [s], and five times the errors' correlation time
 
@@ -69,7 +65,7 @@ class HeldOutErrors:
             for errors in (self.fitted, self.errors)
             for k in (model, -1)
         )
-        return 1.0 if before - after <= WORTH * before else (unseen[0] - unseen[1]) / (before - after)
+        return 1.0 if before - after <= MIN_FIT_GAIN * before else (unseen[0] - unseen[1]) / (before - after)
 
     def support_growth(self) -> Array:
         """By how much the extended model errs more on unseen rows (n,) than where it has seen them; never by less."""
@@ -83,7 +79,7 @@ class HeldOutErrors:
         if self.fitted is None:
             return False
         unseen, seen = (float(self._shares(errors[-1])[joint]) for errors in (self.errors, self.fitted))
-        return unseen > max(ASTRAY * seen, FAR)
+        return unseen > max(MAX_ERROR_RATIO * seen, MIN_UNRELIABLE_ERROR)
 
     def _shares(self, errors: Array) -> Array:
         return self._rms(errors) / np.maximum(self._rms(self.measured), 1e-300)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.stats import t as student
 
+from estimation.diagnosis.calibration import MIN_COMPLIANCE_ENERGY
 from estimation.diagnosis.findings import Finding, Parameter
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.diagnosis.validations.jackknife import blocks_of, gain_by_blocks, independent_rows, jackknife
@@ -23,8 +24,6 @@ from robots.terms.situations.situation import Situation
 Array = NDArray[np.float64]
 
 EFFECT = "joint_elasticity"
-# Share of the load's energy that zero, delay, friction and eccentricity must leave.
-VISIBLE = 1e-2
 ALIGNED = 2  # times that the delay is taken off and found again
 STIFFEST = 1e-12  # [rad/(N m)] below which a gear is rigid
 
@@ -157,7 +156,7 @@ def _test_joint(
     w = own.deflection
     alone, whole = own.rest, np.column_stack([own.rest, own.load])
     hidden = own.load - alone @ _solve(alone, own.load)
-    if not hidden @ hidden > VISIBLE * np.sum((own.load - own.load.mean()) ** 2):
+    if not hidden @ hidden > MIN_COMPLIANCE_ENERGY * np.sum((own.load - own.load.mean()) ** 2):
         return None
     blocks = blocks_of(own.t)
     values = _solve(whole, w)

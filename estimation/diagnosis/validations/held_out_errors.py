@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.payload_and_gravity import base_regressor, subtract_known_payload
+from estimation.diagnosis.calibration import MIN_JOINT_GAIN, ONE_LOG_ENERGY
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
@@ -32,10 +33,6 @@ from robots.terms.effects import Situation
 Array = NDArray[np.float64]
 
 SHORTEST_UNSEEN = 1.0  # [s] of held-out logs
-# A joint counts for the gain of an effect from this share of the total gain on.
-TELLING = 0.1
-# An effect acts in one log only if that log has more than this share of its energy.
-ALONE = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +141,7 @@ def found_in_one_log_only(recording: Recording, effects: Sequence[Array]) -> str
     """States what acts in one of several logs only; empty if nothing does."""
     for X in effects:
         energies = np.array([float(np.sum(X[run] ** 2)) for run in recording.runs])
-        if energies.max() > ALONE * energies.sum():
+        if energies.max() > ONE_LOG_ENERGY * energies.sum():
             return "one finding acts in one log only"
     moves = np.array([~recording.sign_unknown[run].all(axis=0) for run in recording.runs])
     return "a joint moves in one log only" if (moves.sum(axis=0) == 1).any() else ""
@@ -180,7 +177,7 @@ def _joints(member: FittedEffect) -> list[int]:
     if member.hypothesis.joint is None:
         return list(member.group.joints)
     gains = {j: member.gain_on([j]) for j in member.group.joints}
-    shown = [j for j, gain in gains.items() if gain > TELLING * sum(gains.values())]
+    shown = [j for j, gain in gains.items() if gain > MIN_JOINT_GAIN * sum(gains.values())]
     return shown or [member.hypothesis.joint - 1]
 
 

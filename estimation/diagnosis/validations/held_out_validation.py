@@ -7,32 +7,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, MIN_BIC_GAIN
+from estimation.diagnosis.calibration import (
+    CLOSE_RIVAL_BIC,
+    CONTRADICTION_SHARE,
+    FREE_P_VALUE,
+    MAX_FREE_RMSE_RATIO,
+    MAX_RMSE_RATIO,
+    MIN_BIC_GAIN,
+    MIN_RETAINED_GAIN,
+    MIN_SUPPORT,
+    MIN_SUPPORT_CHI2,
+    MINOR_BIC_GAIN,
+    MINOR_SHARE,
+    OSCILLATION_P_VALUE,
+    REJECT_RMSE_RATIO,
+)
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.searches.selection import SelectedEffect
-from estimation.diagnosis.validations.decision import Change, ChangedFinding
-from estimation.diagnosis.validations.free_functions import SURE
+from estimation.diagnosis.validations.changes import Change, ChangedFinding
+from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
-from estimation.diagnosis.validations.verdict import Verdict
+from estimation.diagnosis.validations.name_comparison import ComparedNames
 from robots.terms.discrepancies.patterns import PREFIX, is_of_time, is_oscillation
 from robots.terms.effects import Effect
-
-MIN_RETAINED_GAIN = 0.2  # minimum share of an effect's gain that remains in cross-validation
-OSCILLATION_P_VALUE = 1e-5  # p-value above which an oscillation counts as noise if held-out data cannot test it
-MINOR_SHARE, MINOR_BIC_GAIN = (
-    0.1,
-    50.0,
-)  # an effect is minor below this share of the strongest BIC gain, and below this BIC gain
-CONTRADICTION_SHARE = 0.1  # share of an effect's gain by which held-out data must contradict it
-MAX_RMSE_RATIO = 1.05  # held-out error ratio above which an effect is rejected, significant or not
-REJECT_RMSE_RATIO = 1.2  # the same despite support by held-out rows: the formula does not hold in extrapolation
-MAX_FREE_RMSE_RATIO = 1.02  # held-out error ratio of a joint above which its free functions are rejected together
-MIN_SUPPORT, MIN_SUPPORT_CHI2 = (
-    0.4,
-    30.0,
-)  # relative and absolute chi2 growth by which held-out rows support an effect, whatever the error
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +47,7 @@ class ValidatedFindings:
         changes: rejected and replaced effects.
         refuted: significant named effects that held-out data contradict, with p-value and gain. The residual they
             explained is still significant.
+        compliances: of gears with encoders behind them, measured without the torque.
     """
 
     findings: tuple[SelectedEffect, ...]
@@ -57,14 +57,14 @@ class ValidatedFindings:
     rejected_discrepancies: tuple[tuple[FittedEffect, float, Gain], ...]
     changes: tuple[ChangedFinding, ...]
     refuted: tuple[tuple[FittedEffect, float, Gain], ...]
+    compliances: tuple[MeasuredCompliance, ...] = ()
 
 
 def validate_on_held_out(
-    judgement: Verdict,
+    compared: ComparedNames,
     measure: Callable[[Sequence[FittedEffect], frozenset[int]], HeldOutResult],
-    beyond: Callable[[Effect], bool],
+    beyond: Callable[[FittedEffect], bool],
     forms: Callable[[Sequence[FittedEffect], int], Sequence[FittedEffect]],
-    worth: Callable[[FittedEffect], float],
     unnamed: Callable[[FittedEffect, Sequence[FittedEffect]], tuple[FittedEffect, float] | None],
 ) -> ValidatedFindings:
     """Rejects effects that increase the held-out error, one after the other, the most certain first.
@@ -73,17 +73,16 @@ def validate_on_held_out(
     residual is reported as unexplained.
 
     Args:
-        judgement: the findings.
+        compared: the findings.
         measure: measures members on held-out data; the second argument holds indices of members absent there.
         beyond: whether held-out data cannot test an effect.
         forms: lists equivalent shapes of one of the members, the most likely first.
-        worth: BIC gain of an effect. A minor effect needs support by held-out data.
         unnamed: finds a free function for the residual of a rejected effect, jointly with other members; with its
             p-value.
     """
-    selected = list(judgement.named)
-    members = [*(found.effect for found in selected), *judgement.patterns]
-    p_values = [*(found.p_value for found in selected), *judgement.p_values]
+    selected = list(compared.named)
+    members = [*(found.effect for found in selected), *compared.free_functions]
+    p_values = [*(found.p_value for found in selected), *compared.p_values]
     rejected_functions: list[tuple[FittedEffect, float, Gain]] = []
     changes: list[ChangedFinding] = []
     refuted: list[tuple[FittedEffect, float, Gain]] = []
@@ -94,8 +93,8 @@ def validate_on_held_out(
         return measure(members, frozenset(i for i, member in enumerate(members) if member.hypothesis in absent))
 
     seen = measure_members(members)
-    strongest = max((worth(found.effect) for found in selected), default=0.0)
-    while idle := [i for i in range(len(selected)) if _is_insignificant(seen, i, members[i], beyond, worth, strongest)]:
+    strongest = max((found.effect.local_bic_gain for found in selected), default=0.0)
+    while idle := [i for i in range(len(selected)) if _is_insignificant(seen, i, members[i], beyond, strongest)]:
         changes.append(ChangedFinding(Change.INSIGNIFICANT, members[idle[0]].hypothesis))
         for items in (selected, members, p_values):
             items.pop(idle[0])
@@ -174,7 +173,7 @@ def _alternative(
     place: int,
     members: Sequence[FittedEffect],
     measure: Callable[[Sequence[FittedEffect]], HeldOutResult],
-    beyond: Callable[[Effect], bool],
+    beyond: Callable[[FittedEffect], bool],
     forms: Callable[[Sequence[FittedEffect], int], Sequence[FittedEffect]],
 ) -> tuple[SelectedEffect, HeldOutResult] | None:
     """Finds an equivalent shape or close rival that held-out data support, and the results with it.
@@ -213,15 +212,14 @@ def _is_weak(free: Effect, p_value: float) -> bool:
 
     Held-out data cannot test functions of time.
     """
-    return not is_of_time(free) and p_value > (OSCILLATION_P_VALUE if is_oscillation(free) else SURE)
+    return not is_of_time(free) and p_value > (OSCILLATION_P_VALUE if is_oscillation(free) else FREE_P_VALUE)
 
 
 def _is_insignificant(
     seen: HeldOutResult,
     i: int,
     member: FittedEffect,
-    beyond: Callable[[Effect], bool],
-    worth: Callable[[FittedEffect], float],
+    beyond: Callable[[FittedEffect], bool],
     strongest: float,
 ) -> bool:
     """Whether a barely significant effect has no gain on held-out data that can test it.
@@ -230,24 +228,24 @@ def _is_insignificant(
     Then support or a significant gain keeps it.
     """
     gain = seen.gains[i]
-    if beyond(member.hypothesis.effect):
+    if beyond(member):
         return False
     slight = (
-        worth(member) < min(MINOR_SHARE * strongest, MINOR_BIC_GAIN)
+        member.local_bic_gain < min(MINOR_SHARE * strongest, MINOR_BIC_GAIN)
         and seen.support[i] < MIN_RETAINED_GAIN
         and gain.ci95[0] <= 0
     )
-    return slight or (worth(member) <= MIN_BIC_GAIN and gain.nrmse_after >= gain.nrmse_before)
+    return slight or (member.local_bic_gain <= MIN_BIC_GAIN and gain.nrmse_after >= gain.nrmse_before)
 
 
-def _is_harmful(seen: HeldOutResult, i: int, member: FittedEffect, beyond: Callable[[Effect], bool]) -> bool:
+def _is_harmful(seen: HeldOutResult, i: int, member: FittedEffect, beyond: Callable[[FittedEffect], bool]) -> bool:
     """Whether a member increases the held-out error, significantly or by a large factor.
 
     A state-dependent effect must retain part of its gain in cross-validation, in the error or in the support by
     held-out rows. No effect is accepted on a joint whose base model the logs do not determine.
     """
     effect, joint = member.hypothesis.effect, member.hypothesis.joint
-    if beyond(effect):
+    if beyond(member):
         return False
     gain, speaks = seen.gains[i], seen.support[i]
     supported = (speaks >= MIN_RETAINED_GAIN and gain.ci95[0] > 0) or (

@@ -10,13 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 
 from estimation.diagnosis.findings import Gain
+from estimation.diagnosis.hypothesis_tests.evidence import Evidence
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations.held_out_validation import ValidatedFindings, validate_on_held_out
-from estimation.diagnosis.validations.verdict import Verdict
+from estimation.diagnosis.validations.name_comparison import ComparedNames
 from robots.terms.discrepancies.patterns import build_pattern
-from robots.terms.effect_bases.base import Effect
 from robots.terms.effects import EFFECTS
 
 
@@ -123,16 +123,20 @@ def validated(
     unnamed: tuple[FittedEffect, float] | None = None,
 ) -> ValidatedFindings:
     """What unseen data as a bench shows them bear out of names and free functions."""
-    judgement = Verdict("named", founds, tuple(free), tuple(p_values), 1.0)
+    compared = ComparedNames(founds, tuple(free), tuple(p_values), 1.0)
+    for found in founds:
+        for member in (found.effect, *(rival for rival, _ in found.rivals)):
+            worth = (worths or {}).get(member, 1.0 if member in faint else 100.0)
+            # Nothing was fitted: what is computed once from a fit is put in its place.
+            vars(member)["local_evidence"] = Evidence(worth, 0, 1.0)
 
-    def beyond(effect: Effect) -> bool:
-        return held_out and effect.transient
+    def beyond(member: FittedEffect) -> bool:
+        return held_out and member.hypothesis.effect.transient
 
     return validate_on_held_out(
-        judgement,
+        compared,
         bench,  # type: ignore[arg-type]
         beyond,
         lambda members, i: forms if members[i] is SPRING else (),
-        lambda member: (worths or {}).get(member, 1.0 if member in faint else 100.0),
         lambda member, beside: None if member in beside else unnamed,
     )

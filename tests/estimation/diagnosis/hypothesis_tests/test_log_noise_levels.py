@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from estimation import diagnose, on_one_clock, read_log
+from estimation.diagnosis.calibration import LARGE_HELD_OUT_ERROR
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.log_noise_levels import PASSED, profile_gain
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening
 from estimation.diagnosis.recordings.log_reading import Recording
-from estimation.diagnosis.results.notes import ODD
 from robots import load_robot
 
 STEP = 0.004
@@ -106,5 +106,5 @@ def test_logs_that_contradict_each_other_are_not_passed_over(data):
     folder = data("simple_pendulum_dfki")
     logs = on_one_clock([read_log(folder / f"{name}.parquet") for name in ("dircol", "gravity_comp")])
     said = diagnose(load_robot(folder / "simple_pendulum.urdf"), logs)
-    assert said.baseline[0] > ODD
+    assert said.baseline[0] > LARGE_HELD_OUT_ERROR
     assert said.verdict != "none" or any("differ in something" in note for note in said.notes)

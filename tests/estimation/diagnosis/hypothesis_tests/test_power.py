@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from estimation.diagnosis.calibration import POWER
 from estimation.diagnosis.hypothesis_tests.power import (
-    POWER,
     chance_to_resolve,
     detectable_energy,
     residual_energy,

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.calibration import MIN_BIC_GAIN, RARE_ODDS
 from estimation.diagnosis.hypothesis_tests import refinement
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.joint_agreement import PerJointEvidence
-from estimation.diagnosis.hypothesis_tests.refinement import RARE, FittedEffect
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scan import Outcome
 from estimation.diagnosis.searches import acceptance
 from estimation.diagnosis.searches.acceptance import SURE, exceeds_leakage, is_certain, passes_bic
@@ -43,7 +43,7 @@ def _boxes(size: float = 1.0) -> tuple[np.ndarray, ...]:
 
 def _price(member: FittedEffect) -> float:
     """What a degree of freedom costs."""
-    return (GAIN - member.local_bic_gain(ROWS)) / DEGREES
+    return (GAIN - member.local_bic_gain) / DEGREES
 
 
 @pytest.mark.parametrize("size", [1.0, 0.02, 300.0])
@@ -78,10 +78,8 @@ def test_columns_of_different_length_cost_their_mean_and_two_rows_at_least() -> 
 def test_a_rare_effect_has_to_explain_more() -> None:
     """Its odds are paid for beside its parameters."""
     columns = _boxes()[:1]
-    difference = _member("stribeck", 1, columns).local_bic_gain(ROWS) - _member(
-        "load_stribeck", 1, columns
-    ).local_bic_gain(ROWS)
-    assert difference == pytest.approx(RARE)
+    difference = _member("stribeck", 1, columns).local_bic_gain - _member("load_stribeck", 1, columns).local_bic_gain
+    assert difference == pytest.approx(RARE_ODDS)
 
 
 def test_a_push_leaves_other_rows_alone() -> None:
@@ -98,8 +96,8 @@ def test_what_errors_of_the_motion_may_make_of_a_gain_says_nothing_of_its_being_
     """It is not counted to say whether an effect is there, alone or beside others, but against what may be instead."""
     delay = _member("time_delay", None, _boxes())
     doubted = replace(delay, motion_error_chi2=GAIN - 40.0)
-    assert doubted.bic_gain(ROWS) == delay.bic_gain(ROWS)
-    assert doubted.local_bic_gain(ROWS) == pytest.approx(delay.local_bic_gain(ROWS) - GAIN + 40.0)
+    assert doubted.bic_gain == delay.bic_gain
+    assert doubted.local_bic_gain == pytest.approx(delay.local_bic_gain - GAIN + 40.0)
     problem = SimpleNamespace(rows=ROWS, recording=SimpleNamespace(runs=(slice(0, ROWS),)))
     for others in ([], [_member("spring", 1, _boxes()[:1])]):
         assert passes_bic(problem, delay, others)  # type: ignore[arg-type]
@@ -173,7 +171,7 @@ def test_what_is_far_from_chance_is_sure_on_a_joint_of_its_own(
         return replace(member, group=replace(member.group, joints=(0, 1) if joint is None else (joint - 1,)))
 
     own = replace(on(1), gain=gain, degrees=2)
-    assert own.bic_gain(ROWS) < MIN_BIC_GAIN
+    assert own.bic_gain < MIN_BIC_GAIN
     problem: Any = SimpleNamespace(rows=ROWS)
     assert is_certain(problem, own, chance * SURE * 0.01, [on(joint) for joint in beside], 0.01) is sure
 
@@ -303,5 +301,5 @@ def test_friction_that_turns_round_over_no_way_is_no_presliding(
     problem = SimpleNamespace(state_for=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
     presliding = Hypothesis(EFFECTS["presliding_hysteresis"], 1)
     member = refinement.refine(problem, presliding, (1e-4,), None)  # type: ignore[arg-type]
-    assert (member.bic_gain(ROWS) > 100.0) is worth
-    assert (member.local_bic_gain(ROWS) > 100.0) is worth
+    assert (member.bic_gain > 100.0) is worth
+    assert (member.local_bic_gain > 100.0) is worth

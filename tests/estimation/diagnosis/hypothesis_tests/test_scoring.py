@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from estimation.diagnosis.calibration import MIN_VISIBLE_ENERGY
 from estimation.diagnosis.hypothesis_tests.hypotheses import GLANCE, acting
-from estimation.diagnosis.hypothesis_tests.scoring import VISIBLE, Score, visible_root
+from estimation.diagnosis.hypothesis_tests.scoring import Score, visible_root
 
 
-@pytest.mark.parametrize("share", [0.9, 1.01 * VISIBLE, 0.99 * VISIBLE, 0.0])
+@pytest.mark.parametrize("share", [0.9, 1.01 * MIN_VISIBLE_ENERGY, 0.99 * MIN_VISIBLE_ENERGY, 0.0])
 def test_one_column_shows_as_it_does_beside_one_that_has_nothing_to_do_with_it(share: float) -> None:
     """The root of a diagonal matrix has that of each of its parts; below the least share there is none."""
     raw = np.array([7.0, 3.0])

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve, firwin
 
-from estimation.diagnosis.noise_models.frequency_bands import BIAS, Band, unbiased_frequencies
+from estimation.diagnosis.calibration import MAX_BIAS_CHI2
+from estimation.diagnosis.noise_models.frequency_bands import Band, unbiased_frequencies
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening, quiet_joints
 from estimation.diagnosis.recordings.recording import Recording, cut_recording
 from tests.estimation.diagnosis.noisy_logs import STEP, noise_of, recording_of
@@ -66,8 +67,8 @@ def test_inertia_is_fitted_without_a_bias_that_shows(counted: tuple[Recording, n
     recording, true, noise = counted
     (frequency,) = unbiased_frequencies(recording, np.eye(1), noise)
     assert 5.0 < frequency < 60.0
-    assert 0.4 * BIAS < _left(recording, true, frequency) < 2.5 * BIAS
-    assert _left(recording, true, 2 * frequency) > 100 * BIAS
+    assert 0.4 * MAX_BIAS_CHI2 < _left(recording, true, frequency) < 2.5 * MAX_BIAS_CHI2
+    assert _left(recording, true, 2 * frequency) > 100 * MAX_BIAS_CHI2
 
 
 def test_a_larger_inertia_is_known_further(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:

@@ -9,13 +9,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from estimation.diagnosis.calibration import MAX_HIGH_BAND_ERROR
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
 from estimation.diagnosis.joint_fits.extended_fit import fit_extended
 from estimation.diagnosis.noise_models.frequency_bands import TRANSITION
-from estimation.diagnosis.noise_models.high_frequency_band import WIDER
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.periods import Cycle
 from estimation.diagnosis.recordings.recording import Recording, cut_recording, join_recordings
@@ -62,7 +62,7 @@ def test_a_ripple_tells_its_energy_over_the_noise(recording: Recording, pose_arm
     In the rows that count: not where the direction of motion is not known, nor at the ends, where the filter begins. A
     quarter is lost where white noise happens to look like a burst of it.
     """
-    below, both = (pose_arm(_rippled(recording), wider=wider) for wider in (None, WIDER))
+    below, both = (pose_arm(_rippled(recording), wider=wider) for wider in (None, MAX_HIGH_BAND_ERROR))
     cutoffs = below.whitening.bands[0].cutoff, both.high_band.whitening.bands[0].cutoff  # type: ignore[union-attr]
     assert cutoffs[0] < 12.0
     assert cutoffs[1] > 2 * cutoffs[0]
@@ -83,7 +83,7 @@ def test_the_slope_has_the_products_of_an_effect_with_the_residual(
     recording: Recording, pose_arm: Callable[..., Problem], name: str
 ) -> None:
     """In the bands, and above them of what is fast: what moments and orders are ranked by is what they explain."""
-    problem = pose_arm(_rippled(recording), wider=WIDER)
+    problem = pose_arm(_rippled(recording), wider=MAX_HIGH_BAND_ERROR)
     hypothesis, shape = (RIPPLE, SHAPE) if name == "torque_ripple" else (Hypothesis(EFFECTS[name], 1), ())
     slope = problem.score_gradient_for(hypothesis.effect)
     joints, columns = problem.columns_of(hypothesis, shape)
@@ -104,7 +104,7 @@ def test_what_shakes_the_arm_is_no_inertia(arm: Robot, recording: Recording, pos
     moves = [model.torque(recording.q, recording.dq, a, model.nominal) for a in (recording.ddq + answer, recording.ddq)]
     tau = recording.tau + moves[0] - moves[1]
     tau[:, 0] += SIZE * wave
-    problem = pose_arm(replace(recording, ddq=recording.ddq + answer, tau=tau), wider=WIDER)
+    problem = pose_arm(replace(recording, ddq=recording.ddq + answer, tau=tau), wider=MAX_HIGH_BAND_ERROR)
     vibration = Hypothesis(build_pattern("pattern:vibration:0:even"), 1)  # type: ignore[arg-type]
     assert problem.whitening.bands[0].cutoff < SHAKEN < problem.high_band.whitening.bands[0].cutoff  # type: ignore[union-attr]
     known, taken = (problem.high_band.columns(wave[:, None], 0, bare=bare) for bare in (True, False))  # type: ignore[union-attr]
@@ -123,7 +123,7 @@ def test_what_shakes_the_arm_is_no_inertia(arm: Robot, recording: Recording, pos
 
 def test_only_fast_effects_are_measured_there(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """An effect by acceleration has no rows above the band; what is slow has next to nothing of its energy there."""
-    problem = pose_arm(recording, wider=WIDER)
+    problem = pose_arm(recording, wider=MAX_HIGH_BAND_ERROR)
     assert problem.measured(RIPPLE, SHAPE).high_band_columns[0].shape[1] == 4
     assert not problem.measured(Hypothesis(EFFECTS["encoder_offset"], 1), ()).high_band_columns
     assert problem.high_band is not None
@@ -133,7 +133,7 @@ def test_only_fast_effects_are_measured_there(recording: Recording, pose_arm: Ca
 
 def test_found_beside_it_a_ripple_is_taken_off(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """Once accepted, it leaves nothing of itself."""
-    problem = pose_arm(_rippled(recording), wider=WIDER)
+    problem = pose_arm(_rippled(recording), wider=MAX_HIGH_BAND_ERROR)
     group = problem.measured(RIPPLE, SHAPE)
     accepted = accept(problem, (group,))
     assert accepted.gain > 15.0
@@ -143,7 +143,7 @@ def test_found_beside_it_a_ripple_is_taken_off(recording: Recording, pose_arm: C
 def test_the_extended_model_knows_it_as_well(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """What is above the band makes the standard errors of coefficients smaller, by as much as in a score or more."""
     energies, extended = [], []
-    for wider in (None, WIDER):
+    for wider in (None, MAX_HIGH_BAND_ERROR):
         problem = pose_arm(_rippled(recording), wider=wider)
         member = refine(problem, RIPPLE, SHAPE, accept(problem, ()), effort=0)
         energies.append(np.sqrt(np.sum(score(problem, member.group, accept(problem, ())).root ** 2, axis=0)))
@@ -171,7 +171,9 @@ def test_noise_that_repeats_with_the_motion_tells_less(
     energies = []
     for repeated in (np.tile(noise[:period], (5, 1)), noise) if same else (noise, noise[::-1]):
         log = cut_recording(clean, rows)
-        problem = pose_arm(replace(log, tau=log.tau + NOISE * repeated[rows], cycles=(cycle,)), wider=WIDER)
+        problem = pose_arm(
+            replace(log, tau=log.tau + NOISE * repeated[rows], cycles=(cycle,)), wider=MAX_HIGH_BAND_ERROR
+        )
         assert problem.high_band is not None
         energies.append(float(np.sum(problem.high_band.columns(np.cos(SHAPE[0] * log.q[:, :1]), 0) ** 2)))
     assert energies[1] / energies[0] == pytest.approx(5.0 if same else 1.0, rel=0.5)
@@ -187,7 +189,7 @@ def test_noise_is_levelled(clean: Recording, pose_arm: Callable[..., Problem], p
     noise = NOISE * rng.standard_normal(clean.tau.shape)
     noise += np.gradient(np.gradient(rng.standard_normal(clean.tau.shape), axis=0), axis=0) * 0.3
     cycle = Cycle(0, len(clean), len(clean) * clean.step / periods, 2) if periods else None
-    problem = pose_arm(replace(clean, tau=clean.tau + noise, cycles=(cycle,)), wider=WIDER)
+    problem = pose_arm(replace(clean, tau=clean.tau + noise, cycles=(cycle,)), wider=MAX_HIGH_BAND_ERROR)
     assert problem.high_band is not None
     wide = problem.high_band.whitening
     for j, above in enumerate(problem.high_band.joints):
@@ -218,7 +220,7 @@ def test_a_log_in_which_a_joint_stands_levels_no_noise(clean: Recording, pose_ar
             sign_unknown=clean.sign_unknown | np.array([True, False]),
         )
         whole = join_recordings(whole, stands)
-    upper = pose_arm(whole, wider=WIDER).high_band
+    upper = pose_arm(whole, wider=MAX_HIGH_BAND_ERROR).high_band
     assert upper is not None
     above = upper.joints[0]
     assert above is not None
@@ -232,15 +234,15 @@ def test_a_log_in_which_a_joint_stands_levels_no_noise(clean: Recording, pose_ar
 def test_a_vibration_above_the_band_is_told(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """A steady torque between the two cut-offs shows beside accelerations that are not known there."""
     size = 0.03
-    cutoffs = [pose_arm(recording, wider=WIDER).whitening.bands[0].cutoff]
-    cutoffs.append(pose_arm(recording, wider=WIDER).high_band.whitening.bands[0].cutoff)  # type: ignore[union-attr]
+    cutoffs = [pose_arm(recording, wider=MAX_HIGH_BAND_ERROR).whitening.bands[0].cutoff]
+    cutoffs.append(pose_arm(recording, wider=MAX_HIGH_BAND_ERROR).high_band.whitening.bands[0].cutoff)  # type: ignore[union-attr]
     frequency = float(np.mean(cutoffs)) * (1 - TRANSITION / 2)
     wave = np.cos(2 * np.pi * frequency * (recording.t - recording.t[0]))
     tau = recording.tau.copy()
     tau[:, 0] += size * wave
     vibration = Hypothesis(Pattern("vibration"), 1)
     gains = []
-    for wider in (None, WIDER):
+    for wider in (None, MAX_HIGH_BAND_ERROR):
         problem = pose_arm(replace(recording, tau=tau), wider=wider)
         found = score(problem, problem.measured(vibration, (frequency,)), accept(problem, ()))
         gains.append(found.gain)

@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from estimation.diagnosis.recordings.directions import ALIKE, CLEAR
+from estimation.diagnosis.calibration import MIN_SHARP_SPEED_SIGMAS
+from estimation.diagnosis.recordings.directions import ALIKE
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording, cut_recording
 from robots.common.stretches import spans
@@ -97,8 +98,8 @@ def test_rows_that_count_beside_a_reversal_have_a_velocity_that_is_known(
 ) -> None:
     """Within three rows of a reversal, kicked or not, no velocity that counts errs by more than a small part of itself.
 
-    The rule bounds the error by one part in `CLEAR` of the velocity; a third more is allowed to single rows, and what
-    the velocity changes by while two clocks are one.
+    The rule bounds the error by one part in `MIN_SHARP_SPEED_SIGMAS` of the velocity; a third more is allowed to single
+    rows, and what the velocity changes by while two clocks are one.
     """
     motion = _aperiodic(fourier_motion, arm)
     for q, dq, _ in ((motion.q, motion.dq, motion.ddq), _kicked(motion)):
@@ -109,7 +110,7 @@ def test_rows_that_count_beside_a_reversal_have_a_velocity_that_is_known(
         counted = near[~recording.sign_unknown[near, 0]]
         error = np.abs(recording.dq[counted, 0] - true[counted])
         change = np.abs(recording.ddq[counted, 0]) * STEP
-        assert np.all(error < np.maximum(4 / 3 / CLEAR * np.abs(true[counted]), ALIKE * change))
+        assert np.all(error < np.maximum(4 / 3 / MIN_SHARP_SPEED_SIGMAS * np.abs(true[counted]), ALIKE * change))
         assert len(counted) > 0 or counts < 2**18
 
 

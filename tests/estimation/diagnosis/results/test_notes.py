@@ -6,8 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from estimation.diagnosis.calibration import MIN_WORSE_RATIO
 from estimation.diagnosis.findings import Finding, Gain, Parameter
-from estimation.diagnosis.results.notes import LITTLE, WORSE, beside_larger, turning_joints, unsure_gain, worse_joints
+from estimation.diagnosis.results.notes import LITTLE, beside_larger, turning_joints, unsure_gain, worse_joints
 
 
 def test_joints_that_the_extension_makes_worse_are_told() -> None:
@@ -16,7 +17,7 @@ def test_joints_that_the_extension_makes_worse_are_told() -> None:
     after = np.array([0.051, 0.074, 0.0012, 0.080, np.nan])
     (note,) = worse_joints(before, after)
     assert note == "The extended model has a larger held-out error on joints 2 (5 -> 7.4 %), 4 (5 -> 8 %)."
-    assert WORSE * 0.05 < 0.074
+    assert MIN_WORSE_RATIO * 0.05 < 0.074
     assert 0.0005 + LITTLE > 0.0012
     assert worse_joints(before[:1], after[:1]) == []
     (one,) = worse_joints(before[1:2], after[1:2])

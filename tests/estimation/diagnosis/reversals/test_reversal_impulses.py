@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter1d
 
+from estimation.diagnosis.calibration import MAX_HIGH_BAND_ERROR, REVERSAL_MARGIN
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, _reversal_scatter
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
-from estimation.diagnosis.noise_models.high_frequency_band import WIDER
 from estimation.diagnosis.recordings.log_reading import build_recording
-from estimation.diagnosis.recordings.recording import BESIDE, Recording
+from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.reversals.reversal_impulses import find_reversals
 from estimation.diagnosis.searches.acceptance import ANSWERS, MOSTLY, delay_supported_away_from_impacts
 from robots.plants import simulate
@@ -35,7 +35,7 @@ def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
 @pytest.fixture(scope="module")
 def problem(recording: Recording, pose_arm: Callable[..., Problem]) -> Problem:
     """The same, white, with the frequencies above its bands."""
-    return pose_arm(replace(recording, floor=np.full(2, 1e-11), cycles=(None,)), wider=WIDER)
+    return pose_arm(replace(recording, floor=np.full(2, 1e-11), cycles=(None,)), wider=MAX_HIGH_BAND_ERROR)
 
 
 def _elastic(problem: Problem) -> FittedEffect:
@@ -65,7 +65,7 @@ def test_rows_beside_reversals_and_the_ends_of_rests_are_not_calm(recording: Rec
     unsure = np.zeros_like(recording.sign_unknown)
     unsure[300:304, 0] = True
     unsure[1000:1400, 1] = True
-    reach = round(BESIDE / recording.step)
+    reach = round(REVERSAL_MARGIN / recording.step)
     disturbed = np.zeros(len(recording), dtype=bool)
     for first, last in ((300, 303), (1000, 1000), (1399, 1399)):
         disturbed[first - reach : last + reach + 1] = True

@@ -30,7 +30,7 @@ def test_a_shape_that_is_known_is_refined_from_too(monkeypatch: pytest.MonkeyPat
 
     def refine(problem, hypothesis, shape, accepted):
         starts.append((hypothesis, shape))
-        return SimpleNamespace(hypothesis=hypothesis, shape=shape, bic_gain=lambda rows: 10.0 * shape[0])
+        return SimpleNamespace(hypothesis=hypothesis, shape=shape, bic_gain=10.0 * shape[0])
 
     monkeypatch.setattr(swap_search, "refine", refine)
     outcomes = [SimpleNamespace(hypothesis=A, shape=(1.0,)), SimpleNamespace(hypothesis=B, shape=(2.0,))]
@@ -57,8 +57,8 @@ def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
             group=SimpleNamespace(joints=(0,)),
             shape=(),
             gain=gain,
-            bic_gain=lambda rows: gain,
-            local_bic_gain=lambda rows: gain,
+            bic_gain=gain,
+            local_bic_gain=gain,
         )
 
     looked: list[int] = []
@@ -128,8 +128,8 @@ def test_a_rival_is_tried_with_the_others_refined_beside_it(
             group=group,
             shape=(),
             gain=gain,
-            bic_gain=lambda rows: gain,
-            local_bic_gain=lambda rows: gain,
+            bic_gain=gain,
+            local_bic_gain=gain,
         )
 
     def refined(problem, hypothesis, shape, beside) -> SimpleNamespace:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
+from estimation.diagnosis.calibration import MAX_SHAPE_CHI2
 from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
@@ -19,7 +20,7 @@ from estimation.diagnosis.joint_fits.extended_fit import fit_extended
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.searches.selection import SelectedEffect
-from estimation.diagnosis.validations.equivalent_shapes import ALIKE, complete_effects, equivalent_shapes
+from estimation.diagnosis.validations.equivalent_shapes import complete_effects, equivalent_shapes
 from estimation.models.extension import extension_torque
 from robots.loading import load_robot
 from robots.plants import Sensors
@@ -65,7 +66,7 @@ def test_forms_of_a_spring_that_fit_alike_are_listed(
     plain = refine(problem, SPRING, (0.0, 0.0), accept(problem, ()), effort=0)
     forms = equivalent_shapes(problem, [plain], 0)
     assert len(forms) >= 2
-    assert all(form.gain > plain.gain - ALIKE and form.shape != plain.shape for form in forms)
+    assert all(form.gain > plain.gain - MAX_SHAPE_CHI2 and form.shape != plain.shape for form in forms)
     # The likeliest is the one that with the arm as described says most of the angles that were not seen.
     there = build_baseline(problem.baseline.base, wide)
     errors = []

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
-from estimation.diagnosis.searches.selection import SelectedEffect
-from estimation.diagnosis.validations.held_out_validation import (
+from estimation.diagnosis.calibration import (
+    CLOSE_RIVAL_BIC,
     CONTRADICTION_SHARE,
     MAX_RMSE_RATIO,
     MIN_RETAINED_GAIN,
@@ -16,6 +15,8 @@ from estimation.diagnosis.validations.held_out_validation import (
     MINOR_SHARE,
     REJECT_RMSE_RATIO,
 )
+from estimation.diagnosis.results.notes import state_change
+from estimation.diagnosis.searches.selection import SelectedEffect
 from tests.estimation.diagnosis.held_out_bench import (
     FREE,
     HARMS,
@@ -55,7 +56,7 @@ def test_heat_before_the_unseen_data_is_not_held_against_a_cause(rise: float, ke
     bench.shows[warm.hypothesis.label] = Shown(-0.004, -0.001, rise, kept=kept)
     result = validated(bench, SelectedEffect(warm, 1e-9, ()))
     assert (result.effects == (warm,)) is stays
-    assert bool(result.notes) is not stays
+    assert bool(result.changes) is not stays
     rival = validated(bench, SelectedEffect(warm, 1e-9, ((STRIBECK, 1.0),))).effects
     assert rival == ((warm,) if rise < MAX_RMSE_RATIO else (STRIBECK,))
 
@@ -67,7 +68,7 @@ def test_another_form_of_a_cause_goes_before_a_rival() -> None:
     bench.shows |= {label_of(levers[0]): HARMS, label_of(levers[1]): HELPS, label_of(levers[2]): HELPS}
     result = validated(bench, SelectedEffect(SPRING, 1e-9, (rival,)), forms=levers)
     assert result.findings[0].effect is result.effects[0] is levers[1]
-    assert (result.findings[0].p_value, result.findings[0].rivals, result.notes) == (1e-9, (rival,), ())
+    assert (result.findings[0].p_value, result.findings[0].rivals, result.changes) == (1e-9, (rival,), ())
     bench.shows |= {label_of(lever): HARMS for lever in levers}
     assert validated(bench, SelectedEffect(SPRING, 1e-9, (rival,)), forms=levers).effects[0] is PRESLIDING
 
@@ -79,7 +80,7 @@ def test_a_form_that_does_no_harm_goes_after_a_rival_that_helps() -> None:
     bench.shows |= {label_of(levers[0]): HARMS, label_of(levers[1]): IDLE}
     result = validated(bench, SelectedEffect(SPRING, 1e-9, (rival,)), forms=levers)
     assert result.effects == (levers[1],)
-    assert result.notes == ()
+    assert result.changes == ()
     bench.shows[label_of(PRESLIDING)] = HELPS
     assert validated(bench, SelectedEffect(SPRING, 1e-9, (rival,)), forms=levers).effects == (PRESLIDING,)
 
@@ -92,7 +93,7 @@ def test_what_helps_stays_as_it_was_found() -> None:
     assert result.findings == founds
     assert result.effects == (SPRING, STRIBECK, FREE)
     assert result.p_values == (1e-9, 1e-5, 1e-4)
-    assert (result.rejected_discrepancies, result.notes) == ((), ())
+    assert (result.rejected_discrepancies, result.changes) == ((), ())
     assert len(bench.asked) == 1
     assert len(result.measured.gains) == 3
 
@@ -104,7 +105,7 @@ def test_a_name_that_surely_harms_is_left_out_with_a_note() -> None:
     assert [found.effect for found in result.findings] == [STRIBECK]
     assert result.p_values == (1e-5,)
     assert len(result.measured.gains) == 1
-    (note,) = result.notes
+    note = state_change(*result.changes)
     assert "spring of joint 2" in note
     assert "rejected" in note
 
@@ -134,7 +135,7 @@ def test_a_faint_free_function_that_unseen_data_deny_is_noise(
     result = validated(bench, *founds, free=[free], p_values=[p_value])
     assert [member for member, *_ in result.rejected_discrepancies] == ([free] if told else [])
     assert not result.refuted
-    assert len(result.notes) == 1
+    assert len(result.changes) == 1
 
 
 @pytest.mark.parametrize("shown", [HELPS, HARMS])
@@ -173,7 +174,7 @@ def test_reasons_to_leave_a_name_out(shown: Shown, stays: bool) -> None:
     """Errors a twentieth larger, less than a fifth of the gain kept, a joint that goes astray."""
     result = validated(bench_with(spring=shown), SelectedEffect(SPRING, 1e-9, ()), held_out=False)
     assert bool(result.effects) is stays
-    assert bool(result.notes) is not stays
+    assert bool(result.changes) is not stays
 
 
 def test_what_comes_and_goes_need_not_last_on_other_stretches() -> None:
@@ -193,7 +194,7 @@ def test_a_close_rival_that_helps_takes_the_place() -> None:
     assert result.p_values == (1e-9, 1e-4)
     (found,) = result.findings
     assert (found.effect, found.p_value, found.rivals) == (TILT, 1e-9, ())
-    (note,) = result.notes
+    note = state_change(*result.changes)
     assert "spring of joint 2" in note
     assert "base_tilt" in note
     first = validated(bench_with(spring=HARMS), SelectedEffect(SPRING, 1e-9, rivals)).findings[0]
@@ -208,7 +209,7 @@ def test_a_rival_that_is_not_borne_out_takes_no_place(shown: Shown) -> None:
         bench_with(spring=HARMS, stribeck=shown), SelectedEffect(SPRING, 1e-9, ((STRIBECK, 1.0),)), held_out=False
     )
     assert (result.findings, result.effects, result.p_values) == ((), (), ())
-    (note,) = result.notes
+    note = state_change(*result.changes)
     assert "rejected" in note
 
 
@@ -225,8 +226,8 @@ def test_the_surest_goes_first_and_others_are_measured_anew() -> None:
     bench.beside[LABELS["stribeck"], LABELS["spring"]] = Shown(-0.002, -0.0005, 1.0)
     result = validated(bench, SelectedEffect(STRIBECK, 1e-9, ()), SelectedEffect(SPRING, 1e-5, ()))
     assert result.effects == (STRIBECK,)
-    assert len(result.notes) == 1
-    assert "spring" in result.notes[0]
+    assert len(result.changes) == 1
+    assert "spring" in state_change(result.changes[0])
 
 
 def test_a_free_function_that_errs_is_told_and_no_part_of_the_model() -> None:
@@ -237,7 +238,7 @@ def test_a_free_function_that_errs_is_told_and_no_part_of_the_model() -> None:
     assert result.p_values == (1e-9, 1e-3)
     ((member, p_value, gain),) = result.rejected_discrepancies
     assert (member, p_value, gain.ci95) == (FREE, 1e-4, (HARMS.low, HARMS.high))
-    (note,) = result.notes
+    note = state_change(*result.changes)
     assert note.startswith("Part of the residual of joint 3 is unexplained")
 
 
@@ -270,7 +271,7 @@ def test_what_errs_on_all_joints_is_told_of_the_whole_robot() -> None:
     """What swings at the flange has no joint to name."""
     result = validated(bench_with(swinging=HARMS), free=[SWING], p_values=[1e-10])
     assert [member for member, _, _ in result.rejected_discrepancies] == [SWING]
-    assert result.notes[0].startswith("Part of the residual of the whole robot is unexplained")
+    assert state_change(result.changes[0]).startswith("Part of the residual of the whole robot is unexplained")
 
 
 def test_a_passing_effect_is_not_judged_on_other_logs() -> None:
@@ -291,7 +292,7 @@ def test_a_faint_name_needs_unseen_data_that_speak_for_it(shown: Shown, stays: b
         result = validated(bench_with(spring=said), SelectedEffect(SPRING, 1e-3, ()), faint=[SPRING] if faint else [])
         assert (result.effects == (SPRING,)) is kept
         assert [member for member, *_ in result.refuted] == ([] if kept or faint else [SPRING])
-        assert bool(result.notes) is (not kept)
+        assert bool(result.changes) is (not kept)
     # A push is over when the unseen log begins.
     assert validated(bench_with(external_contact=slightly), SelectedEffect(PUSH, 1e-3, ()), faint=[PUSH]).effects == (
         PUSH,
@@ -357,7 +358,7 @@ def test_what_was_undone_before_the_unseen_data_stays() -> None:
     bench.without["payload_change"] = HELPS
     result = validated(bench, SelectedEffect(payload, 1e-9, ()))
     assert result.effects == (payload,)
-    (note,) = result.notes
+    note = state_change(*result.changes)
     assert "absent from the held-out data" in note
     bench.without["payload_change"] = IDLE
     assert validated(bench, SelectedEffect(payload, 1e-9, ())).effects == ()

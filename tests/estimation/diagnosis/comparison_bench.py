@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from estimation.diagnosis.hypothesis_tests import refinement
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
-from estimation.diagnosis.validations import comparison, verdict
+from estimation.diagnosis.validations import name_comparison
 from robots.terms.effects import EFFECTS
 
 ROWS = 5000
@@ -21,8 +23,13 @@ PRICE = float(np.log(ROWS))
 
 def accepting(monkeypatch: pytest.MonkeyPatch, accept: Callable[..., Any]) -> None:
     """Has members fitted together by a function of the test."""
-    for module in (comparison, verdict):
+    for module in (name_comparison, refinement):
         monkeypatch.setattr(module, "accept", accept)
+
+
+def adding(monkeypatch: pytest.MonkeyPatch, gains: Mapping[int, float]) -> None:
+    """Has members explain together the sum of what each explains, by the identity of its group."""
+    accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=sum(gains[id(g)] for g in groups)))
 
 
 def member_of(name: str, joint: int | None, gain: float, degrees: int) -> FittedEffect:

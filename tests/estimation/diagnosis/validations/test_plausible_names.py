@@ -1,4 +1,4 @@
-"""Specification of the verdict: forms that no machine has, and rivals that leave a name open."""
+"""Specification of the names that are kept: forms that no machine has, and rivals that leave a name open."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, RARE_ODDS
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import RARE, FittedEffect
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.searches.selection import SelectedEffect
-from estimation.diagnosis.validations import verdict
+from estimation.diagnosis.validations import name_comparison
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
 from robots.terms.effects.time_delay import near
-from tests.estimation.diagnosis.verdict_bench import ROWS, accepting, member_of
+from tests.estimation.diagnosis.comparison_bench import ROWS, accepting, member_of
 
 
 @pytest.mark.parametrize(
@@ -35,10 +35,10 @@ def test_a_value_at_the_edge_of_what_machines_have_is_no_name(
     """An encoder half a radian off wants to be more than that; all of a torque may be cut off; teeth have some play."""
     problem = SimpleNamespace(situation=SimpleNamespace(robot=arm))
     member = replace(member_of(name, 1, 300.0, 1), coefficients=np.array([value]))
-    assert verdict._is_plausible(problem, member) is believed  # type: ignore[arg-type]
+    assert name_comparison._is_plausible(problem, member) is believed  # type: ignore[arg-type]
     for seconds in (5.0, 20.0):
         hot = replace(member_of("torque_constant_heat", 1, 300.0, 1), coefficients=np.array([-0.1]), shape=(seconds,))
-        assert verdict._is_plausible(problem, hot) is (seconds > 5.0)  # type: ignore[arg-type]
+        assert name_comparison._is_plausible(problem, hot) is (seconds > 5.0)  # type: ignore[arg-type]
     assert EFFECTS["backlash"].is_plausible(arm, 1, np.full(1, 1e-6))
     assert not EFFECTS["backlash"].is_plausible(arm, 1, np.full(1, 1e-7))
 
@@ -66,9 +66,9 @@ def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
         )
 
     accepting(monkeypatch, lambda problem, groups: SimpleNamespace(gain=0.0))
-    monkeypatch.setattr(verdict, "refine", refined)
+    monkeypatch.setattr(name_comparison, "refine", refined)
     problem: Any = SimpleNamespace(rows=ROWS, state_for=lambda effect: None, situation=SimpleNamespace(robot=None))
-    given = verdict._plausible_form(problem, SelectedEffect(torn, 1e-9, ()), [torn])
+    given = name_comparison._plausible_form(problem, SelectedEffect(torn, 1e-9, ()), [torn])
     assert (given is not None) is kept
     if given is not None:
         assert given.effect.shape == (near(0.004)[0][1],)
@@ -79,8 +79,8 @@ def test_a_form_that_no_machine_has_may_give_way_to_a_likely_one(
     [
         ("spring", CLOSE_RIVAL_BIC - 1.0, True),
         ("spring", CLOSE_RIVAL_BIC + 1.0, False),
-        ("load_heat", RARE - 1.0, True),  # as rare as it is, the data speak for it as much
-        ("load_heat", RARE + 1.0, False),
+        ("load_heat", RARE_ODDS - 1.0, True),  # as rare as it is, the data speak for it as much
+        ("load_heat", RARE_ODDS + 1.0, False),
     ],
 )
 def test_a_rare_rival_leaves_a_name_open_where_the_data_alone_speak_for_it(
@@ -89,6 +89,8 @@ def test_a_rare_rival_leaves_a_name_open_where_the_data_alone_speak_for_it(
     """Its BIC is that much worse beforehand."""
     other = member_of(rival, 1, 100.0, 2)
     assert (
-        verdict.has_close_rivals(SelectedEffect(member_of("thermal_friction", 1, 110.0, 2), 1e-9, ((other, worse),)))
+        name_comparison.has_close_rivals(
+            SelectedEffect(member_of("thermal_friction", 1, 110.0, 2), 1e-9, ((other, worse),))
+        )
         is stays_open
     )

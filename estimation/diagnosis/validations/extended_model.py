@@ -1,0 +1,85 @@
+"""The extended model of a diagnosis: base model and findings fitted together, ready to predict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.diagnosis.base_models.prepared_logs import PreparedLogs
+from estimation.diagnosis.findings import Gain
+from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.joint_fits.extended_fit import ExtendedFit, fit_extended
+from estimation.diagnosis.validations.decision import Decision, Reason
+from estimation.diagnosis.validations.gear_compliance import EFFECT as ELASTICITY
+from estimation.diagnosis.validations.held_out_validation import ValidatedFindings
+from estimation.diagnosis.validations.prediction_settings import with_band, with_best_cutoff, with_best_sign_sharpness
+from estimation.logs.provenance import describe_logs
+from estimation.models.model import Model
+from robots.version import VERSION
+
+
+@dataclass(frozen=True, eq=False)
+class ExtendedModel:
+    """The model that a diagnosis gives, and the fits that its findings are read from.
+
+    Attributes:
+        model: base model and findings, with its settings of prediction.
+        fit: of the findings that the model contains.
+        rejected: significant effects and functions that held-out data rejected, with p-value and gain.
+        fit_with_rejected: of both together; None where nothing was rejected.
+    """
+
+    model: Model
+    fit: ExtendedFit
+    rejected: tuple[tuple[FittedEffect, float, Gain], ...]
+    fit_with_rejected: ExtendedFit | None
+
+
+def fit_extended_model(
+    problem: Problem,
+    validated: ValidatedFindings,
+    decision: Decision,
+    prepared: PreparedLogs,
+    *,
+    false_alarm: float,
+    seed: int,
+) -> ExtendedModel:
+    """Fits base model and validated findings together, and chooses cut-off, sign sharpness and prediction band.
+
+    Args:
+        problem: the data of the fit.
+        validated: the findings.
+        decision: on them.
+        prepared: the logs.
+        false_alarm: chance of one, for the model's provenance.
+        seed: likewise.
+    """
+    fit = fit_extended(problem, validated.effects, _provenance(problem, prepared, false_alarm, seed))
+    # An effect that held-out data reject still shows where the residual is unexplained.
+    refuted = validated.refuted if decision.reason is Reason.REJECTED_CAUSES else ()
+    rejected = validated.rejected_discrepancies or refuted
+    both = fit_extended(problem, [*validated.effects, *(member for member, _, _ in rejected)], {}) if rejected else None
+    known = {extension.joint for extension in fit.model.extensions if extension.effect == ELASTICITY}
+    added = [one.extension for one in validated.compliances if one.extension.joint not in known]
+    model = replace(fit.model, extensions=(*fit.model.extensions, *added))
+    model = with_best_sign_sharpness(with_best_cutoff(model, problem, prepared.logs), prepared.logs)
+    model = with_band(model, prepared.logs, prepared.held_out, validated.measured.errors)
+    return ExtendedModel(model, fit, rejected, both)
+
+
+def _provenance(problem: Problem, prepared: PreparedLogs, false_alarm: float, seed: int) -> dict[str, object]:
+    torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
+    return {
+        "logs": describe_logs(prepared.logs),
+        "method": "diagnosis",
+        "tool_version": VERSION,
+        "cutoff_hz": float(max(problem.recording.cutoff, *(band.cutoff for band in problem.whitening.bands))),
+        "velocity_scales": [float(v) for v in problem.situation.velocity_scale],
+        "seed": seed,
+        "false_alarm": false_alarm,
+        "residual_rms": np.sqrt(np.mean(problem.base_residual**2, axis=0)).tolist(),
+        "torque_rms": torque.tolist(),
+        "gravities": [list(gravity) for gravity in problem.baseline.base.gravities],
+    }

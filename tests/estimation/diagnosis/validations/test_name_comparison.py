@@ -1,0 +1,132 @@
+"""Specification of names against free functions in their place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from estimation.diagnosis.calibration import MIN_EXPLAINED_SHARE, MIN_RETAINED_CHI2, NEARLY_EXPLAINED_SHARE
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.searches.selection import SelectedEffect
+from estimation.diagnosis.validations import name_comparison
+from estimation.diagnosis.validations.name_comparison import ComparedNames, compare_with_free_functions
+from robots.terms.discrepancies.patterns import Pattern
+from tests.estimation.diagnosis.comparison_bench import PRICE, ROWS, adding, member_of
+
+PROBLEM: Any = SimpleNamespace(rows=ROWS)
+
+
+def _function(kind: str, joint: int | None, gain: float, degrees: int) -> FittedEffect:
+    return replace(member_of("spring", joint, gain, degrees), hypothesis=Hypothesis(Pattern(kind), joint))
+
+
+def _compared(
+    monkeypatch: pytest.MonkeyPatch,
+    names: Sequence[FittedEffect],
+    in_place: Sequence[FittedEffect] = (),
+    left: Sequence[FittedEffect] = (),
+    retained: float = 1.0,
+) -> ComparedNames:
+    """Names beside functions that explain as much `in_place` of them, and others that explain what they have `left`."""
+    adding(monkeypatch, {id(m.group): m.gain for m in (*names, *in_place, *left)})
+
+    def free(
+        problem: object, entries: object, beside: Sequence[FittedEffect], chance: float, *, alone: bool = False
+    ) -> tuple[list[FittedEffect], list[float]]:
+        functions = list(left) if alone else list(in_place)
+        return functions, [1e-30] * len(functions)
+
+    monkeypatch.setattr(name_comparison, "free_functions", free)
+    monkeypatch.setattr(name_comparison, "_is_plausible", lambda *arguments: True)
+    monkeypatch.setattr(
+        name_comparison, "score", lambda problem, group, beside: SimpleNamespace(gain=retained * names[0].gain)
+    )
+    selection: Any = SimpleNamespace(
+        found=tuple(SelectedEffect(member, 1e-9) for member in names),
+        accepted=SimpleNamespace(gain=sum(member.gain for member in names)),
+    )
+    return compare_with_free_functions(PROBLEM, selection, [], 0.01)
+
+
+@pytest.mark.parametrize(
+    ("gain", "degrees", "stands"),
+    [
+        (500.0, 6, True),  # as much, with more parameters
+        (545.0, 4, True),  # more, but formulas are true to some per cent only
+        (600.0, 6, False),  # clearly more, and worth its parameters
+        (600.0, 30, True),  # clearly more, for far more parameters
+        (900.0, 90, False),  # whatever it costs, the name leaves a third of it
+    ],
+)
+def test_a_name_stands_where_no_function_in_its_place_is_clearly_better(
+    gain: float, degrees: int, stands: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A name of a gain of 500 and two parameters, beside one free function."""
+    name, function = member_of("stribeck", 1, 500.0, 2), _function("drag", 1, gain, degrees)
+    excess, most = 498.0, gain - degrees
+    assert stands is (
+        excess >= MIN_EXPLAINED_SHARE * most
+        and (excess >= NEARLY_EXPLAINED_SHARE * most or gain - degrees * PRICE <= 500.0 - 2 * PRICE)
+    )
+    result = _compared(monkeypatch, [name], in_place=[function])
+    assert [found.effect for found in result.named] == ([name] if stands else [])
+
+
+def test_of_several_names_on_a_joint_the_weakest_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two names that a function outperforms together are left out one by one; a name elsewhere stays."""
+    names = [member_of("stribeck", 3, 300.0, 3), member_of("spring", 3, 90.0, 4), member_of("spring", 2, 80.0, 4)]
+    here = _function("turns", 3, 700.0, 8)
+    asked: list[tuple[str, ...]] = []
+    adding(monkeypatch, {id(m.group): m.gain for m in (*names, here)})
+
+    def free(
+        problem: object, entries: object, beside: Sequence[FittedEffect], chance: float, *, alone: bool = False
+    ) -> tuple[list[FittedEffect], list[float]]:
+        if alone or {m.hypothesis.joint for m in beside} != {2}:
+            return [], []
+        asked.append(tuple(m.hypothesis.label for m in beside))
+        return [here], [1e-30]
+
+    monkeypatch.setattr(name_comparison, "free_functions", free)
+    monkeypatch.setattr(name_comparison, "_is_plausible", lambda *arguments: True)
+    selection: Any = SimpleNamespace(
+        found=tuple(SelectedEffect(member, 1e-9) for member in names), accepted=SimpleNamespace(gain=470.0)
+    )
+    result = compare_with_free_functions(PROBLEM, selection, [], 0.01)
+    assert [found.effect.hypothesis.label for found in result.named] == ["spring of joint 2"]
+    assert asked == [("spring of joint 2",)] * 2
+
+
+@pytest.mark.parametrize(("left", "unexplained"), [(150.0, False), (600.0, True)])
+def test_what_names_leave_is_unexplained_if_it_is_much(
+    left: float, unexplained: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Formulas leave some of what they explain; three tenths of all is something else."""
+    name, rest = member_of("stribeck", 1, 500.0, 2), _function("angle", 2, left, 4)
+    result = _compared(monkeypatch, [name], left=[rest])
+    assert result.free_functions == ((rest,) if unexplained else ())
+    assert result.p_values == ((1e-30,) if unexplained else ())
+    assert [found.effect for found in result.named] == [name]
+    assert result.explained == pytest.approx(500.0 / (500.0 + left - 4))
+
+
+@pytest.mark.parametrize(("retained", "kept"), [(MIN_RETAINED_CHI2 - 0.05, False), (MIN_RETAINED_CHI2 + 0.05, True)])
+def test_a_name_that_borrows_from_what_is_unexplained_is_left_out(
+    retained: float, kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A formula may be named on one joint for what acts on another, through the base parameters that they share."""
+    name, rest = member_of("encoder_offset", 1, 100.0, 1), _function("angle", 2, 80.0, 15)
+    result = _compared(monkeypatch, [name], left=[rest], retained=retained)
+    assert result.free_functions == (rest,)
+    assert [found.effect for found in result.named] == ([name] if kept else [])
+
+
+def test_without_names_and_functions_nothing_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A log without effects: no names, no functions, all explained."""
+    result = _compared(monkeypatch, [])
+    assert (result.named, result.free_functions, result.p_values, result.explained) == ((), (), (), 1.0)
