@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.documented_outputs import BLOCK, Difference, calls, replace, replay, shorten
+from benchmarks.documented_outputs import BLOCK, PICTURE, Difference, calls, replace, replay, shorten, take_picture
 from benchmarks.sentence_lengths import pages
 
 PAGE = """# A page
@@ -108,3 +108,12 @@ def test_output_needs_a_command():
     """A console block that begins with output is refused with the line."""
     with pytest.raises(ValueError, match="begins with 'er3a'"):
         calls("er3a\n$ oed design\n")
+
+
+def test_no_picture_without_a_browser(monkeypatch, tmp_path, capsys):
+    """Without Chromium the picture is left as it is, and a line of the output says so."""
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    before = PICTURE.read_bytes()
+    take_picture(tmp_path / "report.html")
+    assert "needs Chromium" in capsys.readouterr().out
+    assert PICTURE.read_bytes() == before
