@@ -232,7 +232,7 @@ def test_a_search_starts_again_from_other_summits(far: bool, expected: float, mo
     group = replace(_member("stribeck", 1, (np.ones((ROWS, 1)),)).group)
 
     class _Shape(tuple):  # type: ignore[type-arg]
-        joints = group.joints
+        joints, columns = group.joints, (np.zeros((ROWS, 1)),)
 
     situation = SimpleNamespace(robot=None)
     problem = SimpleNamespace(state_for=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
@@ -271,7 +271,7 @@ def test_what_an_effect_is_whole_without_is_a_parameter_only_where_it_pays(
     monkeypatch.setattr(Hypothesis, "coefficient_bounds", lambda *_: ((-np.inf, np.inf),))
 
     class _Shape(tuple):  # type: ignore[type-arg]
-        joints = (0,)
+        joints, columns = (0,), (np.zeros((ROWS, 1)),)
 
     situation = SimpleNamespace(robot=None)
     problem = SimpleNamespace(state_for=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
@@ -295,7 +295,7 @@ def test_friction_that_turns_round_over_no_way_is_no_presliding(
     monkeypatch.setattr(Hypothesis, "coefficient_bounds", lambda *_: ((0.0, np.inf),))
 
     class _Shape(tuple):  # type: ignore[type-arg]
-        joints = (0,)
+        joints, columns = (0,), (np.zeros((ROWS, 1)),)
 
     situation = SimpleNamespace(robot=None)
     problem = SimpleNamespace(state_for=lambda _: situation, rows=ROWS, measured=lambda _, shape: _Shape(shape))
