@@ -1,4 +1,4 @@
-"""One thing that the gate found in a log."""
+"""One finding on a log."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ class Finding:
     """One finding of a check.
 
     Attributes:
-        name: the kind of finding, such as ``gap`` or ``unit_of_position``.
-        severity: ``info`` (harmless), ``warning`` (the result is worse), ``refuse`` (the fit would be wrong).
+        name: kind of finding, such as ``gap`` or ``unit_of_position``.
+        severity: ``info`` (no effect), ``warning`` (the result is less accurate), ``refuse`` (the fit would be wrong).
         text: what was found, in one clause.
         action: what was done about it, or what to do.
-        value: the number behind it.
+        value: the number on which it is based.
         unit: of the value.
-        column: the column of the log, where one is meant.
-        joint: counted from 1, where one is meant.
-        row: the sample at which it begins, counted from 1, where it has a place.
+        column: of the log, if the finding is about one.
+        joint: counted from 1, if the finding is about one.
+        row: at which it begins, counted from 1, if it has a place.
     """
 
     name: str

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.finding import SEVERITIES, Finding, Severity
+from estimation.gate.measurements.timing import FEWEST
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.plain import all_finite, finite
 from robots.signals import Log
@@ -18,9 +19,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Fewer samples than this carry no derivatives.
-FEWEST = 20
-# Findings of a log that is in order and still does not determine what is asked for.
+# Findings on a log without a fault whose motion does not determine the parameters.
 NO_INFORMATION = frozenset({"badly_excited"})
 
 
@@ -35,18 +34,18 @@ class GateReport:
         duration: [s].
         period: median sample period [s].
         findings: the worst first.
-        parts: (first, stop) sample indices of the stretches without a gap, and in which no column hung; what lies
-            between is not bridged.
-        spikes: indices of outliers in single rows, which a fit must leave out.
-        stale: indices of rows with wrong times, which a fit must leave out: repetitions of the row before while the arm
-            moves, if they are many, and rows that were written late by an unknown time.
+        parts: (first, stop) indices of the parts without a gap and without a column that hung. Nothing is interpolated
+            between them.
+        spikes: indices of rows with isolated outliers, which a fit leaves out.
+        stale: indices of rows with wrong times, which a fit leaves out: copies of the row before, and rows that were
+            written late by an unknown time.
         t: times of the rows [s], corrected for rows that were written late, if possible.
         delay: by which the torque lags the position (n,) [s], NaN if the log does not determine it.
         delay_error: its standard error (n,) [s].
-        unexplained: torque error on held-out data divided by the torque's standard deviation (n,), by
-            a quick fit of rigid body and friction; NaN without torque.
-        information: evidence for each joint's own parameters: inertia or friction losses over their standard
-            errors, the larger of the two (n,); NaN without torque.
+        unexplained: held-out torque error over the torque's standard deviation (n,), from a quick fit of rigid body
+            and friction; NaN without torque.
+        information: inertia or friction power of each joint over its standard error, the larger of the two (n,);
+            NaN without torque.
     """
 
     robot: str
@@ -83,7 +82,7 @@ class GateReport:
 
         Raises:
             NotIdentifiableError: the only fault is that the motion does not explain any joint's torque.
-            InputError: any other fault that would spoil the fit.
+            InputError: any other fault with which the fit would be wrong.
         """
         reasons = self.of("refuse")
         if not reasons:
@@ -120,7 +119,7 @@ class GateReport:
         kept = np.ones(len(log), dtype=bool)
         kept[self.spikes] = kept[self.stale] = False
         parts = [np.arange(first, stop)[kept[first:stop]] for first, stop in self.parts]
-        logs = tuple(pick_rows(log, part) for part in parts if len(part) >= FEWEST)
+        logs = tuple(log.rows(part) for part in parts if len(part) >= FEWEST)
         if not logs:
             raise InputError("no part of the log is long enough", file=self.log or None, allowed=f"{FEWEST} rows")
         return logs
@@ -130,7 +129,7 @@ class GateReport:
         return log if np.array_equal(self.t, log.t) else replace(log, t=self.t)
 
     def summary(self) -> str:
-        """Says the verdict and lists the findings, the worst first."""
+        """Gives the verdict and lists the findings, the worst first."""
         verdict = "refused" if self.refused else "usable"
         rate = 1.0 / self.period if self.period > 0 else float("nan")
         head = f"{self.log or 'log'}: {verdict}; {self.samples} samples, {self.duration:.4g} s at {rate:.4g} Hz"
@@ -163,11 +162,6 @@ class GateReport:
         import html
 
         return f"<pre>{html.escape(self.summary())}</pre>"
-
-
-def pick_rows(log: Log, rows: NDArray[np.intp]) -> Log:
-    """Keeps some rows of a log, by their indices."""
-    return log.rows(rows)
 
 
 def worst_first(findings: list[Finding]) -> tuple[Finding, ...]:

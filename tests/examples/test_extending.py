@@ -37,7 +37,6 @@ def test_page_shows_every_example():
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_criterion(tmp_path):
     """The design by an own criterion is better by it than the design by cond(Y)."""
     values = dict(re.findall(r"^([\w-]+): ([\d.]+)$", example("criterion", tmp_path), flags=re.MULTILINE))
@@ -45,14 +44,12 @@ def test_criterion(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_limit(tmp_path):
     """The flange uses its own speed limit up, and does not pass it."""
     (speed,) = re.findall(r"fastest flange: ([\d.]+) m/s", example("limit", tmp_path))
     assert 0.45 < float(speed) <= 0.5
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_family(tmp_path):
     """An experiment of an own family determines all parameters within all limits."""
@@ -64,7 +61,6 @@ def test_family(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_friction(tmp_path):
     """Data with an own friction are explained by that term alone, to the noise of two per cent."""
     levels = dict(re.findall(r"^([\w-]+): ([\d.]+) % residual$", example("friction", tmp_path), flags=re.MULTILINE))
@@ -72,7 +68,6 @@ def test_friction(tmp_path):
     assert float(levels["coulomb-viscous"]) > 2 * float(levels["saturating_friction"])
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_estimator(tmp_path):
     """An own estimator fits to the noise; its largest relative residual is not above that of WLS."""
@@ -83,6 +78,13 @@ def test_estimator(tmp_path):
 
 
 @pytest.mark.slow
+def test_check(tmp_path):
+    """An own check warns of each joint of a slow log, and not of a fast one."""
+    fast, slow = (part.splitlines() for part in example("check", tmp_path).split("virtual er3a: ")[1:])
+    assert len(fast) == 1
+    assert sum("of its speed limit" in line for line in slow) == 6
+
+
 @pytest.mark.slow
 def test_effect(tmp_path):
     """An own effect is found on its joint with its parameters, and saved in a model that loads again."""

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from estimation.gate import GateReport, check_log
-from estimation.gate.checks.spikes import are_accidents, stray_rows
-from estimation.gate.columns import Columns
 from estimation.gate.finding import Finding
-from estimation.gate.report import FEWEST
+from estimation.gate.measurements.columns import Columns
+from estimation.gate.measurements.outliers import are_isolated, find_outliers
+from estimation.gate.measurements.timing import FEWEST
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -104,10 +104,10 @@ def _is_reported(finding: Finding) -> bool:
 def _filled(log: Log) -> Log:
     """Puts what lies between its neighbours where a column sticks out: rows stay where they are in time."""
     values: dict[str, Array] = {}
-    for (prefix, joint), rows in stray_rows(Columns.of(log)).items():
+    for (prefix, joint), rows in find_outliers(Columns.of(log)).items():
         name = {"q": "q", "tau": "tau", "i": "current"}[prefix]
         known = np.setdiff1d(np.arange(len(log)), rows)
-        if not are_accidents(rows, len(log)) or len(known) < FEWEST:
+        if not are_isolated(rows, len(log)) or len(known) < FEWEST:
             continue
         column = values.setdefault(name, np.array(getattr(log, name)))[:, joint]
         if prefix == "q":

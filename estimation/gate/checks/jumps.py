@@ -2,80 +2,92 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from estimation.gate.columns import Columns
+from estimation.gate.check import Check
+from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
 from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
 
-# A step is a jump when it exceeds its hundredth-largest by so much, this share of the travel, ...
+# A step is a jump above so many times the 99th percentile of the steps and this share of the travel, ...
 OUT, SHARE = 3.0, 0.005
-# ... and all other steps so many rows either way by so much: messages that come twice make steps of up to four.
-WINDOW, LOCAL = 10, 5.0
-# So many in a row at most: a value between the old and the new one is usual.
+# ... and above so many times all other steps within so many rows: messages that come twice make steps of up to four.
+LOCAL, WINDOW = 5.0, 10
+# Most rows of one jump: one row may lie between the old value and the new one.
 AT_ONCE = 2
-# Share of the travel from which on a fit would be wrong.
+# Share of large steps above which they are the motion.
+USUAL = 0.01
+# Number of steps from which the percentile is estimated.
+SAMPLES = 20_000
+# Share of the travel above which a jump would make a fit wrong.
 MUCH = 0.05
+# A jump by a turn, to this error [rad], is a wrapped angle.
+TURN_ERROR = 0.1
 
 
-def jump_rows(t: Array, q: Array) -> NDArray[np.intp]:
-    """Finds the rows of a position (N,) before which it jumps, as no joint can: at one sample, and not around it.
+class Jumps(Check):
+    """Finds jumps of positions that are neither outliers of single rows nor beside a gap in time."""
+
+    name: ClassVar[str] = "jumps"
+    stage: ClassVar[Stage] = Stage.RECORDED
+    order: ClassVar[int] = 130
+
+    def run(self, context: Context) -> list[Finding]:
+        """Reports the number of jumps and the largest of each joint."""
+        recorded = context.recorded
+        known = np.concatenate([recorded.spikes, recorded.spikes + 1, recorded.timing.gaps + 1])
+        # A lost message makes a longer step, and no jump.
+        periods = np.maximum(recorded.timing.steps / recorded.timing.period, 1.0)
+        findings = []
+        for joint, q in enumerate(recorded.columns.q):
+            # The position of a joint that stands changes by single encoder steps.
+            if recorded.standing[joint]:
+                continue
+            rows = np.setdiff1d(jump_rows(periods, q), known)
+            if len(rows):
+                findings.append(_finding(joint, q, rows, float(recorded.columns.travel[joint])))
+        return findings
+
+
+def jump_rows(periods: Array, q: Array) -> Rows:
+    """Finds the rows of a position (N,) before which it jumps: by one large step, without large ones around it.
 
     Args:
-        t: time (N,) [s]; a message that was lost makes a longer step, and no jump.
+        periods: time steps (N - 1,) over their median, 1 at least.
         q: position (N,).
     """
-    duration = np.diff(t)
-    steps = np.abs(np.diff(q)) / np.maximum(duration / np.median(duration), 1.0)
-    usual = float(np.quantile(steps[:: max(1, len(steps) // 20_000)], 0.99))
+    steps = np.abs(np.diff(q)) / periods
+    usual = float(np.quantile(steps[:: max(1, len(steps) // SAMPLES)], 0.99))
     large = steps > max(OUT * usual, SHARE * float(q.max() - q.min()))
-    if not large.any() or large.mean() > 0.01:
+    if not large.any() or large.mean() > USUAL:
         return np.empty(0, dtype=np.intp)
-    # A joint that mostly stands has large steps one after the other when it goes: so it gathered speed.
+    # A joint that stands for most of the log makes many large steps in a row when it accelerates.
     for start, stop in spans(large):
         large[start:stop] = stop - start <= AT_ONCE
     around = maximum_filter1d(np.where(large, 0.0, steps), 2 * WINDOW + 1)
     return np.flatnonzero(large & (steps > LOCAL * around)) + 1
 
 
-def check_jumps(
-    t: Array, columns: Columns, spikes: NDArray[np.intp], gaps: NDArray[np.intp], stands: NDArray[np.bool_]
-) -> list[Finding]:
-    """Finds jumps of positions that are neither single rows nor beside a gap in time.
-
-    Args:
-        t: time (N,) [s].
-        columns: of the log.
-        spikes: rows with outliers, which are ignored anyway.
-        gaps: rows after a gap.
-        stands: joints (n,) that stand: they tremble by steps of the encoder, one sample each.
-    """
-    known = np.concatenate([spikes, spikes + 1, gaps])
-    findings = []
-    for joint, q in enumerate(columns.q):
-        rows = jump_rows(t, q) if not stands[joint] else np.empty(0, dtype=np.intp)
-        rows = rows[~np.isin(rows, known)]
-        if not len(rows):
-            continue
-        sizes = q[rows] - q[rows - 1]
-        worst = int(np.argmax(np.abs(sizes)))
-        wraps = abs(abs(sizes[worst]) - 2 * np.pi) < 0.1
-        findings.append(
-            Finding(
-                name="jump",
-                severity="refuse" if abs(sizes[worst]) > MUCH * columns.travel[joint] else "warning",
-                text=f"jumps {len(rows)} time{'s' if len(rows) > 1 else ''}, by up to {sizes[worst]:.4g} in one sample"
-                + (": the angle wraps" if wraps else ""),
-                action="unwrap the angle" if wraps else "cut the log there, and check the encoder and the logger",
-                value=float(sizes[worst]),
-                unit="rad or m",
-                column=f"q{joint + 1}",
-                joint=joint + 1,
-                row=int(rows[worst]) + 1,
-            )
-        )
-    return findings
+def _finding(joint: int, q: Array, rows: Rows, travel: float) -> Finding:
+    sizes = q[rows] - q[rows - 1]
+    largest = int(np.argmax(np.abs(sizes)))
+    wraps = abs(abs(sizes[largest]) - 2 * np.pi) < TURN_ERROR
+    return Finding(
+        name="jump",
+        severity="refuse" if abs(sizes[largest]) > MUCH * travel else "warning",
+        text=f"jumps {len(rows)} time{'s' if len(rows) > 1 else ''}, by up to {sizes[largest]:.4g} in one sample"
+        + (": the angle wraps" if wraps else ""),
+        action="unwrap the angle" if wraps else "cut the log there, and check the encoder and the logger",
+        value=float(sizes[largest]),
+        unit="rad or m",
+        column=f"q{joint + 1}",
+        joint=joint + 1,
+        row=int(rows[largest]) + 1,
+    )

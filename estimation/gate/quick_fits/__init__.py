@@ -1,1 +1,1 @@
-"""The quick fit that shows whether torque follows from motion at all."""
+"""Quick fits of rigid body and friction to excerpts of a log."""

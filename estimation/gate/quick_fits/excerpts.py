@@ -1,4 +1,4 @@
-"""Stretches of a log that stand for all of it, smoothed and thinned: what a quick fit needs of millions of rows."""
+"""Excerpts of a log, smoothed and thinned: a quick fit needs few of millions of rows."""
 
 from __future__ import annotations
 
@@ -17,23 +17,29 @@ from robots.signals import Log
 
 Array = NDArray[np.float64]
 
-# Rows of the log that are looked at, and into how many stretches they are spread where the log is longer.
+# Most rows of a log that are used, and number of stretches to which they are distributed in a longer log.
 ROWS, STRETCHES = 24_000, 12
-# Cut-offs of the smoothing to choose from [Hz], up to this share of the sampling rate.
+# Candidates for the cut-off of the smoothing [Hz], and the highest over the sampling rate.
 CUTOFFS, NYQUIST_SHARE = (1.5, 3.0, 6.0, 12.0, 24.0), 0.25
 # Samples kept per period of the cut-off.
 KEPT = 5.0
-# Of the smoothing: order of each pass, and what it forgets at the ends, in periods of the cut-off.
+# Fewest samples of a stretch before and after it is smoothed and thinned.
+FEWEST_SAMPLES, FEWEST_KEPT = 24, 12
+# Deviation of the time steps from the median, over it, from which a stretch is interpolated on an even grid.
+UNEVEN = 0.02
+# Share of rows with a new position from which repeated positions are left out of the interpolation.
+FRESH = 0.5
+# Order of each pass of the smoothing, and length of its inaccurate ends in periods of the cut-off.
 ORDER, EDGE = 3, 0.35
 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Some rows of a log on an even grid, as they were recorded.
+    """Some rows of a log on an even grid, not smoothed.
 
     Attributes:
         t: (N,) [s].
-        q: (N, n).
+        q: positions (N, n).
         torque: torque or current (N, n); None without.
         velocity: the log's own (N, n); None without.
     """
@@ -45,7 +51,7 @@ class Stretch:
 
     @property
     def signals(self) -> list[Array]:
-        """Those that there are, in order."""
+        """Positions, torques and velocities, as far as they exist."""
         return [signal for signal in (self.q, self.torque, self.velocity) if signal is not None]
 
 
@@ -55,13 +61,13 @@ class Excerpt:
 
     Attributes:
         t: (M,) [s].
-        q: (M, n), smoothed.
-        dq: (M, n).
-        ddq: (M, n).
+        q: smoothed positions (M, n).
+        dq: their derivative (M, n).
+        ddq: their second derivative (M, n).
         raw: torque or current as it was logged (M, n); None without.
-        column: the log's own velocities, smoothed alike (M, n); None without.
-        place: (M,) of the thinned rows on the grid.
-        grid: all of the stretch's times (N,) [s].
+        column: the log's own velocities, smoothed by the same filter (M, n); None without.
+        place: of the thinned rows on the grid (M,).
+        grid: all times of the stretch (N,) [s].
         smoothed: torque or current on the grid, smoothed (N, n); None without.
     """
 
@@ -76,7 +82,7 @@ class Excerpt:
     smoothed: Array | None
 
     def thinned(self, stride: int) -> Excerpt:
-        """Keeps every so many rows."""
+        """Keeps one of `stride` rows."""
         kept: dict[str, Any] = {
             name: None if array is None else array[::stride]
             for name in ("t", "q", "dq", "ddq", "raw", "column", "place")
@@ -85,21 +91,21 @@ class Excerpt:
         return replace(self, **kept)
 
     def torque_at(self, t: Array, order: int = 0) -> Array:
-        """Smoothed torque or current (K, n) at times (K,), within the stretch, or its derivative of some order."""
+        """Interpolates the smoothed torque or current (K, n) at times (K,) [s], or its derivative of an order."""
         if t is self.t and not order and self.smoothed is not None:
             return self.smoothed[self.place]
         return np.asarray(self._spline(np.clip(t, self.grid[0], self.grid[-1]), order))
 
     def torque_near(self, shift: Array, joint: int, stride: int) -> Array:
-        """Smoothed torque or current of a joint so much later (S,) [s], between the samples by straight lines.
+        """Gives the smoothed torque or current of a joint at several shifts, linear between samples.
 
         Args:
-            shift: (S,) [s].
+            shift: by which it is logged later (S,) [s].
             joint: counted from 0.
-            stride: every so many rows.
+            stride: between the rows that are kept.
 
         Returns:
-            (S, M / stride); at the ends the last sample.
+            (S, M / stride); beyond the ends the last sample.
         """
         assert self.smoothed is not None
         samples = shift * (len(self.grid) - 1) / (self.grid[-1] - self.grid[0])
@@ -111,19 +117,19 @@ class Excerpt:
 
     @cached_property
     def _spline(self) -> CubicSpline:
-        # Few excerpts of those that are tried are ever asked for it.
+        # Only few of the excerpts need it.
         assert self.smoothed is not None
         return CubicSpline(self.grid, self.smoothed)
 
 
 def cutoffs(period: float) -> tuple[float, ...]:
-    """The cut-offs [Hz] that a sample period [s] allows, the lowest first."""
+    """Gives the cut-offs [Hz] that a sample period [s] allows, the lowest first."""
     highest = NYQUIST_SHARE / period
     return tuple(cutoff for cutoff in CUTOFFS if cutoff <= highest) or (highest,)
 
 
 def stretches(parts: Sequence[tuple[int, int]]) -> list[slice]:
-    """Chooses evenly spread rows, some `ROWS` in all, as slices that cross no gap.
+    """Chooses evenly distributed rows, about `ROWS` in all, as slices without a gap.
 
     Args:
         parts: (first, stop) of the stretches without a gap.
@@ -134,7 +140,7 @@ def stretches(parts: Sequence[tuple[int, int]]) -> list[slice]:
     length = ROWS // STRETCHES
     chosen = []
     for centre in (np.arange(STRETCHES) + 0.5) * total / STRETCHES:
-        # The place counted over all parts, found in its own part and moved off its ends.
+        # The centre is counted over all parts. The slice is moved inside the part that contains it.
         passed = 0
         for first, stop in parts:
             if centre < passed + stop - first:
@@ -146,7 +152,7 @@ def stretches(parts: Sequence[tuple[int, int]]) -> list[slice]:
 
 
 def stretch(log: Log, torque: Array | None, piece: slice, period: float) -> Stretch | None:
-    """Puts some rows on an even grid.
+    """Interpolates some rows on an even grid.
 
     Args:
         log: the log.
@@ -155,38 +161,38 @@ def stretch(log: Log, torque: Array | None, piece: slice, period: float) -> Stre
         period: median step of the log [s].
 
     Returns:
-        The stretch; None where too little is left.
+        The stretch; None if it is too short.
     """
     t, q = log.t[piece], log.q[piece]
     duration = float(t[-1] - t[0])
     grid = t[0] + period * np.arange(int(duration / period + 1e-6) + 1)
-    if len(grid) < 24:
+    if len(grid) < FEWEST_SAMPLES:
         return None
     tau, velocity = (None if values is None else values[piece] for values in (torque, log.dq))
-    # Messages that came twice: the position of the later one is old.
+    # A position that repeats the one before is old.
     fresh = np.concatenate([[True], np.any(q[1:] != q[:-1], axis=1)])
-    uneven = np.abs(np.diff(t) - period).max() > 0.02 * period
+    uneven = np.abs(np.diff(t) - period).max() > UNEVEN * period
     if not uneven and fresh.all():
         return Stretch(t, q, tau, velocity)
-    fresh = fresh if fresh.sum() > 0.5 * len(t) else np.ones(len(t), dtype=bool)
+    fresh = fresh if fresh.sum() > FRESH * len(t) else np.ones(len(t), dtype=bool)
     tau, velocity = (None if values is None else _at(grid, t, values) for values in (tau, velocity))
     return Stretch(grid, _at(grid, t[fresh], q[fresh]), tau, velocity)
 
 
 def excerpts_of(parts: Sequence[Stretch], period: float, cutoff: float) -> tuple[Excerpt, ...]:
-    """Smooths stretches, position and torque by the same filter, and thins them.
+    """Smooths position and torque of stretches by the same filter, and thins them.
 
     Args:
-        parts: the stretches, of the same signals.
+        parts: the stretches, all with the same signals.
         period: of their grids [s].
         cutoff: [Hz].
 
     Returns:
-        The stretches without their ends, but for those of which too little is left.
+        The stretches without their inaccurate ends; too short ones are left out.
     """
     smoothed: dict[int, Iterator[Array]] = {}
     for length in {len(part.t) for part in parts}:
-        # One filter for all signals of all stretches of a length: its set-up costs as much as a column.
+        # All signals of all stretches of one length are filtered at once: the set-up costs as much as a column.
         signals = [signal for part in parts if len(part.t) == length for signal in part.signals]
         widths = np.cumsum([signal.shape[1] for signal in signals])
         smoothed[length] = iter(np.split(_low_pass(np.hstack(signals), period, cutoff), widths[:-1], axis=1))
@@ -195,11 +201,11 @@ def excerpts_of(parts: Sequence[Stretch], period: float, cutoff: float) -> tuple
 
 
 def _excerpt(part: Stretch, smoothed: Sequence[Array], period: float, cutoff: float) -> Excerpt | None:
-    """Thins one stretch whose signals are smoothed; None where too little is left."""
+    """Thins one stretch with smoothed signals; None if it is too short."""
     grid, edge = part.t, EDGE / cutoff
     inside = np.flatnonzero((grid >= grid[0] + edge) & (grid <= grid[-1] - edge))
     inside = inside[:: max(1, int(1.0 / (KEPT * cutoff * period)))]
-    if len(inside) < 12:
+    if len(inside) < FEWEST_KEPT:
         return None
     smooth = iter(smoothed)
     q = next(smooth)
@@ -212,7 +218,7 @@ def _excerpt(part: Stretch, smoothed: Sequence[Array], period: float, cutoff: fl
         grid[inside],
         q[inside],
         slope(inside),
-        # The ends that are left out are longer than a sample by far.
+        # The ends that are left out are much longer than a sample.
         (slope(inside + 1) - slope(inside - 1)) / (2 * period),
         None if part.torque is None else part.torque[inside],
         None if part.velocity is None else next(smooth)[inside],

@@ -1,4 +1,4 @@
-"""A quick fit, joint by joint, that shows whether the torque follows from the motion at all."""
+"""The quick fit of each joint alone: whether its torque follows from the motion."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from robots.robot import Robot
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
-# Ridge of the fit of a single joint, for directions that the joint hardly shows.
+# Ridge of the fit of a single joint: its motion excites some combinations of parameters hardly.
 OWN_RIDGE = 1e-6
-# Stretches of time that are left out in turn, and blocks whose residuals count as independent.
+# Folds of the cross-validation, and blocks of rows with independent residuals. Both are contiguous in time.
 FOLDS, BLOCKS = 6, 60
-# sign(dq) is smoothed over this share of a joint's RMS speed.
+# Width of the smoothed sign(dq), over the joint's RMS speed.
 SHARP = 0.05
-# Of a joint's largest column: what is smaller is the rounding of a product that is zero.
+# A column whose RMS is below this share of the joint's largest is rounding.
 SILENT = 1e-12
-# Columns that each joint has of its own, after those of the rigid body.
-OWN = 4  # rotor inertia, Coulomb, viscous, offset
+# Number of a joint's own columns, after those of the rigid body: rotor inertia, Coulomb, viscous, offset.
+OWN = 4
 
 
 @dataclass(frozen=True, eq=False)
 class JointColumns:
-    """The columns of one joint: of the rigid body, then its own.
+    """The regressor of one joint: columns of the rigid body, then its own.
 
     Attributes:
         Y: (M, k), scaled to unit mean square.
-        scale: (k,) by which they were divided.
-        used: indices of the rigid body's columns among its parameters.
+        scale: RMS of the unscaled columns (k,).
+        used: parameters of the rigid body that the first columns belong to.
     """
 
     Y: Array
@@ -50,13 +50,13 @@ class JointFit:
     """The fit of one joint.
 
     Attributes:
-        Y: (M, k), columns that act on the joint, scaled to unit mean square.
-        scale: (k,) of the columns.
-        used: indices (k,) of the rigid body's columns, then of the joint's own.
-        values: (k,), of the scaled columns.
-        inverse: of the Gram matrix with its ridge (k, k).
+        Y: regressor (M, k), scaled to unit mean square.
+        scale: RMS of the unscaled columns (k,).
+        used: parameters of the rigid body that the first columns belong to.
+        values: parameters of the scaled columns (k,).
+        inverse: inverse of the Gram matrix with its ridge (k, k).
         residual: (M,).
-        scores: (B, k), Y' residual of each block.
+        scores: Y' residual of each block (B, k).
     """
 
     Y: Array
@@ -68,10 +68,10 @@ class JointFit:
     scores: Array
 
     def combination(self, weights: Array) -> tuple[float, float]:
-        """A sum of parameters: its value and its standard error, which allows for correlated residuals.
+        """Gives the value of a linear combination of parameters, and its standard error under correlated residuals.
 
         Args:
-            weights: (k,) of the parameters of the unscaled columns.
+            weights: of the parameters of the unscaled columns (k,).
         """
         direction = weights / self.scale
         value = float(direction @ self.values)
@@ -82,16 +82,16 @@ class JointFit:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """All excerpts, one after the other.
+    """All excerpts, one after the other, with the regressor.
 
     Attributes:
-        excerpts: the stretches.
-        q: (M, n).
-        dq: (M, n).
-        ddq: (M, n).
-        joints: the columns of each joint (n).
+        excerpts: the excerpts.
+        q: positions (M, n) [rad or m].
+        dq: velocities (M, n).
+        ddq: accelerations (M, n).
+        joints: regressor of each joint (n).
         bodies: number of the rigid body's parameters.
-        block: (M,) which of the blocks a row belongs to.
+        block: number of each row's block (M,).
         speed: RMS speed of each joint (n,).
     """
 
@@ -106,7 +106,13 @@ class Rows:
 
     @staticmethod
     def of(robot: Robot, excerpts: Sequence[Excerpt], most: int | None = None) -> Rows:
-        """Puts stretches together and evaluates the regressor, thinned to `most` rows where given."""
+        """Evaluates the regressor on all excerpts.
+
+        Args:
+            robot: with n joints.
+            excerpts: of its log.
+            most: number of rows to which they are thinned; None for all.
+        """
         if most is not None:
             stride = max(1, sum(len(part.t) for part in excerpts) // most)
             excerpts = [part.thinned(stride) for part in excerpts]
@@ -122,15 +128,24 @@ class Rows:
         return Rows(tuple(excerpts), q, dq, ddq, joints, rigid_body(robot).size, block, speed)
 
     def raw(self, joint: int) -> Array:
-        """Torque of a joint (M,), counted from 0, as it was logged."""
+        """Gives the torque of a joint (M,), counted from 0, as it was logged."""
         return np.concatenate([part.raw[:, joint] for part in self.excerpts if part.raw is not None])
 
     def torques(self, shift: float = 0.0, order: int = 0) -> Array:
-        """Torques (M, n) as they are logged so much later [s], or their derivatives of some order."""
+        """Gives the smoothed torques (M, n) that are logged later by a shift [s], or their derivatives."""
         return np.concatenate([part.torque_at(part.t + shift if shift else part.t, order) for part in self.excerpts])
 
     def near_torques(self, shifts: Array, joint: int, stride: int) -> Array:
-        """Torque of a joint, counted from 0, so much later (S,) [s], on every so many rows of each stretch (S, M')."""
+        """Gives the torque of a joint at several shifts, linear between samples, on the thinned rows.
+
+        Args:
+            shifts: by which it is logged later (S,) [s].
+            joint: counted from 0.
+            stride: between the rows that are kept of each excerpt.
+
+        Returns:
+            (S, M').
+        """
         return np.concatenate([part.torque_near(shifts, joint, stride) for part in self.excerpts], axis=1)
 
     @cached_property
@@ -138,17 +153,17 @@ class Rows:
         return self.torques()
 
     def torque(self, joint: int) -> Array:
-        """Torque of a joint (M,), counted from 0."""
+        """Gives the smoothed torque of a joint (M,), counted from 0."""
         return np.ascontiguousarray(self._torques[:, joint])
 
     def thinned(self, stride: int) -> NDArray[np.intp]:
-        """The rows that remain of every so many of each stretch."""
+        """Gives the rows that remain if one of `stride` is kept of each excerpt."""
         ends = np.cumsum([len(part.t) for part in self.excerpts])
         starts = np.concatenate([[0], ends[:-1]])
         return np.concatenate([np.arange(start, end, stride) for start, end in zip(starts, ends, strict=True)])
 
     def fit(self, joint: int) -> JointFit:
-        """Fits one joint, counted from 0, by itself: what is wrong with another joint does not touch it."""
+        """Fits one joint, counted from 0, alone: a fault of another joint has no effect on it."""
         own = self.joints[joint]
         Y, tau = own.Y, self.torque(joint)
         gram = Y.T @ Y
@@ -168,7 +183,7 @@ class Rows:
         return [slice(first, stop) for first, stop in pairwise([*self.starts.tolist(), len(self.block)])]
 
     def moments(self, joints: NDArray[np.intp], *, raw: bool = False) -> Moments:
-        """Sums the normal equations of some joints, fold by fold, with smoothed torques or raw ones."""
+        """Sums the normal equations of some joints, fold by fold, of smoothed torques or of those as logged (raw)."""
         chosen = tuple(map(int, joints))
         gram, scale, places = self._gram(chosen)
         n, folds, p = gram.shape[:3]
@@ -184,20 +199,20 @@ class Rows:
         return Moments(gram, cross, square, np.array([rows.stop - rows.start for rows in self._folds], dtype=float))
 
     def _gram(self, joints: tuple[int, ...]) -> tuple[Array, Array, dict[int, tuple[Places, Places]]]:
-        """Gram matrices (n, F, p, p) of the columns that act at all, of unit mean square over these joints.
+        """Sums the Gram matrices of the columns that are not zero, scaled to unit mean square over these joints.
 
-        They are the same for smoothed torques and raw ones, and kept for the latest joints asked for.
+        They do not depend on the torques. The last result is kept.
 
         Returns:
-            The matrices, what the columns were divided by (p,), and of each joint which of its columns act and where
-            they stand.
+            The matrices (n, F, p, p), the RMS of the unscaled columns (p,), and for each joint the columns that are not
+            zero, with their places among the p.
         """
         if joints not in self._grams:
             energy = np.zeros(self.bodies + OWN * len(self.speed))
             parts = {}
             for joint in joints:
                 own = self.joints[joint]
-                parts[joint] = [own.Y[rows].T @ own.Y[rows] for rows in self._folds]
+                parts[joint] = np.array([own.Y[rows].T @ own.Y[rows] for rows in self._folds])
                 energy[self._place(joint)] += own.scale**2 * sum(np.diag(part) for part in parts[joint])
             kept = np.flatnonzero(energy > 0)
             scale = np.sqrt(energy[kept] / len(self.q))
@@ -209,8 +224,8 @@ class Rows:
                 places[joint] = acts, np.searchsorted(kept, at[acts])
                 place = places[joint][1]
                 factor = self.joints[joint].scale[acts] / scale[place]
-                for k, part in enumerate(parts[joint]):
-                    gram[joint, k][np.ix_(place, place)] = part[np.ix_(acts, acts)] * factor[:, None] * factor
+                acting = parts[joint][:, acts[:, None], acts]
+                gram[joint][:, place[:, None], place] = acting * factor[:, None] * factor
             self._grams.clear()
             self._grams[joints] = gram, scale, places
         return self._grams[joints]
@@ -225,19 +240,19 @@ class Rows:
         return [slice(first, stop) for first, stop in pairwise(bounds)]
 
     def _place(self, joint: int) -> NDArray[np.intp]:
-        """Where a joint's columns stand among those of all joints."""
+        """Gives the places of a joint's columns among those of all joints."""
         return np.concatenate([self.joints[joint].used, self.bodies + OWN * joint + np.arange(OWN)])
 
 
 def _joined(body: Array, used: NDArray[np.intp], dq: Array, ddq: Array, speed: float) -> JointColumns:
-    """Sets rotor inertia, Coulomb and viscous friction and offset beside the rigid body's columns (M, k)."""
+    """Appends rotor inertia, Coulomb and viscous friction and offset to the rigid body's columns (M, k)."""
     Y = np.empty((len(body), body.shape[1] + OWN))
     Y[:, :-OWN] = body
     sign = np.tanh(dq / max(SHARP * speed, 1e-12))
     for column, values in enumerate((ddq, sign, dq, 1.0), start=body.shape[1]):
         Y[:, column] = values
     scale = np.sqrt(np.einsum("ik,ik->k", Y, Y) / len(Y))
-    # A column that does not act is rounding: brought to unit size it would be a regressor of chance.
+    # Rounding scaled to unit size would be a random regressor.
     silent = scale <= SILENT * scale.max()
     Y[:, silent], scale[silent] = 0.0, 1.0
     Y /= scale

@@ -1,4 +1,4 @@
-"""Inertia and friction power of a joint, by its quick fit."""
+"""Inertia and friction power of a joint, from its quick fit."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Poses at which the inertia that a joint feels is averaged.
+# Number of poses over which the inertia is averaged.
 POSES = 64
 
 
 @dataclass(frozen=True, eq=False)
 class JointPhysics:
-    """Inertia and friction power of a joint, by its quick fit.
+    """Inertia and friction power of a joint, from its quick fit.
 
     Attributes:
         inertia: mean of the diagonal of the mass matrix over the log's poses, with rotor [kg m2 or kg].
         inertia_error: its standard error.
-        loss: mean power that friction takes [W].
+        loss: mean power that friction dissipates [W].
         loss_error: its standard error.
         power: mean absolute power [W].
     """
@@ -36,44 +36,49 @@ class JointPhysics:
     power: float
 
     @property
-    def ratios(self) -> tuple[float, float]:
-        """Inertia and friction over their standard errors."""
+    def significances(self) -> tuple[float, float]:
+        """Inertia and friction power over their standard errors."""
         tiny = np.finfo(float).tiny
         return self.inertia / max(self.inertia_error, tiny), self.loss / max(self.loss_error, tiny)
 
     @property
     def information(self) -> float:
-        """The larger of the two ratios: whether the log determines any of the joint's own parameters."""
-        return float(np.abs(self.ratios).max())
+        """The larger absolute significance: whether the log determines inertia or friction of the joint."""
+        return float(np.abs(self.significances).max())
 
 
 def mean_inertias(robot: Robot, rows: Rows) -> list[Array]:
-    """What a unit acceleration of each joint costs it, by the parameters that act on it: n arrays (k_j,).
+    """Gives the mean inertia of each joint as a linear combination of the rigid body's parameters.
+
+    It is the diagonal of the mass matrix, from unit accelerations of one joint at a time.
 
     Args:
         robot: with n joints.
-        rows: of the log, some of whose poses are averaged over.
+        rows: of the log, from which poses are taken.
+
+    Returns:
+        Weights of the parameters that act on each joint: n arrays (k_j,).
     """
     poses = rows.q[:: max(1, len(rows.q) // POSES)]
-    # Every joint in turn, and none: what is left is the mass matrix's diagonal.
+    # The last one is zero: its torque is gravity alone, and is subtracted.
     accelerations = np.vstack([np.eye(robot.n), np.zeros(robot.n)])
     q, ddq = np.tile(poses, (len(accelerations), 1)), np.repeat(accelerations, len(poses), axis=0)
-    felt = joint_rows(robot, q, np.zeros_like(q), ddq)
+    columns = joint_rows(robot, q, np.zeros_like(q), ddq)
     places = [slice(k * len(poses), (k + 1) * len(poses)) for k in range(len(accelerations))]
-    return [(own[places[joint]] - own[places[-1]]).mean(axis=0) for joint, own in enumerate(felt)]
+    return [(own[places[joint]] - own[places[-1]]).mean(axis=0) for joint, own in enumerate(columns)]
 
 
-def joint_physics(rows: Rows, fit: JointFit, joint: int, felt: Array) -> JointPhysics:
-    """Derives inertia and friction losses of a joint from its fit.
+def joint_physics(rows: Rows, fit: JointFit, joint: int, mean_inertia: Array) -> JointPhysics:
+    """Derives inertia and friction power of a joint from its fit.
 
     Args:
         rows: of the log.
         fit: of the joint.
         joint: counted from 0.
-        felt: of `mean_inertias` (k,).
+        mean_inertia: weights of the rigid body's parameters, from `mean_inertias` (k,).
     """
     weights = np.zeros(len(fit.scale))
-    weights[: len(fit.used)] = felt
+    weights[: len(fit.used)] = mean_inertia
     weights[-OWN] = 1.0
     inertia, inertia_error = fit.combination(weights)
     own = fit.Y[:, -OWN:] * fit.scale[-OWN:]

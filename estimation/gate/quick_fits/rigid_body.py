@@ -1,4 +1,4 @@
-"""The rigid body's regressor, joint by joint, for the few thousand rows of a check."""
+"""The regressor of the rigid body, joint by joint, for the few thousand rows of a quick fit."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ Array = NDArray[np.float64]
 
 @lru_cache(maxsize=8)
 def rigid_body(robot: Robot) -> TorqueModel:
-    """The rigid body of a robot, kept: its expression takes longer than the check of a short log."""
+    """Gives the rigid body of a robot. It is cached: to build it takes longer than to check a short log."""
     return TorqueModel(robot, (RigidBody(),))
 
 
 def used_columns(robot: Robot) -> tuple[NDArray[np.intp], ...]:
-    """Which of the rigid body's parameters act on each joint: n arrays of indices."""
+    """Lists the parameters of the rigid body that act on each joint: n arrays of indices."""
     return _evaluator(robot)[1]
 
 
 def joint_rows(robot: Robot, q: Array, dq: Array, ddq: Array) -> tuple[Array, ...]:
-    """Evaluates each joint's own columns: n arrays (M, k_j); a joint feels only the links from itself outwards."""
+    """Evaluates the columns that act on each joint, of the links from itself outwards: n arrays (M, k_j)."""
     rows = _evaluator(robot)[0](q, dq, ddq)
     return tuple(part.reshape(len(q), -1) for part in rows)
 

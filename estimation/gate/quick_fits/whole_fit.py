@@ -1,4 +1,4 @@
-"""The fit of all joints at once, from sums over folds: how well the torques agree on the links that they share."""
+"""The quick fit of all joints together: how well the torques agree on the links that the joints share."""
 
 from __future__ import annotations
 
@@ -12,10 +12,16 @@ from estimation.linear_algebra.positive import solve_positive
 
 Array = NDArray[np.float64]
 
-# Added to the diagonal of the Gram matrix once its columns have unit length; the data choose.
+# Candidates for the ridge, added to the diagonal of the Gram matrix of columns with unit length. Cross-validation
+# chooses.
 RIDGES = (1e-8, 1e-6, 1e-5, 1e-4, 1e-3)
-# Weights of the joints are set so many times from the residuals.
+# Number of times that the weights of the joints are computed from the residuals.
 ROUNDS = 3
+# Decrease of the held-out error (mean log) that a larger ridge must bring.
+LOWER = 1e-3
+# A joint is not identified if its held-out error is above this share of the torque's standard deviation: hardly better
+# than a constant.
+HOPELESS = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +31,8 @@ class Moments:
     Attributes:
         gram: (n, F, p, p).
         cross: (n, F, p).
-        square: (n, F), of the torque.
-        count: (F,) rows.
+        square: sum of squared torques (n, F).
+        count: number of rows (F,).
     """
 
     gram: Array
@@ -35,7 +41,7 @@ class Moments:
     count: Array
 
     def scaled(self, factor: Array) -> Moments:
-        """As if the torques (n,) were so many times what was logged."""
+        """Gives the normal equations of the torques times a factor (n,)."""
         return Moments(self.gram, self.cross * factor[:, None, None], self.square * factor[:, None] ** 2, self.count)
 
 
@@ -44,7 +50,7 @@ class WholeFit:
     """The fit of all joints at once.
 
     Attributes:
-        unexplained: error on left-out stretches over the standard deviation of the torque (n,).
+        unexplained: held-out error over the standard deviation of the torque (n,), NaN for a joint that is not fitted.
         cost: mean over the joints of the log of the residual's variance.
     """
 
@@ -53,12 +59,12 @@ class WholeFit:
 
 
 def fit_all(moments: Moments, spread: Array, ridges: Sequence[float] = RIDGES) -> WholeFit:
-    """Fits all joints at once, each weighted by its residual, with the ridge that predicts left-out stretches best.
+    """Fits all joints together, each weighted by its residual, with the ridge that predicts held-out folds best.
 
     Args:
         moments: of the joints.
         spread: standard deviation of the torques (n,).
-        ridges: to choose from.
+        ridges: candidates, the smallest first.
     """
     gram, cross, square = (array.sum(axis=1) for array in (moments.gram, moments.cross, moments.square))
     rows = moments.count.sum()
@@ -81,7 +87,7 @@ def fit_all(moments: Moments, spread: Array, ridges: Sequence[float] = RIDGES) -
             error += _squares(moments.gram[:, k], moments.cross[:, k], moments.square[:, k], values)
         relative = np.sqrt(error / rows) / np.where(used, spread, np.inf)
         cost = float(np.mean(np.log(np.clip(relative[used], 1e-9, 1.0)))) if used.any() else 0.0
-        if cost < lowest - 1e-3:
+        if cost < lowest - LOWER:
             lowest, ridge, best = cost, candidate, relative
     variance = np.maximum(_squares(gram, cross, square, _System(whole, right).solve(ridge)) / rows, floor)
     cost = float(np.mean(np.log(variance[used]))) if used.any() else 0.0
@@ -89,12 +95,12 @@ def fit_all(moments: Moments, spread: Array, ridges: Sequence[float] = RIDGES) -
 
 
 def solve_scaled(gram: Array, cross: Array, ridge: float) -> Array:
-    """Solves normal equations (p, p) and (p,) or (p, k), the ridge added once the columns have unit length."""
+    """Solves normal equations (p, p) and (p,) or (p, k), with a ridge for columns of unit length."""
     return _System(gram, cross).solve(ridge)
 
 
 class _System:
-    """Normal equations with columns of unit length: what many ridges have in common."""
+    """Normal equations with columns of unit length, to be solved with several ridges."""
 
     def __init__(self, gram: Array, cross: Array) -> None:
         scale = np.sqrt(np.diag(gram))
@@ -104,21 +110,21 @@ class _System:
         self._diagonal = np.diag(self._matrix).copy()
 
     def solve(self, ridge: float) -> Array:
-        """Solves them."""
+        """Solves them with a ridge."""
         np.fill_diagonal(self._matrix, self._diagonal + ridge)
         try:
             solved: NDArray[np.floating] = solve_positive(self._matrix, self._right)
         except np.linalg.LinAlgError:
-            # Values that differ by twelve orders of magnitude: rounding has made the matrix indefinite.
+            # The values differ by twelve orders of magnitude, and rounding has made the matrix indefinite.
             solved = np.linalg.lstsq(self._matrix, self._right, rcond=1e-9)[0]
         return np.asarray(solved / self._scale)
 
 
 def _weighted(weights: Array, parts: Array) -> Array:
-    """Sums the joints' parts (n, ...)."""
+    """Gives the weighted sum over the joints of an array (n, ...)."""
     return np.asarray((weights @ parts.reshape(len(parts), -1)).reshape(parts.shape[1:]))
 
 
 def _squares(gram: Array, cross: Array, square: Array, values: Array) -> Array:
-    """Sum of squared residuals of each joint (n,)."""
+    """Gives the sum of squared residuals of each joint (n,)."""
     return np.asarray(np.maximum(square - 2 * cross @ values + (gram @ values) @ values, 0.0))

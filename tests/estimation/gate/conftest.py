@@ -1,4 +1,4 @@
-"""Logs of the catalogue's six-joint robot, and what spoils them."""
+"""Logs of the six-joint robot of the catalogue."""
 
 from __future__ import annotations
 

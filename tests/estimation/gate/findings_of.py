@@ -1,4 +1,4 @@
-"""What a report of the gate holds of one kind."""
+"""Findings of one kind in a report."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from estimation.gate.finding import Finding
 
 
 def found(report: GateReport, name: str) -> list[Finding]:
-    """Those of one name."""
+    """Gives the findings of one name."""
     return [finding for finding in report.findings if finding.name == name]
 
 
 def joints(report: GateReport, name: str) -> list[int | None]:
-    """Their joints."""
+    """Gives the joints of the findings of one name."""
     return [finding.joint for finding in found(report, name)]

@@ -1,4 +1,4 @@
-"""What the gate says of logs with one known fault, and of logs without."""
+"""Specification of findings on logs with one known fault, and on logs without."""
 
 import json
 from dataclasses import replace
@@ -21,7 +21,7 @@ from tests.estimation.gate.findings_of import found, joints
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("options", [{}, {"period": 0.02}, {"torque_noise": 0.15}, {"encoder_counts": 1024.0}])
 def test_good_log_has_no_findings(er3a, good, seed, options):
-    """A log without a fault passes without a word, at 250 or 50 Hz, with noise, with coarse encoders."""
+    """A log without a fault has no findings, at 250 or 50 Hz, with noise, with coarse encoders."""
     report = check_log(er3a, good(seed + 10, **options))
     assert report.findings == ()
     assert report.success
@@ -44,7 +44,7 @@ def test_degrees_as_radians_are_refused(good, spoilt):
 
 
 def test_motor_side_positions_are_refused(er3a, good, spoilt):
-    """Positions of the motors leave the ranges, and divided by the gear ratios do not."""
+    """Positions of the motors leave the ranges; divided by the gear ratios they do not."""
     report = spoilt(q=good().q * er3a.gear_ratio)
     assert report.findings[0].name == "motor_side_position"
     with pytest.raises(InputError, match="of the motors, not the links") as caught:
@@ -52,7 +52,7 @@ def test_motor_side_positions_are_refused(er3a, good, spoilt):
     assert "mapping" in caught.value.remedy
 
 
-def test_small_motion_in_degrees_is_told_by_its_velocities(good, spoilt):
+def test_small_motion_in_degrees_is_found_by_its_velocities(good, spoilt):
     """Positions in degrees that stay inside the ranges disagree with velocities in radians."""
     log = good()
     dq = np.gradient(log.q, log.t, axis=0) / 50
@@ -69,7 +69,7 @@ def test_milliseconds_are_refused(good, spoilt):
 
 
 @pytest.mark.parametrize("joint", range(6))
-def test_turned_torque_is_refused(good, spoilt, joint):
+def test_inverted_torque_is_refused(good, spoilt, joint):
     """The torque of one joint with the wrong sign is refused, and the joint is named."""
     tau = good().tau.copy()
     tau[:, joint] *= -1
@@ -78,33 +78,33 @@ def test_turned_torque_is_refused(good, spoilt, joint):
     assert joint + 1 in [finding.joint for finding in report.of("refuse")]
 
 
-def test_all_torques_turned_are_refused(good, spoilt):
-    """Torques with the wrong sign throughout are refused: inertia and friction are negative."""
+def test_all_torques_inverted_are_refused(good, spoilt):
+    """Torques that all have the wrong sign are refused: inertia and friction are negative."""
     assert len(joints(spoilt(tau=-good().tau), "torque_sign")) >= 4
 
 
 def test_time_that_runs_backward_is_refused(good, spoilt):
-    """A motion played backward has friction that drives."""
+    """In a motion played backward, friction drives."""
     log = good()
     report = spoilt(q=log.q[::-1], tau=log.tau[::-1])
     assert report.refused
     assert found(report, "negative_friction")
 
 
-def test_percent_of_rated_torque_is_told(er3a, good, spoilt):
+def test_percent_of_rated_torque_is_reported(er3a, good, spoilt):
     """Torques in percent do not agree on the links that the joints share."""
     report = spoilt(tau=100 * good().tau / er3a.limits.torque)
     assert "in percent" in found(report, "unit_of_torque")[0].text
 
 
-def test_motor_torque_is_told_by_the_description(good, spoilt):
-    """Torques a hundredth of what the description expects are told."""
+def test_motor_torque_is_found_by_the_description(good, spoilt):
+    """Torques of a hundredth of those of the description are reported."""
     assert joints(spoilt(tau=good().tau / 100), "unit_of_torque")[:3] == [1, 2, 3]
 
 
 @pytest.mark.parametrize("samples", [0.7, 1.7, 5.0, 30.0])
 def test_common_delay_is_measured_to_a_part_of_a_sample(good, spoilt, samples):
-    """A torque logged late is told by a tenth of a sample, or four standard errors, whichever is more."""
+    """A late torque is reported with an error below 0.3 samples, or four standard errors if these are more."""
     log = good(duration=20.0)
     late = CubicSpline(log.t, log.tau)(np.clip(log.t - 0.004 * samples, 0, None))
     report = spoilt(tau=late)
@@ -114,8 +114,8 @@ def test_common_delay_is_measured_to_a_part_of_a_sample(good, spoilt, samples):
     assert finding.value == pytest.approx(0.004 * samples, abs=max(errors, 0.0012))
 
 
-def test_delay_of_one_joint_is_told_of_that_joint(good, spoilt):
-    """A delay of one joint is not laid on the others."""
+def test_delay_of_one_joint_is_reported_for_that_joint(good, spoilt):
+    """A delay of one joint is not attributed to the others."""
     log = good()
     tau = log.tau.copy()
     tau[:, 1] = CubicSpline(log.t, log.tau[:, 1])(np.clip(log.t - 0.012, 0, None))
@@ -124,8 +124,8 @@ def test_delay_of_one_joint_is_told_of_that_joint(good, spoilt):
     assert report.delay[1] == pytest.approx(0.012, abs=0.002)
 
 
-def test_joint_that_stands_is_told(er3a, good):
-    """A joint that hardly moves is named; where none moves, the log is refused."""
+def test_joint_that_stands_is_reported(er3a, good):
+    """A joint that hardly moves is named; if none moves, the log is refused."""
     log = good()
     q = log.q.copy()
     q[:, 2] = q[0, 2] + 1e-4 * q[:, 2]
@@ -137,19 +137,19 @@ def test_joint_that_stands_is_told(er3a, good):
 
 @pytest.mark.slow
 def test_velocity_columns_are_compared(good, spoilt):
-    """Velocities in degrees, with the wrong sign or of another joint are told."""
+    """Velocities in degrees, with the wrong sign or of another joint are reported."""
     log = good()
     dq = np.gradient(log.q, log.t, axis=0)
     assert spoilt(dq=dq).findings == ()
     assert "degrees per second" in found(spoilt(dq=np.rad2deg(dq)), "velocity_column")[0].text
-    turned = dq * np.array([1, 1, -1, 1, 1, 1])
-    assert joints(spoilt(dq=turned), "velocity_column") == [3]
+    inverted = dq * np.array([1, 1, -1, 1, 1, 1])
+    assert joints(spoilt(dq=inverted), "velocity_column") == [3]
     assert joints(spoilt(dq=dq[:, [1, 0, 2, 3, 4, 5]]), "velocity_column") == [1, 2]
     assert found(spoilt(dq=dq * 1000), "unit_of_time")
 
 
 def test_torque_without_connection_to_the_motion_is_refused(good, spoilt):
-    """Shuffled torques follow from nothing."""
+    """The motion does not explain shuffled torques."""
     rng = np.random.default_rng(0)
     report = spoilt(tau=rng.permutation(good().tau))
     assert joints(report, "badly_excited") == [1, 2, 3, 4, 5, 6]
@@ -157,7 +157,7 @@ def test_torque_without_connection_to_the_motion_is_refused(good, spoilt):
 
 
 def test_joint_of_noise_is_badly_excited(good, spoilt):
-    """A joint whose torque is noise is named, and the others stay usable."""
+    """A joint whose torque is noise is reported, and the others stay usable."""
     tau = good().tau.copy()
     tau[:, 5] = np.random.default_rng(0).normal(size=len(tau))
     report = spoilt(tau=tau)
@@ -167,7 +167,7 @@ def test_joint_of_noise_is_badly_excited(good, spoilt):
 
 
 def test_arm_that_is_moved_by_hand_is_refused(fourier_motion):
-    """A torque that holds a pendulum against gravity but never accelerates it says nothing of its inertia."""
+    """A torque that balances gravity but never accelerates a pendulum does not determine its inertia."""
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     one = np.ones(1)
     limits = Limits(
@@ -182,8 +182,8 @@ def test_arm_that_is_moved_by_hand_is_refused(fourier_motion):
     assert check_log(robot, Log(motion.t, motion.q, tau=moved)).findings == ()
 
 
-def test_joint_that_turns_the_other_way_is_told(arm, arm_log):
-    """A position and a torque with turned signs fit the description badly, and turned back well."""
+def test_joint_of_opposite_direction_is_reported(arm, arm_log):
+    """A position and a torque of opposite sign fit the description poorly; inverted they fit it."""
     log = arm_log(motion_seed=3)
     sign = np.array([1.0, -1.0])
     report = check_log(arm, replace(log, q=log.q * sign, tau=log.tau * sign))
@@ -191,7 +191,7 @@ def test_joint_that_turns_the_other_way_is_told(arm, arm_log):
 
 
 def test_absurd_values_are_refused_without_a_fit(good, spoilt):
-    """Values near the largest number are named, not squared."""
+    """Values near the largest number are reported, not squared."""
     tau = good().tau.copy()
     tau[:, 1] = 1e300
     report = spoilt(tau=tau)
@@ -200,18 +200,18 @@ def test_absurd_values_are_refused_without_a_fit(good, spoilt):
 
 
 def test_current_is_checked_as_torque_is(arm, arm_log):
-    """A log of currents is checked as well, in the units that the torque constants give."""
+    """Currents are checked as the torques that the torque constants give."""
     log = arm_log()
     current = log.tau / arm.torque_constant
     report = check_log(arm, Log(log.t, log.q, current=current))
     assert report.findings == ()
     assert (report.unexplained < 0.2).all()
-    turned = check_log(arm, Log(log.t, log.q, current=-current))
-    assert {finding.column for finding in found(turned, "torque_sign")} == {"i1", "i2"}
+    inverted = check_log(arm, Log(log.t, log.q, current=-current))
+    assert {finding.column for finding in found(inverted, "torque_sign")} == {"i1", "i2"}
 
 
 def test_motion_without_torque_is_checked_too(er3a, good):
-    """A log of a motion only passes, or is told its faults."""
+    """A log of a motion without torque passes, or has findings on its motion."""
     log = good()
     report = check_log(er3a, Log(log.t, log.q))
     assert report.findings == ()
@@ -220,18 +220,18 @@ def test_motion_without_torque_is_checked_too(er3a, good):
 
 
 def test_few_rows_are_refused(er3a, good):
-    """Less than the smoothing needs is refused."""
+    """Fewer rows than the smoothing needs are refused."""
     for rows in (2, 10, 40):
         assert found(check_log(er3a, good().rows(slice(0, rows))), "short"), rows
 
 
 def test_log_of_another_robot_is_an_input_error(arm, good):
-    """Another number of joints is no matter for a report."""
+    """Another number of joints is an error, not a finding."""
     with pytest.raises(InputError, match="6 joints"):
         check_log(arm, good())
 
 
-def test_report_says_everything(good, spoilt):
+def test_report_has_verdict_findings_and_actions(good, spoilt):
     """Summary, table and JSON name verdict, findings, numbers and what to do."""
     report = spoilt(t=1e3 * good().t, tau=-good().tau)
     assert "refused" in report.summary()
@@ -247,7 +247,7 @@ def test_report_says_everything(good, spoilt):
 
 @pytest.mark.slow
 def test_a_long_log_is_checked_whole(er3a, good):
-    """A fault near the end of a long log is found, though physics are judged on excerpts of it."""
+    """A fault near the end of a long log is found, though only excerpts are fitted."""
     log = good(duration=20.0)
     times = 60
     t = 0.004 * np.arange(times * len(log))
@@ -259,7 +259,7 @@ def test_a_long_log_is_checked_whole(er3a, good):
     assert found(check_log(er3a, Log(t, np.tile(log.q, (times, 1)), tau=tau)), "gap")
 
 
-def test_short_log_is_told(er3a, good):
-    """Two seconds for six joints leave standard errors that nobody should trust."""
+def test_short_log_is_reported(er3a, good):
+    """Standard errors from two seconds of six joints are unreliable."""
     report = check_log(er3a, good().rows(slice(0, 500)))
     assert found(report, "short")[0].severity == "warning"

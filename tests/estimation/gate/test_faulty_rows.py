@@ -1,4 +1,4 @@
-"""What the gate says of rows that are missing, torn, repeated or coarse."""
+"""Specification of findings on rows that are missing, wrong, repeated or coarse."""
 
 from dataclasses import replace
 
@@ -10,8 +10,8 @@ from robots.signals import Log
 from tests.estimation.gate.findings_of import found, joints
 
 
-def test_clipped_torques_are_told(good, spoilt):
-    """Torques that pile up at a limit name the share of the rows."""
+def test_clipped_torques_are_reported(good, spoilt):
+    """Torques that accumulate at a limit are reported with their share of the rows."""
     limit = np.quantile(np.abs(good().tau), 0.95, axis=0)
     report = spoilt(tau=np.clip(good().tau, -limit, limit))
     assert joints(report, "clipped") == [1, 2, 3, 4, 5, 6]
@@ -19,7 +19,7 @@ def test_clipped_torques_are_told(good, spoilt):
 
 
 def test_gap_cuts_the_log(er3a, good):
-    """Across a gap nothing is interpolated: the usable parts end and begin at it."""
+    """Nothing is interpolated across a gap: the log is split there."""
     log = good()
     keep = np.r_[0:2000, 2600 : len(log)]
     cut = Log(log.t[keep], log.q[keep], tau=log.tau[keep])
@@ -31,7 +31,7 @@ def test_gap_cuts_the_log(er3a, good):
 
 
 def test_spikes_are_left_out(good, spoilt):
-    """Single rows that stick out are named and left out of what is usable."""
+    """Outliers in single rows are reported, and left out of the usable rows."""
     log = good()
     q, tau = log.q.copy(), log.tau.copy()
     q[500, 1] += 0.3
@@ -44,10 +44,10 @@ def test_spikes_are_left_out(good, spoilt):
     assert np.abs(usable.tau).max() < 1e3
 
 
-def test_kicks_at_reversals_are_no_accidents(good, spoilt):
-    """Friction that falls sharply makes a peak where its joint turns round, and the arm jerks on others: it is torque.
+def test_peaks_at_reversals_are_no_outliers(good, spoilt):
+    """A sharp fall of friction makes a peak of torque at a reversal, on this joint and on others.
 
-    A row elsewhere is an accident, and so are as many rows that have nothing to do with reversals.
+    A peak elsewhere is an outlier. So are as many peaks away from reversals.
     """
     log = good()
     turns = np.flatnonzero(np.diff(np.sign(np.diff(log.q[:, 1]))) != 0) + 1
@@ -58,8 +58,8 @@ def test_kicks_at_reversals_are_no_accidents(good, spoilt):
         assert spoilt(tau=tau).spikes.tolist() == left_out
 
 
-def test_a_joint_that_rests_may_flicker_by_a_count(good, spoilt):
-    """An encoder between two counts goes back and forth as long as it stands there: that is no garbled message."""
+def test_a_joint_at_rest_may_flicker_by_an_encoder_step(good, spoilt):
+    """An encoder at rest between two steps alternates between them: these are no outliers."""
     q = good().q.copy()
     q[:, 3] = 0.3 + 1e-5 * (np.random.default_rng(0).random(len(q)) < 0.3)
     report = spoilt(q=q)
@@ -86,8 +86,8 @@ def test_repeated_rows_are_counted(good, spoilt):
     assert finding.severity == "warning"
 
 
-def test_rows_that_a_logger_writes_again_are_left_out(good, spoilt):
-    """A logger that asks four times as often as the controller answers has three old rows to a new one."""
+def test_copies_of_a_logger_that_samples_too_fast_are_left_out(good, spoilt):
+    """A logger that samples four times as fast as the controller answers writes three copies of each row."""
     log = good()
     rows = 4 * (np.arange(len(log)) // 4)
     q, tau = log.q[rows], log.tau[rows]
@@ -100,8 +100,8 @@ def test_rows_that_a_logger_writes_again_are_left_out(good, spoilt):
     assert np.isin(usable.t[moving], log.t[::4]).all()
 
 
-def test_a_slow_arm_with_coarse_sensors_repeats_itself(good, spoilt):
-    """Rows that are equal because nothing has changed by a count of the encoder, nor of the torque, are no copies."""
+def test_equal_rows_of_a_slow_arm_with_coarse_sensors_are_no_copies(good, spoilt):
+    """Rows are no copies if neither the encoder nor the torque has changed by a step."""
     log = good()
     counts = 8.0 * np.median(np.abs(np.diff(log.q, axis=0)), axis=0)
     coarse = {"q": np.round(log.q / counts) * counts, "tau": np.round(log.tau / log.tau.std(axis=0)) * 1.0}
@@ -111,8 +111,8 @@ def test_a_slow_arm_with_coarse_sensors_repeats_itself(good, spoilt):
     assert report.usable(replace(log, **coarse))[0] is not None
 
 
-def test_hung_column_is_told(good, spoilt):
-    """A torque that holds one value while the arm moves, and jumps then, hung."""
+def test_a_column_that_hung_is_reported(good, spoilt):
+    """A torque that is constant while the arm moves, and then jumps, hung."""
     tau = good().tau.copy()
     tau[1000:1400, 0] = tau[1000, 0]
     report = spoilt(tau=tau)
@@ -123,13 +123,13 @@ def test_hung_column_is_told(good, spoilt):
     assert (len(first), len(second)) == (1001, len(tau) - 1400)
 
 
-def test_a_slow_joint_that_hung_is_told(good, spoilt):
-    """A position that hangs while the joint creeps is told by the creep about it, however fast the joint may be."""
+def test_a_slow_joint_that_hung_is_reported(good, spoilt):
+    """A jump of a position is judged by the steps around it: the joint may be much faster elsewhere."""
     q = good().q.copy()
     rows = np.arange(len(q))
-    # A twentieth of the speed for 800 rows: what the hang leaves out is a step that is usual elsewhere.
-    way = np.cumsum(np.where(np.abs(rows - 2500) < 400, 0.05, 1.0))
-    q[:, 1] = np.interp(way, rows, q[:, 1])
+    # A twentieth of the speed for 800 rows: the jump after the hang is a usual step elsewhere.
+    path = np.cumsum(np.where(np.abs(rows - 2500) < 400, 0.05, 1.0))
+    q[:, 1] = np.interp(path, rows, q[:, 1])
     q[2450:2550, 1] = q[2450, 1]
     step = np.abs(np.diff(q[:, 1]))
     assert step[2549] < 3 * np.quantile(step, 0.99)
@@ -138,15 +138,15 @@ def test_a_slow_joint_that_hung_is_told(good, spoilt):
 
 
 def test_position_that_jumps_is_refused(good, spoilt):
-    """An encoder that is set anew in the middle of a log makes it useless."""
+    """An encoder that is reset during a log makes it useless."""
     q = good().q.copy()
     q[2500:, 4] += 0.5
     (finding,) = found(spoilt(q=q), "jump")
     assert (finding.severity, finding.joint, finding.row) == ("refuse", 5, 2501)
 
 
-def test_a_joint_that_stands_for_most_of_the_log_does_not_jump_when_it_goes(good, spoilt):
-    """A fast move of a fortieth of a second to and fro is one: its steps are large one after the other."""
+def test_a_joint_that_stands_most_of_the_time_does_not_jump_when_it_moves(good, spoilt):
+    """A fast move of a fortieth of a second has several large steps in a row, a jump has one."""
     log = good()
     q = log.q.copy()
     move = 0.5 * (1 - np.cos(np.linspace(0.0, np.pi, 10)))
@@ -160,16 +160,16 @@ def test_a_joint_that_stands_for_most_of_the_log_does_not_jump_when_it_goes(good
     assert (finding.joint, finding.value) == (4, pytest.approx(0.1, abs=0.01))
 
 
-def test_quantised_position_and_torque_are_told(good, spoilt):
-    """Steps that are coarse against what they measure are stated."""
+def test_coarse_positions_and_torques_are_reported(good, spoilt):
+    """Steps that are coarse for what they measure are reported with their size."""
     log = good()
     report = spoilt(q=np.round(log.q, 1), tau=np.round(log.tau / 5) * 5)
     assert found(report, "quantised_position")[0].value == pytest.approx(0.1)
     assert found(report, "quantised_torque")[0].value == pytest.approx(5.0)
 
 
-def test_a_column_copied_over_another_is_told(good, spoilt):
-    """Two columns that are the same in every row are one that was copied; those that differ in one row are not."""
+def test_a_column_copied_over_another_is_reported(good, spoilt):
+    """Two columns that are equal in every row are reported; those that differ in one row are not."""
     log = good()
     tau = log.tau.copy()
     tau[:, 4] = tau[:, 1]

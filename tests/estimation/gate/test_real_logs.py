@@ -1,4 +1,4 @@
-"""What the gate says of measured logs: their known oddities, and no refusal without a reason."""
+"""Specification of findings on measured logs: their known faults, and no refusal without a reason."""
 
 import numpy as np
 import pytest
@@ -13,8 +13,8 @@ def names(report, severity=None):
     return {finding.name for finding in report.findings if severity in (None, finding.severity)}
 
 
-def test_tiago_is_told_to_be_badly_excited_on_its_last_joints(data):
-    """Its joints arm_5 to arm_7 have almost no current: they are named, and the log stays usable for the others."""
+def test_last_joints_of_tiago_are_badly_excited(data):
+    """Joints arm_5 to arm_7 have almost no current: they are reported, and the log stays usable for the others."""
     folder = data("tiago_figaroh")
     joints = ["torso_lift_joint", *(f"arm_{number}_joint" for number in range(1, 8))]
     report = check_log(load_robot(folder / "tiago_48_schunk.urdf", joints=joints), read_log(folder / "run1.parquet"))
@@ -28,7 +28,7 @@ def test_tiago_is_told_to_be_badly_excited_on_its_last_joints(data):
 
 @pytest.mark.slow
 def test_ur10_and_lwr_are_usable(data):
-    """Logs that carry an identification pass; what is said of them are small torques of the wrist."""
+    """Logs that can be identified pass, with warnings on the small torques of the wrist only."""
     report = check_log(load_robot("ur10"), read_log(data("ur10_unisa") / "exciting.parquet"))
     assert not report.refused
     assert names(report, "warning") <= {"poorly_explained"}
@@ -41,8 +41,8 @@ def test_ur10_and_lwr_are_usable(data):
         assert {finding.joint for finding in report.of("warning")} <= {1, 5, 6, 7}
 
 
-def test_panda_is_told_its_uneven_time_and_repeated_rows(data):
-    """The Panda's clock jitters, and six in a hundred rows repeat the row before."""
+def test_uneven_times_and_repeated_rows_of_panda_are_reported(data):
+    """The time steps of the Panda vary, and 5 % of the rows repeat the row before."""
     report = check_log(load_robot("panda"), read_log(data("panda_gaz2019") / "traj1_first10s.parquet"))
     assert not report.refused
     assert {"jitter", "repeated_rows"} <= names(report)
@@ -53,7 +53,7 @@ def test_panda_is_told_its_uneven_time_and_repeated_rows(data):
 
 @pytest.mark.slow
 def test_double_pendulum_runs_are_usable(data):
-    """No run of the double pendulum is refused; joints beyond the description's range are told as such."""
+    """No run of the double pendulum is refused, and no unit is suspected, though joints exceed the described range."""
     folder = data("double_pendulum_dfki")
     robot = load_robot(folder / "dp_design_A.0_model_2.1_pendubot.urdf")
     for path in sorted(folder.glob("*.parquet")):
@@ -62,8 +62,8 @@ def test_double_pendulum_runs_are_usable(data):
         assert not names(report) & {"unit_of_position", "unit_of_time", "unit_of_torque"}, report.summary()
 
 
-def test_simple_pendulum_runs_are_told_apart(data):
-    """Two swing-ups pass; an arm that is moved by hand, and a run that rings, are refused with the reason."""
+def test_simple_pendulum_runs_are_distinguished(data):
+    """Two swing-ups pass. An arm moved by hand and a run that oscillates are refused, with the reason."""
     folder = data("simple_pendulum_dfki")
     robot = load_robot(folder / "simple_pendulum.urdf")
     for run in ("ddp", "dircol"):

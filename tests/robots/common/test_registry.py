@@ -163,6 +163,7 @@ def test_the_rest_works_beside_failing_entry_points(installed):
 
 
 PACKAGE = """
+from examples.extending.check import SlowJoints
 from examples.extending.criterion import TwoSmallest
 from examples.extending.effect import TightHose
 from examples.extending.estimator import LoadWeighted
@@ -171,6 +172,8 @@ from examples.extending.friction import SaturatingFriction
 """
 
 POINTS = """
+[robot_oed.checks]
+slow_joints = plant_room:SlowJoints
 [robot_oed.criteria]
 two-smallest = plant_room:TwoSmallest
 [robot_oed.effects]
@@ -186,6 +189,7 @@ saturating_friction = plant_room:SaturatingFriction
 
 CHECK = """
 from estimation.estimators import estimator
+from estimation.gate import CHECKS
 from estimation.models.extension import find_effect
 from oed.criteria import criterion
 from oed.trajectories import family
@@ -204,10 +208,10 @@ for name in ("broken_effect", "nothing"):
         find_effect(name)
     except InputError as error:
         print(error)
+print(CHECKS.get_or_raise("slow_joints").stage.name)
 """
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_an_installed_package_offers_every_kind(tmp_path):
     """All groups are read: members of a package are found by name, without an import by the user."""
@@ -233,5 +237,6 @@ def test_an_installed_package_offers_every_kind(tmp_path):
     assert refused in lines[4]
     assert lines[5].startswith("unknown effect 'nothing'")
     assert "tight_hose" in lines[5]
+    assert lines[6] == "SMOOTHED"
     # It was reported as an error already: listing all names does not repeat it.
     assert "ExtensionWarning" not in ran.stderr

@@ -3,7 +3,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from estimation.gate.checks.delays import _remaining, _Search, estimate_delays
+from estimation.gate.quick_fits.delays import _remaining, _Search, estimate_delays
 from estimation.gate.quick_fits.excerpts import excerpts_of, stretch
 from estimation.gate.quick_fits.joint_fit import OWN, Rows
 from estimation.gate.quick_fits.rigid_body import joint_rows, rigid_body, used_columns
@@ -27,7 +27,7 @@ def test_joint_rows_are_those_of_the_rigid_body(er3a):
 
 
 def test_rounding_is_no_column(er3a, rows):
-    """Columns that do not act are zero: a joint on a vertical axis has some that rounding alone fills."""
+    """Columns of rounding errors are set to zero: a joint on a vertical axis has some."""
     scaled = rows.joints[0].Y
     size = np.sqrt(np.mean(scaled**2, axis=0))
     np.testing.assert_allclose(size[size > 0], 1.0, rtol=1e-9)
@@ -38,7 +38,7 @@ def test_rounding_is_no_column(er3a, rows):
 
 
 def test_the_whole_fit_leaves_out_each_fold(er3a, rows):
-    """Errors on left-out sixths equal those of dense ridge regression, row by row."""
+    """Errors on held-out sixths equal those of dense ridge regression, row by row."""
     n, p = er3a.n, rows.bodies
     wide = np.zeros((len(rows.q), n, p + OWN * n))
     for joint, own in enumerate(rows.joints):
@@ -61,7 +61,7 @@ def test_the_whole_fit_leaves_out_each_fold(er3a, rows):
     everything = np.arange(len(tau))
     weights = 1.0 / spread**2
     for _ in range(3):
-        # The weights come from fits with a ridge of 1e-6, which 1e-4 differs from by far less than what is compared.
+        # The fit computes weights with a ridge of 1e-6. The difference to 1e-4 is far below the tolerance.
         weights = 1.0 / np.mean((tau - wide @ solve(everything, weights)) ** 2, axis=0)
     error = np.zeros(n)
     for first, stop in pairwise(bounds):
@@ -71,8 +71,8 @@ def test_the_whole_fit_leaves_out_each_fold(er3a, rows):
     np.testing.assert_allclose(found, np.sqrt(error / len(tau)) / spread, rtol=0.01)
 
 
-def test_straight_lines_are_near_the_spline(rows):
-    """Torque between samples by straight lines is that of the spline to a per cent of its spread."""
+def test_linear_interpolation_is_near_the_spline(rows):
+    """Linear interpolation between samples is that of the spline, to 1 % of the torque's spread."""
     shifts = np.array([-0.0301, -0.002, 0.0, 0.0033])
     for joint in range(2):
         near = rows.near_torques(shifts, joint, 3)
@@ -83,7 +83,7 @@ def test_straight_lines_are_near_the_spline(rows):
 
 @pytest.mark.parametrize("delay", [0.0, 0.007, -0.013])
 def test_the_search_finds_the_best_of_all_shifts(er3a, good, delay):
-    """Some rows first and the neighbours on all rows then end where all shifts on all rows do, and at the truth."""
+    """The search on some rows, then near the best on all rows, ends at the best of all shifts on all rows."""
     log = good()
     shifted = np.column_stack([np.interp(log.t - delay, log.t, column) for column in log.tau.T])
     (part,) = excerpts_of([stretch(log, shifted, slice(50, 4950), 0.004)], 0.004, 12.0)

@@ -1,17 +1,19 @@
-"""A log column by column: what every check looks at, laid out and summed up once."""
+"""A log column by column, with the numbers that several checks need of each."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.gate.measurements.resolution import lattice_step
 from robots.signals import Log
 
 Array = NDArray[np.float64]
 
-# Below this share of its size, or of 1e-9, a torque varies by rounding only.
+# A torque varies by rounding only if its range is below this share of its size, or below this value [N m, N or A].
 ROUNDING = 1e-9
 
 
@@ -39,9 +41,9 @@ class Columns:
 
     @staticmethod
     def of(log: Log) -> Columns:
-        """Lays a log out."""
+        """Gives the columns of a log."""
         values, prefix = (log.tau, "tau") if log.tau is not None else (log.current, "i")
-        # One column after the other in memory: sums along the rows of a long log would take ten times as long.
+        # A column is contiguous in memory: sums along the rows of a long log would take ten times as long.
         q = np.ascontiguousarray(log.q.T)
         signal = None if values is None else np.ascontiguousarray(values.T)
         spread, varies = np.zeros(len(q)), np.zeros(len(q), dtype=bool)
@@ -56,7 +58,24 @@ class Columns:
         """Range of the positions (n,)."""
         return self.highest - self.lowest
 
+    @cached_property
+    def position_steps(self) -> Array:
+        """Resolution of the positions (n,), 0 for a column without a step."""
+        return np.array([lattice_step(column) for column in self.q])
+
+    @cached_property
+    def signal_steps(self) -> Array:
+        """Resolution of the torques or currents (n,), 0 for a column without a step."""
+        return np.zeros(len(self.q)) if self.signal is None else np.array([lattice_step(x) for x in self.signal])
+
     def extreme(self, joint: int) -> float:
-        """The position farthest from zero of a joint, counted from 0."""
+        """Gives the position of a joint, counted from 0, that is farthest from zero."""
         low, high = float(self.lowest[joint]), float(self.highest[joint])
         return low if -low > high else high
+
+    def named(self) -> list[tuple[str, int, Array]]:
+        """Lists all columns: prefix, joint counted from 0, values (N,)."""
+        signals = () if self.signal is None else self.signal
+        return [("q", j, column) for j, column in enumerate(self.q)] + [
+            (self.prefix, j, column) for j, column in enumerate(signals)
+        ]

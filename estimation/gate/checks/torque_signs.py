@@ -1,0 +1,135 @@
+"""Torques that contradict physics: a negative inertia, friction that drives, an arm that is moved by others."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.gate.check import Check
+from estimation.gate.context import Context, Stage
+from estimation.gate.finding import Finding
+from estimation.gate.quick_fits.joint_fit import OWN, JointFit
+from estimation.gate.quick_fits.joint_physics import JointPhysics
+from estimation.gate.stages.fitted import Fitted
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Standard errors below zero from which inertia or friction is negative; of friction alone CLEAR, for a spring or a
+# balancer that the model lacks can look like negative friction.
+SURE, CLEAR = 5.0, 15.0
+# Friction drives if its power is below minus this share of the joint's power.
+DRIVES = 0.2
+# Change of the cost of the fit of all joints (mean log variance) with the opposite sign of a torque, from which the
+# logged sign is certainly right, or wrong.
+SIGN_COST = 0.3
+# RMS torque over the joint's limit, below which a torque is too small for a refusal.
+FAINT = 0.01
+# Least ratio of inertia to first moment of mass of a link [m], and the acceleration of gravity [m/s2].
+COMPACT, GRAVITY = 0.01, 9.81
+
+
+class TorqueSigns(Check):
+    """Finds torques with a negative inertia or a driving friction, unless the other joints contradict."""
+
+    name: ClassVar[str] = "torque_signs"
+    stage: ClassVar[Stage] = Stage.FITTED
+    order: ClassVar[int] = 20
+
+    def run(self, context: Context) -> list[Finding]:
+        """Looks at inertia and friction of each joint, then at the fit of all joints."""
+        fitted, prefix = context.fitted, context.cleaned.columns.prefix
+        significances = [(0.0, 0.0) if found is None else found.significances for found in fitted.physics]
+        plausible = [inertia > SURE or friction > CLEAR for inertia, friction in significances]
+        findings = []
+        opposite: dict[int, bool] = {}  # joints with a torque of opposite sign, and whether that is certain
+        for joint, (fit, found) in enumerate(zip(fitted.fits, fitted.physics, strict=True)):
+            if fit is None or found is None:
+                continue
+            inertia, friction = significances[joint]
+            drives = -found.loss > DRIVES * found.power
+            negative = inertia < -SURE and friction < SURE / 2
+            # The other joints move the same links: the opposite sign would fit them better if this one were wrong.
+            contradicted = any(plausible[:joint] + plausible[joint + 1 :]) and fitted.sign_costs[joint] > SIGN_COST
+            if _is_moved_by_others(fit, found, joint, context.robot):
+                findings.append(_moved_by_others(found, prefix, joint))
+            elif friction < -CLEAR and inertia > SURE and drives:
+                findings.append(_negative_friction(found, prefix, joint))
+            elif (negative or (friction < -SURE and inertia < SURE / 2 and drives)) and not contradicted:
+                large = _rms_torque(fitted, joint) > FAINT * _finite(context.robot.limits.torque[joint])
+                opposite[joint] = negative or (friction < -CLEAR and large)
+        worst = int(np.argmin(fitted.sign_costs))
+        if not opposite and fitted.sign_costs[worst] < -SIGN_COST and significances[worst][1] < SURE / 2:
+            opposite[worst] = True
+        return findings + [
+            _torque_sign(found, prefix, joint, certain)
+            for joint, certain in opposite.items()
+            for found in [fitted.physics[joint]]
+            if found is not None
+        ]
+
+
+def _rms_torque(fitted: Fitted, joint: int) -> float:
+    return float(np.sqrt(np.mean(fitted.rows.raw(joint) ** 2)))
+
+
+def _finite(limit: float) -> float:
+    return limit if np.isfinite(limit) else 0.0
+
+
+def _is_moved_by_others(fit: JointFit, found: JointPhysics, joint: int, robot: Robot) -> bool:
+    """Whether the torque balances gravity but does not accelerate the joint.
+
+    The inertia of a body about a joint over its first moment of mass is r + k^2/r, with the centre of mass at r and the
+    radius of gyration k. It is at least 2 k, and no link of a robot is as compact as `COMPACT`.
+    """
+    if robot.chain.joints[joint].kind != "revolute":
+        return False
+    weight = fit.Y[:, :-OWN] @ fit.values[:-OWN]
+    moment = float(weight.std()) / GRAVITY
+    return abs(found.inertia) + SURE * found.inertia_error < COMPACT * moment
+
+
+def _moved_by_others(found: JointPhysics, prefix: str, joint: int) -> Finding:
+    return Finding(
+        name="moved_by_others",
+        severity="refuse",
+        text=f"this torque balances gravity but does not accelerate the joint: the estimated inertia is "
+        f"{found.inertia:.3g} (standard error {found.inertia_error:.2g})",
+        action="record a motion made by the drives, not one guided by hand",
+        value=found.inertia,
+        unit="kg m2",
+        column=f"{prefix}{joint + 1}",
+        joint=joint + 1,
+    )
+
+
+def _negative_friction(found: JointPhysics, prefix: str, joint: int) -> Finding:
+    return Finding(
+        name="negative_friction",
+        severity="refuse",
+        text=f"friction delivers {-found.loss:.3g} W (standard error {found.loss_error:.2g}) instead of consuming "
+        "power, but the inertia is positive: time runs backwards, or friction was overcompensated",
+        action="check the order of the rows and the meaning of the torque column",
+        value=found.loss,
+        unit="W",
+        column=f"{prefix}{joint + 1}",
+        joint=joint + 1,
+    )
+
+
+def _torque_sign(found: JointPhysics, prefix: str, joint: int, certain: bool) -> Finding:
+    return Finding(
+        name="torque_sign",
+        severity="refuse" if certain else "warning",
+        text=f"implausible: with this torque the joint's inertia is {found.inertia:.3g} (standard error "
+        f"{found.inertia_error:.2g}) and its friction power is {found.loss:.3g} W ({found.loss_error:.2g}): "
+        + ("its sign is inverted" if certain else "it accelerates instead of braking"),
+        action="set `sign: -1` for the torque, or the position, of this joint in a mapping (--mapping)",
+        value=found.loss,
+        unit="W",
+        column=f"{prefix}{joint + 1}",
+        joint=joint + 1,
+    )

@@ -1,0 +1,96 @@
+"""Torques with the shape that the description predicts, but another size or sign."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.gate.check import Check
+from estimation.gate.context import Context, Stage
+from estimation.gate.finding import Finding
+from estimation.gate.quick_fits.joint_fit import OWN, JointFit
+from estimation.gate.quick_fits.rigid_body import rigid_body
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+# A torque is reported from this correlation with the described torque on, if their ratio is beyond this factor.
+ALIKE, FACTOR = 0.9, 20.0
+# Share of the described torque's energy that must remain without friction and offset.
+REMAINS = 1e-4
+# Findings after which the torque of a joint is not compared.
+EXPLAINED = (
+    "torque_sign",
+    "negative_friction",
+    "moved_by_others",
+    "unit_of_torque",
+    "position_sign",
+    "badly_excited",
+    "poorly_explained",
+)
+
+
+class TorqueSizes(Check):
+    """Compares torques with those of the robot's description: motor torques, percentages, a wrong sign."""
+
+    name: ClassVar[str] = "torque_sizes"
+    stage: ClassVar[Stage] = Stage.FITTED
+    order: ClassVar[int] = 60
+
+    def run(self, context: Context) -> list[Finding]:
+        """Compares each joint without another finding, if the description has inertias."""
+        robot, fitted = context.robot, context.fitted
+        nominal = np.asarray(robot.inertia, dtype=float).ravel()
+        if context.cleaned.columns.prefix != "tau" or not np.isfinite(nominal).all() or not np.any(nominal):
+            return []
+        explained = {finding.joint for finding in context.found(EXPLAINED)}
+        described = rigid_body(robot).nominal
+        findings = []
+        for joint, fit in enumerate(fitted.fits):
+            compared = None if fit is None or joint + 1 in explained else _compare(fit, described)
+            if compared is None:
+                continue
+            slope, correlation = compared
+            if abs(correlation) >= ALIKE and not 1 / FACTOR < slope < FACTOR:
+                findings.append(_finding(robot, joint, slope, correlation))
+        return findings
+
+
+def _compare(fit: JointFit, described: Array) -> tuple[float, float] | None:
+    """Gives the factor between a torque and that of described parameters (p,), and the correlation; None without any.
+
+    Friction and offset are no part of the description: what they can explain is left out.
+    """
+    tau = fit.Y @ fit.values + fit.residual
+    own = fit.Y[:, -OWN + 1 :]
+    expected = fit.Y[:, :-OWN] @ (fit.scale[:-OWN] * described[fit.used])
+    both = np.column_stack([expected, tau])
+    both = both - own @ np.linalg.lstsq(own, both, rcond=None)[0]
+    model, rest = both.T
+    if not model @ model > REMAINS * (expected @ expected) or not rest @ rest > 0:
+        return None
+    product = model @ rest
+    return float(product / (model @ model)), float(product / np.sqrt((model @ model) * (rest @ rest)))
+
+
+def _finding(robot: Robot, joint: int, slope: float, correlation: float) -> Finding:
+    gear = float(abs(robot.gear_ratio[joint]))
+    if slope < 0:
+        guess = "its sign is inverted"
+    elif gear > 2 and 0.5 < slope * gear < 2:
+        guess = f"it seems to be the motor torque (gear ratio {gear:.4g})"
+    else:
+        guess = "check its unit (percent of the rated torque, N mm, motor side)"
+    return Finding(
+        name="torque_sign" if slope < 0 else "unit_of_torque",
+        severity="warning",
+        text=f"is {slope:.3g} times the torque computed from the robot's description (correlation "
+        f"{correlation:.2f}): {guess}",
+        action="set unit, gear ratio or sign in a mapping (--mapping); ignore this if the robot's description is "
+        "inaccurate",
+        value=slope,
+        column=f"tau{joint + 1}",
+        joint=joint + 1,
+    )

@@ -1,0 +1,58 @@
+"""Which joints move, and in which rows."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.gate.measurements.columns import Columns
+from estimation.regressions.preparation import TREMBLE
+from robots.robot import Robot
+from robots.signals import Log
+
+Array = NDArray[np.float64]
+
+# A row is in motion if a joint changes within this time before and after it [s], by this share of its travel.
+AROUND, CHANGE = 0.05, 1e-3
+
+
+def moving_rows(log: Log, columns: Columns, steps: float = 0.0) -> NDArray[np.bool_]:
+    """Finds the rows (N,) in which any joint moves.
+
+    Args:
+        log: the log.
+        columns: of the log.
+        steps: encoder steps per row by which a joint must move, at least.
+    """
+    half = max(2, round(AROUND * (len(log) - 1) / max(log.duration, 1e-300)))
+    half = min(half, (len(log) - 1) // 2)
+    if not half:
+        return np.zeros(len(log), dtype=bool)
+    moving = np.zeros(len(log) - 2 * half, dtype=bool)
+    for joint, (q, travel) in enumerate(zip(columns.q, columns.travel, strict=True)):
+        if travel > 0:
+            least = max(CHANGE * travel, 2 * half * steps * columns.position_steps[joint] if steps else 0.0)
+            moving |= np.abs(q[2 * half :] - q[: -2 * half]) > least
+    edge = np.zeros(half, dtype=bool)
+    return np.concatenate([edge, moving, edge])
+
+
+def travel_shares(robot: Robot, columns: Columns) -> Array:
+    """Divides the travel of each joint by its range, or by a turn if that is less (n,)."""
+    range_ = np.asarray(robot.limits.upper) - np.asarray(robot.limits.lower)
+    range_ = np.where(np.isfinite(range_), range_, 2 * np.pi)
+    return np.asarray(columns.travel / np.maximum(np.minimum(range_, 2 * np.pi), 1e-12))
+
+
+def standing_joints(robot: Robot, columns: Columns) -> NDArray[np.bool_]:
+    """Finds the joints (n,) that stand still.
+
+    A position that changes by some encoder steps only is the error of the position loop. Neither such a motion nor its
+    torque tells anything about the joint: friction may have any value that holds it.
+
+    Args:
+        robot: with n joints.
+        columns: of the log.
+    """
+    stands: NDArray[np.bool_] = travel_shares(robot, columns) < TREMBLE
+    return stands

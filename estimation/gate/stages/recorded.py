@@ -1,0 +1,93 @@
+"""A log as it was recorded."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.gate.measurements.columns import Columns
+from estimation.gate.measurements.hung_columns import Hang, cut_hangs, find_hangs
+from estimation.gate.measurements.late_rows import CorrectedTimes, correct_times
+from estimation.gate.measurements.motion import moving_rows, standing_joints
+from estimation.gate.measurements.outliers import find_outliers, isolated_rows
+from estimation.gate.measurements.repeated_rows import RepeatedRows, find_repeated_rows
+from estimation.gate.measurements.timing import Timing, measure_timing
+from robots.robot import Robot
+from robots.signals import Log
+
+Rows = NDArray[np.intp]
+
+
+class Recorded:
+    """All rows of the log. Only times are corrected, of rows that were written late.
+
+    Attributes:
+        robot: with n joints, as it was set up for the log.
+        original: the log with its own times.
+    """
+
+    def __init__(self, robot: Robot, log: Log) -> None:
+        self.robot, self.original = robot, log
+
+    @cached_property
+    def times(self) -> CorrectedTimes:
+        """Corrected times, and rows without a known time."""
+        return correct_times(self.original)
+
+    @cached_property
+    def log(self) -> Log:
+        """The log with corrected times."""
+        return self.original if self.times.t is self.original.t else replace(self.original, t=self.times.t)
+
+    @cached_property
+    def timing(self) -> Timing:
+        """Its time steps and gaps."""
+        return measure_timing(self.log.t)
+
+    @cached_property
+    def columns(self) -> Columns:
+        """Its columns."""
+        return Columns.of(self.log)
+
+    @cached_property
+    def moving(self) -> NDArray[np.bool_]:
+        """Rows (N,) in which the arm moves."""
+        return moving_rows(self.log, self.columns)
+
+    @cached_property
+    def standing(self) -> NDArray[np.bool_]:
+        """Joints (n,) that stand still."""
+        return standing_joints(self.robot, self.columns)
+
+    @cached_property
+    def repeated(self) -> RepeatedRows:
+        """Rows that repeat the row before."""
+        return find_repeated_rows(self.log, self.columns, self.moving)
+
+    @cached_property
+    def hangs(self) -> tuple[Hang, ...]:
+        """Columns that hung."""
+        return find_hangs(self.columns, self.moving)
+
+    @cached_property
+    def outliers(self) -> dict[tuple[str, int], Rows]:
+        """Rows with outliers, by the column's prefix and joint, counted from 0."""
+        return find_outliers(self.columns)
+
+    @cached_property
+    def spikes(self) -> Rows:
+        """Rows with isolated outliers, which a fit leaves out."""
+        return isolated_rows(self.columns, self.outliers)
+
+    @cached_property
+    def stale(self) -> Rows:
+        """Rows with wrong times, which a fit leaves out."""
+        return np.union1d(self.repeated.copies, self.times.lost)
+
+    @property
+    def parts(self) -> tuple[tuple[int, int], ...]:
+        """Parts (first, stop) without a gap and without a column that hung."""
+        return cut_hangs(self.timing.parts, self.hangs)
