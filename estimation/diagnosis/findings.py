@@ -1,4 +1,4 @@
-"""A cause that was found: its parameters, what it brings, its rivals, as values and as plain data."""
+"""A cause that was found, with parameters, gain and rivals, and its plain data."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from robots.common.plain import finite, number
 
-# Parameters of one finding that a summary lists.
+# Number of parameters of one finding that a summary lists.
 MOST_LISTED = 8
 
 
@@ -23,10 +23,11 @@ class Parameter:
         name: as the effect names it.
         value: the estimate.
         unit: its unit.
-        standard_error: NaN where the data say nothing of it.
-        ci95: 95 % interval; infinite where the data say nothing of it.
-        determined: whether they tell it well: a coefficient from zero, and a nonlinear parameter to a fifth of its
-            value, a moment to .2 s.
+        standard_error: NaN if the data do not determine it.
+        ci95: 95 % interval; infinite if the data do not determine it.
+        determined: whether the data determine it well. The standard error of a coefficient is then below half of the
+            effect's largest one. The 95 % interval of a shape parameter is within a fifth of its value, that of a
+            change time within 0.2 s.
     """
 
     name: str
@@ -38,19 +39,19 @@ class Parameter:
 
     @property
     def text(self) -> str:
-        """Its name, with its interval where it has one, or its value where that was chosen among a few."""
+        """Name with interval; with the value alone if it is a choice, and without a value if it is not determined."""
         low, high = self.ci95
         if not np.isfinite([low, high]).all():
             return self.name
         unit = "" if self.unit in ("", "1") else f" {self.unit}"
         if high <= low:
             return f"{self.name} = {self.value:.3g}{unit}"
-        # As many digits as distinguish the ends of a narrow interval.
+        # Enough digits to distinguish the ends of a narrow interval.
         digits = max(3, 1 + math.ceil(math.log10(max(abs(low), abs(high)) / (high - low))))
         return f"{self.name} ({low:.{digits}g} to {high:.{digits}g}{unit})"
 
     def to_dict(self) -> dict[str, Any]:
-        """Writes it as plain data; what is not determined is None."""
+        """Returns plain data, with None for infinite values and NaN."""
         return {
             "name": self.name,
             "value": self.value,
@@ -66,10 +67,10 @@ class Gain:
     """Held-out gain of an effect, averaged over the joints on which it acts.
 
     Attributes:
-        nrmse_before: residual RMS over torque RMS without it.
-        nrmse_after: with it.
-        ci95: interval of the fall.
-        joints: those joints, from 1; none where older files do not say.
+        nrmse_before: residual RMS over torque RMS without the effect.
+        nrmse_after: the same with it.
+        ci95: 95 % interval of the decrease.
+        joints: those joints, from 1; empty in files that do not state them.
     """
 
     nrmse_before: float
@@ -83,19 +84,19 @@ class Finding:
     """One cause.
 
     Attributes:
-        effect: its name in the vocabulary; ``unexplained`` for a pattern without a known cause.
+        effect: its name in the catalogue; ``unexplained`` for a pattern without a known cause.
         joint: counted from 1; None for the whole robot.
-        parameters: coefficients, then shape.
-        p_value: family-wise: the chance that noise alone has an effect this strong found.
-        delta_bic: how much better the model with it is (Schwarz).
-        gain: on unseen data.
-        rivals: other causes in its place, ``(name, how much worse their BIC is)``, the closest first.
+        parameters: coefficients, then shape parameters.
+        p_value: family-wise: the probability that noise alone gives a finding this strong.
+        delta_bic: decrease of the BIC with the effect.
+        gain: gain on held-out data.
+        rivals: other possible causes, ``(name, how much worse their BIC is)``, the closest first.
         sentence: what it means, in words.
         visible: share of its energy that the base model does not absorb.
-        coordinate: label of the axis on which it shows.
-        pattern: the description of an unexplained pattern; empty for a named effect.
-        measured_by: what it was seen in where that is not the torque: ``qlink``, the encoders behind the gears. Its
-            gain is then of the link's position, over the standard deviation of the wind-up.
+        coordinate: label of the axis on which it shows in a picture.
+        pattern: description of an unexplained pattern; empty for a named effect.
+        measured_by: ``qlink`` if the encoders behind the gears show it instead of the torque. Its gain is then that of
+            the link's position, over the standard deviation of the gear's deflection.
     """
 
     effect: str
@@ -113,14 +114,14 @@ class Finding:
 
     @property
     def elsewhere(self) -> str:
-        """Says on which joints the gain is, where those are not the finding's own; begins with a space, or is empty."""
+        """Names the joints of the gain, with a leading space; empty if they are the finding's own."""
         joints = self.gain.joints
         if self.joint is None or joints in ((), (self.joint,)):
             return ""
         return f" of joint{'s' if len(joints) > 1 else ''} {', '.join(map(str, joints))}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Writes it as plain data."""
+        """Returns plain data."""
         return {
             "effect": self.effect,
             "joint": self.joint,
@@ -142,7 +143,11 @@ class Finding:
 
 
 def read_finding(item: dict[str, Any]) -> Finding:
-    """Reads what `Finding.to_dict` wrote."""
+    """Reads the result of `Finding.to_dict`.
+
+    Args:
+        item: plain data of one finding.
+    """
     parameters = tuple(
         Parameter(
             name=p["name"],
@@ -179,6 +184,6 @@ def read_finding(item: dict[str, Any]) -> Finding:
 
 
 def list_parameters(texts: Sequence[str]) -> str:
-    """Lists parameters, no more than a line holds: a force at a place of a body has twelve."""
+    """Joins texts of parameters to a list; of more than nine only the first eight."""
     left = len(texts) - MOST_LISTED
     return ", ".join(texts if left <= 1 else [*texts[:MOST_LISTED], f"and {left} more in diagnosis.json"])

@@ -1,4 +1,4 @@
-"""The base model on a recording: its columns, the sharpness of its sign, and its fit."""
+"""The base model on a recording: its columns, and the width of the friction sign of each joint."""
 
 from __future__ import annotations
 
@@ -21,26 +21,25 @@ from robots.terms.effects import Situation
 
 Array = NDArray[np.float64]
 
-# tanh(dq / v0) of the Coulomb friction: from a slow axis' sharpest to the widest that is still a sign, a share of a
-# fast joint's speed.
+# Widths v0 [rad/s or m/s] of the Coulomb friction tanh(dq / v0) that are tried. They reach up to `WIDEST`, or for a
+# fast joint up to the share `SHARE` of its largest speed.
 SCALES = tuple(float(v0) for v0 in SHARP * 2.0 ** np.arange(-6.0, 9.5, 0.5))
 WIDEST, SHARE = 0.065, 0.05
 ROUNDS = 3
-# Directions of the column-scaled regressor below this share of the largest are not determined by the log.
+# Directions of the scaled regressor below this share of the largest are not determined by the log.
 FAINT = 1e-7
-# Of the squares of what a sharper sign would change, the rows that count must show this share.
+# A width is fitted if the rows that count contain this share of the squared derivative with respect to it.
 SHOWN = 1e-3
-CHUNK = 4096
 
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """The base model, ready to be fitted by any weighting.
+    """The base model on a recording, ready for a fit with any weights.
 
     Attributes:
         base: base parameters of the model.
         regressor: columns (N, n, b).
-        nuisance: columns (N, n, m) that are fitted beside and belong to no finding: how sharp each joint's sign is.
+        nuisance: columns (N, n, m) that are fitted too but belong to no finding: errors of the sign widths.
     """
 
     base: BaseParameters
@@ -48,7 +47,7 @@ class Baseline:
     nuisance: Array
 
     def situation(self, recording: Recording, values: Array) -> Situation:
-        """Gives what effects may depend on, with base parameters (b,)."""
+        """Returns the quantities on which effects may depend, with base parameters (b,)."""
         return replace(
             build_situation(recording, self.base.model, values, self.base.independent), measured=recording.tau
         )
@@ -57,9 +56,16 @@ class Baseline:
 def base_parameters(
     robot: Robot, friction: str, scales: tuple[float, ...], gravities: Iterable[Array] = ()
 ) -> BaseParameters:
-    """Finds the base parameters of rigid body, friction, rotors and offsets, the sign as sharp as `scales` say.
+    """Finds the base parameters of rigid body, friction, rotors and offsets, for given widths of the friction signs.
 
-    They are those under the gravity of the robot's description and under `gravities` (3,) together.
+    Args:
+        robot: the robot.
+        friction: `polynomial` or `coulomb-viscous`.
+        scales: width of each joint's friction sign [rad/s or m/s].
+        gravities: further gravity vectors (3,) [m/s2] under which the parameters must describe the torque.
+
+    Returns:
+        The base parameters.
     """
     return find_base_parameters(default_model(robot, friction=friction, velocity_scale=scales), gravities=gravities)
 
@@ -70,14 +76,17 @@ def build_baseline(
     residual_scale: Array | None = None,
     known: Recording | None = None,
 ) -> Baseline:
-    """Chooses the sharpness of each joint's sign by the fit, and evaluates the columns.
+    """Selects the width of each joint's friction sign by a fit, and evaluates the columns.
 
     Args:
-        base: base parameters with any sharpness.
+        base: base parameters with any widths.
         recording: the data.
-        residual_scale: standard deviation of the noise (n,); by default a share of the torque.
-        known: the same rows without what is known of effects: torque, and the motion that it was needed for. Friction
-            that is logged late turns round beside its own sign, and would look less sharp than it is.
+        residual_scale: standard deviation of the noise (n,) [N m or N]; by default that of the torque.
+        known: the same rows, corrected for known effects in torque and motion; None for none. Friction that is logged
+            late would otherwise select a sign that is too wide.
+
+    Returns:
+        The base model with its columns.
     """
     seen = recording if known is None else known
     scale = seen.tau.std(axis=0) if residual_scale is None else residual_scale
@@ -92,7 +101,8 @@ def build_baseline(
         chosen = fit.sharpness(narrow)
         fast = np.maximum(narrow, SHARE * np.abs(recording.dq).max(axis=0))
         if np.any((fast > narrow) & (np.array(chosen) == max(v0 for v0 in SCALES if v0 <= WIDEST))):
-            # A log that the base model does not describe at all would have any sign: each counts by what is left of it.
+            # Wider signs are tried with each joint weighted by its residual in each log. Otherwise a log that the base
+            # model does not describe at all could select any width.
             left = np.maximum(fit.left(chosen), least)
             chosen = _Signs(trial, signs, base, seen, 1.0 / left).sharpness(fast)
         model = default_model(
@@ -108,9 +118,10 @@ def build_baseline(
 
 
 def _nuisance(recording: Recording, chosen: tuple[float, ...] | None) -> Array:
-    """How each joint's sign would change if it were less sharp (N, n, n): its derivative by the logarithm of v0.
+    """Differentiates each joint's friction sign with respect to log(v0), (N, n, n).
 
-    Of a joint whose rows that count hardly show it, nothing: its value would be any, and so the torque in the others.
+    The derivative is zero if the rows that count hardly contain it. Its coefficient would be arbitrary, and so would
+    the torque in the other rows.
     """
     if chosen is None:
         return np.zeros((len(recording), recording.n, 0))
@@ -128,20 +139,20 @@ def _change(recording: Recording, joint: int, v0: float) -> Array:
 
 
 class _Signs:
-    """Signs of all widths on trial beside the rest of the base model, in a weighted fit.
+    """Weighted fit of the base model with friction signs of all widths as candidates.
 
     Args:
         Y: columns (N, n, b).
-        signs: which of them are signs.
+        signs: indices of the columns that are friction signs.
         base: base parameters.
         recording: the data.
-        weights: of each joint (n,), or of each row of it (N, n).
+        weights: weights of the joints (n,), or of each of their rows (N, n).
     """
 
     def __init__(self, Y: Array, signs: list[int], base: BaseParameters, recording: Recording, weights: Array) -> None:
         self.recording, self.stride = recording, max(1, len(recording) // 20_000)
         self.joints = [base.columns[i].joint - 1 for i in signs]
-        # The sharpest for each of them.
+        # Index of the sharpest width for each joint.
         self.first = [
             sum(v0 < 0.999 * sharpest_sign_velocity(recording.dq[:, joint]) for v0 in SCALES) for joint in self.joints
         ]
@@ -155,7 +166,7 @@ class _Signs:
         size = len(self.joints) * len(SCALES)
         gram, cross, against = np.zeros((size, size)), np.zeros(size), np.zeros((size, self.Q.shape[2]))
         for a, joint in enumerate(self.joints):
-            # A sign acts on its own joint's rows alone.
+            # A sign acts on rows of its own joint only.
             own = slice(a * len(SCALES), (a + 1) * len(SCALES))
             columns = friction_signs(recording, joint, np.array(SCALES))[rows] * self.counts[:, joint, None]
             gram[own, own] = columns.T @ columns
@@ -164,7 +175,7 @@ class _Signs:
         self.gram, self.cross, self.against = gram - against @ against.T, cross - against @ self.along, against
 
     def sharpness(self, widest: Array) -> tuple[float, ...]:
-        """Picks all joints' scales (n,) together, up to the widest, one joint at a time with the others as they are."""
+        """Selects the widths [rad/s or m/s] of all joints up to the widest (n,), by coordinate search."""
         picked = [k + 1 for k in self.first]
         for _ in range(ROUNDS):
             for a, joint in enumerate(self.joints):
@@ -179,7 +190,7 @@ class _Signs:
         return tuple(scales)
 
     def left(self, scales: tuple[float, ...]) -> Array:
-        """Gives the RMS residual of each joint with some scales, log by log, for each row (N, n) [N m or N]."""
+        """Computes the RMS residual of each joint and log with given widths, for each row (N, n) [N m or N]."""
         trial = [len(SCALES) * a + SCALES.index(scales[joint]) for a, joint in enumerate(self.joints)]
         values = self._fitted(trial)
         residual = self.tau - self.Q @ (self.along - self.against[trial].T @ values)
@@ -199,9 +210,9 @@ class _Signs:
 
 
 def inertia_matrix(baseline: Baseline, recording: Recording, values: Array) -> Array:
-    """Gives the torque on each joint per acceleration of each (n, n) [kg m2], as base parameters (b,) say it.
+    """Computes the torque on each joint per acceleration of each (n, n) [kg m2], with base parameters (b,).
 
-    Rotors included, root mean square over some states.
+    It is the root mean square over some states, rotors included.
     """
     rows = np.linspace(0, len(recording) - 1, 50).astype(int)
     q, zero = recording.q[rows], np.zeros((len(rows), recording.n))

@@ -1,4 +1,4 @@
-"""What is known of some logs: a payload, whose torque is taken off and felt by effects, and how the base stood."""
+"""Known payload and gravity of each log, in the measured torque and in the base model."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 def subtract_known_payload(robot: Robot, recording: Recording) -> Recording:
-    """Takes the torque of the logs' known payloads off the measured one."""
+    """Subtracts the torque of the logs' known payloads from the measured torque."""
     if not recording.payloads:
         return recording
     model = default_model(robot)
@@ -43,7 +43,7 @@ def subtract_known_payload(robot: Robot, recording: Recording) -> Recording:
 def base_regressor(base: BaseParameters, recording: Recording) -> Array:
     """Evaluates the base model's columns (N, n, b) on a recording, each log under its own gravity.
 
-    Signs are low-passed as the torque was, where logs are thinned.
+    If logs are decimated, friction signs pass the same low-pass as the torque.
     """
     Y = _regressor(base, recording)
     if recording.full_rate is None:
@@ -57,7 +57,10 @@ def base_regressor(base: BaseParameters, recording: Recording) -> Array:
 
 
 def friction_signs(recording: Recording, joint: int, scales: Array) -> Array:
-    """Evaluates a joint's signs (N, k), from 0, as smooth as `scales` (k,) say, 0 for the sharp one."""
+    """Evaluates a joint's friction signs (N, k), for widths (k,) [rad/s or m/s]; a width of 0 is a sharp sign.
+
+    The joint is counted from 0.
+    """
     return evaluate_at_full_rate(recording, lambda samples: sign_of(samples.dq[:, joint, None], scales))
 
 
@@ -72,7 +75,7 @@ def _regressor(base: BaseParameters, recording: Recording) -> Array:
 
 
 def base_torque(base: BaseParameters, recording: Recording, values: Array) -> Array:
-    """Evaluates the base model's torque (N, n) on a recording with base parameters (b,), each log under its gravity."""
+    """Evaluates the base model's torque (N, n) [N m or N] with base parameters (b,), each log under its own gravity."""
     parts = []
     for run, gravity in zip(recording.runs, recording.gravities, strict=True):
         motion = (recording.q[run], recording.dq[run], recording.ddq[run])
@@ -83,13 +86,16 @@ def base_torque(base: BaseParameters, recording: Recording, values: Array) -> Ar
 def build_situation(
     recording: Recording, model: TorqueModel, parameters: Array, columns: tuple[int, ...] | None = None
 ) -> Situation:
-    """Gives what effects may depend on in a recording, payloads and bases that stand otherwise included.
+    """Builds the quantities on which effects may depend, including known payloads and gravity of each log.
 
     Args:
         recording: the data.
         model: the base model, under the gravity of the robot's description.
         parameters: its standard parameters (p,), or those of `columns`.
-        columns: the model's columns that `parameters` are of; by default all.
+        columns: indices of the model's columns to which `parameters` belong; by default all.
+
+    Returns:
+        The quantities for all rows; those at the full rate are included if the logs are decimated.
     """
     full = np.zeros(model.size)
     full[slice(None) if columns is None else list(columns)] = parameters

@@ -1,4 +1,4 @@
-"""Logs as given, put on one clock, repaired, and read into one recording with its base model."""
+"""Preparation of logs: common clock, repair, recording, and base parameters."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from robots.common.errors import NotIdentifiableError
 from robots.robot import Robot
 from robots.signals import Log
 
-# Width of the smoothed sign [rad/s or m/s] before the logs tell it.
+# Width of the friction sign [rad/s or m/s] before it is fitted to the logs.
 FIRST_VELOCITY_SCALE = 0.001
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedLogs:
-    """Logs ready to be diagnosed.
+    """Logs prepared for a diagnosis.
 
     Attributes:
-        logs: those of the fit, in the order of time, without unusable ones.
-        held_out: those for validation.
-        recording: the motion and torque of the fit's logs.
+        logs: logs of the fit, in the order of time, without unusable ones.
+        held_out: logs for validation.
+        recording: motion and torque of the logs of the fit.
         base: base parameters of the robot's model, under every gravity of the logs.
-        dated: whether the time between fit and held-out logs is known.
+        dated: whether the time between the logs of the fit and the held-out logs is known.
         notes: what was repaired or left out.
     """
 
@@ -51,10 +51,13 @@ def prepare_logs(
 
     Args:
         robot: the robot.
-        logs: to fit to.
-        held_out: for validation.
-        friction: of the base model: ``polynomial`` or ``coulomb-viscous``.
-        check: whether each log passes the gate, which rejects unusable ones and marks what is to be repaired.
+        logs: logs of the fit.
+        held_out: logs for validation.
+        friction: friction of the base model: `polynomial` or `coulomb-viscous`.
+        check: whether each log passes the gate, which refuses unusable logs and marks what needs repair.
+
+    Returns:
+        The prepared logs.
 
     Raises:
         InputError: logs of another robot, without torque, too short, given twice or refused by the gate.
@@ -70,7 +73,7 @@ def prepare_logs(
     recording = subtract_known_payload(robot, build_recording(robot, fit))
     if not (np.ptp(recording.q, axis=0) > 0).any():
         raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
-    # Held-out logs count too: gravities that only they have need the description as prior.
+    # Held-out logs count too: a gravity that occurs only there needs the robot's description as a prior.
     gravities = [log.gravity for log in (*fit, *other) if log.gravity is not None]
     base = base_parameters(robot, friction, (FIRST_VELOCITY_SCALE,) * robot.n, gravities)
     if unusable := find_unusable_logs(base, recording):
@@ -87,7 +90,7 @@ _UNUSABLE = (
 
 
 def _repaired(robot: Robot, logs: Sequence[Log], kind: str) -> tuple[list[Log], list[str]]:
-    """Gives the usable stretches of logs, and notes about them."""
+    """Returns the usable stretches of logs, and notes about them."""
     repaired = [repair_log(robot, log, f"{kind} {k}{_in_brackets(log.name)}") for k, log in enumerate(logs, start=1)]
     return [part for one in repaired for part in one.logs], [note for one in repaired for note in one.notes]
 

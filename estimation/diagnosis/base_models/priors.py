@@ -1,4 +1,4 @@
-"""What holds base parameters that a log leaves open, so that another motion is not predicted absurdly."""
+"""Priors of the base parameters: a fit then predicts other motions although its log leaves parameters open."""
 
 from __future__ import annotations
 
@@ -12,31 +12,33 @@ from estimation.regressions.parameter_priors import OWN, SILENT, GaussianPrior, 
 
 Array = NDArray[np.float64]
 
-# Speed that a joint exceeds in a thousandth of the time only.
+# Quantile of a joint's speed that counts as its largest.
 FASTEST = 0.999
-# Standard deviations of a description that it may be wrong by before it is let go, and steps in which it is.
+# Standard deviations from which a contradiction weakens the description's prior, and iterations of that weakening.
 CONFLICT_SIGMAS, CONFLICT_ROUNDS = 2.0, 20
 # Directions below this share of the largest are not determined.
 FAINT = 1e-12
 
 
 def base_model_prior(baseline: Baseline, recording: Recording, strength: float = 1.0) -> GaussianPrior:
-    """Pulls base parameters as `identify` does, as strongly as the noise makes right.
+    """Builds the prior of the base parameters from the robot's description, as `identify` does, scaled to the noise.
 
-    Parameters scatter about the robot's description by their own size (`prior_from_description`). Against rows that
-    count by their noise's inverse variance the pull is then their a-priori precision, and the fit is that of the
-    largest posterior density. Coloured noise makes rows tell less than their number: the pull counts by the noise's
-    power density at rest over that of white noise.
+    Parameters scatter about the description by their own size (`prior_from_description`). Rows are weighted by the
+    inverse variance of their noise. The prior then enters with its precision, and the fit maximises the posterior
+    density. In coloured noise, rows are less informative than their number suggests. The prior is therefore multiplied
+    by the noise density at zero frequency over that of white noise.
 
-    Where nothing is described, no base parameter is to make more than some times the torque that its joints have.
+    If the description lacks inertial parameters, the prior limits the torque of each parameter to some times that of
+    the joints.
 
     Args:
         baseline: the base model on the data.
         recording: the data.
-        strength: rows of the noise that tell as much of a slow torque as one of white noise (`Whitening.row_weight`).
+        strength: number of rows that inform as much on a slow torque as one row of white noise
+            (`Whitening.row_weight`).
 
     Returns:
-        Of base parameters and the baseline's nuisance (b + m), in units of rows over the noise's scale.
+        Prior of base parameters and nuisance (b + m), in units of rows weighted by the noise.
     """
     counts = ~recording.sign_unknown
     number = np.maximum(counts.sum(axis=0), 1)
@@ -55,23 +57,27 @@ def base_model_prior(baseline: Baseline, recording: Recording, strength: float =
     b, m = len(pull.target), baseline.nuisance.shape[2]
     precision = np.zeros((b + m, b + m))
     precision[:b, :b] = pull.precision
-    # A sign may be less sharp by so much; without a bound, rows that hardly show it would say anything.
+    # Errors of the sign widths need a bound, too: rows that hardly contain them would allow any value.
     precision[range(b, b + m), range(b, b + m)] = 1.0 / (OWN * torque[:m]) ** 2
     return GaussianPrior(strength * precision, np.concatenate([pull.target, np.zeros(m)]))
 
 
 def inflate_conflicting_prior(pull: GaussianPrior, gram: Array, cross: Array, strength: float = 1.0) -> GaussianPrior:
-    """Lets go of a description where data contradict it: what a file lacks, a rotor or a tool, is not off by its size.
+    """Weakens the prior where the data contradict it: errors by a missing rotor or tool may exceed a parameter's size.
 
-    Parameters scatter about the description with heavy tails, independently along the directions in which data and
-    description are both diagonal. Where these say z > 2 standard deviations of the description, the pull there counts
-    (z / 2)^2 times less, z found by iteration (Huber's weights squared); what the data leave open stays held.
+    Parameters scatter about the description with heavy tails, independently in directions in which the information of
+    the data and the prior are both diagonal. If the estimate is z > 2 standard deviations of the description away, the
+    precision is divided by (z / 2)^2 (the square of Huber's weights). z is found by iteration. Directions that the data
+    do not determine keep their prior.
 
     Args:
-        pull: on base parameters and nuisance (p,), with its strength.
-        gram: of the data, in the same units (p, p).
-        cross: of the data (p,).
-        strength: by which the pull's precision is more than that of what could be wrong.
+        pull: prior of base parameters and nuisance (p,), with its strength.
+        gram: Gram matrix of the data (p, p), in the same units.
+        cross: products of columns and torque (p,), in the same units.
+        strength: factor of the prior's precision over that of the description's own scatter.
+
+    Returns:
+        The weakened prior.
     """
     root = np.linalg.cholesky(pull.precision / strength)
     inverse = solve_triangular(root, np.eye(len(root)), lower=True)
@@ -87,21 +93,21 @@ def inflate_conflicting_prior(pull: GaussianPrior, gram: Array, cross: Array, st
 
 
 def solve_map(gram: Array, cross: Array, pull: GaussianPrior) -> Array:
-    """Solves normal equations (p, p), (p,) with a pull on the first columns, or all.
+    """Solves normal equations (p, p), (p,) with a prior on the first columns, or on all of them.
 
-    Directions that neither determines stay at zero: the fit is that of least norm.
+    Directions that neither the data nor the prior determine are zero, as in the least-norm solution.
     """
     root, aim = _root(gram, pull), _aim(cross, pull)
     return np.asarray(root @ (root.T @ aim))
 
 
 def solve_least_squares(gram: Array, cross: Array) -> Array:
-    """Solves normal equations (p, p), (p,) that nothing holds."""
+    """Solves normal equations (p, p), (p,) without a prior."""
     return solve_map(gram, cross, GaussianPrior(np.zeros((0, 0)), np.zeros(0)))
 
 
 def explained_chi2(gram: Array, cross: Array, pull: GaussianPrior) -> float:
-    """Squared torque that such a fit explains, less what the pull costs it."""
+    """Computes the energy that the fit with a prior explains, minus the penalty of the prior."""
     projected = _root(gram, pull).T @ _aim(cross, pull)
     return float(projected @ projected - pull.target @ pull.precision @ pull.target)
 
@@ -113,7 +119,7 @@ def _aim(cross: Array, pull: GaussianPrior) -> Array:
 
 
 def _root(gram: Array, pull: GaussianPrior) -> Array:
-    """Gives R (p, r) with R R' the inverse of a Gram matrix (p, p) and a pull, in directions that these determine."""
+    """Factorises the inverse of a Gram matrix (p, p) plus prior as R R', with R (p, r), in determined directions."""
     b = len(pull.target)
     gram = gram.copy()
     gram[:b, :b] += pull.precision

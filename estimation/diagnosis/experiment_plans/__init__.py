@@ -1,1 +1,1 @@
-"""What a log could have shown, and what to measure next."""
+"""Detection limits of logs and planned experiments, and the next experiment."""

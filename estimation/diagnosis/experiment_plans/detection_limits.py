@@ -1,4 +1,4 @@
-"""What a log could have shown: for each effect and joint the smallest size that it would, and could have named."""
+"""Detection limits: for each effect and joint, the smallest size that a log shows and distinguishes from rivals."""
 
 from __future__ import annotations
 
@@ -31,35 +31,36 @@ HIDDEN = "not detectable at any size: the base model absorbs it in this motion"
 UNSURE = "not detectable at any size: it acts only at rest or near reversals, where the friction sign is unknown"
 FEW = "only {1} of its {0} tested shapes are detectable, from {2:.2g} % of the torque"
 RESTING = 0.02
-"""Share of a log from which it is said that nothing is seen in rests."""
+"""Share of rest in a log from which a note mentions it."""
 RESTS = "not detectable while the arm is at rest ({:.0f} % of the log), because static friction is unknown"
 STILL = 1e-3
 """Travel of a joint [rad or m] below which it hardly moves."""
 MOST = 0.9
-"""Share of effects and joints whose limits a sentence covers."""
+"""Share of effects and joints for which a summary states the limit."""
 NAMED = 4
-"""Number of undetectable effects that a sentence names."""
+"""Number of undetectable effects that a summary names."""
 SHAPES = 3
-"""Shapes of an effect that its limit is the median of."""
+"""Number of shapes of an effect over which its limit is the median."""
 RIVAL_SHAPES = 4
-"""Shapes with which a rival may imitate it."""
+"""Number of shapes of a rival that are compared with it."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Limit:
-    """What one log can tell of one effect at one joint.
+    """Detection limit of one effect at one joint.
+
+    Sizes are shares of the joint's torque RMS. For an effect of the whole robot it is the joint where the effect is
+    largest.
 
     Attributes:
         effect: its name.
         joint: counted from 1; None for the whole robot.
-        detectable: smallest size that is found with 95 % chance, as a share of the joint's torque RMS (of a robot's
-            effect: of the joint where it shows most); infinite where no size shows.
-        at_worst: that size of the kind of it (its time constants, speeds, travels) that shows least, of those that a
-            scan tries; infinite where one of them shows at no size. `detectable` is of a kind in the middle.
-        attributable: smallest that is also distinguished from every rival; infinite where none is.
-        toughest: the rival that is hardest to tell from it; None without.
+        detectable: smallest size that is found with a probability of 95 %, for a typical shape; infinite if no size is.
+        at_worst: the same for the scanned shape that shows least; infinite if one shape is never detectable.
+        attributable: smallest size that is also distinguished from each rival; infinite if no size is.
+        toughest: the rival that is hardest to distinguish; None without rivals.
         visible: share of its energy that the base model does not absorb.
-        note: why no size shows, or what stays open; or empty.
+        note: why no size is detectable, or what remains undetermined; empty without a note.
     """
 
     effect: str
@@ -72,7 +73,7 @@ class Limit:
     note: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """Writes it as plain data; what is infinite is None."""
+        """Returns plain data, with None for infinite values."""
         return {
             "effect": self.effect,
             "joint": self.joint,
@@ -86,15 +87,15 @@ class Limit:
 
 
 def find_limits(problem: Problem, entries: Sequence[Entry], *, false_alarm: float = 0.01) -> tuple[Limit, ...]:
-    """Finds the limits of a log, by the noise it has and the base model it is fitted with.
+    """Computes the detection limits of a log from its noise and base model; the residual is not used.
 
     Args:
-        problem: the data, white; nothing of its residual is used.
-        entries: all hypotheses, measured.
-        false_alarm: chance that noise alone has an effect named.
+        problem: data and base model.
+        entries: all hypotheses, evaluated by `measure`.
+        false_alarm: probability that noise alone gives a finding.
 
     Returns:
-        One per hypothesis, in the catalogue's order.
+        One limit per hypothesis, in the order of the catalogue.
     """
     tries = sum(entry.tries for entry in entries)
     known = {(entry.hypothesis.name, entry.hypothesis.joint): entry for entry in entries}
@@ -109,7 +110,7 @@ def find_limits(problem: Problem, entries: Sequence[Entry], *, false_alarm: floa
 
 
 def summarise_limits(limits: Sequence[Limit]) -> str:
-    """Says in one sentence, without its stop, what logs would have shown; empty where they would show nothing."""
+    """Summarises detection limits in one sentence without a full stop; empty if nothing is detectable."""
     sizes = [limit.detectable for limit in limits if np.isfinite(limit.detectable)]
     if not sizes:
         return ""
@@ -150,7 +151,7 @@ def _limit(
         return _none(hypothesis, UNSURE if unsure else HIDDEN)
     picked = [showing[k] for k in _spread(len(showing), SHAPES)]
     bounds = hypothesis.effect.bounds(problem.situation, hypothesis.joint)
-    # What an effect is whole without is none of its parameters where it just shows.
+    # Optional parameters do not count as fitted near the detection limit.
     free = [k for k, (low, high) in enumerate(bounds) if high > low and not hypothesis.effect.shapes[k].beside]
 
     def size(at: int) -> float:
@@ -187,7 +188,7 @@ def _limit(
 
 
 def _certain_share(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> float:
-    """Gives the share of an effect's energy that counts, where joints tell it by reversals."""
+    """Returns the share of a delay's energy that remains with errors of the reversal times."""
     evidence = per_joint_evidence(problem, hypothesis, shape, accept(problem, ()))
     return float(np.sum(evidence.certain_share * evidence.gram) / np.sum(evidence.gram)) if evidence.gram.any() else 1.0
 
@@ -195,7 +196,10 @@ def _certain_share(problem: Problem, hypothesis: Hypothesis, shape: tuple[float,
 def _toughest(
     problem: Problem, group: Group, mixtures: Array, rivals: Sequence[tuple[str, Entry]], smallest: float
 ) -> tuple[float, str | None]:
-    """Gives the size, `smallest` at least, from which an effect is told from all rivals, and the one that asks most."""
+    """Returns the size from which an effect is distinguished from all rivals, and the hardest rival.
+
+    The size is at least `smallest`.
+    """
     worst: tuple[float, str | None] = (smallest, None)
     for name, rival in rivals:
         per_energy = max(
@@ -209,9 +213,9 @@ def _toughest(
 
 
 def _note(problem: Problem, hypothesis: Hypothesis) -> str:
-    """Says what a log leaves open that is shorter than an effect's slowest time constant, or in which the arm rests.
+    """Describes what a log does not show because it is short or contains rest.
 
-    What acts for a moment may do so in a rest.
+    A rest hides transient effects. A short log does not determine long time constants.
     """
     if hypothesis.effect.transient:
         resting = float(np.mean(problem.recording.sign_unknown.all(axis=1)))
@@ -227,14 +231,14 @@ def _note(problem: Problem, hypothesis: Hypothesis) -> str:
 def _rivals(
     problem: Problem, hypothesis: Hypothesis, known: dict[tuple[str, int | None], Entry]
 ) -> list[tuple[str, Entry]]:
-    """Finds the declared rivals on the joints where the effect acts; rare ones only of a rare one."""
+    """Lists the declared rivals on the joints where the effect acts; rare rivals only of rare effects."""
     joints: list[int | None] = [None, *(range(1, problem.n + 1) if hypothesis.joint is None else [hypothesis.joint])]
     names = [name for name in hypothesis.effect.rivals if hypothesis.effect.rare or not EFFECTS[name].rare]
     return [(name, known[name, joint]) for name in names for joint in joints if (name, joint) in known]
 
 
 def _spread(count: int, most: int) -> list[int]:
-    """Picks up to `most` of `count` places, evenly, the middle first of all."""
+    """Returns up to `most` of `count` indices, evenly spaced."""
     if count <= most:
         return list(range(count))
     return sorted({round((k + 0.5) * count / most - 0.5) for k in range(most)})

@@ -1,4 +1,4 @@
-"""What experiments tell of causes: Gram matrices of base model and causes, of logs and of motions to come."""
+"""Gram matrices of base model and causes, for logs and for planned motions."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from robots.terms.situations.situation import Situation
 Array = NDArray[np.float64]
 
 SOON, LATER = 2.0, 3600.0
-"""Times from the logs to the experiment [s]: the robot is as warm as they left it, or has cooled. Nobody says which."""
+"""Times from the logs to the experiment [s]: the robot is still warm, or has cooled. Which one holds is not known."""
 WARMING = 25
-"""Every so many samples of the logs are enough to tell how warm they leave the robot."""
+"""Stride of log samples from which the heat at the end of the logs is computed."""
 ARM = 0.1
 """Distance of a payload's centre from the flange [m]."""
 
@@ -55,13 +55,12 @@ class Cause(Protocol):
 
 
 class Grams:
-    """Gram matrices of base columns and all causes' columns, whitened: of the logs, and of any experiment.
+    """Whitened Gram matrices of the base columns and all causes' columns, of the logs and of any experiment.
 
     Args:
-        problem: the logs there are.
-        causes: what may have made them.
-        forms: other shapes that a cause may have, each with its cause's index: as a rival it is taken to have the one
-            that imitates best.
+        problem: the logs.
+        causes: the K possible causes.
+        forms: other shapes of a cause, each with the index of the cause. A rival takes the shape that resembles most.
     """
 
     def __init__(self, problem: Problem, causes: Sequence[Cause], forms: Sequence[tuple[int, Cause]] = ()) -> None:
@@ -70,7 +69,7 @@ class Grams:
         self.every = [*causes, *(form for _, form in forms)]
         self.owners = [*range(len(causes)), *(owner for owner, _ in forms)]
         self.model: TorqueModel = problem.situation.model
-        # A base that is tilted shows parameters that the logs do not: they take a part of what it shows of a cause.
+        # A tilted base shows base parameters that the logs do not. They absorb part of a cause's torque.
         gravity = np.asarray(self.model.robot.chain.gravity, dtype=float)
         fields = [field for field in problem.recording.gravity_fields if field is not None]
         tilted = [gravity + np.linalg.norm(gravity) * axis for axis in level_axes(gravity)] if gravity.any() else []
@@ -80,30 +79,39 @@ class Grams:
 
     @cached_property
     def old(self) -> Array:
-        """Of the logs that there are."""
+        """Gram matrix of the logs."""
         now = self.problem.situation
         effects = [c.hypothesis.effect.columns(now, c.hypothesis.joint, c.shape) for c in self.every]
         return self._gram(base_regressor(self.base, self.problem.recording), effects, self.problem.whitening)
 
     @cached_property
     def heated(self) -> bool:
-        """Whether a cause depends on how warm the logs left the robot."""
+        """Whether a cause depends on the temperature at which the logs left the robot."""
         return any(isinstance(c.hypothesis.effect, HeatEffect) for c in self.every)
 
     def chance(self, stages: Sequence[Stage]) -> float:
-        """Gives the chance that each cause, were it true, would be told from every other."""
+        """Returns the probability that the true cause is separated from all rivals, for the least favourable pair.
+
+        Args:
+            stages: the experiment.
+        """
         return float(self.chances_of(self.later(stages)).min())
 
     def later(self, stages: Sequence[Stage]) -> tuple[Array, ...]:
-        """Does what `of` does for an experiment made after the logs: once it has cooled, and with warm joints."""
+        """Returns the Gram matrices of an experiment after the logs: with cold joints, and with warm ones if needed."""
         end = float(self.problem.recording.t[-1])
         cold = self.of(stages, end + LATER)
         return (cold, self.of(stages, end + SOON, warm=True)) if self.heated else (cold,)
 
     def chances_of(self, new: Sequence[Array], times: int = 1) -> Array:
-        """Gives the chance that each cause (row), were it true, would be told from each rival (column); one of itself.
+        """Returns the probability that a true cause (row) is separated from a rival (column).
 
-        By the Gram matrices of the experiment, made so often; the least chance where there are several.
+        Args:
+            new: Gram matrices of the experiment in several conditions; the least favourable counts.
+            times: how often the experiment is made.
+
+        Returns:
+            (K, K), 1 on the diagonal.
         """
         result = np.ones((len(self.causes),) * 2)
         for gram in new:
@@ -115,9 +123,12 @@ class Grams:
         return result
 
     def of(self, stages: Sequence[Stage], begin: float = 0.0, *, warm: bool = False) -> Array:
-        """Evaluates an experiment that begins at a time [s] of the logs' clock: the Gram matrix of all columns.
+        """Returns the Gram matrix of all columns in an experiment.
 
-        Heat begins at zero, or `warm` as the logs leave it, until a payload or another base pose is changed.
+        Args:
+            stages: the experiment.
+            begin: its start on the logs' clock [s].
+            warm: whether joints are as warm as after the logs, until the payload or base pose changes; cold by default.
         """
         bases: list[Array] = []
         effects: list[list[Array]] = [[] for _ in self.every]
@@ -141,14 +152,14 @@ class Grams:
         return self._gram(base, [np.concatenate(parts) for parts in effects], whitening)
 
     def block(self, gram: Array, cause: int) -> Array:
-        """The energy of a cause's columns (k, k), nothing projected out."""
+        """Returns the Gram matrix of one cause's columns (k, k), with nothing projected out."""
         edges = len(self.columns) + np.concatenate([[0], np.cumsum(self.sizes)])
         own = slice(int(edges[cause]), int(edges[cause + 1]))
         return gram[own, own]
 
     @cached_property
     def _logged(self) -> tuple[Motion, tuple[int, ...]]:
-        """The logs' motion and where each begins, thinned out: what warms the robot."""
+        """Thinned motion of the logs, and the start of each log, from which the heat is computed."""
         recording = self.problem.recording
         rows = np.concatenate([np.arange(run.start, run.stop, WARMING) for run in recording.runs])
         starts = np.searchsorted(rows, recording.starts)
@@ -158,7 +169,7 @@ class Grams:
     def _played(
         self, model: TorqueModel, part: _Part, begin: float, before: tuple[Motion, tuple[int, ...]] | None
     ) -> tuple[Situation, int]:
-        """What an experiment's part does, after the logs where they are given; and the row at which it begins."""
+        """Evaluates a part of an experiment, after the logs if given; also returns the row at which it starts."""
         motion, starts, first = part.motion, part.starts, 0
         t = begin + motion.t
         if before is not None:
@@ -187,12 +198,24 @@ class Grams:
         return gram
 
     def left(self, gram: Array, true: int, rival: int) -> float:
-        """Gives the energy that a rival, in one of its forms, leaves of the true cause."""
+        """Returns the energy of the true cause that a rival, in one of its shapes, does not absorb.
+
+        Args:
+            gram: Gram matrix of all columns.
+            true: index of the true cause.
+            rival: index of the rival's shape among causes and forms.
+        """
         theta = self.causes[true].coefficients
         return max(float(theta @ self.remainder(gram, true, rival) @ theta), 0.0)
 
     def remainder(self, gram: Array, true: int, rival: int | None) -> Array:
-        """What base model and rival, or the base model alone, leave of the true cause's columns (k, k)."""
+        """Returns the Gram matrix (k, k) of the true cause with base model and rival projected out.
+
+        Args:
+            gram: Gram matrix of all columns.
+            true: index of the true cause.
+            rival: index of the rival's shape among causes and forms; None for the base model alone.
+        """
         b = len(self.columns)
         edges = b + np.concatenate([[0], np.cumsum(self.sizes)])
         own = np.arange(edges[true], edges[true + 1])
@@ -210,7 +233,7 @@ class Grams:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Stages that only pauses part."""
+    """Stages with the same payload and base pose, separated by pauses only."""
 
     motion: Motion
     starts: tuple[int, ...]
@@ -219,7 +242,7 @@ class _Part:
 
 
 def _joined(stages: Sequence[Stage]) -> list[_Part]:
-    """Joins stages of one payload and base pose: heat passes from one to the next."""
+    """Joins stages of one payload and base pose, between which heat remains."""
     parts: list[tuple[list[Motion], float, Array | None]] = []
     for stage in stages:
         same = parts and parts[-1][1] == stage.payload and parts[-1][2] is stage.gravity

@@ -1,4 +1,4 @@
-"""Simple motions that separate causes, within the positions, speeds and accelerations that the logs have shown."""
+"""Simple motions that separate causes, within the positions of the logs and near their speeds and accelerations."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from robots.terms.effects.base_tilt import level_axes
 Array = NDArray[np.float64]
 
 REFERENCE = 40.0
-"""Length of the logged motion that experiments repeat [s]."""
+"""Longest part of a logged motion that experiments repeat [s]."""
 EASE = 2.0
-"""Time in which a motion begins and ends [s]."""
+"""Duration of the smooth start and end of a motion [s]."""
 SLOWEST = 20.0
-"""Longest move from point to point [s]: a joint that the logs show at rest has no speed to go by."""
+"""Longest move between two points [s], for joints without a known speed because they rest in the logs."""
 PAUSE = 300.0
-"""A pause in which a warm joint cools [s]."""
+"""Pause in which warm joints cool [s]."""
 TILT = np.radians(15.0)
-"""Angle by which a base is tilted for a second pose."""
+"""Tilt of the base for a second pose [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stage:
-    """A part of an experiment.
+    """One part of an experiment.
 
     Attributes:
         motion: its time starts at zero.
         pause: rest before it [s].
-        payload: mass of a known payload at the flange [kg]; its centre lies a tenth of a metre ahead.
-        gravity: (3,) in the base frame, where the base stands otherwise than it did; None as it did.
+        payload: mass of a known payload [kg], its centre 0.1 m ahead of the flange.
+        gravity: (3,) in the base frame [m/s2] if the base is tilted; None if it is not moved.
     """
 
     motion: Motion
@@ -49,18 +49,18 @@ class Stage:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MotionRange:
-    """What an experiment may use.
+    """Limits and reference motion for experiments.
 
     Attributes:
         robot: the robot.
-        lower: least positions that the logs have shown (n,).
-        upper: largest (n,).
-        speed: largest speed (n,).
-        acceleration: largest acceleration (n,).
+        lower: lower end of the logged positions, within the robot's limits (n,) [rad or m].
+        upper: upper end (n,).
+        speed: largest speed (n,) [rad/s or m/s].
+        acceleration: largest acceleration (n,) [rad/s2 or m/s2].
         reference: a motion of the logs.
-        logged: which that is, in words.
         step: sample period [s].
-        payload: mass of a payload that the robot carries well [kg].
+        payload: mass of a payload well below the robot's rated one [kg].
+        logged: name of that motion's log, and its time, in words.
     """
 
     robot: Robot
@@ -75,12 +75,12 @@ class MotionRange:
 
     @property
     def middle(self) -> Array:
-        """The middle of the positions (n,)."""
+        """Middle of the positions (n,)."""
         return (self.lower + self.upper) / 2
 
 
 def motion_range(robot: Robot, recording: Recording) -> MotionRange:
-    """Measures the room that the logs have shown; limits of the robot that are tighter count."""
+    """Derives the range of experiments from the logs and the robot's limits."""
     lengths = [part.stop - part.start for part in recording.runs]
     longest = int(np.argmax(lengths))
     run = recording.runs[longest]
@@ -105,39 +105,44 @@ def motion_range(robot: Robot, recording: Recording) -> MotionRange:
 
 
 def _known(limit: Array) -> Array:
-    """Nine tenths of limits (n,); infinite where a description leaves them out, which some write as zero."""
+    """Returns 90 % of limits (n,); infinite for missing ones, which some descriptions write as zero."""
     return np.where(np.isfinite(limit) & (limit > 0), 0.9 * limit, np.inf)
 
 
 def _motion(room: MotionRange, q: NDArray[Any]) -> Motion:
-    """Differentiates positions (N, n) that are smooth."""
+    """Differentiates smooth positions (N, n)."""
     t = np.asarray(room.step * np.arange(len(q)))
     dq = np.asarray(np.gradient(q, room.step, axis=0))
     return Motion(t, q, dq, np.asarray(np.gradient(dq, room.step, axis=0)))
 
 
 def at_rate(motion: Motion, period: float) -> Motion:
-    """Samples a motion of this module anew, at a controller's period [s]."""
+    """Resamples a motion of this module.
+
+    Args:
+        motion: the motion.
+        period: the controller's period [s].
+    """
     t = np.asarray(period * np.arange(int(motion.duration / period + 1e-6) + 1))
     spline = CubicSpline(motion.t, motion.q)
     return Motion(t, *(np.asarray(spline(t, order)) for order in range(3)))
 
 
 def _ease(share: NDArray[Any]) -> NDArray[Any]:
-    """From 0 to 1 without jerk: 10 s^3 - 15 s^4 + 6 s^5."""
+    """Returns a smooth step from 0 to 1: 10 s^3 - 15 s^4 + 6 s^5."""
     s = np.clip(share, 0.0, 1.0)
     return s**3 * (10 - 15 * s + 6 * s**2)
 
 
 def _rested(room: MotionRange, q: NDArray[Any]) -> NDArray[Any]:
-    """Lets positions (N, n) begin and end at rest in the middle, over two seconds each."""
+    """Makes positions (N, n) start and end at rest in the middle of the range."""
     t = room.step * np.arange(len(q))
     share = _ease(t / EASE) * _ease((t[-1] - t) / EASE)
     return room.middle + share[:, None] * (q - room.middle)
 
 
 def _visit(room: MotionRange, points: Array, rest: float) -> Array:
-    """Moves from point to point (K, n), with a rest [s] at each."""
+    """Moves through points (K, n), with a rest [s] at each."""
     parts = [np.repeat(points[:1], max(round(rest / room.step), 1), axis=0)]
     for start, end in pairwise(points):
         way = np.abs(end - start)
@@ -151,14 +156,14 @@ def _visit(room: MotionRange, points: Array, rest: float) -> Array:
 
 
 def _alone(room: MotionRange, joint: int, x: Array) -> Array:
-    """One joint, counted from 0, takes positions (N,), the others the middle."""
+    """Returns positions (N, n) in which one joint, from 0, follows x (N,) and the others stay in the middle."""
     q = np.repeat(room.middle[None], len(x), axis=0)
     q[:, joint] = x
     return q
 
 
 def sweep(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
-    """Runs one joint there and back at constant speeds, each twice the last, at most 8 s a stroke."""
+    """Moves one joint back and forth at constant speeds, each half the one before, at most about 8 s per stroke."""
     reach = float(room.upper[joint] - room.lower[joint])
     top, a = float(room.speed[joint]), float(room.acceleration[joint])
     parts = [_alone(room, joint, np.full(2, room.lower[joint]))]
@@ -178,25 +183,25 @@ def sweep(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
 
 
 def pause(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
-    """Repeats the logged motion three times, rests, and repeats it once more."""
+    """Repeats the logged motion three times, and once more after a pause."""
     again = Stage(motion=room.reference)
     return (again, again, again, Stage(motion=room.reference, pause=PAUSE))
 
 
 def static_hold(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
-    """Holds sixteen poses for a second and a half each."""
+    """Holds 16 random poses for 1.5 s each."""
     random = np.random.default_rng(variant)
     points = room.lower + random.random((16, room.robot.n)) * (room.upper - room.lower)
     return (Stage(motion=_motion(room, _visit(room, points, 1.5))),)
 
 
 def payload(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
-    """Makes the logged motion without and with a known payload."""
+    """Repeats the logged motion without and with a known payload."""
     return (Stage(motion=room.reference), Stage(motion=room.reference, pause=60.0, payload=room.payload))
 
 
 def single_joint(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
-    """Makes the logged motion of one joint, then of its neighbour, the others at rest."""
+    """Repeats the logged motion of one joint, then of its neighbour, with the others at rest."""
     joints = [joint, joint - 1 if joint else min(1, room.robot.n - 1)]
     return tuple(
         Stage(motion=_motion(room, _rested(room, _alone(room, j, room.reference.q[:, j]))))
@@ -205,7 +210,7 @@ def single_joint(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ..
 
 
 def micro_reversals(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
-    """Turns one joint back and forth, ever less far: from a third of its range to a thousandth of it."""
+    """Moves one joint back and forth with decreasing amplitude, from 0.3 to less than 0.001 of its range."""
     largest = 0.3 * float(room.upper[joint] - room.lower[joint])
     periods = 4.0 * np.arange(0, 8)
     rate = 2 * np.pi * min(0.25, float(room.speed[joint]) / max(2 * np.pi * largest, 1e-9))
@@ -217,23 +222,23 @@ def micro_reversals(room: MotionRange, joint: int, variant: int) -> tuple[Stage,
 
 
 def mirrored(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
-    """Makes the logged motion forwards, then backwards in time."""
+    """Repeats the logged motion, then the same backwards in time."""
     m = room.reference
     back = Motion(m.t, m.q[::-1], -m.dq[::-1], m.ddq[::-1])
     return (Stage(motion=m), Stage(motion=back))
 
 
 def second_base_pose(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
-    """Makes the logged motion on a base that is tilted by 15 degrees."""
+    """Repeats the logged motion on a base tilted by 15 degrees."""
     gravity = np.asarray(room.robot.chain.gravity, dtype=float)
     axis = level_axes(gravity)[variant % 2] if gravity.any() else np.zeros(3)
-    # Rodrigues for an axis across gravity.
+    # Rodrigues' formula for an axis perpendicular to gravity.
     tilted = gravity * np.cos(TILT) + np.cross(axis, gravity) * np.sin(TILT)
     return (Stage(motion=room.reference, gravity=tilted),)
 
 
 def multisine(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
-    """Moves all joints with frequencies up to 6 Hz, as fast as the accelerations allow."""
+    """Moves all joints with frequencies up to 6 Hz, as fast as speeds and accelerations allow."""
     random = np.random.default_rng(variant)
     t = room.step * np.arange(round(REFERENCE / room.step))
     f = np.geomspace(0.1, min(6.0, 0.1 / room.step), 24)
@@ -252,7 +257,7 @@ def multisine(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
 
 
 def repeat(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
-    """Makes the logged motion again."""
+    """Repeats the logged motion."""
     return (Stage(motion=room.reference),)
 
 
@@ -268,8 +273,8 @@ MAKERS: dict[str, Callable[[MotionRange, int, int], tuple[Stage, ...]]] = {
     "payload": payload,
     "second_base_pose": second_base_pose,
 }
-"""By kind, the least trouble first: each makes the stages for a joint, counted from 0, in several variants."""
+"""Function that builds the stages of each kind, from range, joint (from 0) and variant; the simplest kind first."""
 MADE = {"single_joint", "sweep", "micro_reversals", "multisine", "static_hold"}
-"""Kinds whose motions are new; the others repeat a motion of the logs."""
+"""Kinds with new motions; the others repeat a motion of the logs."""
 VARIED = {"sweep", "static_hold", "multisine", "second_base_pose"}
 """Kinds whose variants differ."""

@@ -1,8 +1,8 @@
-"""Which experiment would tell the causes that are left apart: its kind first, then its motion (T-optimality).
+"""Next experiment to separate the remaining causes: first its kind, then its motion (T-optimality).
 
-With the linear coefficients and the base model refitted under the rival, what the rival leaves of a cause is a Schur
-complement: Delta = theta_A' (G_AA - G_A,[Phi,B] G^-1 G_[Phi,B],A) theta_A, G the sum of the Gram matrices of the logs
-there are and of the experiment. It equals the Kullback-Leibler divergence times two (Atkinson and Fedorov 1975).
+Coefficients and base model are refitted under the rival. What the rival leaves of a cause is then a Schur complement:
+Delta = theta_A' (G_AA - G_A,[Phi,B] G^-1 G_[Phi,B],A) theta_A. G is the sum of the Gram matrices of logs and
+experiment. Delta is twice the Kullback-Leibler divergence (Atkinson and Fedorov 1975).
 """
 
 from __future__ import annotations
@@ -32,26 +32,27 @@ from robots.terms.effects import EXPERIMENTS
 Array = NDArray[np.float64]
 
 VARIANTS = 4
-"""Motions that are tried of the best kind."""
+"""Number of motions tried for the best kind."""
 ENOUGH = 0.99
-"""Chance beyond which the least trouble decides: causes are true to some per cent, and the chance knows noise alone."""
+"""Probability from which the simplest experiment is chosen. Models of causes hold to some per cent, and the probability
+includes noise only."""
 TIE = 0.01
-"""Weight of the mean chance over all pairs of causes beside the least one."""
+"""Weight of the mean probability over all pairs of causes, added to the smallest one."""
 HOPELESS = 0.2
-"""Chance below which two causes are said to stay alike."""
+"""Probability below which two causes are reported as not separable."""
 TIMES, LONGEST = (2, 4, 8, 16), 300.0
-"""How often motions are made where once does not do, and how long an experiment may last then [s], with pauses."""
+"""Numbers of repetitions tried if once is not enough, and the longest experiment then [s], with pauses."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Proposal:
-    """One kind of experiment, judged.
+    """One kind of experiment and its evaluation.
 
     Attributes:
         kind: a name of `EXPERIMENTS`.
-        resolves: chance that it leaves one cause.
+        resolves: probability that it leaves one cause.
         duration: with pauses [s].
-        times: how often its motions are made, one after the other.
+        times: how often each motion is made.
     """
 
     kind: str
@@ -62,18 +63,18 @@ class Proposal:
 
 @dataclass(frozen=True, kw_only=True)
 class NextExperiment:
-    """The experiment to make next.
+    """The proposed experiment.
 
     Attributes:
         kind: a name of `EXPERIMENTS`.
-        joint: the joint that it is about, from 1; None for all.
-        why: one sentence for people.
-        resolves: chance that it leaves one cause.
-        stages: motions with their pauses, payloads and base poses; without a pose of its own, the base stands as in the
-            last log.
+        joint: joint to which it applies, from 1; None for all.
+        why: reason in one or two sentences.
+        resolves: probability that it leaves one cause.
+        stages: motions with pauses, payloads and base poses, repetitions included. Without a pose of its own, the base
+            stands as in the last log.
         ranking: all kinds, the best first.
-        times: how often each motion is made, one after the other; all are among the stages.
-        logged: which motion of the logs is repeated, in words; empty where the motions are new.
+        times: how often each motion is made.
+        logged: which motion of the logs is repeated, in words; empty for new motions.
     """
 
     kind: str
@@ -87,12 +88,12 @@ class NextExperiment:
 
     @property
     def motions(self) -> tuple[Motion, ...]:
-        """Its different motions, in the order in which they are first made."""
+        """Its different motions, in the order of their first use."""
         return tuple(dict.fromkeys(stage.motion for stage in self.stages))
 
     @property
     def runs(self) -> list[dict[str, Any]]:
-        """What to play, one after the other: the motion's number from 1, the rest before it, payload and base pose."""
+        """Runs in their order: number of the motion from 1, pause before it, payload and base pose."""
         numbers = {motion: number for number, motion in enumerate(self.motions, start=1)}
         return [
             {
@@ -105,7 +106,7 @@ class NextExperiment:
         ]
 
     def to_dict(self) -> dict[str, Any]:
-        """Writes it as plain data, without the motions."""
+        """Returns plain data, without the motions."""
         return {
             "kind": self.kind,
             "joint": self.joint,
@@ -122,7 +123,7 @@ class NextExperiment:
 
 @dataclass(frozen=True, eq=False)
 class _Choice:
-    """A kind of experiment, its motions made so often; what they tell (b + k, b + k), and of which cause (K, K)."""
+    """A kind of experiment with its Gram matrices (b + k, b + k), and the probabilities to separate causes (K, K)."""
 
     kind: str
     stages: tuple[Stage, ...]
@@ -132,14 +133,14 @@ class _Choice:
 
     @property
     def chance(self) -> float:
-        """That it leaves one cause, whichever it is."""
+        """Probability that it leaves one cause, for the least favourable true cause."""
         return float(self.chances.min())
 
     @property
     def rank(self) -> tuple[float, int]:
-        """The least first: of those that are sure enough the least trouble, else the surest.
+        """Sort key: sufficiently certain kinds first, by their repetitions, then the others by their probability.
 
-        Where two causes stay alike whatever is done, the one that tells the others apart.
+        The mean probability decides where two causes are never separable.
         """
         if self.chance >= ENOUGH:
             return -ENOUGH, self.times
@@ -147,7 +148,7 @@ class _Choice:
 
     @property
     def duration(self) -> float:
-        """With pauses [s]."""
+        """Duration with pauses [s]."""
         return float(sum(stage.pause + stage.motion.duration for stage in repeat_stages(self.stages, self.times)))
 
     def proposal(self) -> Proposal:
@@ -155,13 +156,13 @@ class _Choice:
 
 
 def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | None:
-    """Finds the experiment that tells possible causes apart.
+    """Finds the experiment that separates the possible causes.
 
-    Where none does that its motions are made once for, they are made several times.
+    If no kind does so when its motions are made once, they are repeated.
 
     Args:
-        problem: the logs there are.
-        causes: two or more, the likeliest first; beyond four, the likeliest four.
+        problem: the logs.
+        causes: two or more, the most likely first; only the first four are used.
 
     Returns:
         The experiment; None for fewer than two causes.
@@ -183,7 +184,7 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
         other = _times(grams, _made(grams, room, index, best.kind, variant), best.times)
         best = min(best, other, key=lambda choice: choice.rank)
     stages = repeat_stages(best.stages, best.times)
-    # What builds up or comes at a moment does not tell twice as much in twice the time.
+    # An effect that builds up or starts at one moment gives less than twice the information in twice the time.
     chance = best.chance if best.times == 1 else grams.chance(stages)
     names = [c.hypothesis.label.replace("_", " ") for c in possible]
     often = f" ({best.times} times)" if best.times > 1 else ""
@@ -211,7 +212,7 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
 
 
 def _by_hand(robot: Robot, stages: Sequence[Stage]) -> str:
-    """Says what is to be hung on the flange, and by how much the base is to be tilted; nothing where neither is."""
+    """Describes the payload to attach and the tilt of the base; empty without both."""
     load = max(stage.payload for stage in stages)
     down = np.asarray(robot.chain.gravity, dtype=float)
     angles = [float(np.arccos(_along(down, stage.gravity))) for stage in stages if stage.gravity is not None]
@@ -228,7 +229,12 @@ def _and(names: Sequence[str]) -> str:
 
 
 def repeat_stages(stages: Sequence[Stage], times: int) -> tuple[Stage, ...]:
-    """Makes each stage so often, one after the other; what is changed before it, such as a payload, is changed once."""
+    """Repeats each stage; a manual change before it, such as a payload, is made once.
+
+    Args:
+        stages: stages of one repetition.
+        times: how often each is made.
+    """
     again = [replace(stage, pause=Stage.pause) for stage in stages]
     return tuple(part for stage, other in zip(stages, again, strict=True) for part in (stage, *(other,) * (times - 1)))
 
@@ -244,7 +250,7 @@ def _times(grams: Grams, choice: _Choice, times: int) -> _Choice:
 
 
 def _longer(grams: Grams, choice: _Choice) -> _Choice:
-    """Makes an experiment's motions as often as it takes, if it may last so long."""
+    """Repeats an experiment's motions until it is certain enough or too long."""
     best = choice
     for times in TIMES:
         more = _times(grams, choice, times)

@@ -1,4 +1,4 @@
-"""What an experiment that has not been made could show: its limits, by the noise that is expected."""
+"""Detection limits of a planned experiment, for the expected noise."""
 
 from __future__ import annotations
 
@@ -31,24 +31,27 @@ from robots.terms.effects import EFFECTS
 Array = NDArray[np.float64]
 
 ORDER = 12
-"""Of the prediction filter of noise that is a sum of white and first-order noise, which has no finite one."""
+"""Order of the prediction filter. A sum of white and first-order noise has no exact finite one."""
 ROUGH = 0.3
-"""Coulomb friction that a plan has at least, over the torque's standard deviation."""
+"""Coulomb friction added to choose the sharpness of the friction sign, over the torque's standard deviation."""
 
 
 def planned_limits(
     model: TorqueModel, parameters: Array, motions: Sequence[Motion], *, noise: Sensors | None = None
 ) -> tuple[Limit, ...]:
-    """Finds the limits of an experiment that has not been made.
+    """Computes the detection limits of a planned experiment.
 
     Args:
         model: the torque model.
         parameters: its standard parameters (p,).
         motions: the planned motions, one after the other on one clock.
-        noise: the torque noise expected.
+        noise: the expected torque noise; the defaults of `Sensors` without it.
+
+    Returns:
+        One limit per hypothesis, in the order of the catalogue.
 
     Raises:
-        InputError: parameters that are not known.
+        InputError: a parameter is unknown.
     """
     problem = planned_problem(model, parameters, motions, noise=noise or Sensors())
     return find_limits(problem, measure(problem, all_hypotheses(model.robot, list(EFFECTS.values()))))
@@ -62,9 +65,17 @@ def planned_problem(
     noise: Sensors,
     level: Array | None = None,
 ) -> Problem:
-    """Poses the diagnosis of an experiment that has not been made: its torque is the model's.
+    """Builds the whitened regression of a planned experiment, with the model's torque as data.
 
-    `level` (n,) [N m or N] is the noise's standard deviation where it is known, else the share that `noise` says.
+    Args:
+        model: the torque model.
+        parameters: its standard parameters (p,).
+        motions: the planned motions, one after the other on one clock.
+        noise: the expected torque noise.
+        level: standard deviation of the noise (n,) [N m or N]; by default the share of the torque stated by `noise`.
+
+    Raises:
+        InputError: a parameter is unknown.
     """
     if not np.isfinite(parameters).all():
         missing = model.columns[int(np.argmin(np.isfinite(parameters)))]
@@ -93,17 +104,17 @@ def planned_problem(
         names=tuple(f"motion {i}" for i in range(1, len(motions) + 1)),
     )
     whitening = expected_whitening(recording, noise, level)
-    # How sharp a sign is shows where there is friction, of which a description may say nothing.
+    # The sharpness of the sign is chosen from friction, which a description may not contain.
     rough = recording.tau + ROUGH * recording.tau.std(axis=0) * np.tanh(joined.dq / SHARP)
     baseline = build_baseline(find_base_parameters(model), replace(recording, tau=rough), whitening.scale)
-    # The parameters are known: the motion's own torque gives them back, and nothing is to hold them elsewhere.
+    # The data determine the known parameters exactly, so no prior is needed.
     size = baseline.base.size + baseline.nuisance.shape[2]
     free = GaussianPrior(np.zeros((size, size)), np.zeros(size))
     return build_problem(recording, baseline, whitening, pull=free)
 
 
 def _at_reversals(dq: Array, starts: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Marks rows (N, n) beside reversals, and those too slow for a sign: a log may not know the direction there."""
+    """Marks rows (N, n) beside reversals, and rows too slow for a known friction sign."""
     turned = np.zeros(dq.shape, dtype=bool)
     turned[1:] = dq[1:] * dq[:-1] < 0
     turned[list(starts)] = False
@@ -112,9 +123,12 @@ def _at_reversals(dq: Array, starts: tuple[int, ...]) -> NDArray[np.bool_]:
 
 
 def expected_whitening(recording: Recording, noise: Sensors, level: Array | None = None) -> Whitening:
-    """Whitens the noise that sensors are expected to have: white and first-order coloured, a share of the torque.
+    """Builds the whitening of expected sensor noise: a white and a first-order coloured part.
 
-    `level` (n,) [N m or N] is its standard deviation where that is known.
+    Args:
+        recording: the planned motion with its torque.
+        noise: the expected torque noise.
+        level: standard deviation of the noise (n,) [N m or N]; by default the share of the torque stated by `noise`.
     """
     size = noise.torque_noise * np.sqrt(np.mean(recording.tau**2, axis=0)) if level is None else level
     size = np.maximum(size, 1e-3 * max(float(size.max()), 1e-9))

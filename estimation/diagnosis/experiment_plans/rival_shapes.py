@@ -1,4 +1,4 @@
-"""Shapes in which a rival would imitate a cause best: after the next experiment it is fitted anew."""
+"""Shapes in which a rival resembles a cause most, since it is refitted after the next experiment."""
 
 from __future__ import annotations
 
@@ -14,15 +14,21 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 
 Array = NDArray[np.float64]
 
-# What is tried around a fitted shape: factors of a logarithmic parameter, shares of the range of another.
+# Shapes tried around a fitted one: factors for logarithmic parameters, shares of the range for others.
 FACTORS, SHARES = (0.5, 0.7, 1.4, 2.0), (-0.25, -0.1, 0.1, 0.25)
-# And so many points of the scan's grid.
+# Approximate number of grid points that are tried as well.
 POINTS = 16
 
 
 @dataclass(frozen=True, eq=False)
 class RivalShape:
-    """A cause with another shape than the one that was fitted."""
+    """A cause with another shape than the fitted one.
+
+    Attributes:
+        hypothesis: effect and joint.
+        shape: its shape parameters.
+        coefficients: zeros (k,); they are refitted.
+    """
 
     hypothesis: Hypothesis
     shape: tuple[float, ...]
@@ -30,10 +36,14 @@ class RivalShape:
 
 
 def find_rival_shapes(problem: Problem, causes: Sequence[Cause]) -> list[tuple[int, RivalShape]]:
-    """Finds for each cause the forms of the others that leave the least of it on the logs there are.
+    """Finds for each pair of causes the shape of the rival that leaves the least of the true cause on the logs.
+
+    Args:
+        problem: the logs.
+        causes: the possible causes with their fitted shapes.
 
     Returns:
-        Index and form of the causes that imitate another better so than as they were fitted.
+        Index of the cause, and its other shape, where that resembles another cause more than the fitted shape does.
     """
     forms = [
         (k, RivalShape(cause.hypothesis, shape, np.zeros(len(cause.coefficients))))
@@ -58,7 +68,7 @@ def _shapes(problem: Problem, cause: Cause) -> Iterator[tuple[float, ...]]:
     state = problem.state_for(effect)
     seen = {cause.shape}
     for shape in (*_around(problem, cause), *_spread(effect.grid(state, joint))):
-        # A moment of the logs says nothing of an experiment.
+        # A change time in the logs has no meaning in a new experiment.
         kept = tuple(
             own if s.moment else value for s, own, value in zip(effect.shapes, cause.shape, shape, strict=True)
         )

@@ -1,4 +1,4 @@
-"""Springs and counterbalances that a log cannot show, however strong: what gravity and offset take for their own."""
+"""Springs and counterbalances that a log does not show, because gravity and offset of the base model absorb them."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from estimation.diagnosis.hypothesis_tests.power import detectable_energy
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from robots.terms.base import force_unit, length_unit
 
-MOVED = 1e-3  # [rad or m] below which a joint has not moved
+MOVED = 1e-3  # travel [rad or m] below which a joint has not moved
 
 
 def undetectable_springs(problem: Problem, false_alarm: float) -> tuple[tuple[int, str], ...]:
-    """Says of which joints a spring as strong as all of their torque would be missed, in a sentence each.
+    """Describes the joints on which a spring as large as the joint's torque RMS is not detectable.
 
-    A spring's or a counterbalance's torque is a smooth function of one position. Over a short range gravity, whose
-    moments are free parameters, and the offset follow any such function: the shorter the range, the better.
+    A spring's or counterbalance's torque is a smooth function of one position. Gravity, whose moments are free
+    parameters, and offset fit such a function; the shorter the range, the better.
 
     Args:
-        problem: the data, the base model projected out.
-        false_alarm: chance of an effect in logs that have none.
+        problem: data with the base model projected out.
+        false_alarm: probability that noise alone gives a finding.
 
     Returns:
         Joint, counted from 1, and sentence.

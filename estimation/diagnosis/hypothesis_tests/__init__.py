@@ -1,1 +1,1 @@
-"""The whitened regression and the test statistics of each effect at each joint."""
+"""Whitened regression, and test statistics for each effect at each joint."""

@@ -1,20 +1,22 @@
-"""The one score by which models are compared: chi-square, less what its parameters cost."""
+"""BIC score by which models are compared: chi-square minus the cost of the parameters."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, RARE_ODDS
+
 
 @dataclass(frozen=True)
 class Evidence:
-    """What data say for a model with an effect against the model without it.
+    """Evidence for a model with an effect, compared with the model without it.
 
     Attributes:
-        chi2: fall of the squared residual, in units of the noise's variance.
-        degrees: parameters fitted: coefficients that show and free shape parameters.
-        rows: number of data N: white rows times the joints that the effect acts on.
-        prior: twice the log of the prior odds against it.
+        chi2: decrease of the squared whitened residual.
+        degrees: number of fitted parameters: visible coefficients and free shape parameters.
+        rows: number of data N: white rows times the joints on which the effect acts.
+        prior: twice the log of the prior odds against the effect.
     """
 
     chi2: float
@@ -24,10 +26,15 @@ class Evidence:
 
     @property
     def bic_gain(self) -> float:
-        """Fall of Schwarz's criterion; larger is better."""
+        """Decrease of the Bayesian information criterion (Schwarz 1978); larger is better."""
         return self.chi2 - self.degrees * math.log(self.rows) - self.prior
 
-    @property
-    def excess(self) -> float:
-        """Chi-square above what as many columns of noise explain on average; not negative."""
-        return max(self.chi2 - self.degrees, 0.0)
+
+def is_close_rival(rare: bool, worse: float) -> bool:
+    """Whether a rival fits about as well: by the data alone, without its prior penalty, if it is rare.
+
+    Args:
+        rare: whether robots seldom have the rival.
+        worse: by how much its BIC is worse.
+    """
+    return worse < (RARE_ODDS if rare else CLOSE_RIVAL_BIC)

@@ -1,4 +1,4 @@
-"""The columns of a hypothesis at one shape, measured against the data."""
+"""Whitened columns of a hypothesis at one shape, and their inner products."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ Small = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """A hypothesis at one shape, measured against the data.
+    """A hypothesis at one shape, whitened, with the base model projected out of its inner products.
 
     Attributes:
-        joints: those it acts on, from 0.
-        columns: whitened (N, k) of each of the joints.
+        joints: joints on which it acts, from 0.
+        columns: whitened columns (N, k) of each of the joints.
         against: <X, Q> (k, b), Q the base model's orthonormal columns.
-        gram: of what the base model leaves of the columns (k, k).
-        raw: squared norms (k,) before that; infinite for columns that are nearly all in rows that do not count.
-        cross: with the residual (k,).
-        high_band_columns: white columns (N', k) of each of the joints above its band; none for effects that are not
+        gram: Gram matrix of the columns (k, k), base model projected out.
+        raw: squared norms (k,) before the projection; infinite for columns that are nearly all in masked rows.
+        cross: inner products with the residual (k,).
+        high_band_columns: white columns (N', k) of each joint above its band; none for effects that are not
             `independent_of_acceleration`.
-        reversal_columns: what each joint's reversals tell of it (n, k), over their errors; None for what is no lag of
-            all torque.
+        reversal_columns: column of each joint's reversal timing over its error (n, k); None if the effect does not
+            delay all torque.
     """
 
     joints: tuple[int, ...]
@@ -39,12 +39,12 @@ class Group:
 
     @property
     def size(self) -> int:
-        """The number of columns k."""
+        """Number of columns k."""
         return len(self.raw)
 
     @property
     def by_reversals(self) -> bool:
-        """Whether most of what tells it are reversals whose rows count neither in a fit nor on unseen data."""
+        """Whether most of its information is from reversal timing, which held-out errors do not contain."""
         return self.reversal_columns is not None and 2.0 * float(np.sum(self.reversal_columns**2)) > float(
             self.gram[0, 0]
         )

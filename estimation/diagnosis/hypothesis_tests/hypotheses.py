@@ -1,4 +1,4 @@
-"""A hypothesis: one effect at one place."""
+"""Hypotheses: one effect at one joint, or on the whole robot."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from robots.terms.effects import Effect, JointEffect, Situation
 
 Array = NDArray[np.float64]
 
-# Rows that are looked at first to tell whether a column is zero.
+# Approximate number of rows that are checked first for a column that is not zero.
 GLANCE = 64
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """An effect at a joint, or on the whole robot.
+    """One effect at one joint, or on the whole robot.
 
     Attributes:
         effect: the effect.
@@ -40,7 +40,15 @@ class Hypothesis:
         return self.name if self.joint is None else f"{self.name} of joint {self.joint}"
 
     def columns(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[int, ...], tuple[Array, ...]]:
-        """Evaluates the columns (N, k) on each joint, from 0, on which they are not zero throughout."""
+        """Evaluates the columns (N, k) on each joint, from 0, on which they are not all zero.
+
+        Args:
+            situation: inputs of the effect (N samples).
+            shape: values of its shape parameters.
+
+        Returns:
+            The joints, from 0, and the columns (N, k) of each [N m or N per unit of the coefficient].
+        """
         if self.effect.needs_full_rate and situation.full_rate is not None:
             joints, parts = self.columns(situation.full_rate.situation, shape)
             return joints, tuple(situation.full_rate.thinned(part) for part in parts)
@@ -51,24 +59,24 @@ class Hypothesis:
         return joints, tuple(np.ascontiguousarray(X[:, j]) for j in joints)
 
     def coefficient_bounds(self, robot: Robot, shape: tuple[float, ...]) -> tuple[Array, Array]:
-        """Least and largest physically possible coefficients (k,) at some shape values."""
+        """Returns the physical bounds of the coefficients, (k,) and (k,), at given shape values."""
         ranges = self.effect.ranges(robot, self.joint, shape)
         return np.array([lower for lower, _ in ranges]), np.array([upper for _, upper in ranges])
 
 
 def all_hypotheses(robot: Robot, effects: Sequence[Effect]) -> tuple[Hypothesis, ...]:
-    """Lists every effect at every place where it can act."""
+    """Lists each effect at each joint where it can act."""
     return tuple(Hypothesis(effect, joint) for effect in effects for joint in effect.joints(robot))
 
 
 def _finite(X: Array) -> Array:
     with np.errstate(all="ignore"):
-        finite = np.isfinite(X.sum())  # one pass where all are, as nearly always
+        finite = np.isfinite(X.sum())  # one pass in the usual case
     return X if finite else np.where(np.isfinite(X), X, 0.0)
 
 
 def acting(columns: Array) -> NDArray[np.bool_]:
-    """Marks columns (N, ...) that are not zero throughout: a few rows tell it, nearly always."""
+    """Marks columns (N, ...) that are not all zero; a few rows usually decide."""
     nonzero = np.asarray(columns[:: len(columns) // GLANCE + 1].any(axis=0))
     nonzero[~nonzero] = columns[:, ~nonzero].any(axis=0)
     return nonzero

@@ -1,4 +1,4 @@
-"""Whether joints agree on a coefficient that all have alike, and how much what each says counts."""
+"""Agreement of the joints on a coefficient that they share."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class PerJointEvidence:
-    """What each of the joints on which an effect of one column acts tells of its coefficient.
+    """Separate estimates of a shared coefficient on the m joints where an effect with one column acts.
 
     Attributes:
-        gram: squares of the column (m,).
-        cross: its products with the residual (m,).
-        certain_share: share (m,) of what they tell that errors of the motion leave.
-        formula_variance: variance (m,) of a joint's own coefficient that the formulas of other effects there may make.
+        gram: squared norm of the column on each joint (m,).
+        cross: its product with the residual (m,).
+        certain_share: share of this information (m,) that remains with errors of the motion.
+        formula_variance: variance of each estimate (m,) due to formula errors of other effects on that joint.
     """
 
     gram: Array
@@ -32,13 +32,17 @@ class PerJointEvidence:
     formula_variance: Array
 
     def subset(self, joints: NDArray[np.bool_]) -> PerJointEvidence:
-        """Gives what some of the joints (m,) tell."""
+        """Selects some of the joints by a mask (m,)."""
         return PerJointEvidence(
             self.gram[joints], self.cross[joints], self.certain_share[joints], self.formula_variance[joints]
         )
 
     def gain(self, *, surely: bool = False) -> float:
-        """What one coefficient of all joints explains, over their Birge ratio; of what is sure of that, where asked."""
+        """Returns the chi-square of one coefficient for all joints, divided by their Birge ratio.
+
+        Args:
+            surely: whether to reduce it to the share that errors of the motion leave.
+        """
         share = self.certain_share if surely else 1.0
         return shared_coefficient_gain(share * self.gram, share * self.cross, self.formula_variance)
 
@@ -46,10 +50,16 @@ class PerJointEvidence:
 def per_joint_evidence(
     problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...], accepted: Accepted
 ) -> PerJointEvidence:
-    """Measures an effect of one column, a torque per time, on each of its joints, beside others.
+    """Fits a delay (an effect with one column, torque per time) on each of its joints separately.
 
-    A log with reversals tells a delay by them, as often as they come; but when a joint turns round is known only as
-    well as its velocity is there, and kicks make that late at each of them alike.
+    Most information on a delay is at reversals. Their times have errors from the velocity, which are alike at each
+    reversal and do not average out. `certain_share` allows for that.
+
+    Args:
+        problem: data and base model.
+        hypothesis: effect and joint.
+        shape: values of its shape parameters.
+        accepted: groups already in the model.
     """
     joints, columns = problem.columns_of(hypothesis, shape)
     gram, cross, sure = np.zeros(len(joints)), np.zeros(len(joints)), np.ones(len(joints))
@@ -62,10 +72,10 @@ def per_joint_evidence(
         if late.any() and gram[k] > 0:
             energies = score(problem, problem.split(group, np.ones(1), late > 0), accepted).gram.sum(axis=1)
             energies = np.maximum(energies, 0.0)
-            # The evidence of the balance of impulses contains its error already.
+            # The impulse balance already includes this error.
             timed = 0.0 if group.reversal_columns is None else float(np.sum(group.reversal_columns**2))
             if energies.sum() > 0:
-                # What each of them has of the column's squares weighs its moment.
+                # Mean square time error, weighted by the column's energy in each row.
                 squares = np.where(late > 0, group.columns[0][:, 0], 0.0) ** 2
                 usual = np.sum(squares * late**2) / max(float(np.sum(squares)), 1e-300)
                 sure[k] = (energies[0] / (1.0 + usual * energies[0]) + energies[1] + timed) / (energies.sum() + timed)
@@ -74,20 +84,21 @@ def per_joint_evidence(
 
 
 def shared_coefficient_gain(gram: Array, cross: Array, apart: Array | None = None) -> float:
-    """What one coefficient of all joints explains, over their Birge ratio.
+    """Returns the chi-square that one coefficient of all joints explains, divided by their Birge ratio.
 
-    One joint may be at odds with the rest, where something else is left on it: it then counts for nothing.
+    One of three or more joints may disagree with the rest because of another error; it is then left out. The largest
+    value over these choices counts.
 
     Args:
-        gram: squares of each joint's column (m,), one or more, of noise one.
-        cross: each one's product with the residual (m,).
-        apart: variance (m,) by which a joint's own coefficient may be another for other effects' sake; none by default.
+        gram: squared norm of each joint's column (m,), m at least 1, noise of unit variance.
+        cross: product of each column with the residual (m,).
+        apart: variance (m,) of each joint's coefficient due to formula errors of other effects; none by default.
     """
     if len(gram) == 1:
         return float(cross[0] ** 2 / gram[0])
     everyone = np.ones((1, len(gram)), dtype=bool)
     sets = np.vstack([everyone, ~np.eye(len(gram), dtype=bool)]) if len(gram) > 2 else everyone
-    # Formulas may be that exact, too: joints that agree need not differ.
+    # The formulas may also be exact, so both variances are tried.
     errors = [np.zeros(len(gram)), *([] if apart is None else [apart])]
     return max(_over_scatter(gram[chosen], cross[chosen], own[chosen]) for chosen in sets for own in errors)
 

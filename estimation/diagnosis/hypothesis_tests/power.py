@@ -1,4 +1,4 @@
-"""How large an effect must be to be seen, and to be told from another: the chances of a likelihood ratio."""
+"""Power of the tests: the size at which an effect is detected, and distinguished from another."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, POWER
 Array = NDArray[np.float64]
 
 DIRECTIONS = 32
-"""Mixtures of its coefficients that an effect of several is judged by."""
+"""Number of coefficient directions at which an effect with several columns is judged."""
 
 
 @lru_cache(maxsize=1024)
 def detectable_energy(degrees: int, tries: int, *, false_alarm: float = 0.01, penalty: float = 0.0) -> float:
-    """Gives the energy lambda = |P e|^2 / sigma^2 at which an effect is found with the chance `POWER`.
+    """Returns the energy lambda = |P e|^2 / sigma^2 at which an effect is found with probability `POWER`.
 
-    The statistic of a test with k degrees of freedom is noncentral chi-squared with lambda; it must exceed the level
-    of `false_alarm` over all `tries` (Bonferroni), and the `penalty` of the selection.
+    The statistic of a test with k degrees of freedom is noncentral chi-square with parameter lambda. It must exceed the
+    `false_alarm` level over all `tries` (Bonferroni) and the `penalty`.
 
     Args:
         degrees: k.
-        tries: independent tests that share the false-alarm chance.
-        false_alarm: the chance that noise alone has an effect named.
-        penalty: what the effect's parameters cost in the selection, k log N.
+        tries: number of tests that share the false-alarm probability.
+        false_alarm: probability that noise alone gives a finding.
+        penalty: cost of the effect's parameters in the BIC, k log N.
     """
     level = max(float(chi2.isf(false_alarm / max(tries, 1), degrees)), penalty)
     return float(brentq(lambda energy: ncx2.sf(level, degrees, energy) - POWER, 1e-9, 10.0 * level + 100.0))
@@ -36,28 +36,36 @@ def detectable_energy(degrees: int, tries: int, *, false_alarm: float = 0.01, pe
 
 @lru_cache
 def resolving_energy(margin: float = CLOSE_RIVAL_BIC) -> float:
-    """Gives the energy at which the wrong cause falls out of the possible ones with the chance `POWER`.
+    """Returns the energy at which the wrong cause is excluded with probability `POWER`.
 
-    Twice the log-likelihood ratio of the true and the wrong cause is normal, of mean lambda and variance 4 lambda,
-    lambda being what the wrong cause leaves of the true effect.
+    Twice the log likelihood ratio of true and wrong cause is normal, with mean lambda and variance 4 lambda. Here
+    lambda is the energy that the wrong cause leaves of the true effect.
+
+    Args:
+        margin: value that twice the log likelihood ratio must exceed.
     """
     root = norm.ppf(POWER) + np.sqrt(norm.ppf(POWER) ** 2 + margin)
     return float(root**2)
 
 
 def chance_to_resolve(energy: float, margin: float = CLOSE_RIVAL_BIC) -> float:
-    """Gives the chance that a wrong cause, which leaves `energy` of the true effect, falls out of the possible ones."""
+    """Returns the probability that a wrong cause is excluded.
+
+    Args:
+        energy: energy that it leaves of the true effect.
+        margin: value that twice the log likelihood ratio must exceed.
+    """
     return float(norm.cdf((energy - margin) / (2.0 * np.sqrt(energy)))) if energy > 0 else 0.0
 
 
 def unit_mixtures(gram: Array) -> Array:
-    """Gives coefficients of an effect of root mean square torque one: mixtures that are spread evenly.
+    """Returns random coefficient vectors of an effect with unit RMS torque.
 
     Args:
-        gram: mean squares and products of the columns as torque (k, k).
+        gram: mean products of the columns as torque (k, k).
 
     Returns:
-        (`DIRECTIONS`, k); no row where the columns are no torque.
+        (`DIRECTIONS`, k); no row if the columns are zero.
     """
     values, vectors = np.linalg.eigh(gram)
     kept = values > 1e-9 * max(float(values[-1]), 1e-300)
@@ -74,14 +82,14 @@ def _directions(count: int) -> Array:
 
 
 def size_per_energy(mixtures: Array, left: Array) -> float:
-    """Gives the size of an effect whose energy is one: its root mean square torque, of a typical mixture of columns.
+    """Returns the RMS torque of an effect whose energy is one, as the median over coefficient vectors.
 
     Args:
-        mixtures: coefficients c of size one (m, k).
-        left: energy of the columns (k, k), base model and rivals projected out, noise white of variance one.
+        mixtures: coefficient vectors c of unit RMS torque (m, k).
+        left: energy of the columns (k, k), base model and rivals projected out, for white noise of unit variance.
 
     Returns:
-        1 / sqrt(c' left c), the median over mixtures; infinite where no energy is left.
+        1 / sqrt(median of c' left c); infinite if no energy is left.
     """
     if not len(mixtures):
         return np.inf
@@ -94,9 +102,9 @@ def residual_energy(left: Array, cross: Array, rival: Array, rival_raw: Array) -
 
     Args:
         left: energy of the effect's columns (k, k).
-        cross: their products with the rival's (k, m).
+        cross: their products with the rival's columns (k, m).
         rival: energy of the rival's columns (m, m).
-        rival_raw: their energy before anything was projected out (m,).
+        rival_raw: their energy before any projection (m,).
 
     Returns:
         (k, k).

@@ -1,4 +1,4 @@
-"""The whitened regression that every hypothesis is measured in, the base model projected out once."""
+"""Whitened regression in which all hypotheses are tested, with the base model projected out."""
 
 from __future__ import annotations
 
@@ -25,33 +25,33 @@ from robots.terms.situations.flange_body import with_body
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
-FAINT = 1e-5
+FAINT = 1e-5  # share of a column's energy below which its unmasked part is only rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Data and base model, white.
+    """Whitened data and base model.
 
-    Inner products are <A, B> = sum_jk P_jk A_j'B_k over joints, P the inverse correlation of their innovations.
+    Inner products are <A, B> = sum_jk P_jk A_j' B_k over joints j, k. P is the inverse correlation of their
+    innovations.
 
     Attributes:
         recording: the data.
         baseline: the base model.
-        whitening: makes the noise white.
-        situation: what effects depend on.
-        weighted_base_columns: P times the base model's orthonormal columns, (n, N, b).
-        residual: P times the white residual of the base model (N, n).
-        white: the white residual of the base model (N, n).
+        whitening: filters that whiten the noise.
+        situation: inputs of the effects.
+        weighted_base_columns: P times the base model's orthonormal columns (n, N, b).
+        residual: P times the whitened residual of the base model (N, n).
+        white: whitened residual of the base model (N, n).
         energy: <r, r> of the residual.
-        base_residual: torque less base model (N0, n) [N m or N], at the recording's own rows.
-        prior: what holds base parameters that the data leave open, in units of rows over the noise's scale.
-        high_band: the frequencies above the bands; None where nothing is asked of them.
-        total_torque_state: what effects depend on that act on all of the torque, as far as that is known; None where
-            none is seen.
-        timing: how late torque is against reversals whose rows do not count; None where that is not known.
-        delayed_torque_state: what those depend on that make all of it late, with the other effects found before; None
-            without any.
-        extra_load: what of the effects found before the gears bear, in `situation`; None for nothing.
+        base_residual: torque minus base model (N0, n) [N m or N], at the recording's own rows.
+        prior: prior of base parameters and nuisance, for rows weighted by the inverse noise scale.
+        high_band: regression above the bands; None without it.
+        total_torque_state: inputs of effects that act on the total torque; None if no log shows such an effect.
+        timing: delay of torque measured at reversals; None if unknown.
+        delayed_torque_state: inputs of effects that delay the torque, with the torque of the other selected effects;
+            None without any.
+        extra_load: gear load of the selected effects, already part of `situation`; None for none.
     """
 
     recording: Recording
@@ -71,7 +71,7 @@ class Problem:
     extra_load: ExtraGearLoad | None = None
 
     def state_for(self, effect: Effect) -> Situation:
-        """Gives what an effect depends on."""
+        """Returns the situation on which an effect depends."""
         if effect.acts_on_total_torque and self.total_torque_state is not None:
             return self.total_torque_state
         return (
@@ -92,7 +92,7 @@ class Problem:
 
     @property
     def parameters_without_payload(self) -> Array:
-        """The base model's parameters (p,) without the payload that the first log may carry."""
+        """Parameters of the base model (p,) without the known payload of the first log."""
         return with_body(self.situation.model, self.situation.parameters, -self.recording.bodies[0])
 
     @cached_property
@@ -102,22 +102,21 @@ class Problem:
 
     @cached_property
     def score_gradient(self) -> Array:
-        """What torque in each of the recording's rows (N0, n) explains, per unit: half the slope of <r, r>.
+        """Gradient (N0, n) of half the explained chi-square with respect to torque in each row [1/(N m) or 1/N].
 
-        The sum of its products with an effect's torque is that effect's product with the residual, as far as the base
-        model has no part in it; zero where a joint rests.
+        Its inner product with an effect's torque is that effect's <X, r>. It is zero where a joint rests.
         """
         rows = len(self.recording)
         return np.column_stack([self.whitening.adjoint(self.residual[:, j], j, rows) for j in range(self.n)])
 
     @cached_property
     def score_gradient_with_high_band(self) -> Array:
-        """The slope (N0, n) for what is `independent_of_acceleration`: with the frequencies above the bands."""
+        """Gradient (N0, n) for effects that are `independent_of_acceleration`: includes the high band."""
         return self._with_high_band(bare=False)
 
     @cached_property
     def score_gradient_exogenous(self) -> Array:
-        """The slope (N0, n) for what is `exogenous` besides."""
+        """Gradient (N0, n) for such effects that are also `exogenous`: no base model is fitted in the high band."""
         return self._with_high_band(bare=True)
 
     def _with_high_band(self, *, bare: bool) -> Array:
@@ -129,7 +128,7 @@ class Problem:
         )
 
     def score_gradient_for(self, effect: Effect) -> Array:
-        """Gives the slope (N0, n) by which the points of an effect's grid are ranked."""
+        """Returns the gradient (N0, n) by which the points of an effect's grid are ranked."""
         return (
             self.score_gradient_exogenous
             if effect.exogenous
@@ -139,25 +138,35 @@ class Problem:
         )
 
     def columns_of(self, hypothesis: Hypothesis, shape: tuple[float, ...]) -> tuple[tuple[int, ...], tuple[Array, ...]]:
-        """Evaluates a hypothesis: the joints it acts on, and its columns (N, k) on each."""
+        """Evaluates a hypothesis: the joints on which it acts, from 0, and its columns (N0, k) on each."""
         return hypothesis.columns(self.state_for(hypothesis.effect), shape)
 
     def measured(self, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Group:
-        """Evaluates a hypothesis at a shape and measures it."""
+        """Evaluates a hypothesis at one shape and returns its group."""
         return self.group(*self.columns_of(hypothesis, shape), effect=hypothesis.effect)
 
     def group(self, joints: tuple[int, ...], columns: tuple[Array, ...], *, effect: Effect | None = None) -> Group:
-        """Whitens columns (N, k) of some joints and projects the base model out of them.
-
-        Of an `effect` on whose size all joints agree, columns count that are largest where motion is not known, if most
-        of what counts is from elsewhere. One that is fast is measured above the bands too.
-        """
+        """Whitens columns (N0, k) of some joints and projects the base model out, as `groups` does."""
         return self.groups(joints, columns, 1, effect=effect)[0]
 
     def groups(
         self, joints: tuple[int, ...], columns: tuple[Array, ...], count: int, *, effect: Effect | None = None
     ) -> list[Group]:
-        """Does what `group` does for several groups on the same joints at once: columns (N, count k), k of each."""
+        """Whitens columns of several groups on the same joints at once and projects the base model out.
+
+        Columns that are nearly all in masked rows get infinite `raw`. Columns of an effect with a `shared_coefficient`
+        do not, if most of their unmasked energy is away from rows of unknown friction sign. Effects
+        `independent_of_acceleration` include the high band.
+
+        Args:
+            joints: joints on which the columns act, from 0.
+            columns: (N0, count k) on each joint, k columns per group.
+            count: number of groups.
+            effect: the effect of the columns; None for other columns.
+
+        Returns:
+            One group per k columns.
+        """
         whole, white = zip(*(self._whitened(part, j) for j, part in zip(joints, columns, strict=True)), strict=True)
         total = white[0].shape[1]
         k = total // count
@@ -168,7 +177,7 @@ class Problem:
             how = {"calm": effect.acceleration_driven, "bare": effect.exogenous}
             above = [self.high_band.columns(part, j, **how) for j, part in zip(joints, columns, strict=True)]
             above = above if any(map(len, above)) else []
-        # What acts above the bands counts there, however little of it those let through.
+        # A column may have little energy in the band and still be visible in the high band.
         power = [own + sum(map(_squares, above)) for own in power]
         raw = np.where(power[0] > MIN_COUNTED_ENERGY * power[1], power[0], np.inf)
         doubtful = np.flatnonzero(np.isinf(raw) & (power[0] > FAINT * power[1]))
@@ -205,12 +214,12 @@ class Problem:
         ]
 
     def _whitened(self, columns: Array, joint: int) -> tuple[Small, Small]:
-        """Whitens columns (N, k) of a joint: with the rows that do not count, and without."""
+        """Whitens columns (N0, k) of a joint: with all rows, and with masked rows projected out."""
         acts = acting(columns)
         if acts.all():
             whole = self.whitening.filtered(columns, joint, single=True)
             return whole, self.whitening.counted(whole, joint)
-        # A push has a column for each joint, zero on all others.
+        # A contact has one column per joint, each zero on all other joints.
         whole, white = (np.zeros((self.rows, len(acts)), np.float32, order="F") for _ in range(2))
         if acts.any():
             whole[:, acts], white[:, acts] = self._whitened(columns[:, acts], joint)
@@ -221,7 +230,7 @@ class Problem:
         return np.asfortranarray(self.residual, dtype=np.float32)
 
     def _products(self, joints: tuple[int, ...], white: Sequence[Small], count: int) -> tuple[Array, Array, Array]:
-        """Products of white columns (N, count k) with base model (count k, b), residual, each other (count, k, k)."""
+        """Multiplies white columns (N, count k) by base model (count k, b), residual, each other (count, k, k)."""
         total = white[0].shape[1]
         against, cross = np.zeros((total, self.weighted_base_columns.shape[2])), np.zeros(total)
         gram = np.zeros((count, total // count, total // count))
@@ -236,28 +245,28 @@ class Problem:
         return against, cross, gram
 
     def split(self, group: Group, coefficients: Array, rows: NDArray[np.bool_]) -> Group:
-        """Makes two columns of a torque: what it is in some white rows (N,) of its joints' bands, and the rest."""
+        """Splits a group's torque into two white columns: its part in the given white rows (N,), and the rest."""
         torques = [part.astype(np.float64) @ coefficients for part in group.columns]
         white = [np.column_stack([np.where(rows, x, 0.0), np.where(rows, 0.0, x)]) for x in torques]
         return self.white_group(group.joints, white)
 
     def white_group(self, joints: tuple[int, ...], white: Sequence[Array]) -> Group:
-        """Measures columns (N, k) of some joints that are white already."""
+        """Builds a group of columns (N, k) of some joints that are already white."""
         small = tuple(np.asfortranarray(part, dtype=np.float32) for part in white)
         against, cross, (gram,) = self._products(joints, small, 1)
         return Group(joints, small, against, gram - against @ against.T, np.diag(gram).copy(), cross)
 
     @cached_property
     def far_from_reversals(self) -> NDArray[np.bool_]:
-        """Marks white rows (N,) in which no joint has turned round, come to rest or left it, nor is about to."""
+        """White rows (N,) in which no joint is near a reversal, or near the start or end of a rest."""
         return self.recording.far_from_reversals(self.whitening.stride)
 
     def reversal_time_error(self, joint: int) -> Array:
-        """How late a joint may turn round [s] by what is not known of its velocity, in white rows (N,)."""
+        """Returns the error [s] of a joint's reversal times due to its velocity error, in white rows (N,)."""
         return self.recording.reversal_time_error_near(joint, self.whitening.stride)
 
     def _known(self, joints: tuple[int, ...], columns: Sequence[Array]) -> Array:
-        """Energy (k,) of whitened columns (N, k) of some joints that is not from beside rows of unknown direction."""
+        """Returns the whitened energy (k,) of columns (N0, k) away from rows of unknown friction sign."""
         total = np.zeros(columns[0].shape[1])
         for j, X in zip(joints, columns, strict=True):
             apart = self.whitening.apply(X * self._distant_from[:, j, None], j)
@@ -266,11 +275,11 @@ class Problem:
 
     @cached_property
     def _distant_from(self) -> NDArray[np.bool_]:
-        """Marks rows (N, n) away from those of unknown direction."""
+        """Rows (N0, n) away from rows of unknown friction sign."""
         return self.recording.distant_from(self.recording.sign_unknown)
 
     def product(self, first: Group, second: Group) -> Array:
-        """Inner products (k1, k2) of what the base model leaves of two groups."""
+        """Returns the inner products (k1, k2) of two groups, with the base model projected out."""
         P = self.whitening.precision
         total = -(first.against @ second.against.T)
         for a, left in zip(first.joints, first.columns, strict=True):

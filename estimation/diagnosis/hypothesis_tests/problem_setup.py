@@ -1,4 +1,4 @@
-"""Sets up the whitened regression: fits the base model and projects it out."""
+"""Setup of the whitened regression: fits the base model and projects it out."""
 
 from __future__ import annotations
 
@@ -29,24 +29,25 @@ def build_problem(
     followed: Array | None = None,
     bearing: ExtraGearLoad | None = None,
 ) -> Problem:
-    """Fits the base model to white data.
+    """Builds the whitened regression and fits the base model in it.
 
     Args:
         recording: the data.
         baseline: the base model.
-        whitening: makes the noise white.
-        extra: torque (N, n) of effects that are known already, taken off before the base model's situation is computed.
-        pull: what holds base parameters that the data leave open; by default `base_model_prior`, loosened.
-        upper: the frequencies above the bands.
-        followed: that part (N, n) of the known effects' torque which others may make late.
-        bearing: what of the known effects the gears bear; None for nothing.
+        whitening: filters that whiten the noise.
+        extra: torque (N, n) of known effects [N m or N], subtracted before the base parameters are fitted.
+        pull: prior of base parameters and nuisance; by default `base_model_prior`, inflated where the data contradict
+            it.
+        upper: regression above the bands.
+        followed: the part (N, n) of the known effects' torque that effects of time delay also delay [N m or N].
+        bearing: gear load of the known effects; None for none.
     """
     n = recording.n
     root = np.linalg.cholesky(whitening.precision)  # P = L L'
     columns = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
     norms = np.sqrt((columns**2).sum(axis=(0, 1)))
     white = whitening.all(columns[:, :, norms > 0])
-    # What is left of a column that acts in rows of unknown direction alone is rounding.
+    # A column that acts only in rows of unknown friction sign is rounding after whitening.
     left = np.sqrt((white**2).sum(axis=(0, 1))) * whitening.scale.max() / norms[norms > 0]
     white = white[:, :, left > FAINT]
     N = len(white)
@@ -85,16 +86,27 @@ def build_problem(
 
 
 def fit_values(baseline: Baseline, scale: Array, unsure: NDArray[np.bool_], tau: Array, pull: GaussianPrior) -> Array:
-    """Fits base parameters (b,) to torque (N, n), weighed by the noise of each joint (n,) or of each row too (N, n).
+    """Fits base parameters (b,) to torque (N, n) by their posterior maximum.
 
-    Directions that the log does not determine go where the pull has them.
+    Args:
+        baseline: the base model.
+        scale: standard deviation of the noise, per joint (n,) or per row (N, n) [N m or N].
+        unsure: rows (N, n) without weight.
+        tau: torque (N, n) [N m or N].
+        pull: prior, which determines directions that the log does not.
     """
     gram, cross = normal_equations(baseline, ~unsure / scale, tau)
     return solve_map(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
 
 
 def normal_equations(baseline: Baseline, weights: Array, tau: Array) -> tuple[Array, Array]:
-    """Gives each joint's normal equations (n, p, p), (n, p) of base parameters and nuisance, rows weighed (N, n)."""
+    """Returns each joint's normal equations (n, p, p), (n, p) of base parameters and nuisance.
+
+    Args:
+        baseline: the base model, with p columns including nuisance.
+        weights: row weights (N, n) [1/(N m) or 1/N].
+        tau: torque (N, n) [N m or N].
+    """
     size = baseline.regressor.shape[2] + baseline.nuisance.shape[2]
     gram, cross = np.zeros((tau.shape[1], size, size)), np.zeros((tau.shape[1], size))
     for j, weight in enumerate(weights.T):

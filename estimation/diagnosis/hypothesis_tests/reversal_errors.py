@@ -1,4 +1,4 @@
-"""How much of what an effect explains an error in the moments of a joint's reversals would explain as well."""
+"""Chi-square of an effect that errors of a joint's reversal times could explain as well."""
 
 from __future__ import annotations
 
@@ -12,10 +12,17 @@ from robots.terms.effects import EFFECTS
 
 
 def gain_from_reversal_errors(problem: Problem, joint: int, group: Group, gain: float, accepted: Accepted) -> float:
-    """Gives the part of a gain that is gone where the reversals of a joint (from 1) may all be late by their error.
+    """Returns the part of a gain that disappears if all reversals of a joint may be late by their time error.
 
-    Friction that turns round over a short way is late for that. What the moments' error allows is fitted beside it,
-    with that error as its prior.
+    Friction that changes sign gradually over a short travel resembles such an error. The delay is fitted beside the
+    effect, with the time error as its prior standard deviation.
+
+    Args:
+        problem: data and base model.
+        joint: counted from 1.
+        group: the effect's columns.
+        gain: chi-square that they explain.
+        accepted: groups already in the model.
     """
     late = problem.reversal_time_error(joint - 1)
     if not late.any():
@@ -29,7 +36,7 @@ def gain_from_reversal_errors(problem: Problem, joint: int, group: Group, gain: 
     allowed = other.gram + usual**-2.0
     gram = own.gram - between @ between.T / allowed
     cross = own.cross - (between * other.cross / allowed)[:, 0]
-    # Directions that the error of the moments explains wholly tell nothing.
+    # Directions that the time error explains completely contain no information.
     values, vectors = np.linalg.eigh(gram)
     determined = values > 1e-9 * max(float(np.trace(own.gram)), 1e-300)
     left = float(np.sum((vectors[:, determined].T @ cross) ** 2 / values[determined]))

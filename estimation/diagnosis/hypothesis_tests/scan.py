@@ -1,4 +1,4 @@
-"""The scan: all hypotheses at all shapes as score tests, with p-values for all of them together."""
+"""Scan: score tests of all hypotheses at all shapes, with family-wise p-values."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from robots.common.parallel import threaded
 
 Array = NDArray[np.float64]
 
-# A grid longer than this is not scanned whole: its effect proposes points, and still pays for the whole grid.
+# Longer grids are not scanned completely: the effect proposes points. The p-value still counts the whole grid.
 LONG = 60
 PROPOSED = 6
-# Hypotheses after which what their evaluation has left of the heap is given back.
+# Number of hypotheses after which freed memory is returned to the system.
 OFTEN = 20
-# Columns that are whitened side by side.
+# Number of columns that are whitened together.
 WIDE = 32
 
 T = TypeVar("T")
@@ -35,15 +35,15 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """A hypothesis with all its shapes measured.
+    """A hypothesis, evaluated at all its shapes.
 
     Attributes:
         hypothesis: effect and joint.
         shapes: the points scanned.
-        groups: one a point.
-        tries: points that the choice was made from.
-        sizes: mean products of each group's columns as shares of the joint's torque (points, k, k), on the joint where
-            they are largest.
+        groups: one per point.
+        tries: number of points of the whole grid, for the Bonferroni correction.
+        sizes: mean products of the columns relative to the joint's torque RMS (points, k, k), on the joint where they
+            are largest.
     """
 
     hypothesis: Hypothesis
@@ -55,15 +55,15 @@ class Entry:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """A hypothesis in one scan.
+    """Result of one hypothesis in a scan.
 
     Attributes:
         hypothesis: effect and joint.
         shape: the best point.
-        gain: squared residual explained there, coefficients within their bounds.
-        visible: largest share of a column's energy that the model before leaves.
-        evidence: -log of the p-value of the best point times the points tried (Bonferroni).
-        degrees: directions that show; 0 where the log cannot tell.
+        gain: chi-square explained there, with bounded coefficients.
+        visible: largest share of a column's energy that the accepted model does not absorb.
+        evidence: -log(p), p the p-value of the best point times the number of points tried (Bonferroni).
+        degrees: number of visible directions; 0 if the log shows none.
     """
 
     hypothesis: Hypothesis
@@ -76,10 +76,10 @@ class Outcome:
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """All hypotheses, the strongest first.
+    """Results of all hypotheses.
 
     Attributes:
-        outcomes: sorted by evidence.
+        outcomes: sorted by evidence, the strongest first.
     """
 
     outcomes: tuple[Outcome, ...]
@@ -89,14 +89,23 @@ class Scan:
         return sum(outcome.degrees > 0 for outcome in self.outcomes)
 
     def p_value(self, outcome: Outcome) -> float:
-        """Family-wise p-value: a bound on the chance that noise alone has a hypothesis this strong (Bonferroni)."""
+        """Returns the family-wise p-value (Bonferroni), a bound on the probability in pure noise."""
         return min(1.0, max(self._tests * math.exp(-outcome.evidence), sys.float_info.min))
 
 
 def measure(
     problem: Problem, hypotheses: Sequence[Hypothesis], advance: Callable[[float], None] = lambda share: None
 ) -> list[Entry]:
-    """Evaluates, whitens and projects the columns of every hypothesis at every shape."""
+    """Evaluates each hypothesis at each shape, whitens its columns and projects the base model out.
+
+    Args:
+        problem: data and base model.
+        hypotheses: effects and joints.
+        advance: is called with the share of the work done.
+
+    Returns:
+        One entry per hypothesis that the data can show.
+    """
     done = 0
 
     def one(hypothesis: Hypothesis) -> Entry | None:
@@ -114,7 +123,7 @@ def measure(
 def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
     joint = hypothesis.joint
     if joint is not None and problem.recording.sign_unknown[:, joint - 1].all():
-        # A joint that rests throughout: friction holds against whatever acts there.
+        # Static friction balances any torque on a joint that rests throughout.
         return None
     situation = problem.state_for(hypothesis.effect)
     shapes = hypothesis.effect.grid(situation, joint)
@@ -134,7 +143,7 @@ def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
     groups: dict[int, Group] = {}
     sizes: dict[int, Array] = {}
     for joints, members in batches.items():
-        # Shapes side by side: one product with the base model and one with the nulls instead of one for each.
+        # One product for many shapes is faster than one for each.
         for chunk in _chunks(members, max(1, WIDE // members[0][1][0].shape[1])):
             together = tuple(
                 np.concatenate([p.T for p in parts]).T for parts in zip(*(c for _, c in chunk), strict=True)
@@ -171,9 +180,9 @@ def _size(problem: Problem, joints: tuple[int, ...], columns: tuple[Array, ...])
 
 
 def scan(problem: Problem, entries: Sequence[Entry], accepted: Accepted) -> Scan:
-    """Scores all entries beside what is accepted.
+    """Computes the score of all entries beside the accepted groups.
 
-    Each hypothesis pays for the points of its grid, so that a fine grid is no advantage.
+    The p-value of a hypothesis is multiplied by the number of its grid points, so a fine grid is no advantage.
     """
     outcomes = [_outcome(problem, entry, accepted) for entry in entries]
     return Scan(tuple(sorted(outcomes, key=lambda o: -o.evidence)))
@@ -186,7 +195,7 @@ def _outcome(problem: Problem, entry: Entry, accepted: Accepted) -> Outcome:
         result = score(problem, group, accepted)
         if not result.degrees:
             continue
-        # Within physical bounds: a gear of negative stiffness is no alarm.
+        # Coefficients stay within physical bounds: a negative stiffness is not a finding.
         gain = result.bounded(*entry.hypothesis.coefficient_bounds(robot, shape))[0]
         evidence = neg_log_p(gain, result.degrees) - math.log(entry.tries)
         if not best.degrees or evidence > best.evidence:
@@ -195,10 +204,15 @@ def _outcome(problem: Problem, entry: Entry, accepted: Accepted) -> Outcome:
 
 
 def neg_log_p(statistic: float, degrees: int) -> float:
-    """Gives -log of the chance that a chi-square variable of these degrees of freedom is as large."""
+    """Returns -log of the upper tail probability of a chi-square variable.
+
+    Args:
+        statistic: value of the variable.
+        degrees: degrees of freedom.
+    """
     half = statistic / 2
     p = float(gammaincc(degrees / 2, half))
     if p > 1e-290:
         return -math.log(p)
-    # Beyond the smallest double the tail's leading term is exact to a per cent of a unit.
+    # Near the smallest double only the leading term of the tail is used; its error is about 0.01.
     return half - (degrees / 2 - 1) * math.log(half) + math.lgamma(degrees / 2)

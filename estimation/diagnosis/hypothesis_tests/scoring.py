@@ -1,4 +1,4 @@
-"""What a group of columns explains beyond the base model and the groups that are part of the model already."""
+"""Score of a group: what it explains beyond the base model and the groups already accepted."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Accepted:
-    """Groups that are part of the model already, their columns orthonormal beside the base model.
+    """Groups that are already part of the model, with orthonormal columns beside the base model.
 
     Attributes:
-        groups: the groups.
-        root: L^-1 with L L' their joint Gram matrix (a, a): makes their columns orthonormal.
-        cross: orthonormal columns with the residual (a,).
+        groups: the groups, with a columns together.
+        root: L^-1 with L L' their joint Gram matrix (a, a); makes their columns orthonormal.
+        cross: products of the orthonormal columns with the residual (a,).
     """
 
     groups: tuple[Group, ...]
@@ -31,11 +31,15 @@ class Accepted:
 
     @property
     def gain(self) -> float:
-        """Squared residual that the groups explain together."""
+        """Chi-square that the groups explain together."""
         return float(self.cross @ self.cross)
 
     def torque(self, white: Array) -> Array:
-        """Gives the groups' torque together, as large as explains most, at white rows (N, n) like these."""
+        """Returns the groups' whitened torque (N, n), fitted by least squares.
+
+        Args:
+            white: array of the result's shape (N, n).
+        """
         total, coefficients = np.zeros_like(white), self.root.T @ self.cross
         for group in self.groups:
             own, coefficients = coefficients[: group.size], coefficients[group.size :]
@@ -45,7 +49,7 @@ class Accepted:
 
 
 def accept(problem: Problem, groups: tuple[Group, ...]) -> Accepted:
-    """Joins groups into one set of orthonormal columns."""
+    """Combines groups into one set of orthonormal columns."""
     if not groups:
         return Accepted((), np.zeros((0, 0)), np.zeros(0))
     gram = np.block([[problem.product(a, b) for b in groups] for a in groups])
@@ -57,14 +61,14 @@ def accept(problem: Problem, groups: tuple[Group, ...]) -> Accepted:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """What a group explains beyond base model and accepted groups.
+    """Regression of a group on the residual, with base model and accepted groups projected out.
 
     Attributes:
-        gram: (k, k).
-        cross: (k,).
-        raw: (k,).
-        root: (k', k): makes the visible directions orthonormal.
-        onto: orthonormal accepted columns times the group's (a, k).
+        gram: Gram matrix of the columns (k, k).
+        cross: products with the residual (k,).
+        raw: squared norms before any projection (k,).
+        root: (k', k), makes the visible directions orthonormal.
+        onto: products of the accepted orthonormal columns with the group's (a, k).
     """
 
     gram: Array
@@ -75,33 +79,33 @@ class Score:
 
     @property
     def degrees(self) -> int:
-        """Directions that show."""
+        """Number of visible directions k'."""
         return len(self.root)
 
     @property
     def gain(self) -> float:
-        """Squared residual explained, unbounded coefficients."""
+        """Chi-square explained with unbounded coefficients."""
         return float(np.sum((self.root @ self.cross) ** 2))
 
     @property
     def visible(self) -> float:
-        """Largest share of a column's energy that is left beside the base model."""
+        """Largest share of a column's energy that the base model and the accepted groups do not absorb."""
         return float(np.max(np.diag(self.gram) / np.maximum(self.raw, 1e-300), initial=0.0))
 
     def coefficients(self) -> Array:
-        """Least squares in the visible directions (k,)."""
+        """Returns the least-squares coefficients (k,) in the visible directions."""
         return np.asarray(self.root.T @ (self.root @ self.cross))
 
     def bounded(self, lower: Array, upper: Array) -> tuple[float, Array]:
-        """Squared residual explained, and coefficients (k,), within bounds (k,)."""
+        """Returns chi-square explained and coefficients (k,) within their bounds (k,)."""
         c = self.coefficients()
         if not self.degrees:
             return 0.0, c
         if np.all((c >= lower) & (c <= upper)):
             return self.gain, c
-        # min |A c - y|^2 with A'A the Gram matrix in its visible directions.
+        # min |A c - y|^2, with A'A the Gram matrix in its visible directions.
         y = self.root @ self.cross
-        if len(c) == 1:  # most effects have one column, and a scan thousands of those
+        if len(c) == 1:  # fast path: most of the thousands of columns in a scan
             A, c = 1.0 / self.root, np.asarray(np.clip(c, lower, upper))
         else:
             A = np.asarray(np.linalg.pinv(self.root.T))
@@ -110,7 +114,7 @@ class Score:
 
 
 def score(problem: Problem, group: Group, accepted: Accepted) -> Score:
-    """Projects the accepted groups out of a group."""
+    """Projects the accepted groups out of a group and returns its score."""
     if not accepted.groups:
         onto = np.zeros((0, group.size))
     else:
@@ -121,7 +125,14 @@ def score(problem: Problem, group: Group, accepted: Accepted) -> Score:
 
 
 def visible_root(gram: Array, raw: Array) -> Array:
-    """Gives R (k', k) with R gram R' the identity on the directions that show beside what was projected out."""
+    """Returns R (k', k) with R gram R' = I on the visible directions.
+
+    A direction is visible if the projections leave at least `MIN_VISIBLE_ENERGY` of its energy.
+
+    Args:
+        gram: Gram matrix after the projections (k, k).
+        raw: squared norms before them (k,).
+    """
     if len(raw) == 1:
         return gram**-0.5 if gram[0, 0] > MIN_VISIBLE_ENERGY * max(raw[0], 1e-300) else np.zeros((0, 1))
     scale = np.sqrt(np.maximum(raw, 1e-300))

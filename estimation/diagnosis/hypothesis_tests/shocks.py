@@ -1,4 +1,4 @@
-"""Whether what acts for a moment is more than one shock of the noise: tails are heavy, and a memory spreads them."""
+"""Test whether a short effect is more than one shock of the noise, which has heavy tails and memory."""
 
 from __future__ import annotations
 
@@ -10,27 +10,35 @@ from scipy.ndimage import maximum_filter1d
 from scipy.signal import correlate
 
 from estimation.diagnosis.calibration import MAX_GLITCH_SHARE, SHOCK_COUNT
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
 
 Array = NDArray[np.float64]
 
-# Points between two white rows at which a shock is looked for.
+# Number of positions between two white rows at which a shock is searched.
 BETWEEN = 9
-# The largest shocks elsewhere tell the noise's tail: this share of all, so many at least and at most. Where as many as
-# this are likely as large, it may be one.
+# The largest shocks elsewhere give the tail of the noise: this share of all, with a least and a largest number.
 TAIL, FEWEST, MOST = 0.02, 5, 20
 
 
 def gain_beside_shock(problem: Problem, member: FittedEffect, accepted: Accepted) -> FittedEffect:
-    """Measures what an effect explains beside what is accepted and one shock of the noise, if that may have been one.
+    """Refits an effect beside the accepted groups and one noise shock, if the noise may contain such a shock.
 
-    Noise with memory comes of innovations; a single one that is far out (an innovational outlier, Fox 1972) makes a
-    bump that decays as the noise does, and in a band of low frequencies a bump of white rows. Where tails are heavy one
-    of many thousands is as large as any push; but to be taken for one the noise would need two that meet. Where nothing
-    else in the log comes near, it is a shock only of one joint that it explains nearly wholly.
+    A single outlier of the innovations (innovational outlier, Fox 1972) makes a bump that decays like the noise, and a
+    bump of white rows after the low-pass. With heavy tails, one of many thousands is as large as a contact.
+
+    If the tail makes shocks of this size likely, one shock on each joint is fitted beside the effect. Otherwise one on
+    a single joint is fitted, and counts only if it explains nearly all of the effect.
+
+    Args:
+        problem: data and base model.
+        member: the effect.
+        accepted: groups already in the model.
+
+    Returns:
+        The effect with its gain beside the shock, or unchanged.
     """
     joints, stride = member.group.joints, problem.whitening.stride
     acts = member.acts()
@@ -53,7 +61,7 @@ def gain_beside_shock(problem: Problem, member: FittedEffect, accepted: Accepted
 
 
 def _bump(problem: Problem, joint: int, offset: float) -> Array:
-    """Gives the white rows of a shock of unit size, `offset` rows of the recording after the middle one of them."""
+    """Returns the white rows of a unit shock, `offset` recording rows after the middle white row."""
     band, stride = problem.whitening.bands[joint], problem.whitening.stride
     if not len(band.taps):
         return np.ones(1)
@@ -65,16 +73,16 @@ def _bump(problem: Problem, joint: int, offset: float) -> Array:
 
 
 def _sizes(problem: Problem, left: Array, joints: tuple[int, ...], offset: float) -> Array:
-    """Gives the size of a shock on each joint (N, joints) that explains most, so many rows after each white row."""
+    """Returns the best-fitting size of a shock (N, joints) at `offset` recording rows after each white row."""
     weights = problem.whitening.weights
-    # As large as it was, not as it counts.
+    # Outliers have a smaller weight; the shock's full size is needed here.
     whole = left if weights is None else left / np.maximum(weights, 1e-3)
     columns = [correlate(whole[:, j], _bump(problem, j, offset), mode="same", method="direct") for j in joints]
     return np.abs(np.column_stack(columns))
 
 
 def _chance(problem: Problem, sizes: Array, joints: tuple[int, ...], size: float) -> float:
-    """Gives how many shocks of a size the noise is expected to have, by the others' (N, joints): Hill's tail (1975)."""
+    """Returns the expected number of noise shocks as large as `size`, by the tail of the others (Hill 1975)."""
     step = problem.recording.step * problem.whitening.stride
     peaks = []
     for k, j in enumerate(joints):
@@ -90,7 +98,7 @@ def _chance(problem: Problem, sizes: Array, joints: tuple[int, ...], size: float
 
 
 def _shock(problem: Problem, joints: tuple[int, ...], place: int, offset: float) -> Group:
-    """Gives a shock so many rows of the recording after a white row: a size on each joint."""
+    """Builds the group of a shock at `offset` recording rows after a white row, with one size per joint."""
     columns = []
     for k, j in enumerate(joints):
         bump = _bump(problem, j, offset)

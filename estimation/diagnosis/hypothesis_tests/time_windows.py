@@ -1,4 +1,4 @@
-"""When an effect acts whose formula holds throughout: by what it explains in all windows of time at once."""
+"""Search for the time window in which a formula that holds throughout the log explains most."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from estimation.diagnosis.hypothesis_tests.scoring import Accepted
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
-# Windows begin and end at multiples of this [s], about a known part by this much more on either side at most, and of a
-# second, finer look.
+# Spacing of the window edges [s] in the coarse and the fine search, and their reach beyond the known window [s].
 COARSE, FINE, BESIDE = 0.5, 0.05, 60.0
-# Directions of less than this share of a column's energy are hardly any.
+# FAINT regularises nearly dependent columns, as a share of their energy. ROUNDING: share of a column's energy over the
+# whole log below which a window has only rounding errors.
 FAINT, ROUNDING = 1e-5, 1e-10
 
 
@@ -27,7 +27,7 @@ class Window:
     """The best window of one formula.
 
     Attributes:
-        gain: squared residual explained there, as far as the base model has no part in it.
+        gain: chi-square explained there, without allowing for the base model's share in it.
         start: [s].
         duration: [s].
     """
@@ -40,17 +40,17 @@ class Window:
 def best_window(
     problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...], beside: Accepted, known: tuple[float, float]
 ) -> Window:
-    """Finds the window in which columns explain most, of all about the middle of a known one.
+    """Finds the window around a known one in which the columns explain most.
 
-    White columns of a window are those of all time in it, but for its ends: sums over rows that come before give the
-    products of each.
+    The whitened columns of a window equal those of the whole log inside it, except near its ends. Differences of
+    cumulative sums therefore give the products of each window.
 
     Args:
-        problem: the data.
+        problem: data and base model.
         hypothesis: effect and joint.
-        shape: of columns that act throughout the log.
-        beside: what is accepted.
-        known: start and end of a part of it [s].
+        shape: shape values for which the columns act throughout the log.
+        beside: groups already in the model.
+        known: start and end of the known window [s].
     """
     rows = _independent(problem, hypothesis, shape)
     left = (problem.white - beside.torque(problem.white)) @ np.linalg.cholesky(problem.whitening.precision)
@@ -63,7 +63,7 @@ def best_window(
 
 
 def _independent(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Small:
-    """White columns of each row, independent across the joints too (N, n, k)."""
+    """Returns white columns (N, n, k), also independent across joints."""
     joints, columns = problem.columns_of(hypothesis, shape)
     root = np.linalg.cholesky(problem.whitening.precision)
     total = np.zeros((problem.rows, problem.n, columns[0].shape[1]), np.float32)
@@ -74,7 +74,7 @@ def _independent(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, .
 
 
 def _times(problem: Problem, moment: float) -> tuple[Array, tuple[int, int]]:
-    """Times (N,) [s] of the white rows, and the first and the end of those of the log that a moment lies in."""
+    """Returns the times (N,) [s] of the white rows, and the first and end row of the log at a given time."""
     parts, log, first = [], (0, problem.rows), 0
     for run in problem.situation.runs:
         own = problem.situation.t[run][:: problem.whitening.stride]
@@ -86,7 +86,7 @@ def _times(problem: Problem, moment: float) -> tuple[Array, tuple[int, int]]:
 
 
 def _look(rows: Small, left: Array, times: Array, log: tuple[int, int], starts: Array, ends: Array) -> Window:
-    """The best of all windows from one of some starts to one of some ends."""
+    """Finds the best of all windows from one of the starts to one of the ends."""
     first, last = log
     moments = np.unique(np.concatenate([starts, ends]))
     places = first + np.searchsorted(times[first:last], moments)
@@ -98,7 +98,7 @@ def _look(rows: Small, left: Array, times: Array, log: tuple[int, int], starts: 
     grams, crosses = grams.cumsum(axis=0), crosses.cumsum(axis=0)
     begin, end = np.searchsorted(moments, starts), np.searchsorted(moments, ends)
     gains = np.zeros((len(begin), len(end)))
-    # What sums of all rows leave of windows that have next to nothing of a column is rounding.
+    # Differences of cumulative sums have rounding errors of this size.
     least = ROUNDING * np.maximum(np.einsum("kk->k", grams[-1]), np.finfo(float).tiny)
     for i, at in enumerate(begin):
         later = np.flatnonzero(end > at)

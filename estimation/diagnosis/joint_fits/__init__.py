@@ -1,1 +1,1 @@
-"""Effects and base model fitted together."""
+"""Joint fits of effects and base model."""

@@ -1,4 +1,4 @@
-"""Whether an effect of a moment goes on beside what its formula has of it, and what it is then."""
+"""Window of a transient effect: whether it continues beyond the fitted one, and a formula that holds throughout."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN, MIN_WINDOW_GAIN
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
 from estimation.diagnosis.hypothesis_tests.time_windows import best_window
 from robots.common.parallel import threaded
@@ -17,23 +18,32 @@ from robots.common.parallel import threaded
 def open_event_edges(
     problem: Problem, member: FittedEffect, others: Sequence[FittedEffect], errors: Sequence[float]
 ) -> list[float]:
-    """Makes errors of shape parameters infinite where the data say that the effect goes on beyond them.
+    """Sets the errors of window edges to infinity where the data show that the effect continues.
 
-    A push on an elbow while the arm moves is no pulse of constant torques: such a pulse is estimated where it is
-    largest, and its edges, however sharp they are, are not the push's.
+    A contact with a moving arm is not a pulse of constant joint torques. Such a pulse fits where the contact is
+    largest, so its sharp edges are not those of the contact.
 
     Args:
-        problem: the data.
-        member: whose shapes have the errors.
-        others: what else was found.
-        errors: by the profiles.
+        problem: data and base model.
+        member: the effect.
+        others: other effects found.
+        errors: standard errors of its shape parameters.
+
+    Returns:
+        The errors (s,), infinite for open edges.
     """
     open_ = _open(problem, member, accept(problem, tuple(m.group for m in others)))
     return [np.inf if k in open_ else error for k, error in enumerate(errors)]
 
 
 def refit_event_window(problem: Problem, member: FittedEffect, beside: Accepted) -> FittedEffect:
-    """Gives an effect of a moment by the formula that stays true while it lasts, where that is worth its parameters."""
+    """Refits a transient effect by a formula that holds for its whole duration, if the BIC improves.
+
+    Args:
+        problem: data and base model.
+        member: the effect; others than transient ones are returned unchanged.
+        beside: groups already in the model.
+    """
     hypothesis = member.hypothesis
     if not hypothesis.effect.transient:
         return member
@@ -51,7 +61,7 @@ def refit_event_window(problem: Problem, member: FittedEffect, beside: Accepted)
 
 
 def _open(problem: Problem, member: FittedEffect, beside: Accepted) -> set[int]:
-    """Which shape parameters of a member, beside what is accepted, the data say are not where the effect ends."""
+    """Returns the indices of shape parameters at which the effect continues."""
     further = member.hypothesis.effect.open_edges(member.shape)
     if not further:
         return set()

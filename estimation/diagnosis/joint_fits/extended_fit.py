@@ -1,4 +1,4 @@
-"""The extended model: base parameters and all effects found, fitted together, with what is uncertain about both."""
+"""Joint fit of base parameters and all effects, with their covariance: the extended model."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.priors import solve_map
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.event_window import open_event_edges
 from estimation.diagnosis.joint_fits.shape_errors import (
@@ -29,10 +29,10 @@ from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
 
-FAINT = 1e-7
-# A column smaller than this is none: one over its square is no number.
+FAINT = 1e-7  # directions with less than FAINT**1.5 of the largest eigenvalue are not determined
+# A column with a smaller norm counts as zero, because its inverse square would overflow.
 NOTHING = 1e-100
-# A coefficient of which more than this lies in directions that the data do not determine is not determined.
+# A coefficient is undetermined if more than this share of it is in undetermined directions.
 LOST = 0.01
 
 
@@ -41,7 +41,7 @@ class ExtendedFit:
     """Base parameters and effects, fitted together.
 
     Attributes:
-        model: with the extensions.
+        model: the model with its extensions.
         effects: for each extension, which of its parameters the data determine (k + s,).
         values: base parameters and nuisance (b + m,).
     """
@@ -52,9 +52,14 @@ class ExtendedFit:
 
 
 def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: dict[str, object]) -> ExtendedFit:
-    """Fits base parameters and the members' coefficients by generalised least squares, shapes as they were refined.
+    """Fits base parameters and effect coefficients by generalised least squares, for the refined shapes.
 
-    The covariance counts the shape parameters as free, by the derivative of the members' torque.
+    The covariance includes the shape parameters, through the derivative of each effect's torque.
+
+    Args:
+        problem: data and base model.
+        members: the effects.
+        provenance: origin of the model, as stored in it.
     """
     baseline, white = problem.baseline, problem.whitening
     base = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
@@ -63,7 +68,7 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
     fitted_members: list[FittedEffect] = []
     for i, member in enumerate(members):
         rest = [m for k, m in enumerate(members) if k != i]
-        # How far it may be is asked from the middle of a pause, not from the end of it that the search came to.
+        # The error of a change time within a pause is measured from its middle, not from the edge that was found.
         member = spread_over_pauses(problem, member, rest)
         steps = shape_errors(problem, member, accept(problem, tuple(m.group for m in rest)))
         steps = open_event_edges(problem, member, rest, widen_change_times(problem, member, rest, steps))
@@ -91,7 +96,7 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
     values = np.zeros(columns.shape[2])
     free = flat[:, linear]
     pull = effects_prior(problem, members)
-    # White rows tell what they are, not what coloured ones of their number would.
+    # The prior is stated for plain rows of the log; `row_weight` converts it to white rows.
     pull = GaussianPrior(pull.precision / white.row_weight, pull.target)
     values[linear] = solve_map(free.T @ free, free.T @ tau, pull)
     by_reversals = reversal_columns(members, [start for start, *_ in slices], (problem.n, flat.shape[1]))
@@ -102,15 +107,15 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
         members, slices, deviations, lower_upper, strict=True
     ):
         rows = slice(start, start + size + shapes)
-        # Joints that differ in what they should agree on know it so much worse.
+        # Estimates that disagree between joints, or near and far from reversals, have a larger variance.
         own = covariance[rows, rows] * member.birge_ratio
         scale = np.concatenate([np.ones(size), np.abs(steps)])
-        # What is not known at all stays so, whatever its slope's covariance.
+        # An undetermined parameter keeps its infinite error.
         open_ = ~np.isfinite(scale)
         scale[open_] = 1.0
         open_[:size] |= unseen[start : start + size]
         own = own * scale[:, None] * scale
-        # The profile is no parabola, for a moment of change least of all: what it says is the least that is unknown.
+        # The profile is not a parabola, least of all for a change time. Its width is a lower bound of the error.
         profile = np.concatenate([np.zeros(size), scale[size:]])
         wider = np.maximum(profile / np.sqrt(np.maximum(np.diag(own), 1e-9 * profile**2 + 1e-300)), 1.0)
         own = own * wider[:, None] * wider
@@ -157,7 +162,7 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
 
 
 def dense(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Array:
-    """Evaluates a hypothesis' columns on all joints (N, n, k)."""
+    """Evaluates the columns of a hypothesis on all joints (N, n, k), zero where it does not act."""
     joints, columns = problem.columns_of(hypothesis, shape)
     X = np.zeros((len(problem.recording), problem.n, columns[0].shape[1]))
     for j, part in zip(joints, columns, strict=True):
@@ -166,7 +171,16 @@ def dense(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) ->
 
 
 def reversal_columns(members: Sequence[FittedEffect], starts: Sequence[int], shape: tuple[int, int]) -> Array:
-    """What each joint's reversals tell beside the rows (n, p) of members whose columns start at these."""
+    """Returns the rows by which reversal timing enters a joint fit, one per joint.
+
+    Args:
+        members: the effects.
+        starts: first column of each effect.
+        shape: number of joints n, and number of columns p.
+
+    Returns:
+        (n, p), relative to the errors of the timing.
+    """
     rows = np.zeros(shape)
     for member, start in zip(members, starts, strict=True):
         if member.group.reversal_columns is not None:
@@ -175,7 +189,7 @@ def reversal_columns(members: Sequence[FittedEffect], starts: Sequence[int], sha
 
 
 def _slope(problem: Problem, member: FittedEffect, k: int, step: float) -> Array:
-    """How the member's torque changes by one standard error of a shape parameter (N, n, 1)."""
+    """Returns the change of an effect's torque (N, n, 1) per standard error of a shape parameter."""
     value = member.shape[k]
     h = step if np.isfinite(step) else 0.3 * abs(value)
     low, high = member.hypothesis.effect.bounds(problem.state_for(member.hypothesis.effect), member.hypothesis.joint)[k]
@@ -187,7 +201,7 @@ def _slope(problem: Problem, member: FittedEffect, k: int, step: float) -> Array
 
 
 def _narrowed(covariance: Array, k: int, error: float) -> Array:
-    """Takes the standard error of one parameter of a covariance to be no more than it may be."""
+    """Limits the standard error of parameter k in a covariance to `error`."""
     if not np.isfinite(covariance[k, k]):
         result = covariance.copy()
         result[k] = result[:, k] = 0.0
@@ -199,9 +213,10 @@ def _narrowed(covariance: Array, k: int, error: float) -> Array:
 
 
 def _covariance(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Covariance of least squares of least norm over unit columns: by the data alone, without the pull.
+    """Returns the covariance of minimum-norm least squares from the data alone, without the prior.
 
-    With it come the coefficients (p,) that the data leave open: their errors there are those of a norm, not of data.
+    Also returns a mask (p,) of the coefficients that the data do not determine. Their variance is that of the minimum
+    norm.
     """
     norms = np.linalg.norm(matrix, axis=0)
     norms[norms < NOTHING] = 1.0
@@ -213,7 +228,7 @@ def _covariance(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def _determined(problem: Problem, values: Array, errors: Array) -> NDArray[np.bool_]:
-    """Which base parameters mean something by themselves: known to a half, or known to be too small to matter."""
+    """Marks base parameters with a small relative error, or with an error too small to matter for the torque."""
     Y = problem.baseline.regressor
     torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
     excited = np.sqrt(np.mean(Y**2, axis=0))

@@ -1,4 +1,4 @@
-"""Whether gears bear the springs, payloads and pushes that were found, and whether that shows another cause."""
+"""Gear load of springs, payloads and contacts that were found, and its influence on load-dependent effects."""
 
 from __future__ import annotations
 
@@ -9,26 +9,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN, MIN_GEAR_LOAD
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, set_bic_gain
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine, set_bic_gain
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from robots.terms.effect_bases.gear_load import ExtraGearLoad, LoadPath, LoadSource
 from robots.terms.effects import EFFECTS
 
 Array = NDArray[np.float64]
 
-# What a friction by load may explain that was named otherwise for want of the load.
+# Effect that may replace another one if the gear load is included.
 BY_LOAD = EFFECTS["load_dependent_friction"]
 
 
 @dataclass(frozen=True, eq=False)
 class GearLoad:
-    """What gears bear of some effects.
+    """Gear load of the effects found.
 
     Attributes:
-        extra_load: that; None for nothing.
-        improves_fit: whether it explains more than what was found without it, so that a search should be made with it.
+        extra_load: the additional load; None without any.
+        improves_fit: whether the effects fit better with this load, so that the search should be repeated.
     """
 
     extra_load: ExtraGearLoad | None = None
@@ -39,16 +40,16 @@ NO_GEAR_LOAD = GearLoad()
 
 
 def find_gear_load(problem: Problem, members: Sequence[FittedEffect], values: Array) -> GearLoad:
-    """Tells from the data what gears bear of the effects found.
+    """Selects the gear load of the effects found by the BIC.
 
-    A gear bears a spring that is mounted behind it, and one is taken to be so where nothing depends on it. Where a load
-    that lacks it was felt, the difference was named as something else: so other names on those joints are asked whether
-    a friction by load does as much.
+    Effects with `loads_gear` load the gears by default. A fit without this load may have named another cause for the
+    difference. Therefore load-dependent effects are refitted with it, and load-dependent friction may replace one other
+    effect.
 
     Args:
-        problem: what was searched.
-        members: the effects.
-        values: of base model, nuisance and all members, fitted together.
+        problem: the searched data and base model.
+        members: the effects found.
+        values: of base model, nuisance and all effects, fitted together.
     """
     at, weights = len(problem.prior.target), []
     for member in members:
@@ -82,7 +83,7 @@ def find_gear_load(problem: Problem, members: Sequence[FittedEffect], values: Ar
 def _alternatives(
     problem: Problem, members: Sequence[FittedEffect], on_them: Sequence[FittedEffect]
 ) -> list[list[FittedEffect]]:
-    """Lists what the members would be with this load: those that feel it fitted anew, and one name or none left out."""
+    """Lists the effects refitted with this load, with at most one of them left out or replaced."""
     feel = [m for m in on_them if m.hypothesis.effect.depends_on_gear_load]
     result = []
     for out in (None, *(m for m in on_them if m not in feel)):

@@ -1,4 +1,4 @@
-"""A reading that is wrong by what the torque itself is, found beside the base model that has followed it."""
+"""Joint fit of the base model and effects that distort the torque reading as a function of the torque."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.priors import solve_map
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, clip_shape, refine
+from estimation.diagnosis.hypothesis_tests.refinement import clip_shape, refine
 from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.total_torque import JointFit
 from robots.terms.effect_bases.static import StaticJointEffect
@@ -18,20 +19,25 @@ from robots.terms.effect_bases.static import StaticJointEffect
 Array = NDArray[np.float64]
 
 STEPS, HALVINGS = 20, 6
-"""Of Gauss and Newton's method, and of each of its steps."""
+"""Gauss-Newton iterations, and step halvings in each of them."""
 ENOUGH = 1e-4
-"""A step that makes the sum of squares smaller by less than this share is the last one."""
+"""Relative decrease of the sum of squares below which the search ends."""
 
 
 def fit_sensor_nonlinearity(problem: Problem, members: Sequence[FittedEffect]) -> tuple[Problem, list[FittedEffect]]:
-    """Fits the base model, other members and what distorts readings at once, by Gauss and Newton's method.
+    """Fits base model, effects and distortions of the torque reading together (Gauss-Newton).
 
-    A base model that is fitted to readings alone follows them. A distortion measured by its torque is then too small,
-    the base model beside that goes too far, and so on in turns, which need not come to an end. Here a change of the
-    base model's torque counts as it would be read.
+    A base model fitted to the readings alone follows the distortion. The distortion computed from its torque is then
+    too small, and alternating both fits need not converge. Here the columns of the base model are scaled by the
+    derivative of the reading.
+
+    Args:
+        problem: data and base model.
+        members: all effects; those with `distorts` are fitted here.
 
     Returns:
-        The problem, its situation that of the true torque; the members, what distorts as it is there.
+        The problem with the situation of the true torque, and the members with refitted distortions. Both are unchanged
+        if no effect distorts.
     """
     wrong = [k for k, member in enumerate(members) if member.hypothesis.effect.distorts]
     found = list(members)
@@ -45,17 +51,17 @@ def fit_sensor_nonlinearity(problem: Problem, members: Sequence[FittedEffect]) -
 
 
 class _Search:
-    """Unknowns: base parameters, nuisance and coefficients of plain members; then coefficients and shapes of others."""
+    """Gauss-Newton search for base parameters, nuisance, effect coefficients and distortions."""
 
     def __init__(self, problem: Problem, plain: Sequence[FittedEffect], wrong: Sequence[FittedEffect]) -> None:
         self.problem, self.wrong = problem, list(wrong)
         self.fit = JointFit(problem, plain, np.ones_like(problem.recording.sign_unknown))
-        # What is known, such as the torque that a formula is relative to, stays.
+        # Shape parameters with equal bounds are fixed.
         self.bounds = [_bounds(problem, member) for member in wrong]
         self.loose = [[k for k, (low, high) in enumerate(own) if low < high] for own in self.bounds]
 
     def run(self) -> tuple[Problem, list[FittedEffect]]:
-        """Steps until the sum of squares falls no more."""
+        """Iterates until the sum of squares stops decreasing."""
         members, tau = self.wrong, self.problem.recording.tau
         values = self.fit.values(tau - self._distortion(self.problem, members))
         now = self._known(values)
@@ -75,7 +81,7 @@ class _Search:
         return now, members
 
     def _solved(self, values: Array, now: Problem, members: Sequence[FittedEffect]) -> Array:
-        """Solves for all unknowns, what is read linear in them as it is about here."""
+        """Solves the linearised problem for all unknowns."""
         passes, more, own = np.ones_like(self.problem.recording.tau), [], [values]
         for member, loose in zip(members, self.loose, strict=True):
             effect, joint = member.hypothesis.effect, member.hypothesis.joint
@@ -88,7 +94,7 @@ class _Search:
             more += [dense(now, member.hypothesis, member.shape), by_shape]
             own += [member.coefficients, np.asarray(member.shape)[loose]]
         columns = np.concatenate([self.fit.full, *more], axis=2)
-        # Nuisance and other effects are read as they are: the nonlinearity is estimated from the base model's torque.
+        # The distortion is evaluated at the base model's torque, so only the base columns are scaled.
         columns[:, :, : self.problem.baseline.base.size] *= passes[:, :, None]
         left = self.problem.recording.tau - self.fit.full @ values - self._distortion(now, members)
         return solve_map(*self.fit.normal(left + columns @ np.concatenate(own), columns), self.problem.prior)
@@ -96,7 +102,7 @@ class _Search:
     def _moved(
         self, values: Array, members: Sequence[FittedEffect], goal: Array, share: float
     ) -> tuple[Array, list[FittedEffect]]:
-        """Goes a share of the way to a solution."""
+        """Takes a share of the step to a solution."""
         at, moved = len(values), []
         for member, loose, bounds in zip(members, self.loose, self.bounds, strict=True):
             k, shape = len(member.coefficients), list(member.shape)
@@ -116,7 +122,7 @@ class _Search:
         return np.sum([dense(now, m.hypothesis, m.shape) @ m.coefficients for m in members], axis=0)
 
     def _cost(self, values: Array, now: Problem, members: Sequence[FittedEffect]) -> float:
-        """What is left, weighed, and what the pull and reversals say against it."""
+        """Returns the weighted sum of squares of residual, prior and reversal timing."""
         fit, problem, pull = self.fit, self.problem, self.problem.prior
         left = (problem.recording.tau - fit.full @ values - self._distortion(now, members)) * fit.weights
         off = values[: len(pull.target)] - pull.target

@@ -1,4 +1,4 @@
-"""How well the shape of an effect is known: standard errors by the profile of the likelihood."""
+"""Standard errors of shape parameters from profiles of the likelihood."""
 
 from __future__ import annotations
 
@@ -10,38 +10,48 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, climb
+from estimation.diagnosis.hypothesis_tests.refinement import climb
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
 
-# Steps of a shape parameter along which its likelihood is followed: up to where it drops by this much.
+# Drop of the explained chi-square to which a profile is followed.
 DROP = 2.0
-# A value at which the likelihood is less than this below its top may be the true one.
+# A value is possible if the explained chi-square there is lower by less than this (95 %).
 OPEN = 3.84
-# A moment may be where the profile drops by less than this: (1 - e^(-x / 2))^2 is .95, the distribution of the
-# likelihood ratio of a moment of change (Hansen, Econometrica 2000).
+# The same for a change time: (1 - e^(-x / 2))^2 = 0.95, the distribution of its likelihood ratio (Hansen 2000).
 CHANGED = 7.35
-# It is followed each way in growing steps, until so many in a row drop by twice as much.
+# Steps of its profile in each direction: the first in standard errors, their growth, their largest number, and the
+# number of successive drops beyond twice that value at which it ends.
 FIRST, GROWING, MANY, LOST = 1.5, 1.3, 24, 3
-# What lies between the last of them and the next is halved so often.
+# Bisections between the last possible point and the next one.
 HALVINGS = 4
-# Of two shapes one is followed in steps that grow by this, so often at most, the other refitted in so many evaluations.
+# Two coupled shapes: growth of the steps of one, their largest number, and evaluations to refit the other.
 WIDENING, FEW, REFITTED = 1.5, 10, 12
-# A moment within this time [s] of rows that show no change may be anywhere in them.
+# Time [s] from a stretch without information within which a change time may be anywhere in that stretch.
 BORDER = 0.05
-# So much of what a drive loses at most it must lose in a row that shows none: the mean loss by noise has no end.
+# Share of the largest clipped torque from which a row counts as clipped. Noise makes the mean loss positive everywhere.
 CUT = 0.05
-# Values of a shape that is left as assumed at which the likelihood is asked.
+# Number of values at which the profile of an assumed shape is evaluated.
 POINTS = 21
 
 
 def shape_errors(problem: Problem, member: FittedEffect, others: Accepted) -> list[float]:
-    """Finds each shape parameter's standard error by its profile; infinite where the likelihood hardly drops.
+    """Estimates the standard error of each shape parameter from its profile.
 
-    One whose bounds are equal is known, unless it is a choice and another would do about as well.
+    Coefficients and base model are refitted at each value. A parameter with equal bounds has no error, unless it is a
+    choice and another value fits about as well.
+
+    Args:
+        problem: data and base model.
+        member: the effect.
+        others: the other groups in the model.
+
+    Returns:
+        One per shape parameter; infinite if the profile hardly drops.
     """
     situation = problem.state_for(member.hypothesis.effect)
     bounds = member.hypothesis.effect.bounds(situation, member.hypothesis.joint)
@@ -86,7 +96,7 @@ def shape_errors(problem: Problem, member: FittedEffect, others: Accepted) -> li
 
 
 def _chosen(problem: Problem, member: FittedEffect, k: int, others: Accepted) -> bool:
-    """Whether the data tell the only value that a shape parameter may have from others that machines have."""
+    """Whether the data reject all other values of a shape parameter with few choices."""
     rest = [value for value in member.hypothesis.effect.shapes[k].choices if value != member.shape[k]]
     gains = [_gain(problem, member, with_value(member.shape, k, value), others) for value in rest]
     return max(gains, default=-np.inf) < _gain(problem, member, member.shape, others) - MIN_BIC_GAIN
@@ -95,7 +105,7 @@ def _chosen(problem: Problem, member: FittedEffect, k: int, others: Accepted) ->
 def _assumed(
     problem: Problem, member: FittedEffect, others: Accepted, best: float, bounds: tuple[float, float]
 ) -> float:
-    """How far a shape may be from what is assumed of it, by the likelihood's own top, which was not worth its price."""
+    """Returns the largest distance of possible values from an assumed one, by the maximum of the profile."""
     points = np.linspace(*bounds, POINTS)
     gains = [_gain(problem, member, (float(x),), others) for x in points]
     top = max(best, *gains)
@@ -104,15 +114,14 @@ def _assumed(
 
 
 def _drop(problem: Problem, member: FittedEffect, k: int, others: Accepted, best: float, value: float) -> float:
-    """How much less is explained with another value of a shape parameter."""
+    """Returns the decrease of the explained chi-square at another value of a shape parameter."""
     return best - _gain(problem, member, with_value(member.shape, k, value), others)
 
 
 def _reach(drop: Callable[[float], float], value: float, step: float, bounds: tuple[float, float]) -> float:
-    """The farthest of some points at which the moment of a change may be, by the likelihood; zero for none.
+    """Returns the largest distance of possible change times; zero if there is none.
 
-    Its profile is a random walk with a drift, not a parabola: it may have more summits, and what the top's curvature
-    says of its width is little.
+    The profile is a random walk with drift and may have several maxima. Its curvature says little about its width.
     """
     farthest = 0.0
     for way in (-1, 1):
@@ -127,7 +136,7 @@ def _reach(drop: Callable[[float], float], value: float, step: float, bounds: tu
                 inside, outside = distance, np.inf
             else:
                 outside = min(outside, distance)
-        # Between the last point where it may be and the next one: a moment in a rest may be anywhere to its end.
+        # A change during a rest may be anywhere up to its end.
         for _ in range(HALVINGS if inside and np.isfinite(outside) else 0):
             middle = (inside + outside) / 2
             inside, outside = (middle, outside) if drop(value + way * middle) < CHANGED else (inside, middle)
@@ -136,16 +145,15 @@ def _reach(drop: Callable[[float], float], value: float, step: float, bounds: tu
 
 
 def _paired(member: FittedEffect) -> bool:
-    """Whether its shapes are a velocity and the exponent of it, or the like: two of which neither is assumed."""
+    """Whether it has two coupled shape parameters without defaults, such as a velocity and an exponent."""
     shapes = member.hypothesis.effect.shapes
     return len(shapes) == 2 and all(s.default is None and s.lower > -np.inf for s in shapes)
 
 
 def _along_ridge(problem: Problem, member: FittedEffect, k: int, others: Accepted, step: float) -> float:
-    """How far one of two shapes may be, by the likelihood at its 95 % bound, the other one always refitted.
+    """Returns the largest distance of possible values of one of two shapes, with the other one refitted.
 
-    A ridge of the likelihood is bent: neither its curvature at the top says how long it is, nor its width. The longer
-    way counts.
+    The likelihood has a curved ridge, whose length follows neither from curvature nor width at the maximum.
     """
     shapes = member.hypothesis.effect.shapes
     bounds = member.hypothesis.effect.bounds(problem.state_for(member.hypothesis.effect), member.hypothesis.joint)
@@ -153,7 +161,7 @@ def _along_ridge(problem: Problem, member: FittedEffect, k: int, others: Accepte
     best: list[float] = []
 
     def fitted(x: float, start: float) -> tuple[float, float]:
-        """The largest gain at a value of the shape, and the other one's there."""
+        """Returns the largest chi-square at a value of shape k, and the other shape's value there."""
         best[:] = [-np.inf, start]
 
         def gain(values: tuple[float, ...]) -> float:
@@ -188,13 +196,16 @@ def _along_ridge(problem: Problem, member: FittedEffect, k: int, others: Accepte
 def widen_change_times(
     problem: Problem, member: FittedEffect, others: Sequence[FittedEffect], errors: Sequence[float]
 ) -> list[float]:
-    """Widens errors of moments of change, and of how long it lasts from there, beside times that show none.
+    """Increases the errors of change times and durations near stretches in which a change is invisible.
 
     Args:
-        problem: the data.
-        member: whose shapes have the errors.
-        others: what else was found.
-        errors: by the profiles.
+        problem: data and base model.
+        member: the effect.
+        others: other effects found.
+        errors: standard errors of its shape parameters.
+
+    Returns:
+        The errors (s,).
     """
     result, lasts = list(errors), _durations(member)
     for k in _moments(member):
@@ -206,7 +217,13 @@ def widen_change_times(
 
 
 def spread_over_pauses(problem: Problem, member: FittedEffect, others: Sequence[FittedEffect]) -> FittedEffect:
-    """Puts a change that may as well have come between two logs in the middle of where it may have come."""
+    """Moves a change time near a pause between logs to the middle of the stretch in which it may be.
+
+    Args:
+        problem: data and base model.
+        member: the effect; unchanged unless it has exactly one change time and no duration.
+        others: other effects found.
+    """
     moments = _moments(member)
     if len(moments) != 1 or _durations(member):
         return member
@@ -225,7 +242,7 @@ def _durations(member: FittedEffect) -> list[int]:
 
 
 def _pauses(problem: Problem) -> list[tuple[float, float]]:
-    """Lists the times [s] between which no log was running."""
+    """Lists the pauses between logs [s]."""
     t = problem.recording.t
     return [(float(t[start - 1]), float(t[start])) for start in problem.recording.starts[1:]]
 
@@ -233,10 +250,7 @@ def _pauses(problem: Problem) -> list[tuple[float, float]]:
 def _hidden(
     problem: Problem, member: FittedEffect, others: Sequence[FittedEffect], moment: float
 ) -> list[tuple[float, float]]:
-    """Lists the times [s] about a moment between which nothing shows it.
-
-    A drive is at its limit, and its torque is all that; the joints stand; or no log was running.
-    """
+    """Lists the stretches [s] about a change time without visible changes: drive at its limit, rest, or no log."""
     t, joints = problem.recording.t, member.hypothesis.effect.acts_on(problem.situation.robot, member.hypothesis.joint)
     blind = [np.asarray(problem.recording.sign_unknown[:, list(joints)].all(axis=1))]
     for other in others:
@@ -247,7 +261,7 @@ def _hidden(
     found += _pauses(problem)
     merged: list[tuple[float, float]] = []
     for start, stop in sorted(found):
-        # A joint that waits for the log's end, and one that waits in the next: between them nothing shows either.
+        # A rest at the end of a log and one at the start of the next are connected by the pause.
         if merged and start <= merged[-1][1] + problem.recording.step:
             merged[-1] = (merged[-1][0], max(merged[-1][1], stop))
         else:
@@ -256,7 +270,13 @@ def _hidden(
 
 
 def formula_errors(problem: Problem, member: FittedEffect, coefficients: Array) -> Array:
-    """Standard errors (k + s,) of coefficients (k,) and shapes that the formula adds to those of the data."""
+    """Returns the standard errors (k + s,) due to errors of the formula and of the motion.
+
+    Args:
+        problem: data and base model.
+        member: the effect.
+        coefficients: its coefficients (k,).
+    """
     effect, robot = member.hypothesis.effect, problem.situation.robot
     described = zip(effect.shapes, member.shape, strict=True)
     shapes = [s.inexact * (abs(value) if s.scale == "log" else 1.0) for s, value in described]
@@ -268,11 +288,11 @@ def formula_errors(problem: Problem, member: FittedEffect, coefficients: Array) 
 
 
 def _gain(problem: Problem, member: FittedEffect, shape: tuple[float, ...], others: Accepted) -> float:
-    """What is explained at a shape, by coefficients that go with it: a delay's are near that of its reversals."""
+    """Returns the chi-square explained at a shape, with coefficients within the bounds for that shape."""
     result = score(problem, problem.measured(member.hypothesis, shape), others)
     return result.bounded(*member.hypothesis.coefficient_bounds(problem.situation.robot, shape))[0]
 
 
 def with_value(shape: tuple[float, ...], k: int, value: float) -> tuple[float, ...]:
-    """Gives a shape with another value of one parameter."""
+    """Returns a shape with parameter k replaced."""
     return (*shape[:k], value, *shape[k + 1 :])

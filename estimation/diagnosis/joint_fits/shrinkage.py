@@ -1,4 +1,4 @@
-"""What holds the coefficients of effects that were found: directions that the logs hardly tell must not run away."""
+"""Priors of effect coefficients by empirical Bayes: they bound directions that the logs hardly determine."""
 
 from __future__ import annotations
 
@@ -8,28 +8,31 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scoring import Score, accept, score
 from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
 
-# Logarithms of the energies that are tried for a column, in units of the noise's.
+# Logarithms of the prior energies that are tried, in units of the noise variance.
 ENERGIES = np.linspace(-2.0, 25.0, 109)
-# Directions that show less than this share of their energy beside all else say nothing of the effect's size.
+# Directions with a smaller share of visible energy contain no information on the effect's size.
 FAINT = 1e-9
 
 
 def shrinkage_precision(result: Score) -> Array:
-    """Gives the a-priori precision (k,) of an effect's coefficients, as the data themselves ask for it.
+    """Returns the prior precision (k,) of an effect's coefficients, estimated from the data.
 
-    Each column is taken to make a torque of the same a-priori energy e, c_i ~ N(0, e / |x_i|^2), and e is what makes
-    the data likeliest (empirical Bayes; Morris 1983). Directions that are well measured keep their least-squares value
-    to within their error; those that base model or other columns nearly imitate stay where the others suggest.
+    Each column is assumed to have the same prior energy e, c_i ~ N(0, e / |x_i|^2). e maximises the marginal likelihood
+    (empirical Bayes, Morris 1983). Well determined directions keep their least-squares value within its error.
+    Directions that base model or other columns nearly absorb are shrunk towards zero.
+
+    Args:
+        result: score of the effect beside all others.
     """
     raw = np.where(np.isfinite(result.raw), result.raw, np.diag(result.gram))
-    # A column that does not act here stays at zero, and may act elsewhere.
+    # A column that is zero in these logs gets a prior at zero, because it may act in other data.
     raw = np.maximum(raw, max(1e-12 * float(raw.max(initial=0.0)), 1e-300))
     scale = 1.0 / np.sqrt(raw)
     shown, directions = np.linalg.eigh(result.gram * scale[:, None] * scale)
@@ -50,7 +53,17 @@ def shrinkage_precision(result: Score) -> Array:
 
 
 def effects_prior(problem: Problem, members: Sequence[FittedEffect]) -> GaussianPrior:
-    """Gives the pull on base model, nuisance and the coefficients of members (b + m + k,), in units of plain rows."""
+    """Returns the prior of base model, nuisance and effect coefficients (b + m + k,).
+
+    It includes the reversal timing of effects that delay all torque.
+
+    Args:
+        problem: data and base model.
+        members: the effects.
+
+    Returns:
+        The prior, in units of plain rows.
+    """
     pull = problem.prior
     own, targets = [], []
     for i, member in enumerate(members):

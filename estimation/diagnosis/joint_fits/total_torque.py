@@ -1,4 +1,4 @@
-"""What acts on all of the torque, such as a limit of current, in sight of base model and other effects."""
+"""Estimate of the total torque, on which effects such as a current limit act."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
 from estimation.diagnosis.base_models.priors import solve_least_squares, solve_map
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.joint_fits.extended_fit import dense, reversal_columns
 from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short
 from estimation.diagnosis.recordings.recording import Recording
@@ -23,21 +23,22 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 ROUNDS = 4
-"""In which all of the torque is found by what is left of it."""
+"""Gauss-Newton iterations of the total torque."""
 STEP = 1e-3
-"""Change of the torque, as a share of its root mean square, by which it is told what passes."""
+"""Torque step of the numerical derivative of clipping, as a share of the torque RMS."""
 
 
 def with_total_torque(problem: Problem, members: Sequence[FittedEffect], hypotheses: Sequence[Hypothesis]) -> Problem:
-    """Lets effects that act on all of the torque know what it is: base model and other members, fitted together.
+    """Adds the total torque to the inputs of effects that act on it, if a log shows unusable samples.
 
-    What makes all of the torque late knows that of the other members as they are. Where no log shows by itself that
-    samples are useless as measurements, no more is estimated: what is clipped elsewhere is a small part.
+    The total torque is that of base model and other effects, fitted together. Effects that delay all torque get the
+    torque of the other effects as fitted. Without unusable samples nothing is estimated: clipping is then a small part
+    of the torque.
 
     Args:
-        problem: the data.
-        members: what is known to act.
-        hypotheses: of which some may act on all of the torque.
+        problem: data and base model.
+        members: effects that are already in the model.
+        hypotheses: hypotheses to be tested, some of which may act on the total torque.
     """
     others = [member for member in members if not member.hypothesis.effect.smooths_friction_sign]
     if others and any(hypothesis.effect.smooths_friction_sign for hypothesis in hypotheses):
@@ -56,17 +57,27 @@ def with_total_torque(problem: Problem, members: Sequence[FittedEffect], hypothe
 
 
 def total_torque_from_unclipped(problem: Problem, members: Sequence[FittedEffect], useless: Flags) -> Problem:
-    """Tells all of the torque by the rows (N, n) that are of use, and members that do not act on all of it."""
+    """Estimates the total torque from usable rows only.
+
+    Args:
+        problem: data and base model.
+        members: effects in the model; those that act on the total torque are left out.
+        useless: rows without a usable torque measurement (N, n).
+    """
     before = [member for member in members if not member.hypothesis.effect.acts_on_total_torque]
     known = JointFit(problem, before, ~useless)
     return known.total_torque(known.values(problem.recording.tau))
 
 
 def fit_clipped_torque(problem: Problem, members: Sequence[FittedEffect]) -> Problem:
-    """Tells all of the torque by all rows, where what acts on it is among the members.
+    """Estimates the total torque from all rows, if one of the effects acts on it.
 
-    Without the useless rows alone, those that noise has kept from being so would make it too small. So the torque as it
-    is cut on average is fitted to all of them (Gauss and Newton): a row counts by what of its torque's changes passes.
+    Unclipped rows alone give a torque that is too small, because noise decides which rows are clipped. The mean clipped
+    torque is therefore fitted to all rows (Gauss-Newton). Each row's columns are scaled by the derivative of clipping.
+
+    Args:
+        problem: data and base model, with a first estimate of the total torque.
+        members: all effects in the model.
     """
     last = [member for member in members if member.hypothesis.effect.acts_on_total_torque]
     if not last or problem.total_torque_state is None:
@@ -85,6 +96,7 @@ def fit_clipped_torque(problem: Problem, members: Sequence[FittedEffect]) -> Pro
 
 
 def _lost(problem: Problem, members: Sequence[FittedEffect]) -> Array:
+    """Returns the torque (N, n) removed by effects that act on the total torque."""
     return np.sum([dense(problem, member.hypothesis, member.shape).sum(axis=2) for member in members], axis=0)
 
 
@@ -97,7 +109,13 @@ def _with_more(problem: Problem, torque: Array) -> Problem:
 
 
 class JointFit:
-    """Base model, nuisance and members fitted together to the rows (N, n) that count."""
+    """Joint fit of base model, nuisance and effects to the rows that count.
+
+    Args:
+        problem: data and base model.
+        members: the effects.
+        counted: rows (N, n) to be used, in addition to a known friction sign.
+    """
 
     def __init__(self, problem: Problem, members: Sequence[FittedEffect], counted: Flags) -> None:
         baseline, recording = problem.baseline, problem.recording
@@ -109,15 +127,25 @@ class JointFit:
         self.weights = (counted & ~recording.sign_unknown) / problem.whitening.scales(len(recording))
 
     def values(self, tau: Array, passes: Array | None = None) -> Array:
-        """Fits torque (N, n), of whose changes a share passes (N, n)."""
+        """Fits all values (b,) to torque by their posterior maximum.
+
+        Args:
+            tau: torque (N, n) [N m or N].
+            passes: derivative of the reading by the torque (N, n); 1 by default.
+        """
         return solve_map(*self.moments(tau, passes), self.problem.prior)
 
     def moments(self, tau: Array, passes: Array | None = None) -> tuple[Array, Array]:
-        """Gives the normal equations (b, b), (b,) of such a fit."""
+        """Returns the normal equations (b, b), (b,) of the same fit."""
         return self.normal(tau, self.full if passes is None else self.full * passes[:, :, None])
 
     def normal(self, tau: Array, columns: Array) -> tuple[Array, Array]:
-        """Gives those of torque (N, n) by columns (N, n, p), the first of which are members' as in `full`."""
+        """Returns the normal equations of torque (N, n) for given columns.
+
+        Args:
+            tau: torque (N, n) [N m or N].
+            columns: (N, n, p), the first b of which correspond to `full`.
+        """
         flat = (columns * self.weights[:, :, None]).reshape(-1, columns.shape[2])
         gram, cross, b = flat.T @ flat, flat.T @ (tau * self.weights).reshape(-1), self.full.shape[2]
         gram[:b, :b] += self.timed.T @ self.timed
@@ -126,7 +154,7 @@ class JointFit:
         return gram, cross
 
     def total_torque(self, values: Array) -> Problem:
-        """The problem, all of the torque known by these values."""
+        """Returns the problem with the total torque of these values (b,)."""
         problem, known = self.problem, len(self.problem.prior.target)
         now = problem.baseline.situation(problem.recording, values[: problem.baseline.base.size])
         beyond = self.full[:, :, known:] @ values[known:] if len(values) > known else None
@@ -134,10 +162,10 @@ class JointFit:
 
 
 def fit_jointly(problem: Problem, members: Sequence[FittedEffect]) -> tuple[Array, Array, Array]:
-    """Fits base model, nuisance and members together.
+    """Fits base model, nuisance and effects together.
 
     Returns:
-        All values (b,); what the fit leaves (N, n) on which noise is measured; all columns (N, n, b).
+        All values (b,); the residual (N, n) from which the noise is estimated; all columns (N, n, b).
     """
     both, tau = JointFit(problem, members, np.ones_like(problem.recording.sign_unknown)), problem.recording.tau
     gram, cross = both.moments(tau)
@@ -152,7 +180,16 @@ def fit_jointly(problem: Problem, members: Sequence[FittedEffect]) -> tuple[Arra
 def effect_columns(
     problem: Problem, recording: Recording, members: Sequence[FittedEffect]
 ) -> tuple[list[Situation], list[Array]]:
-    """Evaluates what members depend on in another recording, and their columns (N, n, k) there."""
+    """Evaluates the inputs of effects in another recording, and their columns there.
+
+    Args:
+        problem: data and base model of the fit.
+        recording: the other recording (N rows).
+        members: effects of the fit.
+
+    Returns:
+        One situation and one array of columns (N, n, k) per effect.
+    """
     model = problem.situation.model
     own = build_situation(recording, model, problem.parameters_without_payload)
     now = with_gear_load(replace(own, since=problem.situation.origin), problem.extra_load)

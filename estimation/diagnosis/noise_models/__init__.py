@@ -1,1 +1,1 @@
-"""The spectrum of the torque noise, the filters that whiten it, and the rows that are masked."""
+"""Noise of the torque: its spectrum, the whitening filters, the usable frequency bands, and the masked rows."""

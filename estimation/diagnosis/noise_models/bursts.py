@@ -1,4 +1,4 @@
-"""Moments at which a residual is far from what it is at most times: a push is an effect, and no noise is told by it."""
+"""Bursts in a residual: short times in which it is far larger than usual, left out of the noise estimate."""
 
 from __future__ import annotations
 
@@ -13,16 +13,21 @@ from estimation.diagnosis.calibration import BURST_SIGMAS, MAX_BURST_SHARE, SPIK
 Array = NDArray[np.float64]
 
 WIDTHS = (0.3, 1.0)
-"""Over which a residual is averaged [s]: a push lasts as long, and spikes of noise do not."""
+"""Durations [s] over which a residual is averaged: as long as a push, and longer than spikes of noise."""
 
 
 def find_bursts(pieces: Sequence[Array], measured: NDArray[np.bool_], step: float) -> NDArray[np.bool_]:
-    """Marks rows (M, n) about such moments, joint by joint.
+    """Marks rows (M, n) in bursts, joint by joint.
+
+    A row is in a burst if a moving average over it is far larger than usual.
 
     Args:
-        pieces: residual of each log (N, n), zero where it is not measured.
+        pieces: residual of each log (N, n) [N m or N], zero where it is not measured.
         measured: rows of all logs that count (M, n).
-        step: of the rows [s].
+        step: time between rows [s].
+
+    Returns:
+        Flags (M, n); none for a joint whose bursts are too frequent to be exceptions.
     """
     marked = np.zeros_like(measured)
     rows_of = np.abs(np.concatenate(pieces))
@@ -35,7 +40,7 @@ def find_bursts(pieces: Sequence[Array], measured: NDArray[np.bool_], step: floa
         for j, (mean, counts) in enumerate(zip(np.abs(means).T, measured.T, strict=True)):
             if counts.any():
                 far = mean > BURST_SIGMAS * float(np.median(mean[counts])) / 0.6745
-                # What a mean says is of all its rows.
+                # A large average marks all rows that it covers.
                 marked[:, j] |= maximum_filter1d(far.astype(np.int8), size) > 0
     marked &= measured
     seldom = marked.sum(axis=0) <= MAX_BURST_SHARE * measured.sum(axis=0)

@@ -1,4 +1,4 @@
-"""The bands of frequencies in which motion is known: torque and columns are low-passed alike, and thinned."""
+"""Usable frequency band of each joint: torque and columns pass the same low-pass, and are decimated."""
 
 from __future__ import annotations
 
@@ -18,26 +18,27 @@ from estimation.diagnosis.recordings.log_reading import Recording
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
-# Spectra are taken over so long [s], of so many rows at least; a power density, or a column, below this is none.
+# Length of the windows of spectra [s], and the fewest rows of one. Power densities and columns below `QUIETEST` are
+# zero.
 WINDOW, FEWEST, QUIETEST = 8.0, 16, 1e-100
-# Slowest low-pass [Hz], fastest as a share of the sampling rate: above, a sampled kick is no longer what it was.
+# Lowest cut-off [Hz], and the highest as a share of the sampling rate: above it, sampling distorts acceleration jumps.
 SLOWEST, FASTEST = 4.0, 0.2
-TRANSITION = 0.25  # of the low-pass, as a share of its cut-off
-# A stride this near below a whole number is one: steps are rounded.
+TRANSITION = 0.25  # width of the transition band, as a share of the cut-off
+# Tolerance by which a stride may fall below a whole number: sample periods are rounded.
 WHOLE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """The frequencies in which a joint's torque is known: it and all its columns are low-passed alike, and thinned.
+    """Low-pass and decimation of one joint's torque and columns.
 
-    Friction that turns round kicks a joint faster than its encoder can tell. Where both sides of the equation are
-    filtered alike, what is lost on one side is lost on the other.
+    Coulomb friction makes the acceleration jump faster than an encoder can resolve. If both sides of the equation pass
+    the same filter, they lose the same part.
 
     Attributes:
-        taps: of the filter, an odd number; empty for none.
-        stride: rows that become one.
-        cutoff: [Hz].
+        taps: coefficients of the filter, an odd number; empty for none.
+        stride: decimation: rows of the log per row kept.
+        cutoff: cut-off frequency [Hz].
     """
 
     taps: Array
@@ -60,11 +61,18 @@ class Band:
     def passed(
         self, series: Array, after: Array | None = None, *, starts: tuple[int, ...] = (0,), single: bool = False
     ) -> Array | Small:
-        """Filters and thins rows (N,) or (N, k) of logs that begin at `starts`, each by itself.
+        """Filters and decimates rows (N,) or (N, k) of logs, each log by itself.
 
-        A filter `after` (p,) acts on what is left. Columns that lie one after the other in memory (Fortran's order) are
-        filtered several times as fast; with `single` precision twice as fast again, their rounding then 1e-7 of the
-        largest.
+        Columns that are contiguous in memory (Fortran order) are filtered several times as fast.
+
+        Args:
+            series: the rows.
+            after: coefficients (p,) of a filter for the decimated rows; None for none.
+            starts: first row of each log.
+            single: computes in single precision, twice as fast, with rounding errors of 1e-7 of the largest value.
+
+        Returns:
+            The decimated rows (M,) or (M, k).
         """
         kind: type = np.float32 if single else np.float64
         runs = [slice(*run) for run in pairwise((*starts, len(series)))]
@@ -75,11 +83,11 @@ class Band:
         if not series.size:  # a joint that does not move has no columns
             return np.zeros((sum(lengths), *series.shape[1:]), dtype=kind)
         columns = series.T if series.ndim > 1 else series[None]
-        # Between logs there are as many zeros as the filters reach.
+        # Zeros between logs, as many as the filters reach.
         size, response, reach = _response(self, sum(lengths), len(runs), 0 if after is None else len(after))
         places = np.cumsum([0, *lengths[:-1]]) + reach * np.arange(len(runs))
-        # Two real columns are one complex one, the filters being real; as large as each other, so that the rounding of
-        # neither shows in the other, and zeros stay zeros.
+        # Filters are real, so that one complex transform serves two real columns. Both are scaled to the same size:
+        # rounding errors of one then do not show in the other, and zeros stay zero.
         sizes = np.maximum(columns.max(axis=1, initial=0.0), -columns.min(axis=1, initial=0.0))[:, None]
         units = 1.0 / np.where(sizes > QUIETEST, sizes, 1.0)
         half = len(columns) // 2
@@ -91,7 +99,7 @@ class Band:
         spectrum = scipy.fft.fft(packed, axis=1, overwrite_x=True)
         if response is not None:
             spectrum *= response.astype(spectrum.dtype, copy=False)
-        # Thinned rows have the mean of the spectra that fall onto each other.
+        # Decimation averages the spectra that alias onto each other.
         folded = spectrum
         if self.stride > 1:
             folded = spectrum.reshape(len(packed), self.stride, -1).sum(axis=1) / self.stride
@@ -110,16 +118,16 @@ class Band:
 
 @lru_cache(maxsize=64)
 def _response(band: Band, rows: int, logs: int, after: int) -> tuple[int, NDArray[np.complex128] | None, int]:
-    """The length of transforms in which nothing wraps round, the filter's response with no delay, and its reach.
+    """Computes the transform length without wrap-around, the zero-phase response of the filter, and its reach.
 
     Args:
-        band: its filter is the first.
-        rows: thinned ones of all logs.
-        logs: how many.
-        after: length of the filter of thinned rows.
+        band: the filter is that of this band.
+        rows: decimated rows of all logs.
+        logs: number of logs.
+        after: length of the filter for decimated rows.
 
     Returns:
-        Length, response, and how many thinned rows apart logs must be.
+        Length; response, None without filter; zeros between logs, in decimated rows.
     """
     half = len(band.taps) // 2
     reach = -(-2 * half // band.stride) + after
@@ -139,16 +147,19 @@ def find_bands(
     share: float = MAX_MOTION_ERROR,
     highest: float | Array = np.inf,
 ) -> tuple[Band, ...]:
-    """Finds each joint's band: up to where the error of all accelerations, as a torque, comes near the torque noise.
+    """Finds each joint's band, which ends where the acceleration error, as a torque, approaches the torque noise.
 
-    Rows are thinned alike for all joints, by what the fastest band needs.
+    All joints are decimated alike, as far as the widest band permits.
 
     Args:
         recording: the data.
         inertia: torque on each joint per acceleration of each (n, n) [kg m2].
-        torque_density: power density of the torque noise at high frequency (n,) [(N m)^2/Hz].
-        share: of the torque noise's power, what the error may have.
-        highest: that the bands may end at [Hz], a number or (n,).
+        torque_density: power density of the torque noise at high frequencies (n,) [(N m)^2/Hz].
+        share: largest power of the acceleration error, as a share of the torque noise.
+        highest: upper bound of the cut-offs [Hz], a number or (n,).
+
+    Returns:
+        The band of each joint.
     """
     rate = 1 / recording.step
     error = np.maximum(inertia**2 @ recording.floor, 1e-300)
@@ -159,16 +170,19 @@ def find_bands(
 
 
 def unbiased_frequencies(recording: Recording, inertia: Array, residual: Array, moving: Array | float = 1.0) -> Array:
-    """Finds up to which frequencies (n,) [Hz] the errors of accelerations bias no model by what shows.
+    """Finds the frequencies (n,) [Hz] up to which acceleration errors do not bias the model significantly.
 
-    An error of energy E in a column that has the energy G with it, both over the noise's, takes the share E / G off its
-    coefficient; what that leaves has this share squared of G - E.
+    An error of energy E in a column of total energy G, both in units of the noise, reduces its coefficient by the share
+    E / G. The residual of that bias has the energy (E / G)^2 (G - E).
 
     Args:
         recording: the data.
         inertia: torque on each joint per acceleration of each (n, n) [kg m2].
-        residual: torque less model (N, n) [N m or N].
-        moving: share of the rows (n,) in which each joint moves: the others count for nothing.
+        residual: torque minus model (N, n) [N m or N].
+        moving: share of the rows (n,) in which each joint moves; only these count.
+
+    Returns:
+        The frequencies; infinity where no bias is significant, or the logs are too short.
     """
     lengths = [run.stop - run.start for run in recording.runs]
     window = min(max(lengths), round(WINDOW / recording.step))
@@ -190,6 +204,6 @@ def unbiased_frequencies(recording: Recording, inertia: Array, residual: Array, 
 
 
 def low_pass(cutoff: float, rate: float, stride: int) -> Band:
-    """Builds a low-pass [Hz] for rows at a rate [Hz], of which `stride` become one."""
+    """Builds a low-pass with a cut-off [Hz] for rows at a rate [Hz], of which one in `stride` is kept."""
     length = int(np.ceil(3.6 * rate / (TRANSITION * cutoff))) | 1
     return Band(firwin(length, cutoff * (1 - TRANSITION / 2), fs=rate, window=("kaiser", 6.0)), stride, cutoff)

@@ -1,4 +1,4 @@
-"""The frequencies above a joint's band: there accelerations are not known, but torque that owes nothing to them is."""
+"""High-frequency band above each joint's usable band, for effects that do not depend on acceleration."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from estimation.linear_algebra.orthonormal import orthonormal
 
 Array = NDArray[np.float64]
 
-# Length [s] over which the noise there is taken to be as strong as it is, where that is more than usual.
+# Time [s] over which the noise level is averaged to find bursts.
 BURST = 0.4
-# Parts of the frequencies above a band whose noise is levelled, and the fewest frequencies that a part has.
+# Number of parts of the high band in which the noise level is estimated, and the fewest frequencies in one.
 PARTS, FEWEST = 8, 10
 
 
 @dataclass(frozen=True, eq=False)
 class JointHighBand:
-    """What one joint's torque is above its band.
+    """High-frequency band of one joint, as a weighted regression.
 
     Attributes:
-        high_pass: lets through what is above, at the white rows, and levels its noise.
-        counts: weights of the rows (N',): none for those whose direction of motion is not known.
+        high_pass: filter for white rows: passes the high band and levels its noise.
+        counts: weights of the rows (N',); zero where the direction of motion is unknown.
         base: orthonormal columns of the base model (N', b).
-        residual: white torque that the base model leaves, fitted anew (N',).
-        residual_of_band_fit: what it leaves as it was fitted to the band (N',).
+        residual: white torque after the base model was fitted to this band (N',).
+        residual_of_band_fit: white torque minus the base model as fitted to the usable band (N',).
     """
 
     high_pass: Band
@@ -51,14 +51,14 @@ class JointHighBand:
 class HighBand:
     """A second regression above each joint's band, for effects that are `independent_of_acceleration`.
 
-    The noise is the residual's own there, with what unknown accelerations add to it. Each joint's columns of the base
-    model are fitted anew, for what is left of friction and inertia there is not what they are below; but not for what
-    shakes the arm by itself: the arm answers to that, and an inertia fitted to the answer would take all of it.
+    Its noise is that of the residual in this band, unknown accelerations included. The base model is fitted anew for
+    each joint, because the errors of friction and inertia differ from those in the usable band. For exogenous effects
+    it is not fitted anew: the arm responds to them, and an inertia fitted to the response would absorb the effect.
 
     Attributes:
-        whitening: makes the noise white in a band that is far wider.
-        joints: each joint's; None where its band leaves nothing above it.
-        far_from_reversals: white rows (N',) in which no joint turns round.
+        whitening: whitening in a band that is far wider.
+        joints: high band of each joint; None where the usable band leaves nothing above it.
+        far_from_reversals: white rows (N',) in which no joint reverses nearby.
     """
 
     whitening: Whitening
@@ -66,10 +66,17 @@ class HighBand:
     far_from_reversals: NDArray[np.bool_]
 
     def columns(self, series: Array, joint: int, *, calm: bool = False, bare: bool = False) -> Array:
-        """Whitens columns (N, k) of a joint, from 0, above its band and projects the base model out (N', k).
+        """Whitens columns of a joint in its high band and projects the base model out.
 
-        Those that are to be `far_from_reversals` count where no joint turns round: all feel what is not known of its
-        acceleration. From those that are `bare` nothing is projected.
+        Args:
+            series: the columns (N, k).
+            joint: the joint, counted from 0.
+            calm: whether only rows far from all reversals count, since each joint feels the acceleration errors of the
+                others.
+            bare: whether the base model is not projected out.
+
+        Returns:
+            White columns (N', k); no rows for a joint without high band.
         """
         above = self.joints[joint]
         if above is None:
@@ -79,26 +86,31 @@ class HighBand:
         return white if bare else np.asarray(white - above.base @ (above.base.T @ white))
 
     def cross(self, columns: Array, joint: int, *, bare: bool = False) -> Array:
-        """Gives the products (k,) of such columns with the residual."""
+        """Multiplies columns (N', k) with the residual and returns the products (k,)."""
         above = self.joints[joint]
         if above is None:
             return np.zeros(columns.shape[1])
         return np.asarray(columns.T @ (above.residual_of_band_fit if bare else above.residual))
 
     def score_gradient(self, joint: int, rows: int, *, bare: bool = False) -> Array:
-        """Gives what torque in each of a joint's rows (N,) has to do with the residual above its band."""
+        """Computes the products of the residual in the high band with unit torques in each of a joint's rows (N,)."""
         above = self.joints[joint]
         if above is None:
             return np.zeros(rows)
         left = above.counts * (above.residual_of_band_fit if bare else above.residual)
         runs = _runs(left, self.whitening.starts, rows, self.whitening.stride)
-        # Without delay, what is above is let through alike from either side.
+        # A filter without delay is its own adjoint.
         return self.whitening.unfiltered(np.concatenate([above.high_pass.passed(run) for run in runs]), joint, rows)
 
     def regression(self, columns: Array, *, calm: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Gives the rows (R, k) of columns (N, n, k) above the bands of joints that they act on, and torque (R,).
+        """Builds the regression of columns in the high bands of the joints on which they act.
 
-        Those marked in `far_from_reversals` (k,) count where no joint turns round.
+        Args:
+            columns: columns (N, n, k).
+            calm: columns (k,) for which only rows far from all reversals count.
+
+        Returns:
+            White columns (R, k) and white torque (R,).
         """
         rows, torque = [np.zeros((0, columns.shape[2]))], [np.zeros(0)]
         for j, above in enumerate(self.joints):
@@ -114,17 +126,20 @@ class HighBand:
 def build_high_band(
     recording: Recording, baseline: Baseline, remainder: Array, noise: Array, bands: Sequence[Band], wide: Whitening
 ) -> HighBand:
-    """Prepares the regression above the bands.
+    """Builds the regression above the joints' bands.
 
     Args:
         recording: the data.
         baseline: the base model.
-        remainder: torque less base model (N, n) [N m or N].
-        noise: that less what is known besides (N, n).
-        bands: each joint's.
-        wide: whitens the noise in wider bands.
+        remainder: torque minus base model (N, n) [N m or N].
+        noise: torque minus base model and known effects (N, n) [N m or N].
+        bands: usable band of each joint.
+        wide: whitening in wider bands.
+
+    Returns:
+        The high band of each joint.
     """
-    # Rows beside reversals are left out after the filters: a ripple goes on through them, and need not be bridged.
+    # Rows near reversals get no weight after filtering: ripple continues through them, so they need no interpolation.
     wide = replace(wide, masked=find_masked_rows(recording.sign_unknown, recording.starts, rest_rows(recording.step)))
     joints: list[JointHighBand | None] = []
     for j, (band, wider) in enumerate(zip(bands, wide.bands, strict=True)):
@@ -146,11 +161,11 @@ def build_high_band(
 def _levelling(
     wide: Whitening, recording: Recording, noise: Array, counts: Array, joint: int, cutoff: float, length: int
 ) -> Band:
-    """Builds the filter, of a length, of what is above a joint's band [Hz]: its noise (N, 1) has unit density there.
+    """Builds a filter of a given length for the high band of a joint, in which noise (N, 1) gets unit density.
 
-    An autoregressive process has the noise of unknown accelerations, which grows with the fourth power of the
-    frequency, but roughly. Where a motion repeats, noise is what is at its harmonics: an encoder rounds each repetition
-    alike, and only what repeats identifies an effect of the motion.
+    Noise of unknown accelerations grows with the fourth power of frequency, which an autoregressive process describes
+    only roughly. For a periodic motion, the noise at its harmonics counts. An encoder rounds each repetition alike, and
+    an effect of the motion shows only at these harmonics.
     """
     rate = 1 / (recording.step * wide.stride)
     low, high = ((1 - TRANSITION / 2) * f for f in (cutoff, wide.bands[joint].cutoff))
@@ -176,7 +191,7 @@ def _levelling(
             inside = (f >= below) & (f < above)
             everywhere = float(power[inside].mean()) if inside.any() else 0.0
             at_lines = float(power[inside & lines].mean()) if (inside & lines).any() else everywhere
-            # In whole repetitions, which the ends of a log may leave fewer of than there are.
+            # Scaled to the repetitions that remain: filters may remove part of one at the ends of a log.
             more = max(at_lines - everywhere, 0.0) * (repeats - 1.0) / (count - 1.0) if count > 1 else 0.0
             density[part] += (everywhere + more) * counted
     levels = np.sqrt(density / max(known, 1))
@@ -185,7 +200,7 @@ def _levelling(
 
 
 def _lines(recording: Recording, run: int) -> tuple[float, int, float]:
-    """A log's period [s], the row at which it begins, and how often it is there; all of a log that does not repeat."""
+    """Returns a log's period [s], first periodic row and number of repetitions; the whole log if not periodic."""
     rows, cycle = recording.runs[run], recording.cycles[run]
     if cycle is not None:
         repeats = (cycle.stop - cycle.start) * recording.step / cycle.period
@@ -195,9 +210,9 @@ def _lines(recording: Recording, run: int) -> tuple[float, int, float]:
 
 
 def _calmness(noise: Array, counts: Array, width: int) -> Array:
-    """Weights of white rows (N',) by the noise about each, one at most.
+    """Returns weights of white rows (N',), at most one, that are lower in bursts of noise.
 
-    Joints that turn round kick each other: what is not known of accelerations comes in bursts, the same in each
+    A reversal of one joint accelerates the others. Acceleration errors therefore come in bursts, the same ones in each
     repetition of a motion.
     """
     near = uniform_filter1d(noise**2, width) / np.maximum(uniform_filter1d(counts**2, width), 1e-3)
@@ -218,10 +233,10 @@ def _passed(wide: Whitening, series: Array, joint: int, passing: Band) -> Array:
 
 
 def _counts(wide: Whitening, recording: Recording, joint: int, edge: int) -> Array:
-    """Weights of a joint's white rows (N',).
+    """Returns weights of a joint's white rows (N',), zero near rows in which its direction is unknown.
 
-    None beside rows in which its direction is not known, nor in the `edge` rows at the ends of a log, where the filter
-    sees the torque begin and end. They come after the filters: before, they would turn slow torque into fast.
+    They are also zero in the `edge` rows at the ends of a log, where the filter sees the torque begin and end. The
+    weights act after the filters, which would otherwise turn slow torque into fast torque.
     """
     reach = int(np.ceil(0.5 / wide.bands[joint].cutoff / recording.step))
     parts = []

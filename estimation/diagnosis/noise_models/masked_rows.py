@@ -1,4 +1,4 @@
-"""Rows in which a joint's direction of motion is not known: bridged where they are long, fitted freely elsewhere."""
+"""Masked rows: rows in which a joint's direction of motion is unknown, interpolated or fitted by a free torque."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class MaskedRows:
-    """Rows in which a joint's direction of motion is not known, nor then the sign of its friction.
+    """Rows in which a joint's direction of motion, and so the sign of its friction, is unknown.
 
-    They are bridged by straight lines in torque and hypotheses alike, so that filters pass over them: a friction that
-    turns round somewhere in them would ring far beyond. Short ones are given a torque of their own each besides, as
-    many numbers as the band lets through: white columns that are projected out of both. Long ones, a joint at rest, do
-    not count.
+    Friction that changes sign in such rows would ring far beyond them in a filter. Torque and hypotheses are therefore
+    interpolated linearly over them. In short stretches a free torque is fitted in addition, with as many coefficients
+    as the band can resolve. It is projected out of the white columns of torque and hypotheses. Long stretches, in which
+    the joint rests, do not count.
 
     Attributes:
-        bridges: per joint the rows, those before and after that count, and the weight of the latter.
-        free: per joint white columns of the short gaps, to be projected out.
+        bridges: per joint: masked rows, the counted rows before and after them, and the weight of the latter.
+        free: per joint: white columns of the free torque in short stretches, to be projected out.
     """
 
     bridges: tuple[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], Array], ...]
     free: tuple[FreeTorque, ...]
 
     def bridged(self, series: Array, joint: int) -> Array:
-        """Replaces the rows of gaps in columns (N,) or (N, k) of a joint, counted from 0."""
+        """Interpolates columns (N,) or (N, k) of a joint, counted from 0, over its masked rows."""
         rows, before, after, weight = self.bridges[joint]
         if not len(rows):
             return series
@@ -43,7 +43,7 @@ class MaskedRows:
         return result
 
     def bridge_adjoint(self, slope: Array, joint: int) -> Array:
-        """Hands on to the rows beside a joint's gaps what (N,) has to do with the bridge: the adjoint of `bridged`."""
+        """Applies the adjoint of `bridged` to a gradient (N,): moves it from masked rows to the rows beside them."""
         rows, before, after, weight = self.bridges[joint]
         result = slope.copy()
         result[rows] = 0.0
@@ -52,11 +52,11 @@ class MaskedRows:
         return result
 
     def project_out(self, white: NDArray[Real], joint: int) -> NDArray[Real]:
-        """Projects the short gaps' torques out of white columns of a joint."""
+        """Projects the free torque of short masked stretches out of white columns of a joint."""
         return self.free[joint].projected_out(white) if joint < len(self.free) else white
 
     def resting(self, starts: tuple[int, ...], rows: int, stride: int, margin: int) -> NDArray[np.bool_]:
-        """Marks the thinned rows (M, n) of long gaps and `margin` rows beside: what bridges them is not measured."""
+        """Marks the decimated rows (M, n) of masked stretches, and `margin` rows beside them."""
         columns = []
         for at, *_ in self.bridges:
             flags = np.zeros(rows, dtype=bool)
@@ -67,7 +67,7 @@ class MaskedRows:
 
 
 def find_masked_rows(unsure: NDArray[np.bool_], starts: tuple[int, ...], longest: int = 0) -> MaskedRows:
-    """Makes bridges over stretches of rows (N, n) longer than `longest`, none from one log to another."""
+    """Masks stretches of flagged rows (N, n) longer than `longest`; interpolation stays within a log."""
     bridges = []
     for column in unsure.T:
         flags = np.zeros_like(column)
@@ -80,7 +80,7 @@ def find_masked_rows(unsure: NDArray[np.bool_], starts: tuple[int, ...], longest
             if not len(rows):
                 continue
             if not len(good):
-                good = rows[:1]  # a joint that stands in this log: a constant, which does not count
+                good = rows[:1]  # a joint that rests in this log: a constant, which does not count
             at = np.searchsorted(good, rows)
             before, after = good[np.maximum(at - 1, 0)], good[np.minimum(at, len(good) - 1)]
             before = np.where(at == 0, after, before)
@@ -96,6 +96,6 @@ def find_masked_rows(unsure: NDArray[np.bool_], starts: tuple[int, ...], longest
 
 
 def no_masked_rows(joints: int) -> MaskedRows:
-    """Builds the gaps of a motion whose direction is known throughout."""
+    """Builds masked rows for a motion whose direction is known throughout: none."""
     none = np.zeros(0, dtype=np.intp)
     return MaskedRows(((none, none, none, np.zeros(0)),) * joints, ())

@@ -1,4 +1,4 @@
-"""The colour of the torque noise, from the residual of a model."""
+"""Estimate of the torque noise from the residual of a model: spectrum, levels, correlation and outliers."""
 
 from __future__ import annotations
 
@@ -29,18 +29,20 @@ from estimation.diagnosis.recordings.recording import rest_rows
 
 Array = NDArray[np.float64]
 
-# Innovations beyond so many standard deviations count as this many: a level that tails of five degrees pass rarely.
+# Standard deviations at which innovations are clipped; t-distributed noise of five degrees of freedom rarely exceeds
+# them.
 WINSOR = 5.0
-# The flat part of the band, as a share of its cut-off.
+# Share of a band's cut-off up to which the band is flat.
 INSIDE = 0.75
-# Nothing is said of fewer periods than so many.
+# Fewest periods in the logs of the lowest frequency that is used.
 FEWEST = 4.0
-# A log's own level counts against that of all logs as its frequencies do against so many.
+# Shrinkage of a log's noise level towards that of all logs: the latter counts like this many frequencies.
 FEW = 20.0
 QUIETEST = 1e-3
-# The noise's fast changes are taken from known rows where a joint has so many.
+# Fewest known rows of a joint from which the high-frequency noise is estimated.
 FEWEST_ROWS = 100
-# Bridges of so many rows are short in any case; where fewer than this share of the rows remain, all bridges stay.
+# Masked stretches of up to `SHORT` rows are always short. If fewer than the share `ENOUGH` of the rows would remain,
+# interpolated rows count, too.
 SHORT, ENOUGH = 8, 0.3
 
 
@@ -52,24 +54,27 @@ def estimate_whitening(
     share: float = MAX_MOTION_ERROR,
     spared: Sequence[Array] = (),
 ) -> Whitening:
-    """Estimates the noise.
+    """Estimates the noise of each joint and builds the filters that whiten it.
 
-    It is the residual of the model: what is found in it later is taken out, and the noise estimated anew. Differences
-    between repetitions would leave all that repeats out of the noise, also the errors of a model that is right but for
-    a few rows: they are for telling what repeats from what does not (`residual_shares`), not for alarms.
+    The noise is the residual of the model. If an effect is found later, it is subtracted and the noise estimated anew.
+    Differences between repetitions of a motion are not used: they contain no error that repeats, even of a model that
+    is right but for a few rows. `residual_shares` uses them instead.
 
     Args:
         recording: the data.
-        residual: torque less model (N, n) [N m or N].
-        parameters: how many were fitted to it: they have taken some of the noise.
-        inertia: torque on each joint per acceleration of each (n, n) [kg m2], for what their errors make.
-        share: of the torque noise, what those may make in the bands.
-        spared: for each joint columns (N, k) on which no noise is measured.
+        residual: torque minus model (N, n) [N m or N].
+        parameters: number of parameters fitted to it, which absorb some of the noise.
+        inertia: torque on each joint per acceleration of each (n, n) [kg m2]; it turns acceleration errors into torque.
+        share: largest power of the acceleration errors in the bands, as a share of the torque noise.
+        spared: nuisance columns of each joint (N, k), projected out before the noise is measured.
+
+    Returns:
+        The whitening filters, with bands, masked rows, and weights of the rows.
     """
     colour = WITHOUT_LOW_FREQUENCIES if len(spared) else ALL_FREQUENCIES
     longest = rest_rows(recording.step)
     rests = find_masked_rows(recording.sign_unknown, recording.starts, longest)
-    # Where the direction of motion is not known the residual is no noise.
+    # Where the direction of motion is unknown, the residual is not noise.
     gaps = find_masked_rows(recording.sign_unknown, recording.starts)
     bridged = np.column_stack([gaps.bridged(column, j) for j, column in enumerate(residual.T)])
     pieces = [bridged[run] for run in recording.runs]
@@ -106,8 +111,8 @@ def estimate_whitening(
         noise = fit_noise_process(pieces, step, counts, parameters, (slowest, fastest), beside, period, colour)
     trimmed = max(len(a) for a in noise.coefficients)
     innovations = np.concatenate([noise.whitened(piece)[min(trimmed, len(piece) // 2) :] for piece in pieces])
-    # White noise has as much power at each frequency: what effects add to the slow ones is left out, and above the band
-    # there is nothing.
+    # Innovations have equal power at all frequencies. Frequencies below the window contain effects, and those above the
+    # band contain nothing; both are left out.
     size = next_fast_len(len(innovations), real=True)
     spectrum = np.fft.rfft(innovations, size, axis=0)
     f = np.fft.rfftfreq(size, step)
@@ -117,11 +122,11 @@ def estimate_whitening(
     spectrum[~inside] = 0.0
     power = np.where(inside, power / beside.kept(size, counts), 0.0)
     scale = np.maximum(np.sqrt(power.sum(axis=0) / np.maximum(inside.sum(axis=0), 1) / counts), 1e-12)
-    # Joints correlate in the frequencies that all of them know.
+    # The correlation of joints comes from the frequencies that are known for all of them.
     spectrum[~inside.all(axis=1)] = 0.0
     shared = _unit(spectrum, size)
     correlation = np.atleast_2d(shared.T @ shared / len(shared))
-    # Too few rows make correlations of nothing; a tenth towards none keeps the inverse tame.
+    # Few rows yield random correlations. Shrinkage towards none keeps the matrix well conditioned.
     correlation = 0.95 * correlation + 0.05 * np.eye(residual.shape[1])
     plain = Whitening(
         coefficients=noise.coefficients,
@@ -142,9 +147,9 @@ def estimate_whitening(
 
 
 def _measured(recording: Recording, stride: int, widths: Array, moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Marks thinned rows (M, n) that show the noise: not where a bridge is longer than what the band lets through.
+    """Marks decimated rows (M, n) that show the noise: not interpolated stretches longer than the band resolves.
 
-    A bridge holds two samples, with all of the noise beyond the band, for as long as it is.
+    Such a stretch repeats the noise of two samples, with all frequencies beyond the band, for its whole length.
     """
     result = moving.copy()
     for j, width in enumerate(widths):
@@ -156,9 +161,10 @@ def _measured(recording: Recording, stride: int, widths: Array, moving: NDArray[
 
 
 def _pushed(outside: NDArray[np.bool_], recording: Recording, stride: int, cutoffs: Array) -> NDArray[np.bool_]:
-    """Marks white rows (N, n) that stick out together, away from the joint's reversals: a push is an effect.
+    """Marks white rows (N, n) that are outliers together, away from the joint's reversals: such a push is an effect.
 
-    For longer than a kick that the band spreads: three quarters of a wave of its cut-off (n,) [Hz] to either side.
+    They must last longer than an acceleration jump that the band spreads: 3/4 of a period of its cut-off (n,) [Hz] to
+    either side.
     """
     step, reach = recording.step * stride, round(IMPACT_TIME / recording.step)
     crowded = np.empty_like(outside)
@@ -175,16 +181,16 @@ def _pushed(outside: NDArray[np.bool_], recording: Recording, stride: int, cutof
 def _levels(
     white: Sequence[Array], counts: Sequence[NDArray[np.intp]], step: float, slowest: float, fastest: Array
 ) -> Array:
-    """Gives the noise of each log over that of all (logs, n), from whitened residuals (N, n) of each.
+    """Estimates the noise level of each log over that of all logs (logs, n), from whitened residuals (N, n) of each.
 
-    By the faster half of what is known: a torque that acts in one log only is slow. A log of few frequencies, or of few
-    rows in which a joint moves (n,), is taken to be as noisy as the others.
+    Only the upper half of the known frequencies is used, since an effect that acts in one log only is slow. The level
+    is shrunk towards one for a log of few frequencies, or of few rows in which a joint moves (n,).
     """
     powers, numbers = np.empty((2, len(white), len(fastest)))
     for i, (rows, counted) in enumerate(zip(white, counts, strict=True)):
         f = np.fft.rfftfreq(len(rows), step)[:, None]
         inside = (f >= np.maximum(slowest, fastest / 2)) & (f < fastest)
-        # A joint at rest has no noise, and as many frequencies less.
+        # A joint at rest has no noise, and accordingly fewer frequencies.
         numbers[i] = inside.sum(axis=0) * counted / len(rows)
         powers[i] = (np.abs(np.fft.rfft(rows, axis=0)) ** 2 * inside).sum(axis=0) / len(rows)
     mean = np.maximum(powers.sum(axis=0) / np.maximum(numbers.sum(axis=0), 1), 1e-300)
@@ -193,7 +199,7 @@ def _levels(
 
 
 def _unit(spectrum: NDArray[np.complex128], rows: int) -> Array:
-    """Gives the signals (N, n) of spectra, outliers cut, of no mean and unit variance."""
+    """Returns the signals (N, n) of spectra with outliers clipped, zero mean and unit variance."""
     white = np.fft.irfft(spectrum, rows, axis=0)
     white = np.clip(white / np.maximum(white.std(axis=0), 1e-12), -WINSOR, WINSOR)
     white -= white.mean(axis=0)
@@ -201,26 +207,29 @@ def _unit(spectrum: NDArray[np.complex128], rows: int) -> Array:
 
 
 def quiet_joints(recording: Recording, residual: Array, inertia: Array) -> NDArray[np.bool_]:
-    """Tells of which joints (n,) the kicks at reversals, as far as their accelerations are not known, drown in noise.
+    """Finds joints (n,) whose acceleration errors at reversals are small against the torque noise.
 
     Args:
         recording: the data.
-        residual: torque less model (N, n) [N m or N].
+        residual: torque minus model (N, n) [N m or N].
         inertia: torque on each joint per acceleration of each (n, n) [kg m2].
+
+    Returns:
+        Flags (n,).
     """
     density = _density([residual[run] for run in recording.runs], recording.step)
-    # Of the samples themselves, which are as many as a kick lasts for.
+    # Standard deviation of single samples at the full rate: an acceleration jump lasts for few of them.
     noise = np.sqrt(density * recording.stride / (2 * recording.step))
     return np.asarray(np.diag(inertia) * recording.reversal_acceleration_error < MAX_REVERSAL_ERROR * noise)
 
 
 def _density(pieces: Sequence[Array], step: float, known: Sequence[NDArray[np.bool_]] | None = None) -> Array:
-    """Power density of the noise (n,) in the upper half of the band, from its fast changes in rows that are `known`."""
-    # A second difference passes white noise of variance s^2 as 6 s^2 and slow noise not at all; the median square
-    # stands above the rare kicks at reversals.
+    """Estimates the power density of high-frequency noise (n,), from second differences in rows that are `known`."""
+    # A second difference of white noise of variance s^2 has the variance 6 s^2, and slow noise cancels. The median of
+    # squares ignores the rare jumps at reversals.
     squares = np.concatenate([np.diff(piece, 2, axis=0) ** 2 for piece in pieces])
     if known is not None:
-        # A bridge is a straight line, without noise: most rows of a joint that stands for most of the time.
+        # Interpolated rows are free of noise. They are most rows of a joint that mostly rests.
         inner = np.concatenate([rows[:-2] & rows[1:-1] & rows[2:] for rows in known])
         squares[~inner & (inner.sum(axis=0) >= FEWEST_ROWS)] = np.nan
     return np.asarray(np.nanmedian(squares, axis=0) / 0.455 / 6 * 2 * step)

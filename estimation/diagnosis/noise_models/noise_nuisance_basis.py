@@ -1,4 +1,4 @@
-"""Free functions of each joint's own state, beside the base model: on them no noise is measured."""
+"""Nuisance functions of each joint's own state, projected out before noise is estimated."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from estimation.linear_algebra.orthonormal import orthonormal
 
 Array = NDArray[np.float64]
 
-# Knots of the functions: of the position over its range, of friction over time, of the speed as shares of its largest.
+# Numbers of knots: over the range of position, and over time for friction. Knots of speed, as shares of the largest.
 POSITIONS, TIMES = 8, 5
 SPEEDS = (0.0, 0.03, 0.1, 0.3, 0.6, 1.0)
-# Of a shorter log [s] they would take most of the noise at the frequencies of the motion.
+# Duration [s] of the logs below which the functions would absorb most of the noise at the frequencies of the motion.
 SHORTEST = 20.0
-RANGE = 1e-3  # [rad or m] a joint that moves less than this has none
-# Directions of columns below this share of the largest are none.
+RANGE = 1e-3  # [rad or m] range of a joint's position below which it has no functions
+# Directions of columns below this share of the largest are dropped.
 FAINT = 1e-6
-# Where they have taken more of a frequency's noise than this leaves, what is left is no measure of it.
+# Least share of the noise power that counts as left at a frequency; a smaller one is no measure of the noise.
 LEAST_KEPT = 0.2
 
 
 class NuisanceProjection:
-    """Columns that are projected out of white rows, joint by joint, and what of noise they leave at each frequency.
+    """Projection of nuisance columns out of white rows, joint by joint, and the share of noise that remains.
 
     Args:
-        columns: for each joint (N, k), none for nothing.
-        bands: of the joints.
-        runs: the logs' rows.
-        measured: white rows (M, n) of all logs that count.
+        columns: nuisance columns of each joint (N, k); an empty sequence for none.
+        bands: bands of the joints.
+        runs: rows of each log.
+        measured: white rows of all logs that count (M, n).
     """
 
     def __init__(
         self, columns: Sequence[Array], bands: Sequence[Band], runs: Sequence[slice], measured: NDArray[np.bool_]
     ) -> None:
-        self.pieces = []  # of each joint and log
+        self.pieces = []  # per joint and log
         lengths = [-(-(run.stop - run.start) // bands[0].stride) for run in runs]
         self.measured = np.split(measured, np.cumsum(lengths)[:-1])
         for j, (X, band) in enumerate(zip(columns, bands, strict=False)):
@@ -48,7 +48,7 @@ class NuisanceProjection:
             self.pieces.append(np.split(orthonormal(whole, FAINT), np.cumsum(lengths)[:-1]))
 
     def left(self, pieces: list[Array]) -> list[Array]:
-        """Projects the columns out of residuals (M, n) of each log; rows that do not count are zero."""
+        """Projects the nuisance columns out of the residuals (M, n) of each log; rows that do not count become zero."""
         result = [piece * rows for piece, rows in zip(pieces, self.measured, strict=True)]
         pieces = [piece.copy() for piece in result]
         for j, own in enumerate(self.pieces):
@@ -58,7 +58,15 @@ class NuisanceProjection:
         return result
 
     def kept(self, size: int, counts: Array) -> Array:
-        """Gives the share of white noise's power that is left (size // 2 + 1, n), of `counts` rows (n,)."""
+        """Computes the share of white noise power that remains at each frequency.
+
+        Args:
+            size: length of the Fourier transform.
+            counts: rows of each joint that count (n,).
+
+        Returns:
+            Shares (size // 2 + 1, n).
+        """
         result = np.ones((size // 2 + 1, len(counts)))
         for j, own in enumerate(self.pieces):
             taken = sum((np.abs(rfft(np.ascontiguousarray(X.T), size)) ** 2).sum(axis=0) for X in own)
@@ -67,23 +75,23 @@ class NuisanceProjection:
 
 
 def is_short(recording: Recording) -> bool:
-    """Whether what is fitted freely to the logs would take most of their noise at the frequencies of the motion."""
+    """Returns whether the logs are so short that nuisance functions would absorb most of the noise."""
     return recording.duration < SHORTEST
 
 
 def build_nuisance_projection(recording: Recording, baseline: Baseline, residual: Array) -> tuple[Array, ...]:
-    """Evaluates functions of position, speed and load, and friction by time, less what the base model makes of them.
+    """Evaluates nuisance functions of position, speed, load, and time, with the base model projected out.
 
-    Most effects of the catalogue are about such a function. What they leave in the residual is as fast as the motion
-    is, and would pass for a colour of the noise, under which they hide.
+    Most effects of the catalogue resemble such a function. What they leave in the residual is as fast as the motion. It
+    would pass for coloured noise and hide the effects.
 
     Args:
         recording: the data.
         baseline: the base model's columns.
-        residual: torque less model (N, n) [N m or N].
+        residual: torque minus model (N, n) [N m or N].
 
     Returns:
-        For each joint, columns (N, k) on its rows; nothing of a log that is too short.
+        Columns (N, k) for each joint; nothing if the logs are too short.
     """
     if is_short(recording):
         return ()

@@ -1,4 +1,4 @@
-"""The colour of noise: an autoregressive process, from a spectrum that is known in a window alone."""
+"""Coloured noise as an autoregressive process, fitted to a spectrum that is known in a window of frequencies only."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from estimation.uncertainty.autoregressive import HIGHEST_ORDER, Noise, fit_nois
 
 Array = NDArray[np.float64]
 
-# Share of the variance added to the diagonal: without it the whitening would amplify an empty band.
+# Share of the variance added to the diagonal: otherwise whitening would amplify an empty band.
 LOADING = 0.01
-# Of the noise's process: fewer coefficients would not tell a colour from white, however seldom rows are.
+# Lowest order of the process: fewer coefficients cannot describe coloured noise, however low the sampling rate.
 LOWEST_ORDER = 4
 ROUNDS = 20
 
 
 @dataclass(frozen=True)
 class SpectrumSettings:
-    """How the colour of noise is told.
+    """Settings of the noise estimate.
 
     Attributes:
-        flat: below this frequency [Hz] noise is flat: what stands out there is an effect's, and not counted.
-        memory: longest of the noise model [s].
-        rows: a coefficient at least.
-        times: the model's order is so many times the one that predicts best.
-        held: whether rows in bridges count that are longer than what the band lets through.
+        flat: frequency [Hz] below which noise is taken to be flat; a higher spectrum there is that of an effect.
+        memory: longest memory of the noise model [s].
+        rows: least number of rows per coefficient.
+        times: order of the model over the order that predicts best.
+        held: whether interpolated stretches longer than the band resolves count.
     """
 
     flat: float
@@ -41,8 +41,9 @@ class SpectrumSettings:
     held: bool
 
 
-# Beside free functions all of the memory is used: an order that predicts best misses much of what noise slower than a
-# second has, and slow effects are measured against that. Where nothing is spared it would take slow effects for noise.
+# With nuisance functions, the whole memory is used. The order that predicts best misses much of the noise slower than a
+# second, against which slow effects are tested. Without nuisance functions, such an order would take slow effects for
+# noise.
 WITHOUT_LOW_FREQUENCIES = SpectrumSettings(flat=0.15, memory=1.0, rows=100, times=HIGHEST_ORDER, held=False)
 ALL_FREQUENCIES = SpectrumSettings(flat=1.0, memory=0.2, rows=1, times=1, held=True)
 
@@ -57,21 +58,24 @@ def fit_noise_process(
     period: float | None,
     colour: SpectrumSettings,
 ) -> Noise:
-    """Fits the noise by its spectrum within a window, and lets the model say what is outside.
+    """Fits the noise process of each joint to its spectrum within a window of frequencies.
 
-    What an effect leaves in the residual is slow, as motion is; taken for noise it would hide itself. Above the window
-    is the edge of the band. Outside, the spectrum is what the fitted process has there, again and again until it stays
-    (a Yule-Walker fit of data that are missing).
+    Effects leave a slow residual, as slow as motion. Taken for noise, it would hide them. Frequencies below the window
+    are therefore not used, and those above it are at the edge of the band. Outside the window the spectrum is replaced
+    by that of the fitted process, and the fit is repeated (a Yule-Walker fit with missing data).
 
     Args:
-        pieces: residual of each log (N, n), `step` [s] a row.
-        step: the sample period [s].
-        counts: rows of each joint that are no bridge over a time at rest (n,).
-        parameters: how many were fitted to the residual: they have taken some of the noise.
-        window: the lowest frequency [Hz], and the highest of each joint (n,).
-        beside: what was taken out of the pieces.
-        period: of the motion [s]; None where it does not repeat.
+        pieces: residual of each log (N, n) [N m or N].
+        step: sample period [s].
+        counts: rows of each joint that count, without interpolated times at rest (n,).
+        parameters: number of parameters fitted to the residual, which absorb some of the noise.
+        window: lowest frequency [Hz], and highest frequency of each joint (n,) [Hz].
+        beside: the nuisance projection that was applied to the pieces.
+        period: period of the motion [s]; None if it does not repeat.
         colour: settings of the estimate.
+
+    Returns:
+        The noise process of each joint.
     """
     rows, joints = sum(map(len, pieces)), pieces[0].shape[1]
     longest = np.minimum(colour.memory / step, counts / colour.rows)
@@ -90,9 +94,9 @@ def fit_noise_process(
 def _covariance(
     power: Array, size: int, step: float, count: float, window: tuple[float, float], highest: int, times: int
 ) -> Array:
-    """Gives one joint's covariances (highest + 1,) from its power (F,), known in a window alone, of `size` rows.
+    """Computes a joint's autocovariance (highest + 1,) from power (F,) of `size` rows, known in a window only.
 
-    What is outside is what a process of so many `times` the order that predicts best has there.
+    Power outside the window is that of a process whose order is `times` the one that predicts best.
     """
     f = np.fft.rfftfreq(size, step)
     power = power.copy()

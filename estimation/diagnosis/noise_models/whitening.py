@@ -1,4 +1,4 @@
-"""A linear filter per joint that makes torque noise white, for torque and hypotheses alike."""
+"""Linear filters, one per joint, that whiten the torque noise; torque and hypotheses pass the same filters."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from robots.common.stretches import spans
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
-# A filter lets through this share of what is at rest at least: what it says of less is chance.
+# Least gain of a whitening filter at zero frequency: a smaller estimate is chance.
 LEAST_AT_REST = 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """A linear filter per joint that makes the noise white, of unit variance, and knows its correlation.
+    """One linear filter per joint that makes the noise white with unit variance, and the correlation of joints.
 
     Attributes:
-        coefficients: per joint the prediction filter (p_j,).
+        coefficients: prediction filter of each joint (p_j,).
         scale: standard deviation of the innovations (n,) [N m or N].
-        precision: inverse correlation of the innovations of the joints (n, n).
-        starts: rows at which a log begins: the filters start anew.
+        precision: inverse of the joints' innovation correlation (n, n).
+        starts: first row of each log; the filters restart there.
         masked: rows of each joint that do not count.
-        bands: each joint's: where motion is known. Rows are thinned alike.
-        weights: of the white rows (N, n): those that no noise explains count less; None for ones.
-        levels: of the noise of each log, in units of `scale` (logs, n); None for ones.
+        bands: usable band of each joint; all have the same decimation.
+        weights: weights of the white rows (M, n), lower for outliers and zero at rest; None for ones.
+        levels: noise level of each log over `scale` (logs, n); None for ones.
     """
 
     coefficients: tuple[Array, ...]
@@ -48,34 +48,34 @@ class Whitening:
 
     @property
     def stride(self) -> int:
-        """Rows of a log that become one."""
+        """Decimation: rows of a log per white row."""
         return self.bands[0].stride
 
     def level(self, run: int, joint: int) -> float:
-        """The noise of a log, in units of `scale`."""
+        """Returns the noise level of a log over `scale`."""
         return 1.0 if self.levels is None else float(self.levels[run, joint])
 
     def taps(self, joint: int) -> Array:
-        """Gives a joint's filter (p_j + 1,), for the noise of a log of level one."""
+        """Returns a joint's filter (p_j + 1,), for the noise of a log of level one."""
         return np.concatenate([[1.0], -self.coefficients[joint]]) / self.scale[joint]
 
     @property
     def at_rest(self) -> Array:
-        """The noise's density at rest, as the standard deviation of white noise that has as much there (n,)."""
+        """Noise density at zero frequency, as the standard deviation of equivalent white noise (n,) [N m or N]."""
         gains = [max(abs(1.0 - float(np.sum(a))), LEAST_AT_REST) for a in self.coefficients]
         return self.scale / np.array(gains)
 
     @property
     def row_weight(self) -> float:
-        """Power density of the noise at rest over that of white noise of its innovations, per row of the log.
+        """Power density of the noise at zero frequency over that of the innovations, times the decimation.
 
-        So many plain rows, weighted by the innovations' scale, hold as much information on a slow torque as one row of
+        This many rows, weighted by the innovations' scale, hold as much information on a slow torque as one row of
         white noise.
         """
         return self.stride * float(np.mean(np.square(self.at_rest / self.scale)))
 
     def scales(self, rows: int) -> Array:
-        """Gives the standard deviation of the innovations of each of a recording's rows (N, n) [N m or N]."""
+        """Returns the standard deviation of the innovations in each row of a recording (N, n) [N m or N]."""
         levels = np.ones((len(self.starts), len(self.scale))) if self.levels is None else self.levels
         return np.repeat(levels * self.scale, np.diff([*self.starts, rows]), axis=0)
 
@@ -88,7 +88,7 @@ class Whitening:
     @overload
     def filtered(self, series: Array, joint: int, *, single: Literal[True]) -> Small: ...
     def filtered(self, series: Array, joint: int, *, single: bool = False) -> Array | Small:
-        """Does what `apply` does, rows that do not count included; in `single` precision twice as fast."""
+        """Filters columns as `apply` does, before masks and weights; in `single` precision twice as fast."""
         series = self.masked.bridged(series, joint)
         taps, band = self.taps(joint), self.bands[joint]
         white = (
@@ -96,7 +96,7 @@ class Whitening:
             if single
             else band.passed(series, taps, starts=self.starts)
         )
-        # Before a log there is nothing to predict from: its first rows would weigh as if they were shocks.
+        # The filter has no past at the start of a log. Full weight would make its first rows look like shocks.
         rise = np.linspace(0, 1, len(taps))[1:, *(None,) * (series.ndim - 1)]
         first = 0
         for run, (start, stop) in enumerate(pairwise((*self.starts, len(series)))):
@@ -107,7 +107,7 @@ class Whitening:
         return white
 
     def counted(self, white: NDArray[Real], joint: int) -> NDArray[Real]:
-        """Leaves out of white columns what is in rows that do not count."""
+        """Applies masks and weights to white columns of a joint."""
         white = self.masked.project_out(white, joint)
         if self.weights is None:
             return white
@@ -115,33 +115,45 @@ class Whitening:
         return white * weights.astype(white.dtype, copy=False)
 
     def adjoint(self, white: Array, joint: int, rows: int) -> Array:
-        """Gives what each of a joint's rows (N,) has to do with white ones (M,): <apply(x), white> = <x, adjoint>.
+        """Maps white rows (M,) of a joint back by the adjoint A* of `apply`: <apply(x), white> = <x, A* white>.
 
-        But for x in the first rows of a log.
+        This holds for x that is zero in the first rows of each log.
+
+        Args:
+            white: the white rows.
+            joint: the joint, counted from 0.
+            rows: number of rows of the recording.
+
+        Returns:
+            Values at the rows of the recording (N,).
         """
         if self.weights is not None:
             white = white * self.weights[:, joint]
         return self.unfiltered(self.masked.project_out(white, joint), joint, rows)
 
     def unfiltered(self, white: Array, joint: int, rows: int) -> Array:
-        """The same of `filtered`."""
+        """Applies the adjoint of `filtered` to white rows (M,), as `adjoint` does."""
         taps = self.taps(joint)
         band, parts, first = self.bands[joint], [], 0
         for run, (start, stop) in enumerate(pairwise((*self.starts, rows))):
             count = -(-(stop - start) // band.stride)
             thinned = np.zeros(stop - start)
-            # The low-pass is its own adjoint, for it has no delay.
+            # A low-pass without delay is its own adjoint.
             thinned[:: band.stride] = np.convolve(white[first : first + count], taps[::-1])[len(taps) - 1 :]
             parts.append(replace(band, stride=1).passed(thinned) / self.level(run, joint))
             first += count
         return self.masked.bridge_adjoint(np.concatenate(parts), joint)
 
     def all(self, series: Array) -> Array:
-        """Whitens (N, n) or (N, n, k)."""
+        """Whitens (N, n) or (N, n, k), joint by joint."""
         return np.stack([self.apply(series[:, j], j) for j in range(series.shape[1])], axis=1)
 
     def independent(self, series: Array) -> Array:
-        """Whitens (N, n) or (N, n, k) across the joints too: a row each of white row and joint, (N n,) or (N n, k)."""
+        """Whitens (N, n) or (N, n, k) also across joints.
+
+        Returns:
+            One row for each white row and joint, (N n,) or (N n, k).
+        """
         root = np.linalg.cholesky(self.precision)  # P = L L'
         mixed = np.einsum("jk,nj...->nk...", root, self.all(series), optimize=True)
         return np.asarray(mixed.reshape(-1, *series.shape[2:]))
@@ -150,9 +162,20 @@ class Whitening:
 def free_columns(
     unsure: NDArray[np.bool_], longest: int, whitening: Whitening, widths: Sequence[float]
 ) -> tuple[FreeTorque, ...]:
-    """Builds the white columns of the short gaps: polynomials over each, one for every `widths[j]` rows and one more.
+    """Builds white columns for the free torque of short masked stretches of each joint.
 
-    Each is whitened where it is not zero only, so that a long log costs no more a gap than a short one.
+    Each stretch gets polynomials, one more than the number of `widths[j]` rows it spans. Of a long stretch only the two
+    ends get them. Each column is whitened only where it is not zero, so that costs do not grow with the length of the
+    log.
+
+    Args:
+        unsure: masked rows (N, n).
+        longest: rows up to which a stretch is short.
+        whitening: the filters.
+        widths: rows of each joint that its band resolves (n,).
+
+    Returns:
+        The free torque of each joint.
     """
     result = []
     for j, (column, width) in enumerate(zip(unsure.T, widths, strict=True)):
@@ -173,7 +196,7 @@ def free_columns(
 
 
 def _white_gap(whitening: Whitening, joint: int, start: int, shapes: Array, rows: int) -> tuple[int, Array]:
-    """Whitens functions of a gap (m, k) that begins at a row of a log: the first white row, and the white rows."""
+    """Whitens functions (m, k) of a stretch that starts at a row of a log; returns the first white row and the rows."""
     band = whitening.bands[joint]
     half, stride = len(band.taps) // 2, band.stride
     taps = whitening.taps(joint)
@@ -189,7 +212,7 @@ def _white_gap(whitening: Whitening, joint: int, start: int, shapes: Array, rows
 
 
 def _short(start: int, stop: int, longest: int, beside: int, rows: int) -> list[tuple[int, int]]:
-    """A short gap as it is; of a long one both ends, where the joint came to rest or broke loose with a kick."""
+    """Returns a short stretch as it is, and both ends of a long one, where the joint stops or breaks away."""
     if stop - start <= longest:
         return [(start, stop)]
     ends = [(max(edge - beside, 0), min(edge + beside, rows)) for edge in (start, stop) if 0 < edge < rows]

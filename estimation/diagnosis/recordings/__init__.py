@@ -1,1 +1,1 @@
-"""From logs to clean motion: one grid, derivatives, directions, and which rows count."""
+"""Reading of logs: uniform grid, low-passed motion and its derivatives, direction of motion, rows that count."""

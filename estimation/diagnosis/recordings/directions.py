@@ -1,4 +1,4 @@
-"""Rows of a log in which the direction of a joint's motion is not known."""
+"""Rows of a log in which the sign of a joint's velocity, and so of its friction, is unknown."""
 
 from __future__ import annotations
 
@@ -15,36 +15,37 @@ from robots.common.stretches import spans
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# A sign is tried as sharp as over this velocity [rad/s or m/s], a slow joint's over this share of its fastest. Rows
-# slower than so many times that count for nothing: friction that turns round at once has no value of the model's there.
+# Width v0 [rad/s or m/s] of the sharpest friction sign that is tried; for a slow joint, as a share of its largest
+# speed. Rows slower than `SURELY` times that do not count: at a sudden reversal the model's friction is not defined
+# there.
 SHARP, SURELY = 0.0005, 3.0
-# Two clocks are one within this share of a sample period.
+# Time stamps that differ by less than this share of a sample period are the same sample.
 ALIKE = 0.02
-# Of a jump J of acceleration, a velocity known up to a frequency f is wrong by this times J / (2 pi f).
+# A jump J of the acceleration causes an error of KICK J / (2 pi f) in a velocity known up to the frequency f.
 KICK = 0.3
-# Rows to either side of a reversal that count for nothing: those that a kick spreads to, in this share of a period of
-# the cut-off, so many at most. A kick below this share of the RMS acceleration is none.
+# Rows on either side of a reversal that do not count: as far as a jump of the acceleration spreads, `SPREAD` periods of
+# the cut-off, and at most `BESIDE` rows. Jumps below the share `NO_KICK` of the RMS acceleration are neglected.
 BESIDE, SPREAD, NO_KICK = 3, 0.25, 0.02
-# The largest jump, over the root mean square of all.
+# Largest jump of the acceleration over the RMS of all jumps.
 LARGER = 3.0
-# Up to such a frequency [Hz] a position loop undoes what kicks do to a joint, which has then most of it about there.
+# Assumed bandwidth [Hz] of the position loop. It attenuates the response to friction jumps below this frequency, so
+# that most of the response lies about it.
 LOOP = 25.0
-# A position's noise beside reversals and elsewhere is as good as drawn anew after so many rows: a slow joint stays on
-# a count of its encoder for some. It is compared where there are so many rows of each.
+# Position noise is independent after this many rows, since a slow joint stays on one encoder count for some rows. The
+# noise beside reversals is compared with the noise elsewhere if each has at least `FEWEST` rows.
 ANEW, FEWEST = 5, 200
 
 
 @dataclass(frozen=True, eq=False)
 class Directions:
-    """What is known of the directions of a log's joints.
+    """What a log determines about the direction of motion of its joints.
 
     Attributes:
-        sign_unknown: rows (N, n) in which a joint's direction is not known, or not to be relied on beside its
-            reversals.
-        sign_known_from_velocity: those of them (N, n) in which the velocity tells it.
-        reversal_acceleration_error: error of the accelerations (n,) beside reversals [rad/s2 or m/s2].
-        reversal_time_error: how late joints may turn round (N, n) [s] by their velocities' error, where rows beside
-            reversals count.
+        sign_unknown: rows (N, n) in which a joint's direction is unknown, or unreliable because of a reversal nearby.
+        sign_known_from_velocity: those of them (N, n) in which the velocity still determines the sign.
+        reversal_acceleration_error: error of the accelerations (n,) near reversals [rad/s2 or m/s2].
+        reversal_time_error: error of the reversal times (N, n) [s] that follows from the error of the velocities; zero
+            for joints whose rows near reversals never count.
     """
 
     sign_unknown: Flags
@@ -53,7 +54,7 @@ class Directions:
     reversal_time_error: Array
 
     def rows(self, kept: slice) -> Directions:
-        """Gives what is known of some rows."""
+        """Selects rows."""
         return replace(
             self,
             sign_unknown=self.sign_unknown[kept],
@@ -62,10 +63,13 @@ class Directions:
         )
 
     def spread(self, between: NDArray[np.intp]) -> Directions:
-        """Takes no row as sure whose torque comes of two samples between which a joint may have turned round.
+        """Marks rows whose torque is interpolated between two samples that enclose a reversal.
 
         Args:
-            between: which two samples each row (N,) lies between, in order; -1 for one that is a sample itself.
+            between: index of the sample pair that encloses each row (N,), in ascending order; -1 for rows at a sample.
+
+        Returns:
+            The directions, in which all rows of such a pair have an unknown sign.
         """
         inner = np.flatnonzero(between >= 0)
         if not len(inner):
@@ -84,22 +88,28 @@ class Directions:
 def find_directions(
     dq: Array, ddq: Array, cutoffs: Array, floor: Array, ends: Array, step: float, rest: Array | None
 ) -> Directions:
-    """Tells in which rows (N, n) of a log the direction of a joint's motion is known.
+    """Finds the rows (N, n) of a log in which the direction of motion is known.
 
-    Rows beside a reversal are not relied on, for a sharp sign turns round between samples: as many as a kick spreads
-    to, and `BESIDE` of them where torque was not sampled at these rows. Clear are those where it was, and the velocity
-    changes from row to row by more than `MIN_SHARP_SPEED_SIGMAS` errors and is itself as large: nearly all, with a fine
-    encoder.
+    Rows near a reversal are unreliable, since Coulomb friction changes sign between samples. Where torque was sampled
+    at the rows of the grid, these are the rows over which a jump of the acceleration spreads. Otherwise they are
+    `BESIDE` rows on either side.
+
+    The velocity still determines the sign if torque was sampled at the rows and two conditions hold. It changes by more
+    than `MIN_SHARP_SPEED_SIGMAS` errors per row, and it is itself larger than that. With a fine encoder this holds for
+    nearly all rows.
 
     Args:
         dq: velocities (N, n) [rad/s or m/s].
-        ddq: accelerations (N, n).
-        cutoffs: up to which they are known (n,) [Hz].
-        floor: power density (n,) of the encoders' noise.
-        ends: power density (n,) of the positions at the cut-offs.
+        ddq: accelerations (N, n) [rad/s2 or m/s2].
+        cutoffs: cut-off frequencies of the positions (n,) [Hz].
+        floor: power density of the encoder noise (n,) [rad^2/Hz or m^2/Hz].
+        ends: power density of the positions at the cut-offs (n,) [rad^2/Hz or m^2/Hz].
         step: sample period [s].
-        rest: what the positions (N, n) as logged have besides; None where positions and torque were measured between
+        rest: logged minus low-passed positions (N, n) [rad or m]; None if positions and torque were not sampled at
             these rows.
+
+    Returns:
+        The directions of motion, row by row.
     """
     sampled = rest is not None
     unsure, clear = np.zeros(dq.shape, dtype=bool), np.zeros(dq.shape, dtype=bool)
@@ -116,9 +126,11 @@ def find_directions(
         near = maximum_filter1d(turned.astype(np.int8), 2 * beside, origin=0) > 0
         unsure[:, j] = (np.abs(v) < np.maximum(MIN_SPEED_SIGMAS * error, SLOW * speed)) | near
         change = np.abs(a) * step
-        # A kick that does not stand out of the noise where it is looked for is still there; a joint at rest has none.
+        # At each reversal the error is at least its RMS over all reversals: a jump may hide in the noise. A joint at
+        # rest has no jumps, which the weights allow for.
         usual = float(np.sqrt(np.average(error**2, weights=np.where(turned, change, 0.0) + 1e-300)))
-        # It may be as large as the noise hides where it has most power, and as what is seen beside the reversals.
+        # The jumps are bounded twice: by the encoder noise, which hides most about the loop's bandwidth, and by the
+        # position residual near reversals.
         hidden = KICK * largest / (2 * np.pi * cutoff) * (LOOP / cutoff) ** 2
         usual = max(usual, hidden if rest is None else min(hidden, _bound_reversal_velocity(rest[:, j], turned, step)))
         jolts[j] = 2 * np.pi * max(cutoff, LOOP) * usual
@@ -126,7 +138,7 @@ def find_directions(
         least = np.maximum(error, np.maximum(ALIKE * change, SURELY * sharpest_sign_velocity(v)))
         clear[:, j] = sampled & (error < change) & (np.abs(v) > least)
         if (turned & (error < change)).any():
-            # Reversals at which it is more do not count.
+            # Reversals with a larger error do not count.
             late[:, j] = np.minimum(usual / np.maximum(np.abs(a), 1e-300), step / MIN_SHARP_SPEED_SIGMAS)
         for start, stop in spans(np.abs(v) < CREEP_SPEED * speed):
             if (stop - start) * step > CREEP_TIME:
@@ -135,10 +147,11 @@ def find_directions(
 
 
 def _bound_reversal_velocity(rest: Array, turned: Flags, step: float) -> float:
-    """Bounds what kicks do to a joint's velocity at its reversals by what its position (N,) has there besides.
+    """Bounds the velocity error [rad/s or m/s] that acceleration jumps cause at a joint's reversals.
 
-    They move it by as much as that is larger than elsewhere, or would not be told to be; a position loop undoes them
-    with its bandwidth, and what they last for is known by that.
+    The position residual (N,) has more power near reversals than elsewhere. That excess, plus its standard error,
+    bounds the motion that the low-pass removed. The loop's bandwidth converts it into a velocity. The bound is infinite
+    if there are too few rows.
     """
     reach = round(1.0 / (LOOP * step))
     near, around = (maximum_filter1d(turned.astype(np.int8), 2 * k * reach + 1) > 0 for k in (1, 2))
@@ -150,16 +163,16 @@ def _bound_reversal_velocity(rest: Array, turned: Flags, step: float) -> float:
 
 
 def sharpest_sign_velocity(dq: Array) -> float:
-    """Gives the velocity over which a joint's sign is tried at its sharpest, by its velocities (N,)."""
+    """Returns the width of the sharpest friction sign [rad/s or m/s] to try for a joint with velocities (N,)."""
     return SHARP * min(1.0, float(np.abs(dq).max(initial=0.0)))
 
 
 def _error(ddq: Array, cutoff: float, floor: float, largest: float, step: float) -> Array:
-    """Gives the error of a joint's velocity (N,) that is known up to a frequency f only.
+    """Estimates the error (N,) of a joint's velocity that is known up to a frequency f only.
 
-    Friction that turns round kicks the joint: its acceleration (N,) jumps, and beside a jump J the velocity is wrong by
-    `KICK` J / (2 pi f). Jumps at a rate r give the position a power of 2 r J^2 / (2 pi f)^6 per hertz, so that what it
-    has at f bounds them: `largest`. Encoder noise of density `floor` adds to that.
+    Coulomb friction makes the acceleration (N,) jump at reversals. Near a jump J the error of the velocity is `KICK` J
+    / (2 pi f). Jumps at a rate r give the position the power density 2 r J^2 / (2 pi f)^6. The power of the position at
+    f therefore bounds the jumps by `largest`. Encoder noise of density `floor` adds to the error.
     """
     reach = max(1, round(0.5 / cutoff / step))
     jump = np.zeros(len(ddq))

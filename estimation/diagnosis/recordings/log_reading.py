@@ -1,4 +1,4 @@
-"""Logs made ready for diagnosis: one grid, motion free of noise, torque as measured."""
+"""Reads logs onto one uniform grid: low-passed motion, torque as measured."""
 
 from __future__ import annotations
 
@@ -27,20 +27,21 @@ from robots.signals import Log
 Array = NDArray[np.float64]
 _Part = tuple[Array, Array, Array, Array, Array, Cycle | None, Array, Directions, Array, Array | None]
 
-# More rows than this only cost time: the logs are then thinned by a whole number, torque low-passed before.
+# Rows beyond which logs are low-passed and decimated by an integer: more rows only cost time.
 MOST_ROWS = 20_000
-# What jumps is evaluated at all rows, where they are no more than this.
+# Rows up to which discontinuous terms, such as friction signs, are evaluated at the full rate.
 MOST_FINE = 130_000
-FASTEST = 260.0  # [Hz] sampling beyond which no effect of the catalogue gains
-# At its ends a log knows its derivatives less well, for nothing is known beyond: so many periods of the cut-off are
-# lost, and no more than a share of the log.
+FASTEST = 260.0  # [Hz] faster sampling improves no effect of the catalogue
+# Derivatives are less accurate at the ends of a log, where the filter lacks data. `LOST` periods of the cut-off are
+# removed at each end, at most the share `MOST_LOST` of the log.
 LOST, MOST_LOST = 4.0, 0.02
-SHORTEST = 5.0  # [s] of log below which nothing can be estimated
-# A step is so many whole periods, but for this share of one.
+SHORTEST = 5.0  # [s] least duration for an estimate
+# Tolerance, as a share of a period, within which a step is a whole number of periods.
 WHOLE = 1e-3
-# A mean over repetitions is taken where it knows frequencies higher by this factor than a single pass.
+# The mean over repetitions is used if its cut-off is higher than that of a single pass by this factor.
 SHARPER = 1.2
-# At the ends of a log, rows in which all joints are slower than this share are left out, up to so long [s].
+# Rows at the ends in which all joints are slower than the share `SETTLED` of their RMS speed are removed, at most
+# `ENDS` [s].
 SETTLED, ENDS = 0.15, 2.0
 
 
@@ -52,21 +53,25 @@ def build_recording(
     shortest: float = SHORTEST,
     travel: Array | float = 0.0,
 ) -> Recording:
-    """Reads logs into noise-free motion on a common grid.
+    """Builds a recording on a uniform grid from logs, with noise removed from the motion.
 
-    Positions of a repeated motion are projected on its harmonics. Others are low-passed, joint by joint, where their
-    spectrum meets the encoder's noise: what is left has a known ratio of signal to noise at every frequency, and so in
-    every derivative.
+    Positions of a periodic motion are projected on its harmonics. Other positions are low-passed joint by joint where
+    their spectrum meets the encoder noise. The signal-to-noise ratio is then known at every frequency, for positions
+    and derivatives.
 
     Args:
         robot: the robot.
-        logs: of t, q and tau or current.
-        step: sample period to take [s]; by default that of the slowest log, longer where there are too many rows.
-        shortest: least time of all logs together [s].
-        travel: the joints' ranges (n,) in logs besides, by which those are known that stand in all of these.
+        logs: logs with t, q and tau or current.
+        step: sample period of the grid [s]; by default that of the slowest log, longer if there are too many rows.
+        shortest: least total duration of the usable logs [s].
+        travel: position ranges of the joints (n,) in other logs [rad or m]; they show which joints rest in all of these
+            logs.
+
+    Returns:
+        The recording of all logs, in the order of time.
 
     Raises:
-        InputError: logs of another robot, without torque, or too short.
+        InputError: logs of another robot, without torque, too short, or overlapping in time.
     """
     prepared = sorted((prepare(robot, log) for log in logs), key=lambda log: float(log.log.t[0]))
     for before, after in pairwise(prepared):
@@ -127,10 +132,10 @@ def build_recording(
 
 
 def _zero_resting_joints(parts: Sequence[_Part], held: NDArray[np.bool_]) -> list[_Part]:
-    """Takes joints that stand in a log (logs, n), but for a tremble, for joints at rest: it says nothing of them.
+    """Sets the motion of resting joints to zero in each log and marks their rows.
 
-    What moves there is the error of the position loop, by some steps of the encoder, and friction holds against it. A
-    step has accelerations that the other joints would feel.
+    Resting joints (logs, n) still move by a few encoder steps, against static friction. Derivatives of these steps are
+    accelerations that the other joints would seem to feel.
     """
     result = []
     for part, stands in zip(parts, held, strict=True):
@@ -166,9 +171,9 @@ def _step(prepared: Sequence[Prepared]) -> float:
 
 
 def _part(log: Prepared, step: float, cap: float, spectra: Spectra, found: Sequence[Spectrum]) -> _Part:
-    """One log: t, q, dq, ddq, tau on the working grid, its cycle there, the lowest cut-off, its directions, noise.
+    """Processes one log into its row arrays, cycle, cut-offs, directions and noise floors on the working grid.
 
-    Above `cap` [Hz], what the positions have is noise, whatever its power; `found` are the positions' own spectra.
+    Positions above `cap` [Hz] are noise, whatever their power; `found` are the spectra of the positions.
     """
     period, grid = log.positions.period, log.positions.t
     positions = log.positions.q
@@ -178,17 +183,17 @@ def _part(log: Prepared, step: float, cap: float, spectra: Spectra, found: Seque
     if cycle is not None:
         rows = slice(cycle.start, cycle.stop)
         exact, known, repeated = project_on_harmonics(positions, period, cycle)
-        # One pass alone may be sharper, where the motion does not repeat as exactly as its encoder counts.
+        # A single pass is better if the motion repeats less exactly than the encoder resolves.
         better = (known > SHARPER * cutoffs) & (known <= cap)
         rest = positions[rows] - exact[0]
         slow = smooth_motion(rest, period, np.array([spectra.of_positions(x).cutoff(none=0.0) for x in rest.T]))
         for whole, harmonic, other in zip((q, dq, ddq), exact, slow, strict=True):
-            # What does not repeat is motion too, where it stands out of the noise.
+            # Motion that does not repeat counts too, where it exceeds the noise.
             whole[rows] = np.where(better, harmonic + other, whole[rows])
         cutoffs = np.where(better, known, cutoffs)
     floor = np.array([spectrum.floor if cap == np.inf else spectrum.noise_at(cap) for spectrum in found])
     edge = min(LOST / float(cutoffs.min()), MOST_LOST * (grid[-1] - grid[0]))
-    # On a sample: between two of them nobody knows when a torque jumped.
+    # Start at a sample: between two samples the time of a torque jump is unknown.
     begin = grid[0] + np.ceil(edge / period - 1e-9) * period
     count = int(np.floor((grid[-1] - edge - begin) / step + 1e-6)) + 1
     t = begin + step * np.arange(count)
@@ -220,14 +225,14 @@ def _part(log: Prepared, step: float, cap: float, spectra: Spectra, found: Seque
 
 
 def _between(own: Array, t: Array, period: float) -> NDArray[np.intp]:
-    """Numbers the pairs of a log's samples that the rows (N,) of a grid lie between; -1 on a sample."""
+    """Returns the index of the sample pair that encloses each row (N,) of a grid; -1 for rows at a sample."""
     after = np.clip(np.searchsorted(own, t, side="right"), 1, len(own) - 1)
     on = np.minimum(np.abs(own[after] - t), np.abs(t - own[after - 1])) < ALIKE * period
     return np.where(on, -1, after)
 
 
 def _torque(log: Prepared, step: float) -> _Interpolation:
-    """Gives the torque as a function of time, low-passed where the grid is coarser than the log."""
+    """Interpolates the torque as a function of time; low-passes it first if the grid is coarser than the log."""
     t, tau = log.log.t, log.tau
     period = log.positions.period
     if step > 1.5 * period:
@@ -238,7 +243,7 @@ def _torque(log: Prepared, step: float) -> _Interpolation:
 
 
 class _Interpolation:
-    """Straight lines between samples: they neither overshoot at a step nor ring."""
+    """Linear interpolation between samples: it neither overshoots at a step nor rings."""
 
     def __init__(self, t: Array, values: Array) -> None:
         self.t, self.values = t, values
@@ -248,7 +253,7 @@ class _Interpolation:
 
 
 def _trim_ends(dq: Array, step: float) -> slice:
-    """Leaves out the ends of a log where the robot comes from and to rest: stiction may hold any torque there."""
+    """Selects the rows without slow ends: near rest, stiction may hold any torque."""
     speed = np.sqrt(np.mean(dq**2, axis=0))
     active = np.flatnonzero((np.abs(dq) > SETTLED * np.maximum(speed, 1e-9)).any(axis=1))
     if not len(active):

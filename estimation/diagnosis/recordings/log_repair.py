@@ -1,4 +1,4 @@
-"""Logs as a diagnosis may take them: rows of lost messages filled in, cut at gaps, and what the gate says of them."""
+"""Repair of logs before a diagnosis: outliers are replaced, logs are cut at gaps, findings of the gate become notes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from robots.signals import Log
 
 Array = NDArray[np.float64]
 
-# Findings of the gate that an effect may cause, or that the diagnosis reports itself, with the reason.
+# Gate findings that an effect of the robot may cause, or that the diagnosis reports itself.
 TOLERATED = frozenset(
     {
         "badly_excited",
@@ -33,9 +33,9 @@ TOLERATED = frozenset(
         "unit_of_torque",
     }
 )
-# Warnings of what a diagnosis looks at more closely.
+# Gate warnings that the diagnosis examines more closely.
 OWN = frozenset({"badly_excited", "clipped", "delay", "hardly_moves", "poorly_explained", "unit_of_torque"})
-# A stretch between gaps that is shorter than this [s] is left out: filters err at its ends.
+# Duration [s] below which a stretch between gaps is dropped: filters are inaccurate at its ends.
 SHORTEST = 2.0
 
 _BY_FIT = " (from a quick fit of rigid body and friction)"
@@ -43,11 +43,11 @@ _BY_FIT = " (from a quick fit of rigid body and friction)"
 
 @dataclass(frozen=True)
 class RepairedLog:
-    """A log without what would be taken for an effect of the robot.
+    """A log without recording errors that could pass for an effect of the robot.
 
     Attributes:
         logs: its stretches between gaps.
-        notes: what was wrong with it, and what was done.
+        notes: what was wrong, and what was done about it.
     """
 
     logs: tuple[Log, ...]
@@ -55,19 +55,22 @@ class RepairedLog:
 
 
 def repair_log(robot: Robot, log: Log, which: str) -> RepairedLog:
-    """Fills rows that stick out of their neighbours, and cuts the log at its gaps.
+    """Replaces outliers in a log and cuts it at its gaps.
 
-    A lost message is a torque of a thousandth of a second, which would be named a contact with any certainty, and a
-    bridge over a gap is a motion that never was.
+    A lost message looks like a torque of one millisecond, which would be identified as a contact. Interpolation over a
+    gap would invent a motion.
 
     Args:
         robot: the robot.
-        log: as it was recorded.
-        which: what notes call it.
+        log: the log as recorded.
+        which: name of the log in notes.
+
+    Returns:
+        The usable stretches of the log, and notes.
 
     Raises:
-        InputError: a log that says nothing of the robot: positions in degrees, times in milliseconds, absurd values,
-            torques of the motors.
+        InputError: the gate refuses the log, for example positions in degrees, times in milliseconds, absurd values, or
+            motor torques.
     """
     gate = check_log(robot, log)
     sizes = [f for f in gate.findings if f.name == "unit_of_torque" and f.joint is not None]
@@ -102,7 +105,7 @@ def _is_reported(finding: Finding) -> bool:
 
 
 def _filled(log: Log) -> Log:
-    """Puts what lies between its neighbours where a column sticks out: rows stay where they are in time."""
+    """Replaces outliers in each column by interpolation; the times of the rows stay."""
     values: dict[str, Array] = {}
     for (prefix, joint), rows in find_outliers(Columns.of(log)).items():
         name = {"q": "q", "tau": "tau", "i": "current"}[prefix]
@@ -111,7 +114,7 @@ def _filled(log: Log) -> Log:
             continue
         column = values.setdefault(name, np.array(getattr(log, name)))[:, joint]
         if prefix == "q":
-            # A straight line would cut the motion's corner, by more than an encoder's step.
+            # A straight line would cut the corner of a motion by more than an encoder step.
             column[rows] = CubicSpline(log.t[known], column[known])(log.t[rows])
         else:
             column[rows] = np.interp(log.t[rows], log.t[known], column[known])
@@ -119,7 +122,7 @@ def _filled(log: Log) -> Log:
 
 
 def _stretches(log: Log, gate: GateReport) -> tuple[Log, ...]:
-    """Cuts a log at its gaps and where a column hung; it is left whole where no stretch is long enough by itself."""
+    """Cuts a log at its gaps and where a column froze; keeps it whole if no stretch is long enough."""
     spans = [(first, stop) for first, stop in gate.parts if log.t[stop - 1] - log.t[first] >= SHORTEST]
     if gate.parts == ((0, len(log)),) or not spans:
         return (_fresh(log, gate, 0, len(log)),)
@@ -130,7 +133,7 @@ def _stretches(log: Log, gate: GateReport) -> tuple[Log, ...]:
 
 
 def _fresh(log: Log, gate: GateReport, first: int, stop: int) -> Log:
-    """The rows of a stretch that are of their time."""
+    """Selects the rows of a stretch that are not stale."""
     if not len(gate.stale):
         return log if stop - first == len(log) else log.rows(slice(first, stop))
     return log.rows(np.setdiff1d(np.arange(first, stop), gate.stale))

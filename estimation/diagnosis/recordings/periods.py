@@ -1,4 +1,4 @@
-"""Repeated motion: its period, found from positions alone and sharper than a sample."""
+"""Periodic motion: its period to a fraction of a sample, and the projection on its harmonics."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
 
-# Two passes of one motion by one controller differ by less than this share of the joint's spread.
+# Two passes of one motion differ by less than this share of the joint's standard deviation.
 ALIKE = 0.02
-# Before it returns, the motion must have been this far away (mean square over twice the variance).
+# Mean square distance, over twice the variance, that the motion must reach before it returns.
 AWAY = 0.25
 # Share of the log that must repeat.
 MOST = 0.6
-# Rows at which lags are compared first.
+# Number of rows of the first, coarse comparison of lags.
 COARSE = 6000
-SHORTEST = 0.5  # [s]
-# A harmonic counts where its power is this much above its error.
+SHORTEST = 0.5  # [s] shortest period
+# Power over its error from which a harmonic is significant.
 STANDS_OUT = 4.0
 
 
 @dataclass(frozen=True)
 class Cycle:
-    """A stretch of a log in which one motion repeats.
+    """A stretch of a log in which a motion repeats.
 
     Attributes:
         start: first row.
         stop: row after the last whole period.
-        period: [s].
-        count: whole periods P.
+        period: period [s].
+        count: number of whole periods P.
     """
 
     start: int
@@ -45,15 +45,15 @@ class Cycle:
 def find_cycle(q: Array, step: float) -> Cycle | None:
     """Finds the shortest period that most of a log repeats.
 
-    The mean square of q(t + L) - q(t) over all lags L comes from one Fourier transform; the lag where it first returns
-    to nothing is looked at sample by sample, and made sharper than a sample by the parabola through its neighbours.
+    One Fourier transform yields the mean square of q(t + L) - q(t) for all lags L. The lag at which it first returns to
+    zero is then examined sample by sample. Parabolas through neighbouring lags refine it to a fraction of a sample.
 
     Args:
         q: positions (N, n) on a uniform grid [rad or m].
-        step: of the grid [s].
+        step: sample period of the grid [s].
 
     Returns:
-        The cycle; None where nothing repeats.
+        The cycle; None if nothing repeats.
     """
     spread = q.std(axis=0)
     moving = spread > 1e-3 * max(float(spread.max()), 1e-9)
@@ -69,7 +69,7 @@ def find_cycle(q: Array, step: float) -> Cycle | None:
 
 
 def _candidate_lags(x: Array, step: float) -> list[int]:
-    """Lags at which the motion comes back after it had been away, the shortest first."""
+    """Returns the lags at which the motion returns after it moved away, the shortest first."""
     difference = _difference(x)
     shortest, longest = max(2, round(SHORTEST / step)), len(x) // 2 + 1
     away = np.maximum.accumulate(difference)
@@ -81,7 +81,7 @@ def _candidate_lags(x: Array, step: float) -> list[int]:
 
 
 def _difference(x: Array) -> Array:
-    """Mean over rows and joints of (x(t + L) - x(t))^2 / 2, for all lags L up to just over half the length."""
+    """Computes the mean over rows and joints of (x(t + L) - x(t))^2 / 2 for lags L up to just over half the length."""
     rows = len(x)
     spectrum = np.fft.rfft(x, 2 * rows, axis=0)
     product = np.fft.irfft(np.abs(spectrum) ** 2, axis=0)[: rows // 2 + 2].sum(axis=1)
@@ -93,7 +93,7 @@ def _difference(x: Array) -> Array:
 
 
 def _examine(x: Array, lag: int, reach: int, step: float) -> Cycle | None:
-    """Looks at one lag at full rate: where it holds, and how long exactly the period is."""
+    """Examines one lag at the full rate: where the motion repeats, and with which period."""
     fine = np.arange(max(1, lag - 2 * reach), min(len(x) - 2, lag + 2 * reach) + 1)
     costs = np.array([_mismatch(x, int(candidate), 8) for candidate in fine])
     best = int(fine[costs.argmin()])
@@ -105,7 +105,7 @@ def _examine(x: Array, lag: int, reach: int, step: float) -> Cycle | None:
     periods = max(1, (len(part) - 1) // best)
     length = _sharp(part, best)
     for multiple in range(2, periods):
-        # Ever more passes apart, the same error of the lag weighs less.
+        # An error of the lag is divided by the number of passes between the rows compared.
         length = _sharp(part, round(length * multiple)) / multiple
     count = int(np.floor(len(part) / length + 1e-6))
     if count < 2:
@@ -114,7 +114,7 @@ def _examine(x: Array, lag: int, reach: int, step: float) -> Cycle | None:
 
 
 def _slack(x: Array, step: float) -> float:
-    """What half a sample of lag may make of the positions."""
+    """Returns the largest change of the positions per row, which bounds the effect of a lag rounded to whole rows."""
     return float(np.abs(np.diff(x, axis=0)).max())
 
 
@@ -123,7 +123,7 @@ def _mismatch(x: Array, lag: int, stride: int = 1) -> float:
 
 
 def _sharp(x: Array, lag: int) -> float:
-    """Minimises the mismatch about a lag by a parabola, in samples."""
+    """Returns the lag of least mismatch near a given lag, in samples, by a parabola."""
     if not 2 <= lag < len(x) - 2:
         return float(lag)
     before, here, after = (_mismatch(x, lag + offset) for offset in (-1, 0, 1))
@@ -138,16 +138,16 @@ def _longest(flags: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 def project_on_harmonics(q: Array, step: float, cycle: Cycle) -> tuple[tuple[Array, Array, Array], Array, Array]:
-    """Projects the repeated rows on the harmonics that stand out of what changes from period to period.
+    """Projects the periodic rows on the harmonics that exceed the variation between periods.
 
     Args:
-        q: positions (N, n) on the grid.
-        step: of the grid [s].
-        cycle: where it repeats.
+        q: positions (N, n) on the grid [rad or m].
+        step: sample period of the grid [s].
+        cycle: the rows that repeat.
 
     Returns:
-        q, dq and ddq (stop - start, n) of the cycle's rows, free of noise; the highest frequency kept (n,) [Hz]; the
-        power density of the noise that the mean over repetitions still has there (n,).
+        q, dq and ddq (stop - start, n) in the rows of the cycle, with noise removed; the highest frequency kept (n,)
+        [Hz]; the power density of the noise that remains in the mean over repetitions (n,) [rad^2/Hz or m^2/Hz].
     """
     rows = np.arange(cycle.start, cycle.stop)
     times = (rows - cycle.start) * step
@@ -159,9 +159,10 @@ def project_on_harmonics(q: Array, step: float, cycle: Cycle) -> tuple[tuple[Arr
     passes = np.fft.rfft(part[: whole * samples].reshape(whole, samples, -1), axis=1) / samples
     mean = passes.mean(axis=0)  # (H, n)
     scatter = (np.abs(passes - mean) ** 2).sum(axis=0) / max(whole - 1, 1) / whole
-    # Neighbouring harmonics share a noise level: few periods tell little of one.
+    # Average over neighbouring harmonics: few periods determine the noise of a single one poorly.
     scatter = _averaged(scatter)
-    # An encoder that rounds each pass alike makes errors that repeat: what the top of the band holds is no motion.
+    # An encoder rounds each pass alike, so that its errors repeat. The upper end of the band contains no motion and
+    # shows them.
     top = slice(-max(4, len(mean) // 4), None)
     scatter = np.maximum(scatter, np.median(np.abs(mean[top]) ** 2, axis=0))
     kept = mean * np.clip(1.0 - scatter / np.maximum(np.abs(mean) ** 2, 1e-300), 0.0, 1.0)
@@ -183,7 +184,7 @@ def _averaged(power: Array, width: int = 15) -> Array:
 
 
 def _first_lost(stands_out: NDArray[np.bool_], allowed: int = 3) -> NDArray[np.intp]:
-    """Per joint the harmonic after which more than `allowed` in a row do not stand out (n,)."""
+    """Returns per joint (n,) the harmonic from which on more than `allowed` in a row are not significant."""
     count, joints = stands_out.shape
     result = np.full(joints, count)
     for j in range(joints):

@@ -1,4 +1,4 @@
-"""Up to which frequency positions are motion: their acceleration must help to explain the torque, not spoil it."""
+"""Cut-off of the positions, chosen by how well the base model then explains the torque."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ from robots.terms.situations.flange_body import with_body
 Array = NDArray[np.float64]
 
 CAPS = (40.0, 25.0, 16.0, 10.0, 6.5, 4.0)  # [Hz]
-# Of the caps those that tell whether there is anything to choose.
+# Cut-offs [Hz] that are tried first, to see whether a lower one helps at all.
 TELLING = (10.0, 4.0)
-# Positions are spoilt where low-passed ones leave less than this share of the residual: what an elastic gear or a late
-# torque make of the base model is far less.
+# A lower cut-off is needed if it reduces the residual below this share. An elastic gear or a delayed torque changes the
+# base model's residual far less.
 SPOILT = 0.7
-# A cap is as good as the best where the residual is within this factor.
+# Residuals within this factor of the best are equivalent.
 NEAR = 1.1
 ROWS = 1000
-WIDTH = 0.02  # [rad/s or m/s] of the sign
-SLOW = 0.05  # of a joint's RMS speed, below which its friction's sign is not known
+WIDTH = 0.02  # [rad/s or m/s] width of the friction sign
+SLOW = 0.05  # share of a joint's RMS speed below which the sign of its friction is unknown
 FAINT = 1e-6
 
 
 def select_position_cutoff(robot: Robot, logs: Sequence[Prepared], cutoffs: Array) -> float:
-    """Finds the frequency [Hz] above which positions are noise by what their acceleration does to the torque's fit.
+    """Selects the highest frequency [Hz] at which positions are motion, by the residual of the base model.
 
-    An encoder's noise is white where its steps are crossed quickly. Where a joint is slow, or samples repeat, it has
-    more power at low frequencies, as motion has, and no floor in the spectrum tells the two apart. In the acceleration
-    it then drowns the motion, and with it all columns that share a parameter with it, gravity's first of all. The base
-    model tells: fitted with the positions low-passed lower and lower, it fits better as long as noise is taken away.
+    Encoder noise is white while the joint crosses encoder steps quickly. If a joint is slow, or samples repeat, the
+    noise has more power at low frequencies, as motion has. A spectrum then shows no noise floor. Such noise dominates
+    the acceleration and distorts all columns that share parameters with it, gravity first. As long as a lower cut-off
+    removes noise, the base model fits better.
 
     Args:
         robot: the robot.
-        logs: with torque, and positions on a grid.
-        cutoffs: at which the joints would be low-passed otherwise (n,) [Hz].
+        logs: logs with torque, and positions on a grid.
+        cutoffs: cut-offs of the joints by their spectra (n,) [Hz].
 
     Returns:
-        The highest of `CAPS` with which the fit is about as good as can be; infinity where the positions spoil nothing.
+        The highest of `CAPS` [Hz] with a residual near the smallest; infinity if no lower cut-off is needed.
     """
     known = {np.inf: _residual(robot, logs, cutoffs)}
 
@@ -60,7 +60,7 @@ def select_position_cutoff(robot: Robot, logs: Sequence[Prepared], cutoffs: Arra
 
 
 def _residual(robot: Robot, logs: Sequence[Prepared], cutoffs: Array) -> float:
-    """Mean over the joints of the logarithm of the base model's residual."""
+    """Computes the mean over the joints of the logarithm of the base model's residual."""
     model = default_model(robot, velocity_scale=WIDTH)
     blocks, targets = [], []
     total = sum(len(log.positions.t) for log in logs)
@@ -72,7 +72,7 @@ def _residual(robot: Robot, logs: Sequence[Prepared], cutoffs: Array) -> float:
         speed = np.sqrt(np.mean(dq**2, axis=0))
         known = (np.abs(dq[rows]) > SLOW * speed) | (speed < 1e-9)
         tau = np.column_stack([np.interp(t[rows], log.log.t, column) for column in log.tau.T])
-        # Each log as it was recorded: a payload or another gravity that is known must not pass for noise.
+        # Each log under its own conditions: a known payload or another gravity is not noise.
         motion = (q[rows], dq[rows], ddq[rows])
         own = model.under(log.log.gravity)
         if log.log.payload is not None:

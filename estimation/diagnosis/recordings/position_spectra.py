@@ -1,4 +1,4 @@
-"""Spectra of positions: up to which frequency they are motion, and how loud their encoder is."""
+"""Spectra of positions: the frequency at which motion meets the encoder noise, and the density of that noise."""
 
 from __future__ import annotations
 
@@ -13,28 +13,29 @@ from estimation.preprocessing import Resampled, between_rows
 
 Array = NDArray[np.float64]
 
-# A frequency of a position is kept where its power is this much above the encoder's noise.
+# Power over the encoder noise from which a frequency counts as motion.
 STANDS_OUT = 3.0
-# Least and most of the cut-off [Hz, share of the sampling rate].
+# Bounds of the cut-off: least [Hz], most [share of the sampling rate].
 LOWEST, HIGHEST = 2.0, 0.4
-# Cut-offs that are tried, over the frequency at which motion meets noise.
+# Cut-offs that are tried, as multiples of the frequency at which motion meets noise.
 HIGHER = np.geomspace(1.0, 2.0, 11)
-# Spectra are taken of this difference of the positions: the slow motion would leak over all of the band otherwise.
+# Order of the difference of the positions whose spectrum is taken: slow motion would otherwise leak over the whole
+# band.
 DIFFERENCE = 3
-# Encoders that are drawn to see what interpolation makes of their noise, and shares of the rate between which all of it
-# stays.
+# Number of white noise sequences by which the effect of interpolation is measured. `SLOW` bounds the frequencies, as
+# shares of the sampling rate, that interpolation does not attenuate.
 DRAWN, SLOW = 4, (0.02, 0.1)
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Of one position.
+    """Spectrum of one position.
 
     Attributes:
-        f: frequencies [Hz].
-        density: power density, as it would be if the encoder's noise were white.
-        floor: density of that noise.
-        rate: of the samples [Hz].
+        f: frequencies (F,) [Hz].
+        density: power density (F,) [rad^2/Hz or m^2/Hz], scaled so that encoder noise is white.
+        floor: power density of the encoder noise [rad^2/Hz or m^2/Hz].
+        rate: sampling rate [Hz].
     """
 
     f: Array
@@ -43,15 +44,15 @@ class Spectrum:
     rate: float
 
     def at(self, frequency: float) -> float:
-        """Gives the density at a frequency [Hz]."""
+        """Interpolates the power density at a frequency [Hz]."""
         return float(np.interp(frequency, self.f, self.density))
 
     def noise_at(self, frequency: float) -> float:
-        """Gives the density at a frequency [Hz] above which all is noise."""
+        """Returns the noise density if everything above a frequency [Hz] is noise."""
         return max(self.at(frequency), self.floor)
 
     def cutoff(self, none: float = LOWEST) -> float:
-        """Gives the frequency at which the position meets its noise [Hz]; `none` where nothing stands out."""
+        """Returns the frequency [Hz] at which motion meets the noise; `none` if no motion exceeds the noise."""
         if self.floor <= 0:
             return none if not self.density.any() else HIGHEST * self.rate
         lost = np.flatnonzero((self.density < STANDS_OUT * self.floor) & (self.f > 4 * self.f[1]))
@@ -62,10 +63,10 @@ class Spectrum:
         return min(self._spared(cutoff), HIGHEST * self.rate)
 
     def _spared(self, meets: float) -> float:
-        """Raises the frequency at which a position meets its noise, where a low-pass there would cut more than noise.
+        """Raises the cut-off `meets` [Hz] if a low-pass there would remove more than noise.
 
-        A motion of a few sines ends at its last as at an edge, which a low-pass that ends there bends. What the
-        acceleration loses of the motion below it must be no more power than the noise that it keeps.
+        The spectrum of a motion of a few sines ends abruptly, and a low-pass at that edge distorts the last sine. The
+        power that the acceleration loses must not exceed the noise power that it keeps.
         """
         motion = np.where(self.f < meets, np.maximum(self.density - self.floor, 0.0), 0.0)
         for cutoff in meets * HIGHER:
@@ -78,12 +79,12 @@ class Spectrum:
 
 @dataclass(frozen=True, eq=False)
 class Spectra:
-    """How the spectra of a log's positions are taken.
+    """Settings for the spectra of a log's positions.
 
     Attributes:
-        period: of the samples [s].
-        f: frequencies [Hz] at which it is known what becomes of white noise; none for even samples.
-        passed: density there of what was white noise of an encoder, over its density far below.
+        period: sample period [s].
+        f: frequencies (F,) [Hz] at which the gain of interpolation is known; empty for evenly sampled logs.
+        passed: power gain of interpolation (F,) for white encoder noise, relative to low frequencies.
     """
 
     period: float
@@ -92,9 +93,10 @@ class Spectra:
 
     @staticmethod
     def of(positions: Resampled) -> Spectra:
-        """Finds what interpolation makes of white noise: between rows it has less of the fast one.
+        """Measures how interpolation between rows attenuates white noise at high frequencies.
 
-        Taken for white, its end of the band would tell a noise that is too small, and noise would count as motion.
+        Without this correction the noise would be underestimated at the upper end of the band, and noise would count as
+        motion.
         """
         if positions.q is positions.fresh_q:
             return Spectra(positions.period, np.zeros(0), np.zeros(0))
@@ -102,16 +104,16 @@ class Spectra:
         noise = between_rows(positions.fresh_t, drawn, np.minimum(positions.t, positions.fresh_t[-1]), positions.period)
         f, density = _density(noise[:, 0], positions.period)
         density = np.mean([density, *(_density(column, positions.period)[1] for column in noise.T[1:])], axis=0)
-        # The slowest are not determined: their power is divided by nearly zero.
+        # The lowest frequencies are inaccurate: their power is divided by nearly zero.
         slow = density[(f > SLOW[0] / positions.period) & (f < SLOW[1] / positions.period)]
         return Spectra(positions.period, f, density / float(np.median(slow)))
 
     def of_positions(self, x: Array) -> Spectrum:
-        """Takes the spectrum of a position (N,)."""
+        """Computes the spectrum of a position (N,) [rad or m]."""
         f, density = _density(x, self.period)
         if len(self.f):
             density = density / np.interp(f, self.f, self.passed)
-        # The encoder's noise is what the end of the band holds.
+        # The upper end of the band contains encoder noise only.
         floor = float(np.median(density[f > HIGHEST / self.period]))
         smooth = np.convolve(np.pad(density, 2, mode="edge"), np.ones(5) / 5, mode="valid")
         return Spectrum(f, smooth, floor, 1 / self.period)

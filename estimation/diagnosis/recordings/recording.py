@@ -1,4 +1,4 @@
-"""What a diagnosis knows of logs: one grid, motion free of noise, torque as measured."""
+"""The recording: all logs on one grid, with low-passed motion and measured torque."""
 
 from __future__ import annotations
 
@@ -21,33 +21,33 @@ class Recording:
     """All logs, one after the other.
 
     Attributes:
-        t: time [s], (N,), one clock.
-        starts: row at which each log begins.
-        q: positions (N, n), free of noise [rad or m].
-        dq: velocities (N, n).
-        ddq: accelerations (N, n).
-        tau: torque as measured (N, n) [N m or N].
+        t: time (N,) [s], on one clock.
+        starts: first row of each log.
+        q: positions (N, n), noise removed [rad or m].
+        dq: velocities (N, n) [rad/s or m/s].
+        ddq: accelerations (N, n) [rad/s2 or m/s2].
+        tau: measured torque (N, n) [N m or N].
         step: sample period [s].
-        cycles: per log the repeated part, in rows of the log; None where nothing repeats.
-        cutoff: lowest frequency [Hz] above which positions are taken for noise.
-        floor: power density of each joint's position noise (n,) [rad^2/Hz].
-        sign_unknown: rows (N, n) in which the direction of motion is not known: friction may have either sign there.
-        sign_known_from_velocity: those of them (N, n) in which the velocity tells the direction, if kicks at reversals
-            do not show.
-        reversal_acceleration_error: error of each joint's acceleration (n,) beside its reversals [rad/s2 or m/s2].
-        names: of the logs.
-        reversal_time_error: how late joints may turn round (N, n) [s] by their velocities' error; None where motion is
-            known exactly.
-        position_residual: what positions (N, n) as logged have besides `q`; None where not all were logged at these
-            rows.
-        cutoffs: of each log's joints (logs, n) [Hz], above which positions are taken for noise; None as
-            `position_residual`.
-        full_rate: the same logs at the rate of their samples, where this one is thinned: each log's first row and every
-            so many; None where those are too many.
-        payloads: per log a known body at the flange (10,), in its frame; empty where no log has one.
-        gravity_fields: per log gravity (3,) in the base frame [m/s2], None as the robot is described; empty where all
-            are so.
-        trusted: joints (n,) whose clear rows count, and are `sign_unknown` no more; None before that is known.
+        cycles: periodic part of each log, in rows of that log; None if its motion does not repeat.
+        cutoff: lowest frequency [Hz] above which positions count as noise.
+        floor: power density of each joint's position noise (n,) [rad^2/Hz or m^2/Hz].
+        sign_unknown: rows (N, n) in which the direction of motion, and so the sign of friction, is unknown.
+        sign_known_from_velocity: those of them (N, n) in which the velocity determines the sign, provided that
+            acceleration jumps at reversals are small against the noise.
+        reversal_acceleration_error: error of each joint's acceleration (n,) near its reversals [rad/s2 or m/s2].
+        names: names of the logs.
+        reversal_time_error: error of the reversal times (N, n) [s] by the error of the velocities; None if the motion
+            is known exactly.
+        position_residual: logged positions minus `q` (N, n) [rad or m]; None unless all were logged at these rows.
+        cutoffs: cut-off of each joint's position in each log (logs, n) [Hz]; None as for `position_residual`.
+        full_rate: the same logs at their own sampling rate, if this recording is decimated from them; None if it is
+            not, or if there are too many rows.
+        payloads: inertial parameters of the known payload of each log (10,), in the flange frame; empty if no log has
+            one.
+        gravity_fields: gravity of each log (3,) in the base frame [m/s2], or None for the robot's description; empty if
+            this holds for all logs.
+        trusted: joints (n,) whose rows in `sign_known_from_velocity` count and were taken out of `sign_unknown`; None
+            before this is decided.
     """
 
     t: Array
@@ -82,27 +82,27 @@ class Recording:
 
     @property
     def runs(self) -> tuple[slice, ...]:
-        """Each log's rows."""
+        """Rows of each log."""
         return tuple(slice(a, b) for a, b in pairwise((*self.starts, len(self.t))))
 
     @property
     def bodies(self) -> tuple[Array, ...]:
-        """Each log's known payload (10,), zeros for none."""
+        """Known payload of each log (10,); zeros if there is none."""
         return self.payloads or (np.zeros(10),) * len(self.starts)
 
     @property
     def gravities(self) -> tuple[Array | None, ...]:
-        """Each log's gravity (3,) in the base frame [m/s2], None as the robot is described."""
+        """Gravity of each log (3,) in the base frame [m/s2]; None for the robot's description."""
         return self.gravity_fields or (None,) * len(self.starts)
 
     @property
     def duration(self) -> float:
-        """Time recorded, without the pauses between logs [s]."""
+        """Recorded time, without the pauses between logs [s]."""
         return len(self.t) * self.step
 
     @property
     def stride(self) -> int:
-        """Rows of the finer recording that became one; 1 without any."""
+        """Decimation: rows of `full_rate` per row; 1 without `full_rate`."""
         return 1 if self.full_rate is None else round(self.step / self.full_rate.step)
 
     @property
@@ -112,7 +112,7 @@ class Recording:
 
     @property
     def counted_rows(self) -> NDArray[np.bool_]:
-        """Joints (n,) of which rows at reversals count."""
+        """Joints (n,) whose rows near reversals count."""
         return (
             np.zeros(self.n, dtype=bool)
             if self.trusted is None
@@ -120,7 +120,7 @@ class Recording:
         )
 
     def far_from_reversals(self, stride: int = 1) -> NDArray[np.bool_]:
-        """Marks every `stride`-th row of each log in which no joint turns round, comes to rest, or has just done so."""
+        """Marks every `stride`-th row of each log in which no joint reverses, comes to rest or leaves rest nearby."""
         turns = np.zeros((len(self), 1), dtype=bool)
         for run in self.runs:
             for column in self.sign_unknown[run].T:
@@ -132,9 +132,13 @@ class Recording:
         return np.concatenate([away[run][::stride] for run in self.runs])
 
     def reversal_time_error_near(self, joint: int, stride: int = 1) -> Array:
-        """How late a joint may turn round [s] by what is not known of its velocity, every `stride`-th row of each log.
+        """Returns the error of a joint's reversal time [s] in every `stride`-th row of each log.
 
-        Zero in rows that are not beside reversals, and where those do not count.
+        The error is zero in rows that are not near reversals, and if rows near reversals do not count.
+
+        Args:
+            joint: the joint, counted from 0.
+            stride: rows per row returned.
         """
         late = np.zeros(len(self))
         if self.reversal_time_error is not None and self.trusted is not None and self.trusted[joint]:
@@ -146,19 +150,19 @@ class Recording:
         return np.concatenate([late[run][::stride] for run in self.runs])
 
     def distant_from(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Marks rows of each log farther than `REVERSAL_MARGIN` from marked ones, both (N, k)."""
+        """Marks the rows of each log that are farther than `REVERSAL_MARGIN` from marked ones, both (N, k)."""
         reach = 2 * round(REVERSAL_MARGIN / self.step) + 1
         return np.concatenate([maximum_filter1d(rows[run].astype(np.int8), reach, axis=0) == 0 for run in self.runs])
 
     def with_trusted(self, joints: NDArray[np.bool_] | None) -> Recording:
-        """Lets the clear rows of some joints (n,) count too."""
+        """Lets rows near reversals count for some joints (n,), where the velocity determines the sign."""
         if joints is None:
             return self
         return replace(self, sign_unknown=self.sign_unknown & ~(self.sign_known_from_velocity & joints), trusted=joints)
 
 
 def cut_recording(whole: Recording, rows: slice) -> Recording:
-    """Takes rows of a recording, and the logs that begin in them."""
+    """Selects rows of a recording, and the logs to which they belong."""
     begins = (0, *(start - rows.start for start in whole.starts if rows.start < start < rows.stop))
     first = sum(start <= rows.start for start in whole.starts) - 1
     logs = slice(first, first + len(begins))
@@ -184,7 +188,7 @@ def cut_recording(whole: Recording, rows: slice) -> Recording:
 
 
 def _at_all_samples(thinned: Recording, rows: slice) -> slice:
-    """Gives the rows of the finer recording from the first to the last of some."""
+    """Returns the rows of `full_rate` from the first to the last of some decimated rows."""
     assert thinned.full_rate is not None
     starts, ends = np.array(thinned.starts), np.array([rows.start, rows.stop - 1])
     own = np.searchsorted(starts, ends, side="right") - 1
@@ -193,7 +197,7 @@ def _at_all_samples(thinned: Recording, rows: slice) -> slice:
 
 
 def join_recordings(first: Recording, second: Recording) -> Recording:
-    """Joins two recordings of one sample period on one clock, the first before the second."""
+    """Joins two recordings of the same sample period and clock, the first before the second."""
     starts = (*first.starts, *(len(first) + start for start in second.starts))
 
     def both(name: str) -> Array:
@@ -225,5 +229,5 @@ def join_recordings(first: Recording, second: Recording) -> Recording:
 
 
 def rest_rows(step: float) -> int:
-    """Number of rows of `step` [s] beyond which a joint whose direction is not known is at rest."""
+    """Returns the number of rows of `step` [s] beyond which a joint with an unknown direction is at rest."""
     return max(8, round(REST_TIME / step))

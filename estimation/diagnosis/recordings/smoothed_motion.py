@@ -1,4 +1,4 @@
-"""Positions low-passed without lag, and their derivatives."""
+"""Zero-phase low-pass of positions, and their derivatives."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from scipy.special import binom
 Array = NDArray[np.float64]
 
 ORDER = 8
-# Nobody knows what a position was before a log began. A filter's guess rings on for some ten periods of the cut-off;
-# near the ends a smoothing spline of the same response needs none. Both agree where the one gives way to the other.
+# The position before a log begins is unknown, and a filter's guess of it rings for about ten periods of the cut-off.
+# Within `FREE` of the ends, a smoothing spline of the same response is used instead. It blends into the filter over
+# `BLENDED`.
 FREE, BLENDED = 12.0, 6.0  # [periods of the cut-off]
 DEGREE = 7
 KNOTS = 6.0  # per period of the cut-off
 
 
 def smooth_motion(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array, Array]:
-    """Low-passes positions (N, n) without lag and differentiates them.
+    """Low-passes positions (N, n) without phase lag and differentiates them.
 
     Args:
-        x: positions on an even grid.
-        period: of the grid [s].
-        cutoffs: of each joint (n,) [Hz]; one of zero or less leaves nothing.
+        x: positions (N, n) on a uniform grid [rad or m].
+        period: sample period of the grid [s].
+        cutoffs: cut-off of each joint (n,) [Hz]; a joint with zero or less becomes zero.
 
     Returns:
         Positions, velocities and accelerations (N, n).
@@ -54,16 +55,19 @@ def smooth_motion(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array
 
 
 def low_pass_gain(f: Array, cutoff: float) -> Array:
-    """Gives the share that passes of positions of some frequencies [Hz]: that of the filter, forward and backward."""
+    """Returns the gain of the low-pass, applied forward and backward, at frequencies (F,) [Hz]."""
     return np.asarray(1.0 / (1.0 + (f / cutoff) ** (2 * ORDER)))
 
 
 def differentiate(x: Array, period: float) -> tuple[Array, Array]:
-    """Gives the first and second derivative (N, n) by central differences of sixth order, lower at the ends.
+    """Computes first and second derivatives (N, n) by central differences of sixth order, lower at the ends.
 
     Args:
-        x: (N, n) on an even grid.
-        period: of the grid [s].
+        x: values (N, n) on a uniform grid.
+        period: sample period of the grid [s].
+
+    Returns:
+        First and second derivative (N, n).
     """
     first = np.gradient(x, period, axis=0, edge_order=2)
     second = np.gradient(first, period, axis=0, edge_order=2)
@@ -76,11 +80,11 @@ def differentiate(x: Array, period: float) -> tuple[Array, Array]:
 
 
 def _free(x: Array, period: float, cutoff: float) -> tuple[Array, Array, Array]:
-    """Fits a smoothing spline to a position (N,) and gives it with two derivatives.
+    """Fits a smoothing spline to a position (N,) and evaluates it with two derivatives.
 
-    A penalty on the differences of B-spline coefficients (Eilers and Marx 1996), of the order of the filter and as
-    strong as halves the cut-off, has in the middle of a log the response of that filter passed forward and backward,
-    1 / (1 + (f / fc)^16), and nothing beyond the ends.
+    The penalty acts on differences of the B-spline coefficients (Eilers and Marx 1996), of the same order as the
+    filter. It is scaled to halve the signal at the cut-off. In the middle of a log the response equals that of the
+    filter applied forward and backward, 1 / (1 + (f / fc)^16). Nothing is assumed beyond the ends.
     """
     length = (len(x) - 1) * period
     spans = int(np.clip(np.ceil(length * cutoff * KNOTS), ORDER + 1, max(len(x) - 1, ORDER + 1)))
@@ -91,7 +95,7 @@ def _free(x: Array, period: float, cutoff: float) -> tuple[Array, Array, Array]:
     size = spans + DEGREE
     signs = [(-1.0) ** k * binom(ORDER, k) for k in range(ORDER + 1)]
     differences = diags_array(signs, offsets=range(ORDER + 1), shape=(size - ORDER, size)).tocsr()
-    # At the cut-off, the penalty weighs as much as the data, whose weight B-splines pass on low-passed.
+    # At the cut-off, penalty and data term are equal. The B-splines attenuate the data term there, hence the sinc.
     passed = width / period * np.sinc(cutoff * width) ** (2 * DEGREE + 2)
     strength = passed / (2 * np.sin(np.pi * cutoff * width)) ** (2 * ORDER)
     normal = (design.T @ design + strength * (differences.T @ differences)).tocsr()

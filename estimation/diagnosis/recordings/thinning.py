@@ -1,4 +1,4 @@
-"""Logs of more rows than are needed: torque, and what of a model jumps between rows, low-passed alike and thinned."""
+"""Decimation of recordings: torque and discontinuous model terms pass the same low-pass."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from robots.common.stretches import spans
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# The low-pass before thinning sees so many new rows to either side, and no farther: what is not known of a torque for
-# some rows must not ring beside them. Its window (Kaiser) leaves a hundredth of what would fall onto the bands.
+# Half-length of the low-pass before decimation, in rows after decimation: unknown torque in some rows must not ring far
+# beyond them. `WINDOW` is the parameter beta of its Kaiser window, which attenuates aliases to about a hundredth.
 REACH, WINDOW = 2, 3.4
-# Torque within this share of its largest is at it, three samples in a row.
+# Three samples in a row within this share of the largest torque are a flat top.
 FLAT = 1e-6
 
 
 def decimate(series: Array, starts: Sequence[int], stride: int) -> Array:
-    """Low-passes rows (N, ...) of logs that begin at `starts`, without delay, and keeps every `stride`-th of each."""
+    """Low-passes rows (N, ...) of logs that begin at `starts`, without delay, and keeps each `stride`-th of a log."""
     runs = [series[start:stop] for start, stop in pairwise((*starts, len(series)))]
     return np.concatenate([low_pass_rows(run, stride, stride) for run in runs])
 
 
 def decimate_recording(finer: Recording, stride: int) -> Recording:
-    """Thins a recording, which is kept beside."""
+    """Low-passes and decimates a recording; `full_rate` of the result is the given recording."""
     rows = np.concatenate([np.arange(run.start, run.stop, stride) for run in finer.runs])
     width = 2 * stride + 1
 
@@ -66,7 +66,7 @@ def decimate_recording(finer: Recording, stride: int) -> Recording:
 
 
 def shift_motion(recording: Recording, by: float) -> Recording:
-    """Gives a recording with the motion of a moment [s] before: what torque that is logged so late was needed for."""
+    """Delays the motion of a recording by a time [s], to match torque that is logged late by that time."""
     if by == 0.0:
         return recording
     moved: dict[str, Array] = {}
@@ -82,17 +82,21 @@ def shift_motion(recording: Recording, by: float) -> Recording:
 
 
 def evaluate_at_full_rate(recording: Recording, evaluate: Callable[[Recording], Array]) -> Array:
-    """Evaluates rows (N, ...) on a recording: of one that is thinned, on all samples, and thinned as its torque was."""
+    """Evaluates rows (N, ...) on a recording, at the full rate if that is known, then decimated like the torque."""
     if recording.full_rate is None:
         return evaluate(recording)
     return decimate(evaluate(recording.full_rate), recording.full_rate.starts, recording.stride)
 
 
 def low_pass_rows(series: Array, ratio: float, kept: int = 1) -> Array:
-    """Low-passes rows (N, ...) of one log without delay for a period `ratio` times as long; gives every `kept`-th."""
+    """Low-passes rows (N, ...) of one log, without delay, for a sample period `ratio` times as long.
+
+    Returns:
+        Every `kept`-th row.
+    """
     half = int(np.ceil(REACH * ratio))
     taps = _low_pass(half, ratio)
-    # Beyond its ends a log goes on as it does when it is turned about them.
+    # Beyond its ends a log is continued by point reflection.
     beyond = np.pad(series, ((half, half), *((0, 0),) * (series.ndim - 1)), mode="reflect", reflect_type="odd")
     first = 2 * half // kept
     return np.asarray(upfirdn(taps, beyond, down=kept, axis=0))[first : first + -(-len(series) // kept)]
@@ -104,7 +108,7 @@ def _low_pass(half: int, ratio: float) -> Array:
 
 
 def keep_clipped_level(tau: Array, passed: Array) -> Array:
-    """Keeps the flat tops of torque (N, n) that a filter has passed: a drive at its limit gives no more than that."""
+    """Restores flat tops of torque (N, n) after a low-pass: a drive at its limit delivers no more."""
     result = passed.copy()
     for own, column in zip(result.T, tau.T, strict=True):
         most = float(np.abs(column).max(initial=0.0))

@@ -1,4 +1,4 @@
-"""Logs that no base model explains: of several, such a one would spoil what the others tell."""
+"""Logs that no base model explains; they would distort the fit to the other logs."""
 
 from __future__ import annotations
 
@@ -8,23 +8,24 @@ from estimation.diagnosis.calibration import MAX_UNEXPLAINED_POWER
 from estimation.diagnosis.recordings.recording import Recording
 from robots.base_parameters import BaseParameters
 
-# Rows of a log that are looked at, and how many numbers determine a parameter.
+# Rows of each log that are used, and values that must count per base parameter.
 ROWS, ENOUGH = 2000, 3
 
 
 def find_unusable_logs(base: BaseParameters, recording: Recording) -> dict[int, float]:
-    """Finds logs of which the base model explains next to nothing, whatever its parameters.
+    """Finds logs that the base model hardly explains, whatever its parameters.
 
-    Friction of all kinds, masses and offsets are fitted to the log alone: a drive that rings in saturation, a torque
-    that is not this robot's. Beside others, it would bend the base model by which effects are sought in those.
+    The base model, with friction, masses and offsets, is fitted to each log alone. Examples are a drive that rings in
+    saturation, or torque of another robot. Such a log would distort the base model with which effects are searched in
+    the others.
 
     Args:
         base: the base model.
-        recording: of several logs.
+        recording: a recording of several logs.
 
     Returns:
-        By number of the log, in the order of time and from 0: the share of the torque's RMS that is left, on the joint
-        where it is least. Empty where all logs are so, or there is one alone.
+        By index of the log, in the order of time and from 0: the share of the torque's RMS that remains, on the joint
+        where it is least. Empty if this holds for all logs, or if there is one log only.
     """
     if len(recording.runs) < 2:
         return {}
@@ -39,7 +40,7 @@ def find_unusable_logs(base: BaseParameters, recording: Recording) -> dict[int, 
         acts = squares > 0
         if counts.sum() < ENOUGH * base.size or not acts.any():
             continue
-        # Joints count alike, however large their torques are.
+        # Joints count alike, whatever the size of their torques.
         weights = np.where(acts, 1.0 / np.sqrt(np.where(acts, squares, 1.0)), 0.0)
         A, y = (Y * weights[:, None]).reshape(-1, Y.shape[2]), (tau * weights).reshape(-1)
         errors = (y - A @ np.linalg.lstsq(A, y, rcond=None)[0]).reshape(tau.shape)

@@ -1,1 +1,1 @@
-"""The result of a diagnosis and its text; nothing is decided here."""
+"""Result of a diagnosis and its text; all decisions are made before."""

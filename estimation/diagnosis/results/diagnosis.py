@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from estimation.diagnosis.experiment_plans.detection_limits import Limit, summarise_limits
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
 from estimation.diagnosis.findings import Finding, list_parameters, read_finding
-from estimation.diagnosis.results.verdict_text import format_p_value, state_verdict
+from estimation.diagnosis.results.verdict_text import close_rivals, format_p_value, state_verdict
+from estimation.diagnosis.simulations.simulation_result import Simulation, read_simulation
 from estimation.diagnosis.validations.prediction_settings import all_row_errors
-from estimation.diagnosis.validations.simulation_result import Simulation, read_simulation
 from estimation.models.model import Model, load_model
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
@@ -34,16 +34,16 @@ VERDICTS = ("none", "named", "ambiguous", "unexplained")
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Curves behind a finding, for pictures; all (M,) or (M, n).
+    """Curves on held-out data, for plots.
 
     Attributes:
-        coordinate: per finding in the torque the axis on which it shows.
-        measured: torque.
-        before: residual of the base model.
-        after: residual of the extended model.
-        t: time [s].
-        windups: per finding by encoders behind the gears, which follow: load, and position behind the gear, measured
-            less simulated, by a rigid and by an elastic gear.
+        t: time [s], (M,).
+        measured: measured torque (M, n) [N m or N].
+        before: residual of the base model (M, n) [N m or N]; NaN in rows that do not count.
+        after: residual of the extended model (M, n) [N m or N]; NaN in rows that do not count.
+        coordinate: per finding from the torque the values (M,) of its plot axis.
+        windups: per finding from link encoders the gear load, and the link position, measured minus predicted, with a
+            rigid and with an elastic gear; all (K,).
     """
 
     t: Array
@@ -60,18 +60,19 @@ class Diagnosis:
 
     Attributes:
         verdict: ``none``, ``named``, ``ambiguous`` or ``unexplained``.
-        findings: the strongest first.
+        findings: findings from the torque, the largest BIC gain first; then rejected ones of an unexplained residual;
+            then findings from link encoders.
         baseline: NRMSE of the base model per joint (n,), on held-out data.
-        extended: NRMSE of the extended model there.
+        extended: NRMSE of the extended model per joint (n,), on held-out data.
         explained: share of the residual above noise that the named effects explain; 1 if nothing is left.
         excess: per joint the shares (n, 3) of the base model's squared residual that are noise, that repeat with the
             motion, and that change with time; NaN where the motion does not repeat.
         limits: detection limits per effect and joint.
-        next_experiment: what to measure next; None where nothing is open.
+        next_experiment: proposed experiment that separates the remaining causes; None if none is proposed.
         model: the extended model.
         how_unseen: how the held-out data were separated.
-        notes: what a reader must know.
-        trace: curves for pictures; None once loaded from a file.
+        notes: limitations of this diagnosis.
+        trace: curves for plots; None after loading from a file.
         simulation: forward simulation of a stretch of held-out data, without and with the findings; None without
             findings.
     """
@@ -96,7 +97,7 @@ class Diagnosis:
 
     @property
     def success(self) -> bool:
-        """Whether the question is answered: nothing found, or named without a rival left."""
+        """Whether the verdict is conclusive: ``none`` or ``named``."""
         return self.verdict in ("none", "named")
 
     @property
@@ -108,7 +109,7 @@ class Diagnosis:
         return all_row_errors(self.model)
 
     def summary(self) -> str:
-        """States the findings, their gain on held-out data, and what is still unknown."""
+        """Returns the verdict, findings, held-out errors, simulation, next experiment and notes as text."""
         robot = self.model.robot
         lines = [f"{robot.name}: {state_verdict(self.verdict, self.findings)}"]
         if self.verdict == "none" and (seen := summarise_limits(self.limits)):
@@ -132,8 +133,7 @@ class Diagnosis:
                 lines.append(f"    95 % intervals: {list_parameters(known)}")
             if open_ := [parameter.text for parameter in parameters if not parameter.determined]:
                 lines.append(f"    not well determined by these logs: {list_parameters(open_)}")
-            close = [f"{name} ({worse:.0f})" for name, worse in finding.rivals if worse < 10]
-            if close:
+            if close := close_rivals(finding):
                 lines.append(f"    cannot be distinguished from (BIC difference): {', '.join(close)}")
         before, after, every = (
             " ".join(f"{100 * value:.2f}" if np.isfinite(value) else "-" for value in errors)
@@ -156,7 +156,7 @@ class Diagnosis:
         return "\n".join(lines)
 
     def to_frame(self) -> pd.DataFrame:
-        """Gives a row per finding and parameter."""
+        """Returns a table with one row per finding and parameter."""
         import pandas as pd
 
         rows = [
@@ -179,7 +179,7 @@ class Diagnosis:
         return pd.DataFrame(rows, columns=names)
 
     def to_dict(self) -> dict[str, Any]:
-        """Writes `diagnosis.json`."""
+        """Returns the content of `diagnosis.json` as plain data."""
         return {
             "verdict": self.verdict,
             "findings": [finding.to_dict() for finding in self.findings],
@@ -197,7 +197,7 @@ class Diagnosis:
         }
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws the held-out error of each joint, for the base and the extended model."""
+        """Plots the held-out error of each joint for both models, on `ax` or on a new figure; returns the axes."""
         from matplotlib.figure import Figure
 
         axes = ax if ax is not None else Figure(figsize=(6, 4)).subplots()
@@ -210,10 +210,14 @@ class Diagnosis:
         return axes
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `diagnosis.json` and `model.json` into a folder that is there.
+        """Writes `diagnosis.json` and `model.json` into an existing folder.
+
+        Args:
+            folder: the folder.
+            force: whether existing files are replaced.
 
         Raises:
-            InputError: a file is there, and force is not given.
+            InputError: a file exists, and `force` is not set.
         """
         text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
         write_atomic(Path(folder) / DIAGNOSIS, text, force=force)
@@ -221,10 +225,13 @@ class Diagnosis:
 
     @staticmethod
     def load(folder: str | Path) -> Diagnosis:
-        """Reads what `save` wrote; the curves and the motions of the next experiment are not in the files.
+        """Reads the files of `save`. They contain neither curves nor the motions of the next experiment.
+
+        Args:
+            folder: folder with `diagnosis.json` and `model.json`.
 
         Raises:
-            InputError: a missing file, or one that is no diagnosis.
+            InputError: a file is missing or not a valid diagnosis.
         """
         file = Path(folder) / DIAGNOSIS
         try:
@@ -255,7 +262,7 @@ def _from_dict(data: dict[str, Any], model: Model) -> Diagnosis:
         model=model,
         how_unseen=data["unseen"],
         notes=tuple(data["notes"]),
-        # Older files have none.
+        # Older files lack this entry.
         simulation=None if data.get("simulation") is None else read_simulation(data["simulation"]),
     )
 
@@ -265,7 +272,7 @@ def _limit(item: dict[str, Any]) -> Limit:
         effect=item["effect"],
         joint=item["joint"],
         detectable=number(item["detectable"], np.inf),
-        # Older files have none.
+        # Older files lack this entry.
         at_worst=number(item.get("at_worst"), np.inf),
         attributable=number(item["attributable"], np.inf),
         toughest=item["toughest_rival"],
@@ -282,7 +289,7 @@ def _next(item: dict[str, Any]) -> NextExperiment:
         resolves=float(item["resolves"]),
         stages=(),
         ranking=(),
-        # Older files have none.
+        # Older files lack this entry.
         times=int(item.get("times", 1)),
         logged=str(item.get("logged", "")),
     )

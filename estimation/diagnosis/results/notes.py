@@ -18,8 +18,8 @@ from estimation.diagnosis.calibration import (
 from estimation.diagnosis.experiment_plans.detection_limits import STILL
 from estimation.diagnosis.experiment_plans.undetectable_springs import undetectable_springs
 from estimation.diagnosis.findings import Finding
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.recordings.recording import cut_recording
 from estimation.diagnosis.validations.changes import Change, ChangedFinding
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
@@ -30,11 +30,12 @@ from robots.terms.effects.current_clipping import CERTAIN, CurrentClipping
 
 Array = NDArray[np.float64]
 
-# So are positions outside the fitted range by this share of it, for this share of the time.
+# Findings for which positions outside the fitted range are reported.
 PLACED = ("spring", "unexplained")
-# So is a joint whose NRMSE grows with the extended model by this factor and by this difference.
+# Smallest increase of a joint's held-out NRMSE by the extended model that is reported.
 LITTLE = 0.001
-# So is a joint whose error in all rows is MUCH_MORE times that of the counted rows, if SEVERAL of them do not count.
+# Ratio of a joint's error in all rows to that in counted rows, and share of rows that do not count, above which both
+# errors are reported as different.
 MUCH_MORE, SEVERAL = 2.0, 0.01
 CLIPPING = CurrentClipping()
 
@@ -53,15 +54,18 @@ def notes_of(
     after: Array,
     timed: Sequence[str] = (),
 ) -> tuple[str, ...]:
-    """Lists what the logs and the findings leave open.
+    """Lists limitations of the logs and of the findings.
 
     Args:
-        problem: the logs.
-        false_alarm: chance of one.
-        findings: all of them.
-        apart: those that the extended model does not contain.
-        after: NRMSE of that model on held-out data (n,).
-        timed: effects identified from reversals, whose rows do not count.
+        problem: logs and base model.
+        false_alarm: threshold of the p-values.
+        findings: all findings.
+        apart: findings that the extended model does not contain.
+        after: NRMSE of the extended model on held-out data (n,).
+        timed: names of effects identified from reversals, whose rows do not count.
+
+    Returns:
+        The notes.
     """
     recording, robot = problem.recording, problem.situation.robot
     notes = []
@@ -91,7 +95,7 @@ def notes_of(
                 f"{finding.effect}: {recording.duration:.0f} s of logs do not determine {parameter.name}. The value "
                 f"{parameter.value:.3g} s is one of many that fit."
             )
-        # Findings outside the model have their own sentence.
+        # Findings outside the model get no gain note, because their sentence states the failed validation.
         if finding.effect in timed:
             notes.append(_TIMED.format(finding.effect))
         elif finding.gain.ci95[0] <= 0 and finding not in apart:
@@ -123,7 +127,7 @@ _AGAINST = (
 
 
 def unsure_gain(finding: Finding) -> str:
-    """States that a held-out gain is not significant, and whether any parameter is determined."""
+    """States that the held-out gain is not significant or negative, and if so, that no parameter is determined."""
     named = finding.effect != "unexplained"
     what = finding.effect if named else "the unexplained residual"
     where = f"{what} of joint {finding.joint}" if finding.joint else what
@@ -151,6 +155,13 @@ def worse_joints(before: Array, after: Array) -> list[str]:
     """Lists joints whose held-out NRMSE (n,) is larger with the extended model than with the base model.
 
     An effect on one joint can change the base parameters of others.
+
+    Args:
+        before: NRMSE of the base model (n,).
+        after: NRMSE of the extended model (n,).
+
+    Returns:
+        One note, or none.
     """
     worse = np.flatnonzero(after > np.maximum(MIN_WORSE_RATIO * before, before + LITTLE))
     if not len(worse):
@@ -163,9 +174,12 @@ def turning_joints(every: Array, after: Array, counts: NDArray[np.bool_]) -> lis
     """Lists joints whose error is dominated by rows with unknown friction sign, which do not count otherwise.
 
     Args:
-        every: its NRMSE with every row counted (n,).
-        after: of rows that count (n,).
-        counts: which those are (N, n).
+        every: NRMSE of the extended model on all held-out rows (n,).
+        after: its NRMSE on rows that count (n,).
+        counts: mask of the rows that count (N, n).
+
+    Returns:
+        One note, or none.
     """
     aside = 1.0 - counts.mean(axis=0)
     (joints,) = np.nonzero((every > MUCH_MORE * after) & (aside > SEVERAL))
@@ -183,7 +197,7 @@ _TURNING = (
 
 
 def faster_joints(problem: Problem, seen: HeldOutResult) -> list[str]:
-    """Lists joints that are faster in the held-out data than in the data of the friction polynomial."""
+    """Lists joints that are faster in the held-out data than in the fit of the friction polynomial, in one note."""
     if seen.whole is problem.recording or not any(column.symbol == "f4" for column in problem.baseline.base.columns):
         return []
     unseen = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
@@ -195,7 +209,7 @@ def faster_joints(problem: Problem, seen: HeldOutResult) -> list[str]:
 
 
 def farther_joints(problem: Problem, seen: HeldOutResult, findings: Sequence[Finding]) -> list[str]:
-    """Lists joints with position-dependent findings that the held-out data extrapolate."""
+    """Lists joints with position-dependent findings that are extrapolated on held-out data, in one note each."""
     if seen.whole is problem.recording:
         return []
     unseen = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
@@ -222,7 +236,7 @@ _FASTER = (
 
 
 def beside_larger(slight: FittedEffect | None, members: Sequence[FittedEffect]) -> tuple[str, ...]:
-    """Reports a significant candidate that the formula error of a finding can explain."""
+    """Reports a significant candidate `slight` that the formula error of one of the members can explain."""
     if slight is None:
         return ()
     shares = [(slight.gain_on([j]) / m.gain_on([j]), m, j) for m in members for j in slight.group.joints if _acts(m, j)]
@@ -251,7 +265,7 @@ _NOT_ALIKE = (
 
 
 def state_change(changed: ChangedFinding) -> str:
-    """States what held-out data changed in a finding."""
+    """States one change of a finding by the held-out data."""
     place = f"joint {changed.effect.joint}" if changed.effect.joint else "the whole robot"
     free = changed.effect.name.startswith(PREFIX)
     label = f"a free function of {place}" if free else changed.effect.label

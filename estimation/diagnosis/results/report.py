@@ -1,4 +1,4 @@
-"""The result of a diagnosis from its stages: findings in words and numbers, errors, notes, curves."""
+"""Assembles the result of a diagnosis from its stages: findings, errors, notes, curves."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from estimation.diagnosis.results.notes import (
 from estimation.diagnosis.results.wording import no_part, word_finding
 from estimation.diagnosis.searches.search import Search
 from estimation.diagnosis.searches.selection import SelectedEffect
+from estimation.diagnosis.simulations.held_out_simulation import simulate_held_out
 from estimation.diagnosis.validations.decision import Decision, Reason
 from estimation.diagnosis.validations.extended_model import ExtendedModel
 from estimation.diagnosis.validations.gain_intervals import HeldOutErrors
 from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance
-from estimation.diagnosis.validations.held_out_simulation import simulate_held_out
 from estimation.diagnosis.validations.held_out_validation import ValidatedFindings
 from estimation.diagnosis.validations.name_comparison import ComparedNames
 from estimation.diagnosis.validations.prediction_settings import all_row_errors
@@ -39,7 +39,7 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-SHOWN = 4000  # rows of the curves kept for pictures
+SHOWN = 4000  # approximate number of rows of the curves kept for plots
 
 
 def report(
@@ -53,7 +53,22 @@ def report(
     extended: ExtendedModel,
     false_alarm: float,
 ) -> Diagnosis:
-    """Puts what the stages of a diagnosis found into words and numbers; nothing is decided here."""
+    """Assembles the result of a diagnosis from its stages. All decisions are made before.
+
+    Args:
+        robot: the robot.
+        found: last search.
+        prepared: logs of the fit and held-out logs.
+        limits: detection limits per effect and joint.
+        compared: named effects and free functions before the validation.
+        validated: findings after the validation on held-out data.
+        decision: verdict and its reason.
+        extended: extended model and its fits.
+        false_alarm: threshold of the p-values.
+
+    Returns:
+        The diagnosis.
+    """
     problem, seen, unseen = found.problem, validated.measured, validated.measured.errors
     part = _findings(robot, problem, validated, extended)
     order = sorted(range(len(part)), key=lambda i: -part[i].delta_bic)
@@ -62,7 +77,7 @@ def report(
     simulation = (
         simulate_held_out(problem, validated.effects, seen, bool(prepared.held_out)) if validated.effects else None
     )
-    # A joint that rests in all held-out data has no error: NaN, not zero.
+    # The error of a joint without counted rows in the held-out data is NaN, not zero.
     shown = unseen.counts.any(axis=0)
     before, after = (np.where(shown, unseen.nrmse(model), np.nan) for model in (0, len(unseen.errors) - 1))
     timed = [member.hypothesis.name for member in validated.effects if member.group.by_reversals]
@@ -88,7 +103,7 @@ def report(
         next_experiment=_next(problem, validated.findings) if decision.reason is Reason.CLOSE_RIVALS else None,
         model=extended.model,
         how_unseen=unseen.how,
-        # Several functions of one joint have the same note.
+        # Several free functions of one joint have the same note.
         notes=tuple(dict.fromkeys(notes)),
         trace=_trace(unseen, [seen.coordinates[i] for i in order], validated.compliances),
         simulation=simulation,

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from estimation.diagnosis.findings import Finding
+from estimation.diagnosis.hypothesis_tests.evidence import is_close_rival
+from robots.terms.effects import EFFECTS
 
 
 def state_verdict(verdict: str, findings: Sequence[Finding]) -> str:
@@ -12,7 +14,10 @@ def state_verdict(verdict: str, findings: Sequence[Finding]) -> str:
 
     Args:
         verdict: ``none``, ``named``, ``ambiguous`` or ``unexplained``.
-        findings: all of the diagnosis.
+        findings: all findings of the diagnosis.
+
+    Returns:
+        One line of text.
     """
     joints: dict[str, list[int]] = {}
     for finding in findings:
@@ -40,5 +45,15 @@ _VERDICTS = {
 
 
 def format_p_value(value: float) -> str:
-    """Writes a p-value with three decimals, or its bound."""
+    """Formats a p-value with three decimals, or as ``< 0.001``."""
     return f"{value:.3f}" if value >= 0.001 else "< 0.001"
+
+
+def close_rivals(finding: Finding) -> list[str]:
+    """Lists the causes that fit about as well as a finding, each with the difference in BIC."""
+    close = []
+    for name, worse in finding.rivals:
+        effect = EFFECTS.get(name.split(" of joint ")[0])
+        if is_close_rival(effect is not None and effect.rare, worse):
+            close.append(f"{name} ({worse:.0f})")
+    return close

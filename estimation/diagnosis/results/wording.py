@@ -1,4 +1,4 @@
-"""Turns a fitted effect into a finding: parameters with intervals, rivals, gain and a sentence."""
+"""Findings from fitted effects: parameters with intervals, rivals, gain and a sentence."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import MAX_RELATIVE_ERROR, MAX_TIME_ERROR
 from estimation.diagnosis.findings import Finding, Gain, Parameter
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.joint_fits.extended_fit import ExtendedFit
 from estimation.diagnosis.searches.selection import SelectedEffect
 from robots.robot import Robot
@@ -34,17 +34,20 @@ def word_finding(
     found: SelectedEffect | None,
     gain: Gain,
 ) -> Finding:
-    """Puts one effect of the extended model into words and numbers.
+    """Builds the finding of one effect of the extended model.
 
     Args:
-        robot: of the logs.
-        problem: what the effect was found in.
+        robot: robot of the logs.
+        problem: data of the fit.
         member: the effect.
-        fitted: the extended model that holds it.
-        i: its place there.
-        p_value: of the effect.
-        found: with its rivals; None for a free function.
-        gain: on held-out data.
+        fitted: fit of the extended model that contains the effect.
+        i: index of the effect in this fit.
+        p_value: p-value of the effect.
+        found: the selected effect with its rivals; None for a free function.
+        gain: gain on held-out data.
+
+    Returns:
+        The finding.
     """
     extension, known = fitted.model.extensions[i], fitted.effects[i]
     hypothesis = member.hypothesis
@@ -53,7 +56,8 @@ def word_finding(
     if joint is not None:
         units = {"force": force_unit(robot, joint - 1), "length": length_unit(robot, joint - 1)}
     parameters = _parameters(robot, member, fitted, i, known)
-    sentence = _when(hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units), parameters)
+    sentence = hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units)
+    sentence += _uncertain_times(parameters)
     if hypothesis.effect.undetermined_text and not known[: len(extension.coefficients)].any():
         sentence = hypothesis.effect.undetermined_text.format(joint=joint)
     pattern = hypothesis.name if hypothesis.name.startswith(PREFIX) else ""
@@ -76,22 +80,27 @@ def word_finding(
     )
 
 
-def _when(sentence: str, parameters: Sequence[Parameter]) -> str:
-    """Replaces an uncertain change time by its interval, and an uncertain push by its minimum duration."""
+def _uncertain_times(parameters: Sequence[Parameter]) -> str:
+    """States what the logs leave open of the time of a change or of a push; begins with a space, or is empty."""
+    text = ""
     for own in parameters:
         if own.name == "change_time" and not own.determined and np.isfinite(own.ci95).all():
-            between = f"between t = {own.ci95[0]:.1f} and {own.ci95[1]:.1f} s"
-            sentence = sentence.replace(f"at t = {own.value:.2f} s", between)
-    spell = {own.name: own for own in parameters if own.name in ("start", "duration")}
-    if len(spell) == 2 and not all(np.isfinite(own.ci95).all() for own in spell.values()):
-        start, duration = (spell[name].value for name in ("start", "duration"))
-        least = f"at least from t = {start:.1f} to {start + duration:.1f} s"
-        sentence = sentence.replace(f"from t = {start:.2f} s for {duration:.2g} s", least)
-    return sentence
+            text += f" The time of the change is uncertain: between t = {own.ci95[0]:.1f} and {own.ci95[1]:.1f} s."
+    times = [own for own in parameters if own.name in ("start", "duration")]
+    if len(times) == 2 and not all(np.isfinite(own.ci95).all() for own in times):
+        text += " It may have begun earlier or ended later."
+    return text
 
 
 def no_part(finding: Finding) -> Finding:
-    """Rewords a finding that the held-out data rejected: it is unexplained, and not part of the extended model."""
+    """Changes a finding that held-out data rejected into an unexplained residual outside the extended model.
+
+    Args:
+        finding: the rejected finding.
+
+    Returns:
+        The changed finding.
+    """
     if finding.pattern:
         return replace(finding, sentence=f"{finding.sentence} {_NOT_IN_MODEL}")
     sentence = _REJECTED.format(EFFECTS[finding.effect].title)
@@ -108,6 +117,7 @@ _REJECTED = (
 def _parameters(
     robot: Robot, member: FittedEffect, fitted: ExtendedFit, i: int, known: NDArray[np.bool_]
 ) -> tuple[Parameter, ...]:
+    """Lists the coefficients and shape parameters of an effect with their 95 % intervals."""
     extension = fitted.model.extensions[i]
     effect = member.hypothesis.effect
     described: list[Coefficient | Shape] = [
@@ -147,16 +157,17 @@ def _parameters(
 
 
 def _stopped(shape: Shape, value: float) -> bool:
-    """Whether a size is at its bound, so that the data may favour a value beyond it."""
+    """Whether a shape parameter is at its bound, so that the data may favour a value beyond it."""
     return shape.scale == "log" and value != shape.default and bool(np.isclose(value, [shape.lower, shape.upper]).any())
 
 
 def _opened(parameter: Parameter) -> Parameter:
+    """Marks a parameter as undetermined."""
     return replace(parameter, standard_error=float("nan"), ci95=(-np.inf, np.inf), determined=False)
 
 
 def _perhaps_unused(effect: Effect, shape: tuple[float, ...], intervals: Mapping[str, tuple[float, float]]) -> set[str]:
-    """Names shape parameters without meaning if another may have its default: an angle of a lever of zero length."""
+    """Names shape parameters without influence if another may be at its default, such as the angle of a zero lever."""
     names: set[str] = set()
     for k, own in enumerate(effect.shapes):
         if own.default is None or own.name not in intervals:
@@ -169,7 +180,7 @@ def _perhaps_unused(effect: Effect, shape: tuple[float, ...], intervals: Mapping
 
 
 def _roughly(shape: Shape, value: float, interval: tuple[float, float]) -> bool:
-    """Whether an interval is too wide for a determined value; never for positions, which may have either sign."""
+    """Whether an interval is too wide for a determined value. A position, which may have either sign, never is."""
     half = 0.5 * (interval[1] - interval[0])
     if not np.isfinite(half):
         return False

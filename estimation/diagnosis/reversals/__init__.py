@@ -1,1 +1,1 @@
-"""The balance of impulses where a joint's velocity reverses."""
+"""Timing of torque against motion, by the balance of impulses at velocity reversals."""

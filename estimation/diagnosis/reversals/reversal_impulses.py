@@ -1,4 +1,4 @@
-"""What friction that turns round does to a joint: reversals, and what a force about each of them does to its motion."""
+"""Velocity reversals of a joint, and the response of its motion to a force about each of them."""
 
 from __future__ import annotations
 
@@ -17,31 +17,34 @@ from robots.base_parameters import BaseParameters
 
 Array = NDArray[np.float64]
 
-# Reversals of which a mean is taken, and how fast against the usual one: a joint that creeps round kicks at no moment.
+# Fewest reversals for an average, and least acceleration of one over their median: slow reversals have no sharp pulse.
 FEWEST, SLOWEST = 12, 0.2
-# An inertia is no smaller anywhere than this share of the usual one.
+# Lower bound of a joint's inertia, as a share of its median.
 LEAST = 0.1
-# Edges [s] within which the force of a kick is constant, on either side of a reversal, for samples as close as [s].
-# Within the first torque tells nothing of it: friction that turns round late would look the same.
+# Edges [s] of the intervals on either side of a reversal in which the force is constant, for sample periods up to
+# `CLOSE`. Torque within the first edge is not used: late friction would look the same there.
 CLOSE = 0.004
 EDGES = (0.0, 0.006, 0.010, 0.014, 0.020, 0.028, 0.040, 0.056, 0.080, 0.112, 0.160, 0.200)
-# A kick is over within this share of a period of the cut-off, and no sooner than this [s]; a low-pass spreads it by
-# some periods more.
+# The force ends within `PERIODS` periods of the cut-off, but not before `SHORTEST` [s]. The low-pass spreads the
+# response by `RINGS` periods more.
 PERIODS, SHORTEST, RINGS = 1.0, 0.04, 2.0
-FINE = 8  # points of tables in a sample
-# A reversal stays the same one while it moves by less than this [s]; of a repeated motion it is by its phase [s].
+FINE = 8  # table points per sample period
+# A reversal that moves by less than `MOVES` [s] is still the same. In a periodic motion, reversals are the same if
+# their phases differ by less than `SAME` [s].
 MOVES, SAME = 0.02, 0.01
-# Reversals in two logs are one and the same where positions and acceleration differ by this share of their range.
+# Reversals in two logs are the same if positions and accelerations differ by less than this share of their range.
 ALIKE = 2e-3
 
 
 @dataclass(frozen=True, eq=False)
 class ImpulseResponse:
-    """What unit forces between each pair of edges do to a unit inertia, less what a low-pass leaves in the motion.
+    """Response of a unit inertia to force pulses about a reversal, minus what the low-pass keeps of it.
+
+    Pulses are combinations of unit forces between two edges each, after which position and velocity return to zero.
 
     Attributes:
         x: times from the reversal (T,) [s].
-        values: positions, velocities, accelerations (3, T, K).
+        values: positions, velocities and accelerations (3, T, K).
     """
 
     x: Array
@@ -49,7 +52,7 @@ class ImpulseResponse:
 
     @staticmethod
     def of(cutoff: float, step: float, half: Array) -> ImpulseResponse:
-        """Evaluates them for a low-pass [Hz], a sample period [s] and edges on one side [s]."""
+        """Evaluates the response for a low-pass [Hz], a sample period [s] and the edges on one side [s]."""
         edges = np.concatenate([-half[:0:-1], half])
         dx = step / FINE
         count = int(np.ceil((half[-1] + RINGS / cutoff) / dx))
@@ -58,7 +61,7 @@ class ImpulseResponse:
         force = ((at >= low) & (at < high)).astype(float)
         speed = np.clip(at - low, 0.0, high - low)
         way = speed**2 / 2 + (high - low) * np.maximum(at - high, 0.0)
-        # The loop undoes a kick: position and velocity are what they were, in the end.
+        # The position loop compensates the pulse: position and velocity return to their values without it.
         ends = np.stack([high - low, (high - low) ** 2 / 2 + (high - low) * (half[-1] - high)])
         free = np.linalg.svd(ends)[2][2:].T
         inside = np.abs(at) <= half[-1]
@@ -70,7 +73,7 @@ class ImpulseResponse:
         return ImpulseResponse(x, whole - kept[:, : len(x)])
 
     def at(self, times: Array) -> Array:
-        """Gives positions, velocities, accelerations (3, M, K) at times (M,) within."""
+        """Interpolates positions, velocities and accelerations (3, M, K) at times (M,) [s] from the reversal."""
         place = np.clip((times - self.x[0]) / (self.x[1] - self.x[0]), 0, len(self.x) - 1.000001)
         low = place.astype(int)
         share = (place - low)[:, None]
@@ -78,7 +81,7 @@ class ImpulseResponse:
 
 
 def edges_of(cutoff: float, step: float) -> Array:
-    """Gives the edges on one side [s] for a low-pass [Hz] and a sample period [s]."""
+    """Returns the edges on one side of a reversal [s], for a low-pass [Hz] and a sample period [s]."""
     wider = max(1.0, step / CLOSE)
     edges = wider * np.array(EDGES)
     return edges[edges <= max(PERIODS / cutoff, wider * SHORTEST)]
@@ -86,14 +89,14 @@ def edges_of(cutoff: float, step: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Reversals:
-    """A joint's reversals in all logs.
+    """Reversals of a joint in all logs.
 
     Attributes:
-        at: moments (R,), in rows.
+        at: times (R,), in rows.
         way: signs (R,) of the acceleration.
-        run: log (R,) of each.
-        kind: number (R,) of each: those of a motion that is repeated, within a log or in others, have one.
-        inertia: of the joint there (R,) [kg m2 or kg].
+        run: index (R,) of the log.
+        kind: label (R,); repetitions of a reversal, within a log or between logs, share one.
+        inertia: inertia of the joint at each reversal (R,) [kg m2 or kg].
     """
 
     at: Array
@@ -104,7 +107,17 @@ class Reversals:
 
 
 def find_reversals(recording: Recording, j: int, base: BaseParameters, values: Array) -> Reversals | None:
-    """Finds the reversals of a joint (from 0), with base parameters (b,); None where they are too few."""
+    """Finds the reversals of a joint.
+
+    Args:
+        recording: the data.
+        j: the joint, counted from 0.
+        base: base parameters of the model.
+        values: their values (b,), which yield the inertia.
+
+    Returns:
+        The reversals; None if there are too few.
+    """
     at, rates, run, kind = [], [], [], []
     for k, rows in enumerate(recording.runs):
         moments, rate = _crossings(recording.dq[rows, j])
@@ -132,14 +145,14 @@ def find_reversals(recording: Recording, j: int, base: BaseParameters, values: A
 
 
 def _crossings(v: Array) -> tuple[Array, Array]:
-    """Gives the moments [rows] at which a velocity (N,) changes its sign, and its changes from row to row there."""
+    """Returns the times [rows] at which a velocity (N,) changes sign, and its change per row there."""
     before = np.flatnonzero(v[1:] * v[:-1] < 0)
     rate = v[before + 1] - v[before]
     return before - v[before] / rate, rate
 
 
 def _kinds(moments: Array, cycle: Cycle | None) -> NDArray[np.intp]:
-    """Numbers reversals (R,) [s] by their phase in a repeated motion, or one by one."""
+    """Labels reversals (R,) [s] by their phase in a periodic motion, or one by one."""
     if cycle is None or not len(moments):
         return np.arange(len(moments))
     phase = np.mod(moments, cycle.period)
@@ -150,9 +163,9 @@ def _kinds(moments: Array, cycle: Cycle | None) -> NDArray[np.intp]:
 
 
 def _alike(kinds: NDArray[np.intp], q: Array, rate: Array) -> NDArray[np.intp]:
-    """Numbers kinds (R,) anew, as one where all joints were in the same place (R, n) and this one turned alike (R,).
+    """Merges labels (R,) of reversals with the same positions of all joints (R, n) and the same acceleration (R,).
 
-    Logs of one motion err alike in it: an encoder's steps are where they were.
+    Logs of the same motion have the same errors at them, because the encoder steps are at the same positions.
     """
     counts = np.bincount(kinds)
     about = np.column_stack([q, rate / np.max(np.abs(rate))])
@@ -165,16 +178,16 @@ def _alike(kinds: NDArray[np.intp], q: Array, rate: Array) -> NDArray[np.intp]:
 def impulse_columns(
     recording: Recording, turns: Reversals, at: Array, tables: list[ImpulseResponse]
 ) -> tuple[list[Array], NDArray[np.intp], Array]:
-    """Gives what unit forces about reversals do (N, K), and how near those are.
+    """Evaluates the response to unit pulses about all reversals.
 
     Args:
         recording: the data.
         turns: the reversals.
-        at: their moments (R,), in rows.
-        tables: of each log.
+        at: their times (R,), in rows.
+        tables: response for each log.
 
     Returns:
-        Columns (N, K) of the position, of the velocity and of the torque; the nearest reversal (N,); how far it is (N,)
+        Columns (N, K) of position, velocity and torque; the index of the nearest reversal (N,); the distance to it (N,)
         [rows].
     """
     N, step = len(recording), recording.step
@@ -195,7 +208,7 @@ def impulse_columns(
 
 
 def shift_reversals(recording: Recording, turns: Reversals, at: Array, dq: Array) -> Array:
-    """Moves reversals (R,) to where a velocity (N,) has its own nearest to them, if that is near."""
+    """Moves reversals (R,) to the nearest sign change of a velocity (N,) in the same direction, if it is near."""
     own, rate = _crossings(dq)
     result = at.copy()
     for way in (-1.0, 1.0):

@@ -1,4 +1,4 @@
-"""How late torque is against each joint's reversals, by the balance of impulses there: position and torque together."""
+"""Lag of torque behind motion at each joint's reversals, by the balance of impulses in position and torque."""
 
 from __future__ import annotations
 
@@ -24,37 +24,39 @@ from estimation.diagnosis.reversals.reversal_impulses import (
 Array = NDArray[np.float64]
 
 ROUNDS = 3
-# Least number of kinds of reversals that determines their scatter.
+# Fewest distinct reversals for an estimate of their scatter.
 FEWEST_KINDS = 3
-# A mean differs from what each reversal did by more than its own scatter says: its edges, its moments.
+# Factor on standard errors of the mean pulse: its edges and the times of reversals are approximate.
 LARGER = 1.15
-# A kick is one from so many errors on.
+# Standard errors from which a velocity error at reversals is significant.
 SURE = 2.0
-# When within the gap an impulse acts is not known.
+# Standard deviation of a uniform distribution of unit width: when an impulse acts within the gap is unknown.
 ANYWHERE = 12**-0.5
-# What is left beside reversals is no more than noise by these factors, of positions and of torque.
+# Mean squares of the residuals of position and torque, over their noise, up to which the fit is valid.
 QUIET = (1.25, 1.4)
-# Reversals count whose moment is known to this [s], and lags within this share of the gap: no torque turns later then.
+# Largest error of a reversal's time [s], and largest lag as a share of the gap: beyond the gap no friction jump is
+# seen.
 KNOWN, WITHIN = 1e-3, 0.75
-# A joint whose rows at reversals count is timed by impulses where those tell it so much better than its rows may.
+# If rows near a joint's reversals count, the impulses are used only if their error is below this share of that of the
+# rows.
 BETTER = 0.5
-# Directions of the fit below this share of a usual one are not determined; forces beside the gap are those from here on
-# [s].
+# Regularisation of the fit, as a share of the mean eigenvalue. Distance [s] from the gap at which the force beside it
+# is evaluated.
 FAINT, BESIDE = 1e-9, 1e-3
-# Times about reversals [s] that are fitted, and must be understood.
+# Time [s] about reversals in which the fit is made, and its residuals are checked.
 ABOUT = 0.2
-# A signal counts as usual up to so many medians.
+# Multiple of the median up to which values count in a signal's level.
 USUAL = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class ReversalTiming:
-    """What reversals tell of how late torque is.
+    """Lag of torque behind motion, as measured at reversals.
 
     Attributes:
-        lags: of torque behind motion (n,) [s], by each joint.
-        errors: their standard deviations (n,); infinite for joints that tell nothing.
-        kicks: velocities (n,) [rad/s or m/s] that motion as it is known lacks at reversals, where they surely do.
+        lags: lag of torque (n,) [s], by each joint.
+        errors: their standard errors (n,) [s]; infinite for joints without a measurement.
+        kicks: significant velocity errors of the low-passed motion at reversals (n,) [rad/s or m/s]; zero for others.
     """
 
     lags: Array
@@ -63,15 +65,22 @@ class ReversalTiming:
 
     @property
     def residual(self) -> Array:
-        """The lags over their errors (n,)."""
+        """Lags over their standard errors (n,)."""
         return np.asarray(self.lags / self.errors)
 
     def column(self, joints: Sequence[int]) -> Array:
-        """What some joints (from 0) tell of a lag of all torque (n, 1), over their errors."""
+        """Returns the column of a lag of all torques (n, 1), as some joints (from 0) measure it, over their errors."""
         return np.where(np.isin(np.arange(len(self.errors)), joints), 1.0 / self.errors, 0.0)[:, None]
 
     def beside(self, recording: Recording) -> ReversalTiming | None:
-        """Keeps what is not told by rows at reversals that count, or far better than by those; None for nothing."""
+        """Drops joints whose rows at reversals count, unless impulses are far more accurate than these rows.
+
+        Args:
+            recording: the data.
+
+        Returns:
+            The timing of the remaining joints; None if there are none.
+        """
         errors = self.errors.copy()
         for j in np.flatnonzero(recording.counted_rows):
             assert recording.reversal_time_error is not None
@@ -85,24 +94,24 @@ class ReversalTiming:
 def measure_reversal_timing(
     recording: Recording, baseline: Baseline, values: Array, residual: Array, extra: Array | None = None
 ) -> ReversalTiming | None:
-    """Measures how late torque is against each joint's reversals.
+    """Measures the lag of torque behind motion at each joint's reversals.
 
-    Friction that turns round is late in the torque by as much as the torque is. An encoder tells a reversal of
-    low-passed motion to some milliseconds only: Coulomb friction kicks the joint there, with much the same force each
-    time, the loop undoes it, and all of it hides in the encoder's noise. Torque tells the kick's force (beyond the base
-    model), but just about the reversal, where friction that turns round late would look the same; positions tell, in
-    the mean of all reversals, what velocity the kick brought in all. What impulse torque had beyond that is friction's:
-    twice the Coulomb friction times the lag.
+    If torque is logged late, its friction jump is late by the same time. Low-passed positions show a reversal only to
+    some milliseconds. Coulomb friction excites the joint there with nearly the same force each time. The position loop
+    compensates it, and encoder noise hides the response. Torque shows that force beyond the base model, except close to
+    the reversal, where late friction would look the same. The mean of positions over all reversals shows the total
+    velocity change due to the force. The rest of the torque's impulse is due to friction: twice the Coulomb friction
+    times the lag.
 
     Args:
         recording: the data.
         baseline: the base model on it.
         values: its parameters (b,).
-        residual: torque less base model and effects that are known (N, n) [N m or N].
-        extra: torque of those (N, n); None for none.
+        residual: torque minus base model and known effects (N, n) [N m or N].
+        extra: torque of the known effects (N, n) [N m or N]; None for none.
 
     Returns:
-        The timing; None where no joint tells any.
+        The timing; None if the positions were not logged at the rows of the grid.
     """
     base = baseline.base
     if recording.full_rate is not None:
@@ -128,15 +137,15 @@ def measure_reversal_timing(
 
 @dataclass(frozen=True, eq=False)
 class _Impulse:
-    """The mean force of a joint's kicks.
+    """Mean force pulse at a joint's reversals.
 
     Attributes:
-        at: moments (R,) of the reversals, in rows.
-        force: of the kicks at all rows (N,) [N m or N].
-        gap: rows to either side of a reversal in which torque tells nothing of it.
-        velocity: what a kick does to the velocity at the reversal, times the inertia [N m s or N s], and its error.
-        impulse: beyond that of the forces beside the gap, in it [N m s or N s].
-        error: of the whole impulse in the gap [N m s or N s].
+        at: times (R,) of the reversals, in rows.
+        force: pulses at all rows (N,) [N m or N].
+        gap: rows on either side of a reversal in which torque is not used.
+        velocity: velocity change due to the pulse at the reversal, times the inertia, and its error [N m s or N s].
+        impulse: impulse in the gap beyond that of the forces beside it [N m s or N s].
+        error: error of the whole impulse in the gap [N m s or N s].
     """
 
     at: Array
@@ -150,13 +159,13 @@ class _Impulse:
 def _joint(
     recording: Recording, j: int, turns: Reversals, force: Array, friction: float, sign: Array
 ) -> tuple[float, float, float] | None:
-    """Lag of torque behind a joint's reversals, its error [s], and the kicks; None where those are not understood."""
+    """Measures a joint's lag [s], its error [s], and its velocity error [rad/s or m/s]; None if the fit is invalid."""
     kick = _fit_impulse(recording, j, turns, force) if friction > 0 else None
     if kick is None:
         return None
     rate = np.abs(np.interp(kick.at, np.arange(len(force)), recording.ddq[:, j]))
     usual = float(np.mean(turns.inertia))
-    # A velocity that is wrong changes its sign late by that over the acceleration.
+    # A velocity error delays the sign change by the error over the acceleration.
     wrong = float(np.hypot(kick.velocity[1], ANYWHERE * kick.impulse)) / usual
     velocity = abs(kick.velocity[0]) / usual if abs(kick.velocity[0]) > SURE * kick.velocity[1] else 0.0
     torque, lags = force - kick.force + friction * sign, np.full(len(kick.at), np.nan)
@@ -181,9 +190,9 @@ def _joint(
 
 
 def _fit_impulse(recording: Recording, j: int, turns: Reversals, force: Array) -> _Impulse | None:
-    """Fits the mean force of a joint's kicks to its positions and, but for the gaps, its torque; None where that fails.
+    """Fits the mean pulse to a joint's positions and, outside the gaps, its torque; None if the fit is invalid.
 
-    A low-pass leaves nothing of it in the motion that stands out of the encoder's noise at any one reversal.
+    The low-passed motion contains too little of it to exceed the encoder noise at a single reversal.
     """
     assert recording.position_residual is not None
     assert recording.cutoffs is not None
@@ -208,7 +217,7 @@ def _fit_impulse(recording: Recording, j: int, turns: Reversals, force: Array) -
     position, torque = np.split(left, [int(counted.sum())])
     if np.mean(position**2) > QUIET[0] or np.mean(torque**2) > QUIET[1]:
         return None
-    # Each kind of reversal by its own sums: what it says beyond noise that comes anew at each sample counts, too.
+    # The covariance adds the scatter between distinct reversals (cluster-robust) to that of independent samples.
     sums = np.zeros((turns.kind.max() + 1, len(gram)))
     np.add.at(sums, turns.kind[np.concatenate([nearest[counted], nearest[beyond_gap]])], design * left[:, None])
     kinds = len(np.unique(turns.kind))
@@ -230,6 +239,6 @@ def _fit_impulse(recording: Recording, j: int, turns: Reversals, force: Array) -
 
 
 def _level(x: Array) -> float:
-    """Gives the root mean square of a signal (N,) where it is not far larger than usual."""
+    """Returns the root mean square of a signal (N,) without outliers."""
     usual = np.abs(x) < USUAL * np.median(np.abs(x))
     return float(np.sqrt(np.mean(x[usual] ** 2))) if usual.any() else 0.0

@@ -1,1 +1,1 @@
-"""Which effects enter the model."""
+"""Search for the effects that enter the extended model."""

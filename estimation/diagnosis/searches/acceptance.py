@@ -1,4 +1,4 @@
-"""Whether an effect is worth its parameters beside others, by what no other effect may leave of itself."""
+"""Acceptance of effects: BIC gain, beyond what errors of other effects' formulas or noise shocks can explain."""
 
 from __future__ import annotations
 
@@ -8,22 +8,30 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence, shared_coefficient_gain
-from estimation.diagnosis.hypothesis_tests.log_noise_levels import profile_gain
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
 from estimation.diagnosis.hypothesis_tests.shocks import gain_beside_shock
+from estimation.diagnosis.searches.log_noise_levels import profile_gain
 
-# Time [s] before and after a kick of another effect, such as a link that lands, in which drives answer to it; what
-# kicks in more than this share of the rows is none. Rows aside must tell this share of a delay.
+# Time [s] before and after an impact of another effect in which the drives respond to it; share of the rows from which
+# such times no longer count as impacts; share of a delay that the other rows must show.
 ANSWERS, MOSTLY, ASIDE = 0.2, 0.8, 0.5
-# But where no other effect acts, below this share of the false-alarm chance: no other formula leaves it there.
+# p-value over the false-alarm threshold below which an effect is certain, on joints without other effects.
 SURE = 0.2
 
 
 def passes_bic(problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]) -> bool:
-    """Whether a candidate is worth its parameters beside members; the first one may have another size in each log."""
+    """Whether the BIC gain of a candidate beside the members is sufficient.
+
+    For the first effect, the noise level of each log may also be free.
+
+    Args:
+        problem: whitened data.
+        candidate: effect, measured beside the members.
+        members: effects in the model.
+    """
     worth = candidate.bic_gain - candidate.motion_error_chi2 if members else candidate.local_bic_gain
     if worth <= MIN_BIC_GAIN and not members and len(problem.recording.runs) > 1:
         worth += profile_gain(problem, candidate) - candidate.gain
@@ -33,29 +41,56 @@ def passes_bic(problem: Problem, candidate: FittedEffect, members: Sequence[Fitt
 def is_accepted(
     problem: Problem, candidate: FittedEffect, p_value: float, others: Sequence[FittedEffect], false_alarm: float
 ) -> bool:
-    """Whether an effect is worth its parameters beside others, or sure without that."""
+    """Whether an effect has a sufficient BIC gain or is certain.
+
+    Args:
+        problem: whitened data.
+        candidate: effect, measured beside the others.
+        p_value: p-value of the effect.
+        others: other effects in the model.
+        false_alarm: threshold of the p-values.
+    """
     return passes_bic(problem, candidate, others) or is_certain(problem, candidate, p_value, others, false_alarm)
 
 
 def is_certain(
     problem: Problem, candidate: FittedEffect, p_value: float, others: Sequence[FittedEffect], false_alarm: float
 ) -> bool:
-    """Whether an effect on joints where no other acts is far from chance, and worth its parameters at all."""
+    """Whether an effect on joints without other effects has a very small p-value and a positive BIC gain.
+
+    Args:
+        problem: whitened data.
+        candidate: effect, measured beside the others.
+        p_value: p-value of the effect.
+        others: other effects in the model.
+        false_alarm: threshold of the p-values.
+    """
     joints = set(candidate.group.joints)
     apart = not any(joints.intersection(other.group.joints) for other in others)
     return apart and p_value < SURE * false_alarm and candidate.bic_gain - candidate.motion_error_chi2 > 0
 
 
 def exceeds_single_shock(problem: Problem, candidate: FittedEffect, accepted: Accepted) -> bool:
-    """Whether what acts for a moment is more than one shock of the noise."""
+    """Whether a transient effect has a sufficient BIC gain beside a single noise shock.
+
+    Args:
+        problem: whitened data.
+        candidate: transient effect.
+        accepted: effects in the model.
+    """
     return gain_beside_shock(problem, candidate, accepted).local_bic_gain > MIN_BIC_GAIN
 
 
 def exceeds_leakage(problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]) -> bool:
-    """Whether a candidate is worth it by the joints alone on which it is more than what others may leave.
+    """Whether a candidate has a sufficient BIC gain on joints where formula errors of the members cannot explain it.
 
-    What the torque as logged shows by itself, such as flat tops, no other formula leaves. Nor does one leave the same
-    coefficient on joints that must agree on it: those on which another effect explains more must do no more than that.
+    Formula errors cannot explain an effect that the logged torque shows by itself, such as flat tops. If all joints
+    share the coefficient, the joints on which the candidate explains more than their own effects must agree on it.
+
+    Args:
+        problem: whitened data.
+        candidate: effect, measured beside the members.
+        members: effects in the model.
     """
     hypothesis = candidate.hypothesis
     flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
@@ -83,10 +118,16 @@ def exceeds_leakage(problem: Problem, candidate: FittedEffect, members: Sequence
 def delay_supported_away_from_impacts(
     problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]
 ) -> bool:
-    """Whether a delay that all joints have alike is told by more than the answers of drives to another effect's kicks.
+    """Whether a shared delay is also significant away from impacts of an acceleration-driven effect.
 
-    A link that lands throws its motor back, which the log has for motion of motor and link alike: the torque, which
-    answers to it, then seems to be ahead of that, on all joints that feel it.
+    After backlash the link hits the other tooth flank and pushes the motor back. The base model takes the logged
+    position for that of motor and link. The torque, which responds to the impact, then seems to be ahead of the motion
+    on all joints that the impact reaches.
+
+    Args:
+        problem: whitened data.
+        candidate: effect; any other than a shared delay passes.
+        members: other effects in the model.
     """
     kicks = [member for member in members if member.hypothesis.effect.acceleration_driven]
     if not kicks or not candidate.hypothesis.effect.shared_coefficient:
@@ -104,7 +145,7 @@ def delay_supported_away_from_impacts(
         group = problem.group((j,), (X,), effect=candidate.hypothesis.effect)
         parts = score(problem, problem.split(group, np.ones(1), beside), accepted)
         if parts.gram[0, 0] > 0:
-            # Whatever it is beside the kicks.
+            # Eliminates the coefficient in the rows near impacts.
             onto = parts.gram[1, 0] / parts.gram[0, 0]
             per_joint.append((parts.gram[1, 1] - onto * parts.gram[0, 1], parts.cross[1] - onto * parts.cross[0]))
     gram, cross = np.array([each for each in per_joint if each[0] > 0]).reshape(-1, 2).T
@@ -117,7 +158,7 @@ def delay_supported_away_from_impacts(
 
 
 def _joints_agree(problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]) -> bool:
-    """Whether joints on which no effect of theirs explains more tell a common coefficient by themselves."""
+    """Whether the joints on which no other effect explains more determine a common coefficient."""
     if not delay_supported_away_from_impacts(problem, candidate, members):
         return False
     beside = accept(problem, tuple(m.group for m in members))

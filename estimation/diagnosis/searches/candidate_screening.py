@@ -1,4 +1,4 @@
-"""Which hypotheses of a scan are worth refining: near the best at the grid, and able to come near it."""
+"""Selection of the hypotheses of a scan that are refined."""
 
 from __future__ import annotations
 
@@ -7,22 +7,30 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimation.diagnosis.calibration import MAX_CANDIDATES, MIN_CANDIDATE_GAIN
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scan import Outcome, Scan
 from robots.terms.effects import Effect
 
-# What acts for a moment is no contender where twice its gain at the grid is too little: its search takes the longest.
+# Assumed largest ratio of refined gain to grid gain of a transient effect, whose refinement takes longest.
 TWICE = 2.0
 
 
 def screen_candidates(
     problem: Problem, result: Scan, members: Sequence[FittedEffect] = (), least: float = -np.inf
 ) -> list[Outcome]:
-    """Picks the hypotheses worth refining: near the best at the grid, each effect and joint once.
+    """Picks the hypotheses that are refined: those with a gain near the best on the grid, and not in the model.
 
-    What acts for a moment must also be able to come near the best there, or near a worth (Schwarz) that is known to be
-    reached: `least`.
+    A transient effect, or one with a change time, must also be able to reach the best BIC gain on the grid.
+
+    Args:
+        problem: whitened data.
+        result: scan beside the members.
+        members: effects in the model; each effect and joint is selected once.
+        least: BIC gain that is known to be reached.
+
+    Returns:
+        The hypotheses with their best shapes on the grid, the best BIC first.
     """
     taken = {(m.hypothesis.name, m.hypothesis.joint) for m in members}
     able = [o for o in result.outcomes if o.degrees and (o.hypothesis.name, o.hypothesis.joint) not in taken]
@@ -33,7 +41,7 @@ def screen_candidates(
         return float(outcome.gain - outcome.degrees * np.log(problem.rows))
 
     def reached(outcome: Outcome, times: float = 1.0) -> float:
-        """What it is worth with its shape parameters paid for, as when it is refined."""
+        """Returns the BIC gain with free shape parameters counted, at a multiple of the grid gain."""
         effect, joint = outcome.hypothesis.effect, outcome.hypothesis.joint
         free = sum(high > low for low, high in effect.bounds(problem.state_for(effect), joint))
         rows = problem.rows * len(effect.acts_on(problem.situation.robot, joint))

@@ -1,4 +1,4 @@
-"""Shapes of several effects on one joint, refined together: one at a time they creep along a valley of the misfit."""
+"""Joint refinement of the shapes of several effects on one joint, which converges slowly one at a time."""
 
 from __future__ import annotations
 
@@ -7,34 +7,42 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, refine
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 
-ROUNDS = 8
-# A round that explains less than this more, in units of chi squared, is the last one.
+ROUNDS = 8  # largest number of rounds
+# Gain of chi2 by a round below which the refinement stops.
 TOLD = 1.0
-# What a round did is done so many times more, as long as that explains more.
+# Multiples of the step of a round that are tried, as long as the gain increases.
 FACTORS = (1.0, 2.0, 4.0, 8.0, 16.0)
 
 
 def refine_shapes_jointly(problem: Problem, members: Sequence[FittedEffect]) -> list[FittedEffect]:
-    """Refines the shapes of members that share a joint until they move no more.
+    """Refines the shapes of members that share a joint until they converge.
 
-    One round refines each beside the others; where all of them went then they go on together (the pattern moves of
-    Hooke and Jeeves 1961), for what two formulas have in common one may only give up as the other takes it.
+    One round refines each member beside the others. All members then repeat their steps together (pattern moves, Hooke
+    and Jeeves 1961). Two formulas may share part of the torque, which one can release only as the other takes it up.
+
+    Args:
+        problem: whitened data.
+        members: effects in the model.
+
+    Returns:
+        The members with refined shapes.
     """
     result = list(members)
     for joint in sorted({m.hypothesis.joint for m in members if m.hypothesis.joint is not None}):
         own = [i for i, m in enumerate(result) if m.hypothesis.joint == joint and m.shape]
-        # What acts on all of the torque is measured in sight of the others as they are.
+        # Effects on the total torque depend on the torque of the other effects, which is fixed here.
         if len(own) > 1 and not any(result[i].hypothesis.effect.acts_on_total_torque for i in own):
             _along(problem, result, own)
     return result
 
 
 def _along(problem: Problem, members: list[FittedEffect], own: Sequence[int]) -> None:
-    """Moves some of the members, in place."""
+    """Refines the members with the indices `own`, in place."""
     gain = _explained(problem, members)
     for left in reversed(range(ROUNDS)):
         before = [members[i] for i in own]
@@ -42,7 +50,7 @@ def _along(problem: Problem, members: list[FittedEffect], own: Sequence[int]) ->
             beside = accept_all_but(problem, members, i)
             members[i] = refine(problem, members[i].hypothesis, members[i].shape, beside)
         more = _explained(problem, members) - gain
-        # The last word is a refinement's: it says which shapes are free.
+        # The last step must be a refinement, because it determines which shape parameters are free.
         if more < TOLD or not left:
             break
         gain += more
@@ -62,7 +70,7 @@ def _explained(problem: Problem, members: Sequence[FittedEffect]) -> float:
 
 
 def _further(problem: Problem, before: FittedEffect, after: FittedEffect, factor: float) -> tuple[float, ...]:
-    """Gives the shape that goes on as from one to the other, by a multiple of that, within its bounds."""
+    """Extrapolates the step from one shape to another by a factor, within bounds."""
     effect, joint = after.hypothesis.effect, after.hypothesis.joint
     shape = []
     for (low, high), described, a, b in zip(

@@ -1,4 +1,4 @@
-"""Base model and effects found, brought into line: what one search leaves for the next."""
+"""Joint refit of base model and selected effects, and whether it requires another search."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import MIN_BASE_CHANGE, MIN_EFFECT_CHANGE, MIN_NOISE_CHANGE, MIN_SLOW_NOISE_CHANGE
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.gear_load import NO_GEAR_LOAD, GearLoad, find_gear_load
@@ -24,7 +25,7 @@ from robots.terms.effect_bases.gear_load import with_gear_load
 
 Array = NDArray[np.float64]
 
-# Rows in which more than this share of the most is cut off are useless as measurements.
+# Clipped torque, as a share of the largest, above which a row is not used as a measurement.
 CUT = 0.01
 
 
@@ -33,13 +34,13 @@ class RefitResult:
     """Base model and effects, fitted together.
 
     Attributes:
-        residual: what they leave (N, n) [N m or N] where nothing holds the base model: what noise is measured on.
+        residual: residual (N, n) [N m or N] from which noise is estimated; without prior unless the logs are short.
         values: base parameters (b,).
         extra: torque of the effects (N, n) [N m or N]; None without any.
-        degrees: parameters of the effects.
-        delayed: torque (N, n) of those that others among them make late; None without such others.
-        delay_torque: torque (N, n) by which all of it is late; None where it is not.
-        gear_load: what of the effects the gears bear.
+        degrees: number of parameters of the effects.
+        delayed: torque (N, n) of the effects that do not smooth the friction sign; None if no effect smooths it.
+        delay_torque: torque (N, n) of delays of the whole robot; None without any.
+        gear_load: load of the effects on the gears.
     """
 
     residual: Array
@@ -51,15 +52,23 @@ class RefitResult:
     gear_load: GearLoad = NO_GEAR_LOAD
 
     def without_delay(self) -> tuple[Array, Array | None]:
-        """What all effects but those leave by which all torque is late, and their torque (N, n); None without any."""
+        """Returns residual and torque of the effects without delays of the whole robot.
+
+        Returns:
+            Residual (N, n) and torque (N, n) [N m or N]; None for the torque without effects.
+        """
         if self.extra is None or self.delay_torque is None:
             return self.residual, self.extra
         return self.residual + self.delay_torque, self.extra - self.delay_torque
 
     def delayed_motion(self, recording: Recording, members: Sequence[FittedEffect]) -> Recording:
-        """What shows how sharply friction turns round: torque without what blurs that, motion as late as all of it is.
+        """Returns the recording from which the width of the friction sign is estimated.
 
-        What other effects have at low speeds may stand for a sign that was taken to be less sharp than it is.
+        The torque is without effects that smooth the friction sign, and the motion is delayed like the torque.
+
+        Args:
+            recording: logs of the fit.
+            members: effects of the fit.
         """
         late = [m for m in members if m.hypothesis.effect.lags and m.hypothesis.effect.whole_robot]
         beyond = self.without_delay()[1]
@@ -71,8 +80,15 @@ def refit(problem: Problem, members: Sequence[FittedEffect]) -> RefitResult:
     """Fits base model and effects together.
 
     Clipped torque biases the base model towards the clipped value, and the estimated clipping then follows that model.
-    So the base model is fitted without such rows first, then to the torque as it is cut; and the cut beside it. What
-    distorts a reading is fitted beside it at once.
+    The base model is therefore first fitted without clipped rows, then together with the clipping. Distortions of the
+    torque measurement are fitted jointly.
+
+    Args:
+        problem: whitened data.
+        members: selected effects.
+
+    Returns:
+        The joint fit.
     """
     useless = [_unusable_rows(problem, member) for member in members]
     cut = [k for k, flags in enumerate(useless) if flags is not None]
@@ -98,7 +114,14 @@ def refit(problem: Problem, members: Sequence[FittedEffect]) -> RefitResult:
 
 
 def noise_decreased(problem: Problem, whitening: Whitening) -> bool:
-    """Whether the noise without what was found is smaller than it was taken to be, or its slow part as far as known."""
+    """Whether the noise, or its slow part, is clearly smaller than assumed in the search.
+
+    The slow part counts only if the logs are not short.
+
+    Args:
+        problem: data with the noise model of the search.
+        whitening: noise model from the residual of the joint fit.
+    """
     before = problem.whitening
     if np.max(np.log(before.scale / whitening.scale)) > MIN_NOISE_CHANGE:
         return True
@@ -107,10 +130,15 @@ def noise_decreased(problem: Problem, whitening: Whitening) -> bool:
 
 
 def base_torque_changed(problem: Problem, values: Array, members: Sequence[FittedEffect]) -> bool:
-    """Whether the base model's torque beside what was found differs from that without by a share that effects feel.
+    """Whether the base model's torque, or that of an effect on it, changed enough for another search.
 
-    Effects that grow with load or friction were measured by a base model that had taken what it could of others. The
-    torque beyond a limit is little of all: it differs by much where the base model does by little.
+    Effects of load or friction were measured with a base model that had absorbed part of other effects. A clipping
+    torque is a small difference of large torques, so a small change of the base model changes it much.
+
+    Args:
+        problem: data with the base model of the search.
+        values: base parameters (b,) of the joint fit.
+        members: selected effects.
     """
     base = problem.baseline.base
     full = np.zeros(base.model.size)
@@ -129,7 +157,7 @@ def base_torque_changed(problem: Problem, values: Array, members: Sequence[Fitte
 
 
 def _unusable_rows(problem: Problem, member: FittedEffect) -> NDArray[np.bool_] | None:
-    """Rows (N, n) that an effect makes useless as measurements, by the log and by its torque; None if it makes none."""
+    """Flags the rows (N, n) that an effect makes useless as torque measurements; None for no such effect."""
     hypothesis = member.hypothesis
     flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
     if flags is None:
@@ -139,5 +167,6 @@ def _unusable_rows(problem: Problem, member: FittedEffect) -> NDArray[np.bool_] 
 
 
 def _again(problem: Problem, members: Sequence[FittedEffect], k: int) -> FittedEffect:
+    """Refines one member beside the others, starting from its shape."""
     others = tuple(member.group for i, member in enumerate(members) if i != k)
     return refine(problem, members[k].hypothesis, members[k].shape, accept(problem, others))

@@ -1,4 +1,4 @@
-"""A search through the catalogue: base model fitted, noise told, effects selected; once more if the noise changed."""
+"""Search through the catalogue: fit of the base model, noise estimate, selection of effects, repeated if needed."""
 
 from __future__ import annotations
 
@@ -32,10 +32,11 @@ from robots.common.memory import give_back
 from robots.common.progress import Progress
 from robots.terms.effects import Effect
 
-SEARCHES = 2
-# The base model alone is fitted again while what is left of a joint's torque falls below this share of what it was.
+SEARCHES = 2  # largest number of searches
+# Largest number of fits of the base model alone. The fit is repeated while a joint's residual falls below this share of
+# the previous one.
 ROUNDS, SETTLED = 4, 0.9
-# Noise is no smaller than this share of the torque there.
+# Least noise in these fits, as a share of the torque's standard deviation.
 QUIETEST = 0.05
 
 
@@ -44,10 +45,10 @@ class Search:
     """One search through the catalogue with one noise model.
 
     Attributes:
-        searched_problem: what was searched.
-        problem: that, its state composed with the effects found.
-        entries: the catalogue, measured.
-        selection: what was found.
+        searched_problem: data of the search.
+        problem: the same, with the total torque of base model and selected effects where effects depend on it.
+        entries: hypotheses of the catalogue, measured.
+        selection: selected effects.
     """
 
     searched_problem: Problem
@@ -63,7 +64,18 @@ def search(
     false_alarm: float,
     bar: Progress,
 ) -> Search:
-    """Searches the catalogue; once more where what was found had been taken for noise."""
+    """Searches the catalogue, and repeats the search if the selected effects changed noise, base model or gear load.
+
+    Args:
+        base: base parameters.
+        recording: logs of the fit.
+        effects: effects of the catalogue.
+        false_alarm: threshold of the p-values.
+        bar: progress.
+
+    Returns:
+        The last search, with the rivals of each selected effect.
+    """
     hypotheses = all_hypotheses(base.model.robot, effects)
     recording = _trust_reversal_rows(base, recording)
     baseline, settled = fit_plain(base, recording)
@@ -81,7 +93,7 @@ def search(
             anew = settled.gear_load.improves_fit or noise_decreased(last.problem, whitening)
             if not (anew or base_torque_changed(last.problem, settled.values, members)):
                 break
-            # Its columns are most of what a diagnosis keeps in memory: they go before others come.
+            # The columns of the last search take most of the memory, so they are released first.
             last = None
             give_back()
             if blurred:
@@ -96,7 +108,7 @@ def search(
         )
         if any(effect.independent_of_acceleration for effect in effects):
             wide = estimate_whitening(recording, settled.residual, fitted, inertia, MAX_HIGH_BAND_ERROR, spared)
-            # What is left by the base model as it is fitted alone: beside effects it may be far from that.
+            # A base model fitted beside effects may leave a very different residual than the base model alone.
             upper = build_high_band(recording, baseline, posed.base_residual, settled.residual, whitening.bands, wide)
             posed = replace(posed, high_band=upper)
         timing = measure_reversal_timing(recording, baseline, settled.values, *settled.without_delay())
@@ -115,7 +127,7 @@ def search(
             break
         known = {found.effect.hypothesis: found.effect.shape for found in last.selection.found}
         settled = refit(last.problem, [found.effect for found in last.selection.found])
-        # A delay made the sign of friction look less sharp than it is.
+        # Such an effect, for example a delay, increased the estimated width of the friction sign.
         blurred = any(found.effect.hypothesis.effect.smooths_friction_sign for found in last.selection.found)
     assert last is not None
     with_alternatives = with_rivals(last.searched_problem, last.entries, last.selection)
@@ -123,7 +135,7 @@ def search(
 
 
 def _trust_reversal_rows(base: BaseParameters, recording: Recording) -> Recording:
-    """Lets rows at reversals count where neither direction nor acceleration is in doubt: a model tells the second."""
+    """Includes rows at reversals of joints whose acceleration errors are small, as checked with the base model."""
     if not recording.sign_known_from_velocity.any():
         return recording
     baseline, settled = fit_plain(base, recording)
@@ -131,17 +143,24 @@ def _trust_reversal_rows(base: BaseParameters, recording: Recording) -> Recordin
     trusted = quiet_joints(recording, settled.residual, inertia)
     timing = measure_reversal_timing(recording, baseline, settled.values, settled.residual)
     if timing is not None and recording.reversal_time_error is not None:
-        # Positions alone bound what a kick may hide; beside torque they may tell that it is more.
+        # Impulses in the torque may show a larger velocity error than the positions alone.
         trusted &= timing.kicks <= np.max(recording.reversal_time_error * np.abs(recording.ddq), axis=0)
     return recording.with_trusted(trusted)
 
 
 def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, RefitResult]:
-    """Fits the base model alone.
+    """Fits the base model without effects, iteratively reweighted.
 
-    Rows count by what the fit before leaves of them: against noise as large as the torque, a description that lacks a
-    rotor or a tool would hold the fit, and what it then leaves pass for noise. But what is left is not all noise, and
-    joints that the base model describes well must not bend what it says of the others.
+    Each joint is weighted by its residual in the previous iteration. Weights from the torque alone would let the prior
+    dominate where the description lacks a rotor or a tool. The weights are bounded, because residuals also contain
+    model errors, and joints with small residuals must not dominate the fit of the others.
+
+    Args:
+        base: base parameters.
+        recording: logs of the fit.
+
+    Returns:
+        The base model on the recording, and its fit.
     """
     baseline, tau = build_baseline(base, recording), recording.tau
     counts, size = ~recording.sign_unknown, tau.std(axis=0) + 1e-12
@@ -159,7 +178,7 @@ def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Ref
         if (scale > SETTLED * before).all():
             break
     if not is_short(recording):
-        # Effects are measured beside a base model that nothing holds: so is the noise.
+        # Effects are measured beside a base model without prior, so the noise is, too.
         left = tau - np.concatenate([baseline.regressor, baseline.nuisance], axis=2) @ solve_least_squares(gram, cross)
     return baseline, RefitResult(left, values)
 
@@ -172,6 +191,7 @@ def _searched(
     share: float,
     known: Mapping[Hypothesis, tuple[float, ...]],
 ) -> Search:
+    """Measures all hypotheses on a problem and selects effects."""
     entries = measure(problem, hypotheses, _scan_progress(bar, share, 0.2))
     give_back()
     advance = _note_progress(bar, share + 0.25)

@@ -1,4 +1,4 @@
-"""Which effects the data ask for: forward steps, each refined before the next, swaps with rivals, backward steps."""
+"""Stepwise selection of effects: forward steps with refinement, swaps with rivals, backward steps."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from itertools import compress
 
 from estimation.diagnosis.calibration import MAX_EFFECTS, MIN_CANDIDATE_GAIN
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, refine
-from estimation.diagnosis.hypothesis_tests.scan import Entry, Scan, measure, scan
-from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
+from estimation.diagnosis.hypothesis_tests.refinement import refine
+from estimation.diagnosis.hypothesis_tests.scan import Entry, measure, scan
+from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.event_window import refit_event_window
 from estimation.diagnosis.joint_fits.total_torque import with_total_torque
 from estimation.diagnosis.searches.acceptance import (
@@ -26,18 +27,18 @@ from estimation.diagnosis.searches.candidate_screening import screen_candidates
 from estimation.diagnosis.searches.joint_shape_refinement import refine_shapes_jointly
 from estimation.diagnosis.searches.swap_search import refine_candidates, refine_with_swaps, remeasure
 
-FAR_MORE = 1.5  # times the gain
+FAR_MORE = 1.5  # ratio of gains by which a joint refinement must strengthen a candidate
 
 
 @dataclass(frozen=True, eq=False)
 class SelectedEffect:
-    """One effect that was selected, and what else could have been.
+    """One selected effect and its rivals.
 
     Attributes:
-        effect: the effect, its shape, measured beside the other effects found.
-        p_value: family-wise, of the step that found it.
-        rivals: other hypotheses in its place, the closest first, with how much worse their BIC is; none before they
-            are asked for (`with_rivals`).
+        effect: effect with its shape, measured beside the other selected effects.
+        p_value: family-wise p-value of the step that selected it.
+        rivals: other hypotheses in its place, the closest first, and by how much their BIC is worse; empty before
+            `with_rivals`.
     """
 
     effect: FittedEffect
@@ -47,23 +48,17 @@ class SelectedEffect:
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """What was found in one problem.
+    """Effects selected in one problem.
 
     Attributes:
-        found: the effects, strongest first.
-        visible_in_torque: what the torque as logged shows by itself, whatever explains it.
-        first: the scan before any was found.
-        last: the scan beside all that were found.
-        accepted: all found, joined.
-        strongest_unaccepted: what stood out of the noise next, but no more than formulas of what was found may leave;
-            None for none.
+        found: selected effects, the strongest first.
+        visible_in_torque: effects that the logged torque shows by itself, such as clipping.
+        strongest_unaccepted: next significant effect, which formula errors of the selected effects can explain; None
+            without one.
     """
 
     found: tuple[SelectedEffect, ...]
     visible_in_torque: frozenset[Hypothesis]
-    first: Scan
-    last: Scan
-    accepted: Accepted
     strongest_unaccepted: FittedEffect | None = None
 
 
@@ -75,23 +70,30 @@ def select(
     advance: Callable[[str], None] = lambda note: None,
     known: Mapping[Hypothesis, tuple[float, ...]] | None = None,
 ) -> Selection:
-    """Adds effects while the strongest is significant, refining and swapping before each next step.
+    """Adds effects as long as the strongest is significant, with refinement and swaps after each step.
 
-    Shapes that are `known` from another search are refined from there, too. One that the others make unnecessary once
-    they are refined beside it is not tried again, and no set of effects is built on twice: the search would go round in
-    a circle.
+    An effect that is dropped after the others are refined is not tried again. The search stops when a set of effects
+    occurs for the second time, because it would not end otherwise.
+
+    Args:
+        problem: whitened data.
+        entries: hypotheses of the catalogue, measured.
+        false_alarm: threshold of the p-values.
+        advance: receives the label of the effect in progress.
+        known: further starting shapes, from another search.
+
+    Returns:
+        The selected effects, without rivals.
     """
     members, p_values = _visible_in_torque(problem, entries, false_alarm, ())
     seen = {member.hypothesis for member in members}
     spurned: set[Hypothesis] = set()
     visited = [seen]
     won: dict[Hypothesis, float] = {}
-    first: Scan | None = None
     slight: FittedEffect | None = None
     while True:
         accepted = accept(problem, tuple(member.group for member in members))
         result = scan(problem, entries, accepted)
-        first = first or result
         if len(members) == MAX_EFFECTS or not result.outcomes:
             break
         chances = {o.hypothesis: result.p_value(o) for o in result.outcomes}
@@ -107,7 +109,7 @@ def select(
         ]
         if not candidates:
             break
-        # What is sure is on joints where no other acts, and so none leaves anything.
+        # A certain effect acts on joints without other effects, whose formula errors therefore cannot explain it.
         sure_alone = is_certain(problem, candidates[0], chance[candidates[0].hypothesis], members, false_alarm)
         if not (sure_alone or exceeds_leakage(problem, candidates[0], members)):
             if (formed := _refit_with_candidate(problem, candidates[0], members)) is None:
@@ -119,7 +121,7 @@ def select(
         members.append(candidates[0])
         p_values.append(chance[candidates[0].hypothesis])
         won[candidates[0].hypothesis] = candidates[0].gain
-        # What is known of the torque now may come near what the log shows.
+        # With the new effect, more effects may show in the total torque, such as clipping.
         more, sure = _visible_in_torque(problem, entries, false_alarm, members)
         seen |= {member.hypothesis for member in more}
         members, p_values = [*members, *more], [*p_values, *sure]
@@ -127,7 +129,7 @@ def select(
             members, p_values = refine_with_swaps(problem, entries, members, p_values, seen, won, false_alarm)
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
-        # What was found before kicks were known may have been the drives' answers to those.
+        # A delay selected before an acceleration-driven effect may be the drives' response to its impacts.
         held = [
             delay_supported_away_from_impacts(problem, m, [*members[:i], *members[i + 1 :]])
             for i, m in enumerate(members)
@@ -152,22 +154,28 @@ def select(
         or is_accepted(problem, f.effect, f.p_value, [*members[:i], *members[i + 1 :]], false_alarm)
     ]
     order = sorted(kept, key=lambda f: -f.effect.gain)
-    last = result if members else first
-    joined = accept(problem, tuple(f.effect.group for f in order))
-    return Selection(tuple(order), frozenset(seen), first, last, joined, slight)
+    return Selection(tuple(order), frozenset(seen), slight)
 
 
 def with_rivals(problem: Problem, entries: Sequence[Entry], selection: Selection) -> Selection:
-    """Measures what else could be in each effect's place, beside the others.
+    """Determines the rivals of each selected effect, measured in its place beside the others.
 
-    What was seen in the torque as logged has no rivals, whatever else explains as little of it.
+    Effects that the logged torque shows by itself have no rivals.
+
+    Args:
+        problem: whitened data.
+        entries: hypotheses of the catalogue, measured.
+        selection: selected effects.
+
+    Returns:
+        The selection with rivals.
     """
     members = [found.effect for found in selection.found]
     effects = []
     for i, found in enumerate(selection.found):
         rivals: list[tuple[FittedEffect, float]] = []
         if found.effect.hypothesis not in selection.visible_in_torque:
-            # It was found by what it is worth: a moment's cause has not all rows to pay for, in sight of others either.
+            # A transient effect counts only the rows in which it acts, so its local BIC gain may be the larger one.
             beside, own = accept_all_but(problem, members, i), found.effect
             reference = max(own.bic_gain, own.local_bic_gain)
             result = scan(problem, entries, beside)
@@ -189,9 +197,9 @@ def _visible_in_torque(
     false_alarm: float,
     members: Sequence[FittedEffect],
 ) -> tuple[list[FittedEffect], list[float]]:
-    """Refines what the torque as logged shows by itself, beside members and each other, with the chance of it.
+    """Refines the effects that the logged torque shows by itself, and returns them with their p-values.
 
-    That is not a question of what it explains: a torque cut off at a few peaks explains little.
+    Their gain does not matter, because clipping at a few peaks explains little of the residual.
     """
     found: list[FittedEffect] = []
     p_values: list[float] = []
@@ -205,7 +213,7 @@ def _visible_in_torque(
             for outcome in scan(now, measure(now, [hypothesis]), beside).outcomes:
                 member = refine(now, hypothesis, outcome.shape, beside) if outcome.degrees else None
                 if member is not None and member.gain > 0:
-                    # Once more, beside all of the torque as it is when that is known to be so.
+                    # Refines again with the total torque that includes this effect.
                     known = with_total_torque(problem, (*members, *found, member), [hypothesis])
                     found.append(refine(known, hypothesis, member.shape, beside))
                     p_values.append(chance)
@@ -215,9 +223,10 @@ def _visible_in_torque(
 def _refit_with_candidate(
     problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]
 ) -> list[FittedEffect] | None:
-    """Gives members and a candidate refined together, if beside it they take forms that leave it far more; or None.
+    """Refines members and candidate together; returns them if the candidate's gain grows much, else None.
 
-    A gear that loses less when driven back follows a motor that saturates for most of what that does.
+    Load-dependent friction that is smaller when the gear is driven back, for example, can follow most of a torque
+    constant saturation.
     """
     moved = refine_shapes_jointly(problem, [*members, candidate])
     own = remeasure(problem, moved[-1], accept_all_but(problem, moved, len(members)))

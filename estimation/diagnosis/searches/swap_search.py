@@ -1,4 +1,4 @@
-"""Effects that are found refined beside each other: each against what else could be in its place, or none."""
+"""Refinement of selected effects, in which each may be replaced by a rival or dropped."""
 
 from __future__ import annotations
 
@@ -7,14 +7,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but, set_bic_gain
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import (
-    FittedEffect,
-    accept_all_but,
-    refine,
-    set_bic_gain,
-)
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry, Outcome, scan
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from estimation.diagnosis.joint_fits.total_torque import with_total_torque
@@ -22,9 +18,9 @@ from estimation.diagnosis.searches.acceptance import is_certain
 from estimation.diagnosis.searches.candidate_screening import screen_candidates
 from robots.common.parallel import threaded
 
-# A member whose gain is within this share of what it was when it won over its rivals wins over them still.
+# Relative change of a member's gain up to which its last comparison with rivals remains valid.
 SAME = 0.02
-RIVALS = 4  # that are tried in a member's place at once
+RIVALS = 4  # largest number of rivals that are refined in a member's place
 
 
 def refine_with_swaps(
@@ -36,11 +32,24 @@ def refine_with_swaps(
     won: dict[Hypothesis, float],
     false_alarm: float,
 ) -> tuple[list[FittedEffect], list[float]]:
-    """Refines each member beside the others, lets its rivals take its place, and drops what is no longer needed.
+    """Refines each member beside the others, replaces it by a better rival, and drops members without BIC gain.
 
-    What was seen in the torque stays. Rivals of one that has `won` over them with the gain that it has still, whatever
-    is beside it now, are not tried again, but those that act on joints of the newest as well, where it does not: that
-    may have hidden there what they explain. Such a one is tried with the others refined beside it, too.
+    Effects that the torque shows by itself stay. A member with the same gain as at its last comparison is not compared
+    again. Exceptions are rivals that act on a joint of the newest member on which the compared member does not act: the
+    newest member may have explained there what the rival would. The best of these rivals is also tried with the others
+    refined beside it.
+
+    Args:
+        problem: whitened data.
+        entries: hypotheses of the catalogue, measured.
+        members: effects in the model, the newest last.
+        p_values: their p-values.
+        seen: effects that the torque shows by itself.
+        won: gain of each effect at its last comparison with rivals; updated.
+        false_alarm: threshold of the p-values.
+
+    Returns:
+        The remaining members and their p-values.
     """
     newest = set(members[-1].group.joints)
     for _ in range(2):
@@ -61,7 +70,7 @@ def refine_with_swaps(
             rest = [o for o in near if o.hypothesis != members[i].hypothesis]
             if still:
                 rest = [o for o in rest if cleared.intersection(_acts_on(problem, o.hypothesis))]
-            # All at once: the refinement of its own shape takes as long as those of its rivals.
+            # In parallel, because refining the member takes as long as refining its rivals.
             with ThreadPoolExecutor(1) as apart:
                 own = apart.submit(refine, now, members[i].hypothesis, members[i].shape, beside)
                 rivals = refine_candidates(problem, rest[:RIVALS], beside)
@@ -85,9 +94,9 @@ def refine_with_swaps(
 
 
 def _again(problem: Problem, members: Sequence[FittedEffect], i: int) -> FittedEffect:
-    """Gives a member, measured anew beside the others as they are now if it was worth too little beside what they were.
+    """Returns a member, measured again beside the current others if its BIC gain was too small.
 
-    Joints on which they had not found their forms yet may have seemed at odds.
+    Before the others had their final shapes, joints may have seemed to disagree.
     """
     m = members[i]
     if m.local_bic_gain > MIN_BIC_GAIN:
@@ -99,9 +108,9 @@ def _again(problem: Problem, members: Sequence[FittedEffect], i: int) -> FittedE
 def _with(
     problem: Problem, members: list[FittedEffect], i: int, rival: FittedEffect, seen: Collection[Hypothesis]
 ) -> list[FittedEffect]:
-    """Gives members with a rival in the place of one and the others on its joints refined beside it, if that is better.
+    """Replaces a member by a rival, with the others on its joints refined beside it, if this improves the BIC.
 
-    A ripple that has taken up how late its torque is leaves a delay of all torque nothing there.
+    A torque ripple with a fitted delay, for example, leaves no gain there for a delay of all torques.
     """
     trial = [*members[:i], rival, *members[i + 1 :]]
     for k, m in enumerate(members):
@@ -122,7 +131,17 @@ def refine_candidates(
     accepted: Accepted,
     known: Mapping[Hypothesis, tuple[float, ...]] | None = None,
 ) -> list[FittedEffect]:
-    """Refines contenders, from shapes that are known too, the best BIC first."""
+    """Refines candidates from their best shape on the grid, and from known shapes.
+
+    Args:
+        problem: whitened data.
+        outcomes: candidates of a scan.
+        accepted: effects in the model.
+        known: further starting shapes.
+
+    Returns:
+        The best fit of each hypothesis, the best BIC first.
+    """
     starts = [(o.hypothesis, o.shape) for o in outcomes]
     starts += [(o.hypothesis, known[o.hypothesis]) for o in outcomes if known and o.hypothesis in known]
     refined = threaded(lambda start: refine(problem, start[0], start[1], accepted), starts)
@@ -133,7 +152,16 @@ def refine_candidates(
 
 
 def remeasure(problem: Problem, member: FittedEffect, beside: Accepted) -> FittedEffect:
-    """Measures a member anew, at its shape, beside what is accepted."""
+    """Measures gain and coefficients of a member again, with the same shape.
+
+    Args:
+        problem: whitened data.
+        member: effect with its shape.
+        beside: other effects in the model.
+
+    Returns:
+        The member with new gain, coefficients and visible share.
+    """
     result = score(problem, member.group, beside)
     bounds = member.hypothesis.coefficient_bounds(problem.situation.robot, member.shape)
     gain, coefficients = result.bounded(*bounds)

@@ -1,1 +1,1 @@
-"""Whether findings hold against generic alternatives and on held-out data."""
+"""Validation of findings against generic alternatives and on held-out data, and the verdict."""

@@ -1,4 +1,4 @@
-"""What held-out data changed in the findings."""
+"""Changes of findings by the validation on held-out data."""
 
 from __future__ import annotations
 
@@ -9,7 +9,15 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 
 
 class Change(Enum):
-    """What held-out data changed in the findings."""
+    """Kinds of changes that the validation on held-out data makes to findings.
+
+    Attributes:
+        INSIGNIFICANT: rejected, because it was barely significant and the held-out data do not support it.
+        REJECTED: a significant effect was rejected, because it does not improve the held-out prediction.
+        REPLACED: replaced by a rival that the held-out data support.
+        ABSENT: kept, but absent from the held-out data, such as a payload that was removed before.
+        FREE_FUNCTION_REJECTED: a free function was rejected; its residual is still significant.
+    """
 
     INSIGNIFICANT = "insignificant"
     REJECTED = "rejected"
@@ -20,12 +28,12 @@ class Change(Enum):
 
 @dataclass(frozen=True)
 class ChangedFinding:
-    """One change.
+    """One change of a finding.
 
     Attributes:
-        change: its kind.
-        effect: the effect as it was found.
-        instead: what replaced it; None for nothing.
+        change: kind of change.
+        effect: effect and joint before the change.
+        instead: effect and joint that replaced it; None without a replacement.
     """
 
     change: Change

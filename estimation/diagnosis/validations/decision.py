@@ -1,4 +1,4 @@
-"""The verdict, from what the comparison with free functions and the held-out data left of the findings."""
+"""Verdict of the diagnosis, from the validated findings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from estimation.diagnosis.validations.name_comparison import has_close_rivals
 
 
 class Reason(Enum):
-    """Why the verdict is what it is."""
+    """Reason for a verdict."""
 
     NOTHING_SIGNIFICANT = "nothing significant"
     CAUSES_FOUND = "causes found"
@@ -26,7 +26,7 @@ class Decision:
 
     Attributes:
         verdict: ``none``, ``named``, ``ambiguous`` or ``unexplained``.
-        reason: why.
+        reason: reason for the verdict.
     """
 
     verdict: str
@@ -34,7 +34,14 @@ class Decision:
 
 
 def decide(validated: ValidatedFindings) -> Decision:
-    """Decides the verdict; nothing else does."""
+    """Decides the verdict. No other function sets or changes it.
+
+    Args:
+        validated: findings after the validation on held-out data.
+
+    Returns:
+        The verdict and its reason.
+    """
     if len(validated.effects) > len(validated.findings):
         return Decision("unexplained", Reason.FREE_FUNCTION)
     if validated.rejected_discrepancies:

@@ -1,7 +1,8 @@
-"""Forms of one effect that fit alike: first the one beside which the base model stays nearest to what is known of it.
+"""Shapes of one effect that fit about equally well, ranked by their evidence under the base model's prior.
 
-Over the angles of a log a spring's torque is a polynomial's as well as any lever's; beyond those angles they part, and
-so do the gravity terms that each leaves to the base model. The robot's description then says which is likelier.
+Within the angles of a log, a polynomial and a balancer with a lever can have the same spring torque. Beyond those
+angles they differ, and so do the gravity parameters that the base model takes beside them. The prior from the robot's
+description ranks them.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ import numpy as np
 
 from estimation.diagnosis.base_models.priors import explained_chi2
 from estimation.diagnosis.calibration import MAX_SHAPE_CHI2, MIN_BIC_GAIN
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, accept_all_but, refine
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.shrinkage import effects_prior
@@ -23,7 +25,16 @@ from estimation.regressions.parameter_priors import GaussianPrior
 
 
 def equivalent_shapes(problem: Problem, members: Sequence[FittedEffect], i: int) -> list[FittedEffect]:
-    """Lists the other forms of a member that fit about as well beside the rest, the likeliest first."""
+    """Lists other shapes of a member that fit about as well beside the other members, the most likely first.
+
+    Args:
+        problem: whitened data.
+        members: effects in the model.
+        i: index of the member.
+
+    Returns:
+        The member with each of the other shapes, refitted.
+    """
     own, others = members[i], [m for k, m in enumerate(members) if k != i]
     shapes = own.hypothesis.effect.forms(problem.situation, own.hypothesis.joint)
     beside = accept(problem, tuple(m.group for m in others))
@@ -33,10 +44,17 @@ def equivalent_shapes(problem: Problem, members: Sequence[FittedEffect], i: int)
 
 
 def complete_effects(problem: Problem, founds: Sequence[SelectedEffect]) -> tuple[SelectedEffect, ...]:
-    """Gives what was found with all that its effect has once it is there, where it is worth that.
+    """Adds the optional shape parameters of each effect where the BIC gain remains sufficient.
 
-    The search leaves out coefficients that are hardly determined. Without them the others are biased, and their stated
-    errors are too small.
+    The search leaves out coefficients that are poorly determined. Without them the others are biased, and their
+    standard errors are too small.
+
+    Args:
+        problem: whitened data.
+        founds: selected effects.
+
+    Returns:
+        The same effects, some with more shape parameters.
     """
     members = [found.effect for found in founds]
     whole = []
@@ -51,7 +69,7 @@ def complete_effects(problem: Problem, founds: Sequence[SelectedEffect]) -> tupl
 
 
 def _evidence(problem: Problem, others: Sequence[FittedEffect]) -> Callable[[FittedEffect], float]:
-    """Builds the function that gives twice the log-evidence of a form, up to what all forms have alike."""
+    """Returns the function that computes twice the log evidence of a shape, up to a constant for all shapes."""
     baseline, white = problem.baseline, problem.whitening
     blocks = [baseline.regressor, baseline.nuisance, *(dense(problem, m.hypothesis, m.shape) for m in others)]
     known, tau = white.independent(np.concatenate(blocks, axis=2)), white.independent(problem.recording.tau)

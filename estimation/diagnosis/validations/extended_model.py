@@ -1,4 +1,4 @@
-"""The extended model of a diagnosis: base model and findings fitted together, ready to predict."""
+"""Extended model of a diagnosis: base model and findings fitted together, with settings for prediction."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 
 from estimation.diagnosis.base_models.prepared_logs import PreparedLogs
 from estimation.diagnosis.findings import Gain
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.joint_fits.extended_fit import ExtendedFit, fit_extended
 from estimation.diagnosis.validations.decision import Decision, Reason
 from estimation.diagnosis.validations.gear_compliance import EFFECT as ELASTICITY
@@ -22,13 +22,13 @@ from robots.version import VERSION
 
 @dataclass(frozen=True, eq=False)
 class ExtendedModel:
-    """The model that a diagnosis gives, and the fits that its findings are read from.
+    """Extended model of a diagnosis, and the fits that determine the parameters of its findings.
 
     Attributes:
-        model: base model and findings, with its settings of prediction.
-        fit: of the findings that the model contains.
-        rejected: significant effects and functions that held-out data rejected, with p-value and gain.
-        fit_with_rejected: of both together; None where nothing was rejected.
+        model: base model and findings, with settings for prediction.
+        fit: joint fit of base model and the findings that the model contains.
+        rejected: significant effects or free functions that held-out data rejected, with p-value and gain.
+        fit_with_rejected: joint fit that includes the rejected ones; None without any.
     """
 
     model: Model
@@ -49,15 +49,18 @@ def fit_extended_model(
     """Fits base model and validated findings together, and chooses cut-off, sign sharpness and prediction band.
 
     Args:
-        problem: the data of the fit.
-        validated: the findings.
-        decision: on them.
-        prepared: the logs.
-        false_alarm: chance of one, for the model's provenance.
-        seed: likewise.
+        problem: data of the fit.
+        validated: findings after the validation on held-out data.
+        decision: verdict and its reason.
+        prepared: logs of the fit and held-out logs.
+        false_alarm: threshold of the p-values, for the model's provenance.
+        seed: seed of the diagnosis, for the model's provenance.
+
+    Returns:
+        The extended model and its fits.
     """
     fit = fit_extended(problem, validated.effects, _provenance(problem, prepared, false_alarm, seed))
-    # An effect that held-out data reject still shows where the residual is unexplained.
+    # If held-out data reject all causes, the report shows the rejected ones as an unexplained residual.
     refuted = validated.refuted if decision.reason is Reason.REJECTED_CAUSES else ()
     rejected = validated.rejected_discrepancies or refuted
     both = fit_extended(problem, [*validated.effects, *(member for member, _, _ in rejected)], {}) if rejected else None

@@ -1,16 +1,17 @@
-"""Free functions of the motion, time and load: what they explain beside names, or in place of them."""
+"""Free functions of motion, time and load: their gain beside named effects, or in place of them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from estimation.diagnosis.calibration import FREE_P_VALUE, MAX_FREE_FUNCTIONS, MIN_BIC_GAIN, MIN_FREE_SHARE
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry, scan
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 
-# A grid tells narrow functions of few parameters less well than wide ones of many: so many are refined and compared.
+# Number of candidates that are refined. The scan on a grid underrates narrow functions with few parameters.
 CONTENDERS = 3
 
 
@@ -22,9 +23,19 @@ def free_functions(
     *,
     alone: bool = False,
 ) -> tuple[list[FittedEffect], list[float]]:
-    """Adds patterns beside named effects, while the strongest is significant and worth it.
+    """Adds free functions beside named effects, as long as the strongest is significant and improves the BIC.
 
-    Where the first is `alone`, no formula beside it that could be inexact, it must be no more than sure.
+    A free function must also explain a minimum share of what the other effects explain on its joints.
+
+    Args:
+        problem: whitened data.
+        patterns: candidate free functions, measured.
+        named: named effects in the model.
+        false_alarm: largest p-value of a free function.
+        alone: whether a very small p-value suffices for the first free function if no named effect is in the model.
+
+    Returns:
+        The free functions in the order of their selection, and the p-value of each.
     """
     members: list[FittedEffect] = []
     p_values: list[float] = []
@@ -46,14 +57,3 @@ def free_functions(
         members.append(member)
         p_values.append(p)
     return members, p_values
-
-
-def strongest_pattern(
-    problem: Problem,
-    patterns: Sequence[Entry],
-    named: Sequence[FittedEffect],
-    false_alarm: float,
-) -> tuple[FittedEffect, float] | None:
-    """Gives the free function that explains most beside names, and its p-value; None where noise explains as much."""
-    members, p_values = free_functions(problem, patterns, named, false_alarm, alone=True)
-    return (members[0], p_values[0]) if members else None

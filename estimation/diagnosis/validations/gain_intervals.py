@@ -1,4 +1,4 @@
-"""What an extension brings on data that its fit has not seen, with an interval that survives coloured errors."""
+"""Gain of an extended model on held-out data, with a block bootstrap interval for correlated errors."""
 
 from __future__ import annotations
 
@@ -17,27 +17,29 @@ from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
 
-PARTS = 5
-RESAMPLES = 500
-SURELY = 1.96  # standard errors
-BLOCK = 1.0  # [s], and five times the errors' correlation time
+PARTS = 5  # stretches into which a log is split
+RESAMPLES = 500  # bootstrap samples of an interval
+SURELY = 1.96  # standard errors of a contradiction
+BLOCK = 1.0  # shortest block [s]; longer ones have five times the correlation time of the errors
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOutErrors:
-    """Errors on data that the fits behind them had not seen.
+    """Errors of several models on held-out data.
+
+    The models are the base model, the extended model without each of its effects, and the extended model, in this
+    order.
 
     Attributes:
-        how: one sentence: what was kept apart.
+        how: how the held-out data were separated, as text.
         t: time [s], (M,).
         step: sample period [s].
-        measured: torque (M, n).
-        errors: per model the errors (M, n): the base model first, the whole extended model last, and between them the
-            extended model less one effect each.
-        counts: rows that count (M, n): not those whose direction of motion is unknown.
-        fitted: the errors on the same rows of fits that have seen them; None where no fit has.
-        growth: per model, by how much the squared torque that the effect which it lacks explains grows when the unseen
-            rows are fitted besides, over the variance that noise gives it (models,).
+        measured: measured torque (M, n) [N m or N].
+        errors: per model the torque errors (M, n) [N m or N].
+        counts: rows that count (M, n): those with a known friction sign.
+        fitted: errors of fits that include these rows; None with separate held-out logs.
+        growth: per model the chi2 that its missing effects gain when the held-out rows are added to the fit
+            (models,); negative if the held-out rows contradict them.
     """
 
     how: str
@@ -50,13 +52,21 @@ class HeldOutErrors:
     growth: tuple[float, ...] = ()
 
     def nrmse(self, model: int) -> Array:
-        """Residual RMS over torque RMS (n,) of one of the models."""
+        """Returns the error RMS over the torque RMS (n,).
+
+        Args:
+            model: index of the model.
+        """
         return self._shares(self.errors[model])
 
     def retained_share(self, model: int, joints: Sequence[int]) -> float:
-        """Share of the fall in NRMSE by a model's lacking effect, mean over joints, that is left on unseen data.
+        """Returns the share of an effect's NRMSE reduction that remains on held-out data.
 
-        One where nothing is known of fits that have seen the rows, or where they hardly differ.
+        It is 1 without errors of fits that include the rows, or if these fits hardly differ.
+
+        Args:
+            model: index of the model without the effect.
+            joints: joints, from 0, over which the reductions are averaged.
         """
         if self.fitted is None:
             return 1.0
@@ -68,14 +78,14 @@ class HeldOutErrors:
         return 1.0 if before - after <= MIN_FIT_GAIN * before else (unseen[0] - unseen[1]) / (before - after)
 
     def support_growth(self) -> Array:
-        """By how much the extended model errs more on unseen rows (n,) than where it has seen them; never by less."""
+        """Returns the error RMS of the extended model on held-out rows over that in the fit (n,), at least 1."""
         if self.fitted is None:
             return np.ones(self.measured.shape[1])
         unseen, seen = (self._rms(errors[-1]) for errors in (self.errors, self.fitted))
         return np.maximum(np.divide(unseen, seen, out=np.ones_like(unseen), where=seen > 0), 1.0)
 
     def is_unreliable(self, joint: int) -> bool:
-        """Whether the extended model errs on unseen rows of a joint, from 0, far more than where it has seen them."""
+        """Whether the held-out error of the extended model on a joint (from 0) is much larger than its fit error."""
         if self.fitted is None:
             return False
         unseen, seen = (float(self._shares(errors[-1])[joint]) for errors in (self.errors, self.fitted))
@@ -88,7 +98,14 @@ class HeldOutErrors:
         return np.sqrt((values**2 * self.counts).sum(axis=0) / np.maximum(self.counts.sum(axis=0), 1))
 
     def interval(self, before: int, after: int, joints: Sequence[int], rng: np.random.Generator) -> tuple[float, float]:
-        """95 % interval of the fall in NRMSE from one model to another, averaged over joints, by moving blocks."""
+        """Returns the 95 % interval of the NRMSE reduction from one model to another, by a moving block bootstrap.
+
+        Args:
+            before: index of one model.
+            after: index of the other model.
+            joints: joints, from 0, over which the reductions are averaged.
+            rng: random generator of the bootstrap.
+        """
         rows = len(self.t)
         block = int(min(max(round(self._block() / self.step), 1), max(rows // 4, 1)))
         level = np.maximum(self._rms(self.measured), 1e-300)
@@ -106,16 +123,19 @@ class HeldOutErrors:
         return float(low), float(high)
 
     def surely_worse(self, model: int) -> bool:
-        """Whether unseen rows speak against the effect that a model lacks.
+        """Whether the held-out rows significantly contradict the effect that a model lacks.
 
-        What a cause explains of some rows grows by g'g + 2 g'e with others, g its torque there beside the base model,
-        as far as that is known, and e the noise. Below -1.96^2 times the noise's variance that falls by chance once in
-        40 times at most, whatever g is.
+        If the effect is true, its chi2 grows by g'g + 2 g'e on the held-out rows: g is its torque there beside the
+        base model, e the noise. This falls below -1.96^2 noise variances with a probability of 2.5 % at most, for any
+        g.
+
+        Args:
+            model: index of the model without the effect.
         """
         return self.growth[model] < -(SURELY**2)
 
     def _block(self) -> float:
-        """Length of a block [s]."""
+        """Computes the length of a bootstrap block [s] from the correlation time of the errors."""
         times = []
         for column in self.errors[-1].T:
             series = column - column.mean()
@@ -127,12 +147,15 @@ class HeldOutErrors:
 
 
 def cross_validation_errors(problem: Problem, effects: Sequence[Array], pull: GaussianPrior) -> HeldOutErrors:
-    """Fits on all runs but one, or all parts but one of a single run, and measures on the one left out.
+    """Cross-validates the models over logs, or over stretches of a single log.
 
     Args:
-        problem: the data.
-        effects: columns (N, n, k) of each effect found.
-        pull: on base model, nuisance and effects.
+        problem: data of the fit.
+        effects: columns (N, n, k) of each effect.
+        pull: prior of base model, nuisance and effects.
+
+    Returns:
+        The errors on each log or stretch of the fit to the others.
     """
     recording = problem.recording
     runs = recording.runs
@@ -181,15 +204,18 @@ def held_out_errors(
     unseen_effects: Sequence[Array],
     pull: GaussianPrior,
 ) -> HeldOutErrors:
-    """Fits on all logs and measures on others.
+    """Fits the models to the logs of the fit and computes their errors on held-out logs.
 
     Args:
-        problem: the data of the fit.
-        effects: columns (N, n, k) of each effect found, there.
-        unseen: other logs.
-        unseen_base: columns of base model and nuisance on them (M, n, b + m).
-        unseen_effects: columns of each effect on them (M, n, k).
-        pull: on base model, nuisance and effects.
+        problem: data of the fit.
+        effects: columns (N, n, k) of each effect on the data of the fit.
+        unseen: held-out logs.
+        unseen_base: columns of base model and nuisance on the held-out logs (M, n, b + m).
+        unseen_effects: columns of each effect on the held-out logs (M, n, k).
+        pull: prior of base model, nuisance and effects.
+
+    Returns:
+        The errors on the held-out logs.
     """
     recording = problem.recording
     base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
@@ -201,7 +227,7 @@ def held_out_errors(
     for chosen in model_columns(base.shape[2], effects):
         values = solve_map(gram[np.ix_(chosen, chosen)], cross[chosen], pull.columns(chosen))
         errors.append(unseen.tau - other[:, :, chosen] @ values)
-    # Stretches of a log that was cut at gaps are named after it.
+    # Stretches of a log that was cut at gaps contain its name.
     logs = len({name.rpartition(" from ")[0] or name for name in unseen.names})
     how = f"{logs} log{'s' if logs > 1 else ''} that the fit has not seen"
     how += f", in {len(unseen.runs)} stretches" if len(unseen.runs) > logs else ""
@@ -224,9 +250,9 @@ def _growth(
     pull: GaussianPrior,
     chosen_by: Sequence[NDArray[np.intp]],
 ) -> Array:
-    """See `Unseen.growth`: moments of the fit and of the unseen rows, whose squared torque and number are known.
+    """Computes `HeldOutErrors.growth` from the normal equations of the fit and of the held-out rows.
 
-    Errors beyond those of the noise, which a base model that is wrong makes, count as noise.
+    Errors of the base model increase the held-out residual; they count as noise.
     """
     gains = []
     for chosen in chosen_by:
@@ -238,7 +264,15 @@ def _growth(
 
 
 def model_columns(base: int, effects: Sequence[Array]) -> list[NDArray[np.intp]]:
-    """Columns of the base model, of the extended model less each effect, and of the extended model."""
+    """Returns the columns of each model in the order of `HeldOutErrors`.
+
+    Args:
+        base: number of columns of base model and nuisance.
+        effects: columns (N, n, k) of each effect.
+
+    Returns:
+        Per model the indices of its columns.
+    """
     edges = np.cumsum([base, *(X.shape[2] for X in effects)])
     own = [np.arange(a, b) for a, b in pairwise(edges)]
     everything = np.arange(edges[-1])

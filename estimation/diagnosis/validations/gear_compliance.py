@@ -1,4 +1,4 @@
-"""Gears whose wind-up is measured: encoders on both sides of them show how far the load twists them."""
+"""Gear compliance from encoders on both sides of the gear."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from robots.terms.situations.situation import Situation
 Array = NDArray[np.float64]
 
 EFFECT = "joint_elasticity"
-ALIGNED = 2  # times that the delay is taken off and found again
-STIFFEST = 1e-12  # [rad/(N m)] below which a gear is rigid
+ALIGNED = 2  # iterations of the encoder delay
+STIFFEST = 1e-12  # compliance below which a gear is rigid [rad/(N m) or m/N]
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredCompliance:
-    """The elasticity of one gear, by its two encoders.
+    """Compliance of one gear, measured by its two encoders.
 
     Attributes:
-        finding: what it is; its gain is of the link's position, over the wind-up's standard deviation.
-        extension: the effect of the catalogue with that compliance.
-        coordinate: load of the gear (M,) [N m or N].
-        before: position behind the gear, measured less simulated by a rigid one (M,) [rad or m].
-        after: by an elastic one (M,).
+        finding: the finding; its errors are those of the link position over the standard deviation of the deflection.
+        extension: effect `joint_elasticity` with this compliance.
+        coordinate: gear load (M,) [N m or N].
+        before: link position, measured minus predicted with a rigid gear (M,) [rad or m].
+        after: the same with an elastic gear (M,).
     """
 
     finding: Finding
@@ -49,9 +49,9 @@ class MeasuredCompliance:
 
 @dataclass(frozen=True, eq=False)
 class _Signals:
-    """Of one joint: wind-up (M,), what it is made of (M, k) besides the load, the load, its rival (M, 2).
+    """Signals of one joint, with the encoder delay [s] removed.
 
-    The delay [s] is taken off already.
+    `deflection` and `load` are (M,). `rest` (M, k) has the other regressors, `rival` (M, 2) those of a rival cause.
     """
 
     t: Array
@@ -70,19 +70,23 @@ def measure_gear_compliance(
     false_alarm: float,
     unseen: tuple[Situation, Recording, Sequence[Log]] | None = None,
 ) -> tuple[MeasuredCompliance, ...]:
-    """Finds the gears that wind up under load, where encoders behind them were logged.
+    """Finds the gears that deflect under load, on joints with logged link positions.
 
-    q - q_link = c load + d dq + h sign(dq) + zero + eccentricity: c the compliance, d the delay of one encoder behind
-    the other, h half the lost motion, eccentricity once per turn of the link. Load is what the base model's rigid body
-    asks of the gear. Standard errors are by leaving out blocks in turn (jackknife), for what the formula lacks makes
-    neighbours alike.
+    q - q_link = c load + d dq + h sign(dq) + zero + eccentricity: c is the compliance, d the delay of the link encoder
+    behind the motor encoder, h half the lost motion. The eccentricity has one period per turn of the link. The load is
+    that of the base model's rigid body. Standard errors are by the jackknife over blocks, because errors of the
+    formula are correlated in time.
 
     Args:
-        now: the base model along the recording.
-        recording: the logs on one grid.
-        logs: those that the recording was made of.
-        false_alarm: chance of finding one in a robot whose gears are stiff.
-        unseen: the same of held-out logs, to measure the gain on; by default each block is predicted from the others.
+        now: state of the base model along the recording.
+        recording: logs on one time grid.
+        logs: logs of the recording.
+        false_alarm: probability of a false finding on a robot with rigid gears.
+        unseen: state, recording and logs of held-out data, to measure the gain on. By default each block is predicted
+            from the others.
+
+    Returns:
+        The gears with significant compliance.
     """
     robot = now.robot
     joints = [
@@ -92,7 +96,7 @@ def measure_gear_compliance(
     ]
     found = []
     for joint in joints:
-        # A delay is no multiple of the velocity where the joint speeds up: what was found of it is taken off first.
+        # Delay times velocity holds at constant velocity only, so the delay is removed and estimated again.
         delay = 0.0
         for _ in range(ALIGNED):
             signals = _signals(now, gear_deflection(recording, logs, joint, delay), joint, delay)
@@ -109,22 +113,24 @@ def measure_gear_compliance(
 
 
 def gear_deflection(recording: Recording, logs: Sequence[Log], joint: int, delay: float = 0.0) -> Array:
-    """Gives a joint's position less that behind its gear on a recording's rows (N,).
-
-    NaN where that was not logged, and where the joint's direction is not known, nor then the side of the lost motion.
+    """Computes a joint's motor position minus its link position.
 
     Args:
-        recording: the logs on one grid.
-        logs: those that it was made of.
-        joint: counted from 1.
-        delay: by which the encoder behind the gear is logged later [s].
+        recording: logs on one time grid.
+        logs: logs of the recording.
+        joint: joint, counted from 1.
+        delay: delay of the link encoder behind the motor encoder [s].
+
+    Returns:
+        Gear deflection (N,) [rad or m]. It is NaN without link positions, and where the direction of motion is unknown,
+        because the side of the lost motion is unknown there, too.
     """
     result = np.full(len(recording), np.nan)
     ordered = sorted(logs, key=lambda log: float(log.t[0]))
     for log, run in zip(ordered, recording.runs, strict=True):
         if log.qlink is not None and np.isfinite(log.qlink[:, joint - 1]).all():
             t = recording.t[run]
-            # Straight lines between samples would cut the corners of an accelerated motion.
+            # Linear interpolation would be biased during acceleration.
             own, link = (CubicSpline(log.t, signal[:, joint - 1]) for signal in (log.q, log.qlink))
             result[run] = own(t) - link(np.clip(t + delay, log.t[0], log.t[-1]))
     result[recording.sign_unknown[:, joint - 1]] = np.nan
@@ -132,6 +138,7 @@ def gear_deflection(recording: Recording, logs: Sequence[Log], joint: int, delay
 
 
 def _signals(now: Situation, measured: Array, joint: int, delay: float) -> _Signals:
+    """Evaluates the signals of one joint on the rows with a measured deflection."""
     j = joint - 1
     rows = np.isfinite(measured)
     q, dq, sign = (values[rows, j] for values in (now.q, now.dq, now.sign))
@@ -152,7 +159,7 @@ def _signals(now: Situation, measured: Array, joint: int, delay: float) -> _Sign
 def _test_joint(
     now: Situation, own: _Signals, other: _Signals | None, joint: int, tests: int, false_alarm: float
 ) -> MeasuredCompliance | None:
-    """Judges one joint: an elastic gear against a rigid one, and against an encoder that is out of true."""
+    """Tests an elastic gear of one joint against a rigid gear, and against an eccentric encoder."""
     w = own.deflection
     alone, whole = own.rest, np.column_stack([own.rest, own.load])
     hidden = own.load - alone @ _solve(alone, own.load)
@@ -234,7 +241,7 @@ def _parameter(name: str, value: float, error: float, unit: str, quantile: float
 
 
 def _extension(now: Situation, joint: int, compliance: float, error: float) -> Extension:
-    """The effect of the catalogue; its dynamics have the same stiffness, its rotor is the one that is known."""
+    """Builds the effect `joint_elasticity`, with the same dynamic stiffness and the known rotor inertia."""
     low, high = EFFECTS[EFFECT].bounds(now, joint)[0]
     stiffness = float(np.clip(1.0 / compliance, low, high)) if compliance > 0 else high
     return Extension(
@@ -264,5 +271,5 @@ def _sentence(joint: int, parameters: Sequence[Parameter], force: str, length: s
 
 
 def _three(value: float) -> str:
-    """Rounds to three significant digits, without an exponent for usual stiffnesses."""
+    """Formats with three significant digits, without an exponent for usual stiffnesses."""
     return f"{float(f'{value:.3g}'):.9g}"

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from estimation.diagnosis.base_models.payload_and_gravity import base_regressor, subtract_known_payload
 from estimation.diagnosis.calibration import MIN_JOINT_GAIN, ONE_LOG_ENERGY
 from estimation.diagnosis.findings import Gain
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.shrinkage import effects_prior
 from estimation.diagnosis.joint_fits.total_torque import effect_columns
@@ -32,7 +32,7 @@ from robots.terms.effects import Situation
 
 Array = NDArray[np.float64]
 
-SHORTEST_UNSEEN = 1.0  # [s] of held-out logs
+SHORTEST_UNSEEN = 1.0  # shortest stretch of a held-out log that is used [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,19 +40,19 @@ class HeldOutResult:
     """Errors and gains on held-out data.
 
     Attributes:
-        errors: of all models.
+        errors: errors of the base model, the extended model, and the extended model without each member.
         gains: held-out gain of each member.
-        rmse_ratio: error with over error without each member, on all joints that it acts on.
+        rmse_ratio: error with each member over error without it, on all joints on which it acts.
         contradicts: whether held-out rows contradict each member.
         cv_retained_gain: share of the error reduction of each member in the fit that remains on held-out data.
-        support: chi2 by which held-out rows support each member, over its gain in the fit.
-        coordinates: coordinate of each member on the held-out data (M,).
-        whole: the held-out data, preceded by the logs of the fit if their heat may last.
+        support: increase of each member's chi2 by the held-out rows, over its gain in the fit.
+        coordinates: per member the values (M,) of its plot axis on the held-out data.
+        whole: held-out data, preceded by the logs of the fit if those were recorded before.
         first_held_out_row: row of `whole` at which the held-out data begin.
         effects: columns (N, n, k) of each member on the data of the fit.
-        torque: of all members together on the held-out data (M, n).
-        prior: on base model, nuisance and members, of all fits.
-        absent: indices of members that are taken to be absent from the held-out data.
+        torque: torque of all members together on the held-out data (M, n) [N m or N].
+        prior: prior of base model, nuisance and members in all fits.
+        absent: indices of members that are assumed to be absent from the held-out data.
     """
 
     errors: HeldOutErrors
@@ -78,15 +78,18 @@ def measure_held_out(
     seed: int,
     gone: frozenset[int] = frozenset(),
 ) -> HeldOutResult:
-    """Measures on held-out logs, or on each part of the logs by a fit to the others.
+    """Measures errors and gains on held-out logs, or by cross-validation.
 
     Args:
         robot: the robot.
-        problem: the data of the fit.
-        members: what was found.
-        held_out: logs not used in the fit; none for cross-validation.
-        seed: of the intervals' resampling.
+        problem: data of the fit.
+        members: effects in the model.
+        held_out: logs not used in the fit; empty for cross-validation.
+        seed: seed of the bootstrap intervals.
         gone: indices of members that are absent from the held-out logs.
+
+    Returns:
+        Errors, gains and support of each member.
     """
     effects = tuple(dense(problem, member.hypothesis, member.shape) for member in members)
     rng = np.random.default_rng(seed)
@@ -122,7 +125,7 @@ def measure_held_out(
 
 
 def _left_out(problem: Problem, effects: Sequence[Array], pull: GaussianPrior) -> HeldOutErrors:
-    """Leaves out logs in turn, or parts of logs if an effect acts in one log only."""
+    """Cross-validates over logs, or over parts of logs if an effect acts in one log only."""
     recording = problem.recording
     why = found_in_one_log_only(recording, effects)
     if len(recording.runs) == 1 or not why:
@@ -138,7 +141,15 @@ _WITHIN = (
 
 
 def found_in_one_log_only(recording: Recording, effects: Sequence[Array]) -> str:
-    """States what acts in one of several logs only; empty if nothing does."""
+    """States why whole logs cannot be left out: an effect acts, or a joint moves, in one log only.
+
+    Args:
+        recording: logs of the fit.
+        effects: columns (N, n, k) of each effect.
+
+    Returns:
+        The reason as text; empty if there is none.
+    """
     for X in effects:
         energies = np.array([float(np.sum(X[run] ** 2)) for run in recording.runs])
         if energies.max() > ONE_LOG_ENERGY * energies.sum():
@@ -148,7 +159,14 @@ def found_in_one_log_only(recording: Recording, effects: Sequence[Array]) -> str
 
 
 def split_runs(recording: Recording) -> list[slice]:
-    """Cuts every log into stretches of about as many rows."""
+    """Cuts every log into stretches of about equal length.
+
+    Args:
+        recording: logs of the fit.
+
+    Returns:
+        The rows of each stretch.
+    """
     parts = []
     for run in recording.runs:
         edges = np.linspace(run.start, run.stop, PARTS + 1).astype(int)
@@ -157,7 +175,7 @@ def split_runs(recording: Recording) -> list[slice]:
 
 
 def _gain(unseen: HeldOutErrors, i: int, member: FittedEffect, rng: np.random.Generator) -> Gain:
-    """Gives the error reduction by one member, over the joints on which it acts."""
+    """Computes the held-out gain of one member, averaged over the joints on which it acts."""
     joints = _joints(member)
     last = len(unseen.errors) - 1
     low, high = unseen.interval(i + 1, last, joints, rng)
@@ -172,7 +190,8 @@ def _gain(unseen: HeldOutErrors, i: int, member: FittedEffect, rng: np.random.Ge
 def _joints(member: FittedEffect) -> list[int]:
     """Lists the joints, counted from 0, over which a member's gain is averaged.
 
-    An error of one joint may act mainly on others: an encoder offset on the joints that carry the gravity load.
+    An error of one joint may act mainly on others. An encoder offset, for example, acts on the joints that carry
+    gravity.
     """
     if member.hypothesis.joint is None:
         return list(member.group.joints)
@@ -182,6 +201,7 @@ def _joints(member: FittedEffect) -> list[int]:
 
 
 def _rise(unseen: HeldOutErrors, i: int, member: FittedEffect) -> float:
+    """Returns the error with a member over the error without it, on all joints on which it acts."""
     joints = list(member.group.joints)
     before, after = (float(np.sum(unseen.nrmse(model)[joints] ** 2)) for model in (i + 1, len(unseen.errors) - 1))
     return float(np.sqrt(after / max(before, 1e-300)))
@@ -196,6 +216,7 @@ def _on_logs(
     pull: GaussianPrior,
     gone: frozenset[int],
 ) -> tuple[HeldOutErrors, list[Situation], Recording, int, list[Array]]:
+    """Computes the errors on held-out logs, and the states and columns of the members there."""
     recording = problem.recording
     travel = np.max([np.ptp(recording.q[run], axis=0) for run in recording.runs], axis=0)
     other = subtract_known_payload(

@@ -23,8 +23,8 @@ from estimation.diagnosis.calibration import (
     REJECT_RMSE_RATIO,
 )
 from estimation.diagnosis.findings import Gain
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations.changes import Change, ChangedFinding
 from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance
@@ -40,14 +40,14 @@ class ValidatedFindings:
 
     Attributes:
         findings: accepted named effects.
-        effects: their fits, followed by free functions.
-        p_values: of the effects.
-        measured: held-out results of the effects.
+        effects: fits of the named effects, followed by free functions.
+        p_values: p-values of `effects`.
+        measured: held-out results of `effects`.
         rejected_discrepancies: free functions rejected by held-out data, with p-value and gain.
         changes: rejected and replaced effects.
         refuted: significant named effects that held-out data contradict, with p-value and gain. The residual they
             explained is still significant.
-        compliances: of gears with encoders behind them, measured without the torque.
+        compliances: measured compliances of gears with link encoders.
     """
 
     findings: tuple[SelectedEffect, ...]
@@ -69,16 +69,19 @@ def validate_on_held_out(
 ) -> ValidatedFindings:
     """Rejects effects that increase the held-out error, one after the other, the most certain first.
 
-    An equivalent shape or a close rival that the held-out data support replaces a rejected effect. Otherwise its
-    residual is reported as unexplained.
+    An equivalent shape or a close rival that the held-out data support replaces a rejected effect. Otherwise a free
+    function for its residual is fitted.
 
     Args:
-        compared: the findings.
-        measure: measures members on held-out data; the second argument holds indices of members absent there.
+        compared: named effects and free functions.
+        measure: measures members on held-out data; the second argument contains indices of members absent there.
         beyond: whether held-out data cannot test an effect.
         forms: lists equivalent shapes of one of the members, the most likely first.
-        unnamed: finds a free function for the residual of a rejected effect, jointly with other members; with its
-            p-value.
+        unnamed: finds a free function for the residual of a rejected effect beside other members, and its p-value;
+            None if none is significant.
+
+    Returns:
+        The findings that remain, their held-out results, and all changes.
     """
     selected = list(compared.named)
     members = [*(found.effect for found in selected), *compared.free_functions]
@@ -106,12 +109,12 @@ def validate_on_held_out(
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         own = members[worst].hypothesis
         if len(members) == 1 > len(selected) and _is_weak(members[0].hypothesis.effect, p_values[0]):
-            # The only finding is barely significant, and held-out data contradict it: it counts as noise.
+            # A single barely significant free function that held-out data contradict counts as noise.
             changes.append(ChangedFinding(Change.INSIGNIFICANT, own))
             members.clear()
             p_values.clear()
         elif worst >= len(selected):
-            # A free function that fails on held-out data is no model, but the residual is still unexplained.
+            # The model must not contain this free function, but its residual is still unexplained.
             rejected_functions.append((members.pop(worst), p_values.pop(worst), seen.gains[worst]))
         elif (undone := _without_change(members, worst, absent, measure_members)) is not None:
             seen = undone
@@ -154,7 +157,7 @@ def _without_change(
     absent: set[Hypothesis],
     measure_members: Callable[[Sequence[FittedEffect]], HeldOutResult],
 ) -> HeldOutResult | None:
-    """Measures held-out data with a change undone, such as a removed payload; None if that is no better."""
+    """Measures with a change undone on held-out data, such as a removed payload; None without significant gain."""
     hypothesis = members[place].hypothesis
     effect = hypothesis.effect
     comes = effect.depends_on == "time" and not effect.transient and any(shape.moment for shape in effect.shapes)
@@ -176,9 +179,9 @@ def _alternative(
     beyond: Callable[[FittedEffect], bool],
     forms: Callable[[Sequence[FittedEffect], int], Sequence[FittedEffect]],
 ) -> tuple[SelectedEffect, HeldOutResult] | None:
-    """Finds an equivalent shape or close rival that held-out data support, and the results with it.
+    """Finds an equivalent shape or close rival that held-out data support, and its held-out results.
 
-    If there is none, an equivalent shape that does not increase the held-out error is kept.
+    If there is none, an equivalent shape that does not increase the held-out error is returned.
     """
     harmless: list[tuple[SelectedEffect, HeldOutResult]] = []
     for form in forms(members, place):
@@ -199,7 +202,7 @@ def _alternative(
 def _harmful_free_functions(seen: HeldOutResult, members: Sequence[FittedEffect], named: int) -> list[int]:
     """Lists free functions without significant gain on joints whose error the free functions increase together.
 
-    Each may have a gain given the others, because it compensates their error.
+    Each may reduce the error beside the others, because it compensates their errors.
     """
     before, after = seen.errors.nrmse(0), seen.errors.nrmse(-1)
     worse = set((np.flatnonzero(after > MAX_FREE_RMSE_RATIO * before) + 1).tolist())
@@ -208,9 +211,9 @@ def _harmful_free_functions(seen: HeldOutResult, members: Sequence[FittedEffect]
 
 
 def _is_weak(free: Effect, p_value: float) -> bool:
-    """Whether a single free function is so barely significant that contradicting held-out data reject it.
+    """Whether a single free function counts as noise if held-out data contradict it.
 
-    Held-out data cannot test functions of time.
+    This does not apply to functions of time, which held-out data cannot test.
     """
     return not is_of_time(free) and p_value > (OSCILLATION_P_VALUE if is_oscillation(free) else FREE_P_VALUE)
 
@@ -224,8 +227,8 @@ def _is_insignificant(
 ) -> bool:
     """Whether a barely significant effect has no gain on held-out data that can test it.
 
-    An effect that is minor beside another may be true and still increase the error, because it moves base parameters.
-    Then support or a significant gain keeps it.
+    A minor effect may be true and still increase the error, because it changes base parameters. It is kept if it has
+    support or a significant gain.
     """
     gain = seen.gains[i]
     if beyond(member):
@@ -241,8 +244,8 @@ def _is_insignificant(
 def _is_harmful(seen: HeldOutResult, i: int, member: FittedEffect, beyond: Callable[[FittedEffect], bool]) -> bool:
     """Whether a member increases the held-out error, significantly or by a large factor.
 
-    A state-dependent effect must retain part of its gain in cross-validation, in the error or in the support by
-    held-out rows. No effect is accepted on a joint whose base model the logs do not determine.
+    A state-dependent effect must retain part of its gain in cross-validation, or have support by held-out rows. An
+    effect is also harmful on a joint whose base model the logs do not determine.
     """
     effect, joint = member.hypothesis.effect, member.hypothesis.joint
     if beyond(member):
@@ -255,25 +258,25 @@ def _is_harmful(seen: HeldOutResult, i: int, member: FittedEffect, beyond: Calla
         return True
     if joint is not None and seen.errors.is_unreliable(joint - 1):
         return True
-    # A free function names no cause: it is kept for its held-out gain only.
+    # A free function has no physical meaning, so only its held-out gain justifies it.
     least = gain.ci95[1] if len(seen.gains) == 1 or is_of_time(effect) else gain.nrmse_before - gain.nrmse_after
     idle = effect.name.startswith(PREFIX) and least < 0
-    # A smaller contradiction can come from errors of the base model.
+    # Errors of the base model can cause a smaller contradiction.
     against = seen.contradicts[i] and speaks < -CONTRADICTION_SHARE
-    # Base parameters that it moves may increase the error by more than the effect itself.
+    # An effect may increase the error because it changes base parameters. With support, the limit is therefore higher.
     risen = (
         seen.rmse_ratio[i] > MAX_RMSE_RATIO
         if speaks < MIN_RETAINED_GAIN
         else seen.rmse_ratio[i] > REJECT_RMSE_RATIO and gain.ci95[0] <= 0
     )
-    # Neither shows the heat stored before the held-out data, or its decay in a pause.
+    # Contradiction does not count for thermal effects: heat stored before the held-out data is unknown.
     return (against and not effect.has_thermal_memory) or idle or risen
 
 
 def _explained_by_cooling(seen: HeldOutResult, i: int, member: FittedEffect) -> bool:
-    """Whether unknown heat after a pause can explain that held-out data contradict a member.
+    """Whether unknown heat after a pause can explain that held-out data contradict a thermal effect.
 
-    One thermal mass stands for gear and housing, so cooling in a pause is predicted worse than warming.
+    Gear and housing are modelled as one thermal mass, so cooling in a pause is predicted worse than warming.
     """
     joint = member.hypothesis.joint
     known = seen.cv_retained_gain[i] >= MIN_RETAINED_GAIN and not (

@@ -1,4 +1,4 @@
-"""Standard errors and gains by leaving out stretches of a log in turn, which count as independent."""
+"""Standard errors and gains by the delete-one-block jackknife, for residuals that are correlated in time."""
 
 from __future__ import annotations
 
@@ -12,23 +12,45 @@ from estimation.diagnosis.findings import Gain
 
 Array = NDArray[np.float64]
 
-FEWEST, MOST, BLOCK = 10, 30, 4.0  # [s] of a block where there may be more of them
+FEWEST, MOST, BLOCK = 10, 30, 4.0  # least and largest number of blocks, length of a block in between [s]
 
 
 def blocks_of(t: Array) -> list[NDArray[np.bool_]]:
-    """Cuts rows (M,) into stretches of about as many rows, in the order of time."""
+    """Cuts rows into consecutive blocks of about equal size.
+
+    Args:
+        t: time [s], (M,).
+
+    Returns:
+        Per block a mask of its rows (M,).
+    """
     count = int(np.clip((len(t) * float(np.median(np.diff(t)))) / BLOCK, FEWEST, MOST))
     number = np.minimum(np.arange(len(t)) * count // len(t), count - 1)
     return [number == k for k in range(count)]
 
 
 def jackknife(values: Array) -> Array:
-    """Standard errors (...) from estimates (B, ...) that leave out one block each."""
+    """Computes jackknife standard errors.
+
+    Args:
+        values: estimates (B, ...), each without one of the B blocks.
+
+    Returns:
+        Standard errors (...).
+    """
     return np.asarray(np.sqrt((len(values) - 1) * np.mean((values - values.mean(axis=0)) ** 2, axis=0)))
 
 
 def gain_by_blocks(errors: Sequence[tuple[Array, Array]], level: Array) -> Gain:
-    """The fall of the error, over the wind-up's standard deviation, with its interval by blocks."""
+    """Computes the decrease of the error, relative to the standard deviation of the gear deflection.
+
+    Args:
+        errors: per block the errors without and with the effect, each (M_b,) [rad or m].
+        level: gear deflection (M,) [rad or m].
+
+    Returns:
+        Errors before and after, with the 95 % interval of their difference by the jackknife over blocks.
+    """
     squares = np.array([[float(one @ one), float(two @ two), float(len(one))] for one, two in errors])
     rest = squares.sum(axis=0) - squares
     spread = max(float(level.std()), 1e-300)
@@ -43,7 +65,16 @@ def gain_by_blocks(errors: Sequence[tuple[Array, Array]], level: Array) -> Gain:
 
 
 def independent_rows(residual: Array) -> float:
-    """The number of independent rows that tell as much as rows (M,) that resemble their neighbours."""
+    """Estimates the number of independent rows that are equivalent to correlated rows.
+
+    It is M / (1 + 2 sum of the autocorrelations up to their first zero crossing).
+
+    Args:
+        residual: residual (M,).
+
+    Returns:
+        The effective number of rows, at least 2.
+    """
     series = residual - residual.mean()
     power = np.abs(np.fft.rfft(series, 2 * len(series))) ** 2
     correlation = np.fft.irfft(power)[: len(series)]

@@ -1,7 +1,7 @@
-"""Named effects against free functions: does a cause explain the data as well as a function without a name?
+"""Comparison of named effects with free functions in their place.
 
-Functions of position, speed, load and time are flexible: given enough data they follow any effect, and any error of its
-formula too. A name stands where no free function in its place explains clearly more.
+Free functions of position, speed, load and time are flexible. Given enough data they follow any effect, and also the
+errors of its formula. A named effect is kept if no free function in its place explains clearly more.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from estimation.diagnosis.calibration import (
-    CLOSE_RIVAL_BIC,
     MIN_BIC_GAIN,
     MIN_EXPLAINED_SHARE,
     MIN_RETAINED_CHI2,
     NEARLY_EXPLAINED_SHARE,
-    RARE_ODDS,
 )
+from estimation.diagnosis.hypothesis_tests.evidence import is_close_rival
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, set_bic_gain
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine, set_bic_gain
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
 from estimation.diagnosis.searches.selection import SelectedEffect, Selection
@@ -27,13 +27,14 @@ from estimation.diagnosis.validations.free_functions import free_functions
 
 @dataclass(frozen=True, eq=False)
 class ComparedNames:
-    """What the names explain, and what they do not.
+    """Named effects that are kept, and free functions for the rest of the residual.
 
     Attributes:
-        named: the effects whose names stand.
-        free_functions: functions of the motion that explain the rest, each measured beside all before.
-        p_values: of the free functions.
-        explained: share of the significant residual that the effects found explain.
+        named: named effects that are kept.
+        free_functions: functions that explain the rest, each measured beside those before it; empty if the named
+            effects explain enough.
+        p_values: p-values of the free functions.
+        explained: share of the significant residual that the named effects explain.
     """
 
     named: tuple[SelectedEffect, ...]
@@ -45,43 +46,42 @@ class ComparedNames:
 def compare_with_free_functions(
     problem: Problem, selection: Selection, patterns: Sequence[Entry], false_alarm: float
 ) -> ComparedNames:
-    """Keeps the names that explain the data as well as free functions in their place.
+    """Keeps the named effects that explain the data about as well as free functions in their place.
 
     Args:
-        problem: the whitened data.
-        selection: the effects found.
+        problem: whitened data.
+        selection: effects selected by the search.
         patterns: all free functions, measured.
-        false_alarm: chance of one.
+        false_alarm: largest p-value of a free function.
+
+    Returns:
+        The named effects that are kept, and the free functions for the rest.
     """
-    found = [found.effect for found in selection.found]
-    left, p_values = free_functions(problem, patterns, found, false_alarm, alone=True)
-    share = _share(selection.accepted.gain, left)
     kept = _plausible(problem, selection.found)
     while (worst := _outperformed(problem, kept, patterns, false_alarm)) is not None:
         kept.remove(worst)
-    if len(kept) < len(found):
-        left, p_values = free_functions(problem, patterns, [f.effect for f in kept], false_alarm, alone=True)
-    while _share(accept(problem, tuple(f.effect.group for f in kept)).gain, left) < MIN_EXPLAINED_SHARE:
-        # A formula may have been named for part of what is unexplained, which reaches other joints.
+    while True:
+        names = [found.effect for found in kept]
+        left, p_values = free_functions(problem, patterns, names, false_alarm, alone=True)
+        explained = accept(problem, tuple(name.group for name in names)).gain
+        total = explained + sum(member.excess_chi2 for member in left)
+        share = explained / total if total > 0 else 1.0
+        if share >= MIN_EXPLAINED_SHARE:
+            return ComparedNames(tuple(kept), (), (), share)
+        # An effect may have been selected for part of an unexplained error that acts on other joints, too.
         borrowed = [f for f in kept if not _retains_gain(problem, f.effect, [*_others(kept, f), *left])]
         if not borrowed:
             return ComparedNames(tuple(kept), tuple(left), tuple(p_values), share)
         kept.remove(min(borrowed, key=lambda f: f.effect.gain))
-        left, p_values = free_functions(problem, patterns, [f.effect for f in kept], false_alarm, alone=True)
-    return ComparedNames(tuple(kept), (), (), share)
 
 
 def has_close_rivals(found: SelectedEffect) -> bool:
-    """Whether another cause fits about as well; a rare one must do so by the data alone."""
-    return any(
-        worse < (RARE_ODDS if rival.hypothesis.effect.rare else CLOSE_RIVAL_BIC) for rival, worse in found.rivals
-    )
+    """Whether a rival fits about as well. A rare rival must do so without its prior penalty.
 
-
-def _share(explained: float, left: Sequence[FittedEffect]) -> float:
-    """Share of the significant residual that is explained, if these functions explain the rest."""
-    total = explained + sum(member.excess_chi2 for member in left)
-    return explained / total if total > 0 else 1.0
+    Args:
+        found: selected effect with its rivals.
+    """
+    return any(is_close_rival(rival.hypothesis.effect.rare, worse) for rival, worse in found.rivals)
 
 
 def _others(kept: Sequence[SelectedEffect], found: SelectedEffect) -> list[FittedEffect]:
@@ -91,7 +91,7 @@ def _others(kept: Sequence[SelectedEffect], found: SelectedEffect) -> list[Fitte
 def _outperformed(
     problem: Problem, kept: Sequence[SelectedEffect], patterns: Sequence[Entry], false_alarm: float
 ) -> SelectedEffect | None:
-    """Finds the weakest name of a joint, or of the whole robot, where a free function explains clearly more."""
+    """Finds the weakest effect of a joint, or of the whole robot, if a free function explains clearly more there."""
     for joint in sorted({found.effect.hypothesis.joint or 0 for found in kept}):
         own = [found for found in kept if (found.effect.hypothesis.joint or 0) == joint]
         names, others = [f.effect for f in own], [f.effect for f in kept if f not in own]
@@ -102,7 +102,7 @@ def _outperformed(
         gain = accept(problem, tuple(m.group for m in (*others, *names))).gain
         gain -= accept(problem, tuple(m.group for m in others)).gain
         excess, most = gain - sum(m.degrees for m in names), free[0].excess_chi2
-        # Formulas are true to some per cent, and functions follow their errors as well.
+        # Formulas hold to some per cent only, and free functions also follow their errors.
         nearly = excess >= NEARLY_EXPLAINED_SHARE * most or set_bic_gain(problem, names, others) >= free[0].bic_gain
         if excess < MIN_EXPLAINED_SHARE * most or not nearly:
             return min(own, key=lambda f: f.effect.gain)
@@ -110,13 +110,13 @@ def _outperformed(
 
 
 def _retains_gain(problem: Problem, name: FittedEffect, beside: Sequence[FittedEffect]) -> bool:
-    """Whether a name explains beside other functions most of what it does without them."""
+    """Whether a named effect retains most of its chi2 beside other functions."""
     accepted = accept(problem, tuple(member.group for member in beside))
     return score(problem, name.group, accepted).gain > MIN_RETAINED_CHI2 * name.gain
 
 
 def _plausible(problem: Problem, founds: Sequence[SelectedEffect]) -> list[SelectedEffect]:
-    """Keeps effects and rivals whose parameters a machine may have."""
+    """Keeps effects and rivals whose parameters are physically plausible."""
     named = [found.effect for found in founds]
     forms = [_plausible_form(problem, found, named) for found in founds]
     return [
@@ -127,9 +127,9 @@ def _plausible(problem: Problem, founds: Sequence[SelectedEffect]) -> list[Selec
 
 
 def _plausible_form(problem: Problem, found: SelectedEffect, named: Sequence[FittedEffect]) -> SelectedEffect | None:
-    """Gives what was found as a machine may have it: as fitted, or in a likely form that is worth it; None if neither.
+    """Returns the effect as fitted if that is plausible, else with usual design values if these fit; None if neither.
 
-    A delay may be biased where another friction effect acts at reversals: it delays that one, too.
+    A delay, for example, may be biased if another friction effect acts at reversals, because it delays that one, too.
     """
     own = found.effect
     if _is_plausible(problem, own):
@@ -146,6 +146,6 @@ def _plausible_form(problem: Problem, found: SelectedEffect, named: Sequence[Fit
 
 
 def _is_plausible(problem: Problem, member: FittedEffect) -> bool:
-    """Whether a machine may have what was fitted."""
+    """Whether the fitted parameters are physically plausible."""
     place, robot = member.hypothesis, problem.situation.robot
     return place.effect.is_plausible(robot, place.joint, member.coefficients, member.shape)

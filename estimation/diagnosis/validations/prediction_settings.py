@@ -1,4 +1,4 @@
-"""What an extended model needs to predict other logs: their smoothing, the sign's sharpness, how far it may be off."""
+"""Settings of an extended model for prediction: low-pass cut-off, width of the friction sign, prediction band."""
 
 from __future__ import annotations
 
@@ -22,22 +22,25 @@ from robots.terms.situations.of_model import sign_of, velocity_scale
 
 Array = NDArray[np.float64]
 
-# Of the longest log, this long a stretch in the middle [s] tells it, at so many cut-offs.
+# Length [s] of the stretch, in the middle of the longest log, on which settings are chosen; number of cut-offs tried.
 STRETCH, POINTS = 30.0, 5
-# Rows of a log without which it tells no motion.
+# Smallest number of rows of an earlier log from which heat is computed.
 FEWEST = 50
 
 
 def with_best_cutoff(model: Model, problem: Problem, logs: Sequence[Log]) -> Model:
-    """States the cut-off of the motion with which a model predicts its own logs best.
+    """Sets the low-pass cut-off with which a model predicts its own logs best.
 
-    The diagnosis has a cut-off per joint. A prediction has one for all: with the highest, encoder noise dominates the
-    error of a heavy joint; with the lowest, the friction of a fast joint reverses late.
+    The diagnosis has a cut-off per joint, a prediction one for all joints. With the highest, encoder noise dominates
+    the error of a heavy joint. With the lowest, the friction of a fast joint changes sign late.
 
     Args:
-        model: whose provenance gets the cut-off [Hz].
-        problem: what it was fitted in.
-        logs: those of the fit, with torque.
+        model: extended model.
+        problem: data of the fit.
+        logs: logs of the fit, with torque.
+
+    Returns:
+        The model with the cut-off [Hz] in its provenance.
     """
     cutoffs = [problem.recording.cutoff, *(band.cutoff for band in problem.whitening.bands)]
     low, high = min(cutoffs), max(cutoffs)
@@ -48,14 +51,17 @@ def with_best_cutoff(model: Model, problem: Problem, logs: Sequence[Log]) -> Mod
 
 
 def with_best_sign_sharpness(model: Model, logs: Sequence[Log]) -> Model:
-    """States the sharpness of each joint's sign with which a model predicts its own logs best.
+    """Sets the width of each joint's friction sign with which a model predicts its own logs best.
 
-    A diagnosis gives up rows about reversals, and may be left with those that any sharpness suits: its model would turn
-    friction round too gradually. A prediction has all rows, and another error by that in each of them.
+    The diagnosis leaves out rows at reversals. The remaining rows may fit any width, so that the friction of the model
+    may change sign too gradually. A prediction contains the rows at reversals, too.
 
     Args:
-        model: whose terms get the velocities v0 of tanh(dq / v0), and whose provenance states them.
-        logs: those of the fit, with torque.
+        model: extended model.
+        logs: logs of the fit, with torque.
+
+    Returns:
+        The model with the widths v0 of tanh(dq / v0) [rad/s or m/s] in its terms and its provenance.
     """
     columns = zip(model.parameters, model.values, strict=True)
     signs = {column.joint - 1: float(value) for column, value in columns if column.symbol == "f1"}
@@ -68,13 +74,13 @@ def with_best_sign_sharpness(model: Model, logs: Sequence[Log]) -> Model:
         squares = [np.nansum((own - coulomb * sign_of(dq, v0)) ** 2) for v0 in (now[joint], *SCALES)]
         chosen[joint] = (now[joint], *SCALES)[int(np.argmin(squares))]
     trial = _with_scales(model, chosen)
-    # Effects turn round as sharply as the model's sign does: with theirs a joint may be worse off.
+    # Effects use the same width: with them, the new width may increase the error of a joint.
     better = _predicted(trial, part, earlier).error_rms < before.error_rms
     return _with_scales(model, np.where(better, chosen, now)) if better.any() else model
 
 
 def _part(model: Model, logs: Sequence[Log]) -> tuple[Log, list[Log]]:
-    """The middle of the longest log, and what came before."""
+    """Returns the middle of the longest log, and the rows before it."""
     log = max(logs, key=lambda log: float(log.t[-1] - log.t[0]))
     middle = 0.5 * float(log.t[0] + log.t[-1])
     part = log.rows(slice(*np.searchsorted(log.t, (middle - 0.5 * STRETCH, middle + 0.5 * STRETCH)).tolist()))
@@ -82,7 +88,7 @@ def _part(model: Model, logs: Sequence[Log]) -> tuple[Log, list[Log]]:
 
 
 def _before(model: Model, log: Log, logs: Sequence[Log]) -> list[Log]:
-    """What of logs on one clock came before one of them, or a part of one, and has warmed it."""
+    """Returns the parts of logs before the start of a log, for a model with thermal memory."""
     if not model.keeps_heat:
         return []
     parts = [own.rows(slice(0, int(np.searchsorted(own.t, log.t[0])))) for own in logs if own.t[0] < log.t[0]]
@@ -90,7 +96,7 @@ def _before(model: Model, log: Log, logs: Sequence[Log]) -> list[Log]:
 
 
 def _with_scales(model: Model, scales: Array) -> Model:
-    """Gives the model whose signs are as sharp as v0 (n,) says."""
+    """Returns the model with the widths v0 (n,) of its friction signs."""
     stated = tuple(float(v0) for v0 in scales)
     terms = tuple(
         replace(term, velocity_scale=stated) if isinstance(term, FrictionPolynomial) else term
@@ -104,22 +110,27 @@ def _with_scales(model: Model, scales: Array) -> Model:
 
 
 def _misfit(model: Model, log: Log, before: Sequence[Log]) -> float:
-    """Mean over the joints of the logarithm of a prediction's error over the torque's spread."""
+    """Computes the mean over joints of the logarithm of the prediction error relative to the torque's spread."""
     spread = _predicted(model, log, before).relative_spread
     errors = spread[np.isfinite(spread) & (spread > 0)]
     return float(np.mean(np.log(errors))) if len(errors) else 0.0
 
 
 def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen: HeldOutErrors) -> Model:
-    """States the half-widths of a band that holds 95 % of the model's errors on data that its fit has not seen.
+    """Sets the half-widths of a band that contains 95 % of the model's errors on held-out data.
+
+    The provenance also gets the coverage (n,): the share of each part of the held-out logs that lies in the band from
+    the other parts. It also gets the NRMSE on all rows (n,).
 
     Args:
-        model: whose provenance gets them (n,) [N m or N], the share of each part of the held-out logs that the band of
-            the other parts holds (n,), None of a joint without any, and the errors' RMS over the torque's (n,).
-        logs: those of the fit, with torque.
-        held_out: others. Without any, errors on the logs of the fit count as many times as much as errors grew on parts
-            of them that fits had not seen.
-        unseen: the errors on those.
+        model: extended model.
+        logs: logs of the fit, with torque.
+        held_out: held-out logs. Without any, the errors on the logs of the fit are scaled by their growth in
+            cross-validation.
+        unseen: held-out or cross-validation errors.
+
+    Returns:
+        The model with half-widths (n,) [N m or N], coverage and NRMSE in its provenance.
     """
     growth = np.ones(model.robot.n) if held_out else unseen.support_growth()
     every = [*logs, *held_out]
@@ -143,13 +154,20 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
 
 
 def all_row_errors(model: Model) -> Array:
-    """Gives back the errors on unseen data that `with_band` states (n,); NaN where it is not known."""
+    """Returns the NRMSE on all held-out rows that `with_band` set.
+
+    Args:
+        model: extended model.
+
+    Returns:
+        NRMSE (n,); NaN where unknown.
+    """
     stated = model.provenance.get("unseen_nrmse")
     return np.full(model.robot.n, np.nan) if stated is None else np.array([number(value) for value in stated])
 
 
 def _predicted(model: Model, log: Log, before: Sequence[Log] = ()) -> Prediction:
-    """Predicts a log, or a part of one, that is on the clock of the fit, as are those before it."""
+    """Predicts a log, or a part of one, on the same clock as the logs of the fit."""
     return predict(model, log, later=0.0, before=before)
 
 

@@ -1,4 +1,4 @@
-"""How much of a residual is noise, how much repeats with the motion, and how much changes with time."""
+"""Shares of a residual that are noise, that repeat with the motion, and that change with time."""
 
 from __future__ import annotations
 
@@ -9,30 +9,31 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 
 Array = NDArray[np.float64]
 
-# From fewer repetitions nothing is said of what repeats.
+# Number of repetitions below which a log is not split.
 FEWEST = 3
-# Frequency below which what differs between repetitions is counted as a change with time [cycles per period].
+# Frequency below which differences between repetitions may count as a change with time [cycles per period].
 SLOW = 3.0
 
 
 def residual_shares(problem: Problem) -> Array:
-    """Splits the squared residual of the base model by what repeats.
+    """Splits the squared residual of the base model by its repetition with the motion.
 
-    The mean over P repetitions holds what repeats, and 1/P of the noise. What differs between repetitions is noise, but
-    for its slowest part, where noise of a smooth spectrum has no more than next to it: the rest changes with time.
+    The mean over P repetitions contains the repeating part and 1/P of the noise power. Differences between repetitions
+    are noise, except at the lowest frequencies. Power there that exceeds the noise level at the next higher
+    frequencies is a change with time.
 
     Args:
-        problem: the data; its base model's residual is split.
+        problem: data, with the residual of the base model.
 
     Returns:
-        Shares (n, 3): noise, repeating with the motion, changing with time; NaN where no log repeats three times.
+        Shares (n, 3): noise, repeating with the motion, changing with time; NaN if no log repeats three times.
     """
     recording = problem.recording
     totals, states, times = (np.zeros(recording.n) for _ in range(3))
     for run, cycle in zip(recording.runs, recording.cycles, strict=True):
         if cycle is None or cycle.count < FEWEST:
             continue
-        # Where friction turns round, what is left is the doubt of when: it would repeat, but it is no effect.
+        # Rows with unknown friction sign have an error that repeats with the motion but is no effect.
         own = (problem.base_residual[run] * ~recording.sign_unknown[run])[cycle.start : cycle.stop]
         period = cycle.period / recording.step
         mean = period_mean(own, period, cycle.count)
@@ -54,21 +55,30 @@ def residual_shares(problem: Problem) -> Array:
 
 
 def period_differences(series: Array, period: float, count: int) -> Array:
-    """Subtracts the mean over repetitions, and makes up for the variance that goes with it.
+    """Subtracts the mean over repetitions, and corrects for the variance that this removes.
 
     Args:
-        series: (M, n).
-        period: in samples, not necessarily whole.
-        count: of repetitions P.
+        series: signal r (M, n).
+        period: period [samples], not necessarily an integer.
+        count: number of repetitions P.
 
     Returns:
-        (r - mean) sqrt(P / (P - 1)), (M', n).
+        (r - mean) sqrt(P / (P - 1)), (M, n).
     """
     return (series - period_mean(series, period, count)) * np.sqrt(count / (count - 1))
 
 
 def period_mean(series: Array, period: float, count: int) -> Array:
-    """Gives the mean over repetitions, repeated (M, n); rows of a period are matched to the nearest sample."""
+    """Computes the mean over repetitions at each row.
+
+    Args:
+        series: signal (M, n).
+        period: period [samples], not necessarily an integer.
+        count: number of repetitions.
+
+    Returns:
+        The mean of the rows with the same phase, to within one sample (M, n).
+    """
     rows = len(series)
     samples = max(1, round(period))
     phase = np.floor(np.mod(np.arange(rows) + 1e-6, period) / period * samples).astype(int) % samples

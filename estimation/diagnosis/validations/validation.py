@@ -1,4 +1,4 @@
-"""Findings validated on held-out data: by the torque, and by encoders behind the gears where there are some."""
+"""Validation of findings on held-out data, with the torque and with encoders behind the gears."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from functools import partial
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
 from estimation.diagnosis.base_models.prepared_logs import PreparedLogs
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.hypothesis_tests.scan import measure
 from estimation.diagnosis.recordings.recording import cut_recording
 from estimation.diagnosis.validations.equivalent_shapes import complete_effects, equivalent_shapes
@@ -26,25 +26,28 @@ from robots.terms.discrepancies.patterns import all_patterns
 def validate(
     robot: Robot, problem: Problem, compared: ComparedNames, prepared: PreparedLogs, *, false_alarm: float, seed: int
 ) -> ValidatedFindings:
-    """Validates what was found on held-out logs, or by leaving out parts of the logs in turn.
+    """Validates findings on held-out logs, or by cross-validation if there are none.
 
     Args:
         robot: the robot.
-        problem: the data of the fit.
+        problem: data of the fit.
         compared: named effects and free functions.
-        prepared: the logs.
-        false_alarm: chance of one.
-        seed: of the intervals' resampling.
+        prepared: logs of the fit and held-out logs.
+        false_alarm: largest p-value of a free function or a gear compliance.
+        seed: seed of the bootstrap intervals.
+
+    Returns:
+        The findings that remain, their held-out errors and gains, and the measured gear compliances.
     """
     whole = replace(compared, named=complete_effects(problem, compared.named))
     by_reversals = {found.effect.hypothesis.name for found in whole.named if found.effect.group.by_reversals}
 
     def is_beyond(member: FittedEffect) -> bool:
-        """Whether held-out logs cannot test an effect because it belongs to the fitted logs: a contact, a drift."""
+        """Whether held-out data cannot test an effect: identified from reversals, or present in fitted logs only."""
         effect = member.hypothesis.effect
         if effect.name in by_reversals:
             return True
-        # Without the recording times, they cannot test effects of time either.
+        # Without recording times, held-out logs cannot test time-dependent effects either.
         return bool(prepared.held_out) and (effect.transient or (not prepared.dated and effect.depends_on == "time"))
 
     validated = validate_on_held_out(
@@ -60,7 +63,7 @@ def validate(
 def _unnamed(
     robot: Robot, problem: Problem, false_alarm: float, member: FittedEffect, beside: Sequence[FittedEffect]
 ) -> tuple[FittedEffect, float] | None:
-    """Finds a free function on the joint of a rejected effect, or on all joints for an effect of the whole robot."""
+    """Finds a free function on the joint of a rejected effect, or on any joint for an effect of the whole robot."""
     own = member.hypothesis.joint
     wanted = [h for h in all_hypotheses(robot, list(all_patterns(robot))) if own is None or h.joint == own]
     members, p_values = free_functions(problem, measure(problem, wanted), beside, false_alarm, alone=True)
@@ -70,7 +73,7 @@ def _unnamed(
 def _compliances(
     problem: Problem, prepared: PreparedLogs, seen: HeldOutResult, false_alarm: float
 ) -> tuple[MeasuredCompliance, ...]:
-    """Measures gears with logged wind-up; their gain is measured on held-out logs that have link positions too."""
+    """Measures the compliance of gears with `qlink`, and its gain on held-out logs with `qlink` if there are any."""
     if all(log.qlink is None for log in prepared.logs):
         return ()
     now, unseen = problem.situation, None

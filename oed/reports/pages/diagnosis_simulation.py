@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from estimation.diagnosis.validations.simulation_result import Simulation
+from estimation.diagnosis.simulations.simulation_result import Simulation
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.page import Cell, Section, Table
 from oed.reports.rendering.picture import Line, Panel, Picture, Series

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.experiment_plans.detection_limits import Limit
 from estimation.diagnosis.results.diagnosis import Diagnosis, Finding, Trace
-from estimation.diagnosis.validations.simulation_result import Simulation
+from estimation.diagnosis.simulations.simulation_result import Simulation
 from robots.terms.base import length_unit
 from robots.terms.effects import EFFECTS, EXPERIMENTS
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.diagnosis.hypothesis_tests import refinement
+from estimation.diagnosis.hypothesis_tests import fitted_effects
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.validations import name_comparison
 from robots.terms.effects import EFFECTS
 
@@ -23,7 +23,7 @@ PRICE = float(np.log(ROWS))
 
 def accepting(monkeypatch: pytest.MonkeyPatch, accept: Callable[..., Any]) -> None:
     """Has members fitted together by a function of the test."""
-    for module in (name_comparison, refinement):
+    for module in (name_comparison, fitted_effects):
         monkeypatch.setattr(module, "accept", accept)
 
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.evidence import Evidence
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations.held_out_validation import ValidatedFindings, validate_on_held_out
 from estimation.diagnosis.validations.name_comparison import ComparedNames

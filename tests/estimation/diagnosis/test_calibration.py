@@ -12,14 +12,15 @@ from estimation.diagnosis import calibration
 
 PACKAGE = Path(estimation.diagnosis.__file__).parent
 # What decides is in these folders. Constants of numerics may stay there: tolerances, sizes of grids, rounds, effort.
-FOLDERS = ("hypothesis_tests", "searches", "validations", "results")
+FOLDERS = ("hypothesis_tests", "searches", "validations", "simulations", "results")
 NUMERICS = {
     "hypotheses.py": {"GLANCE"},
     "joint_shape_refinement.py": {"ROUNDS", "TOLD", "FACTORS"},
     "log_noise_levels.py": {"PASSED"},
+    "fitted_effects.py": {"ACTS"},
     "power.py": {"DIRECTIONS"},
     "problem.py": {"FAINT"},
-    "refinement.py": {"EFFORT", "ZOOMS", "AGAIN", "WIDE", "FACTOR", "SHARE", "ACTS", "SHORT_TRAVEL_FACTOR"},
+    "refinement.py": {"EFFORT", "ZOOMS", "AGAIN", "WIDE", "FACTOR", "SHARE", "SHORT_TRAVEL_FACTOR"},
     "scan.py": {"LONG", "PROPOSED", "OFTEN", "WIDE"},
     "shocks.py": {"BETWEEN", "TAIL", "FEWEST", "MOST"},
     "time_windows.py": {"COARSE", "FINE", "BESIDE", "FAINT", "ROUNDING"},

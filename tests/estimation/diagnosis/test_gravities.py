@@ -15,7 +15,7 @@ from estimation.diagnosis import Diagnosis, diagnose
 from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation, subtract_known_payload
 from estimation.diagnosis.recordings.log_reading import build_recording
-from estimation.diagnosis.validations.forward_simulation import FittedRobot
+from estimation.diagnosis.simulations.forward_simulation import FittedRobot
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log, Motion

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.extended_fit import _covariance, _narrowed, dense, fit_extended
 from estimation.diagnosis.joint_fits.total_torque import effect_columns

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from estimation import load_model
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, refine
+from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.extended_fit import dense, fit_extended
 from estimation.diagnosis.joint_fits.gear_load import NO_GEAR_LOAD, find_gear_load

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.findings import Finding, Gain, Parameter
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
-from estimation.diagnosis.results.wording import _parameters, _roughly, _stopped, _when, no_part
+from estimation.diagnosis.results.wording import _parameters, _roughly, _stopped, _uncertain_times, no_part
 from estimation.models.extension import Extension
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
@@ -144,24 +144,21 @@ def test_what_warms_up_gains_no_friction(arm: Robot, effect: str, falls: tuple[f
     assert EFFECTS[effect].is_plausible(fast, 1, np.array(falls), shape) is believed
 
 
-def test_a_change_is_told_at_its_time_or_between_two() -> None:
-    """As well as the interval says."""
-    sentence = "The payload grew by 0.2 kg at t = 210.37 s."
+def test_an_uncertain_time_of_a_change_is_stated_with_its_interval() -> None:
+    """A determined time needs no sentence; nor does one without an interval, of which nothing is known."""
     sure = Parameter(
         name="change_time", value=210.37, unit="s", standard_error=0.01, ci95=(210.3, 210.4), determined=True
     )
-    assert _when(sentence, [sure]) == sentence
+    assert not _uncertain_times([sure])
     rough = replace(sure, ci95=(59.72, 361.04), determined=False)
-    assert _when(sentence, [rough]) == "The payload grew by 0.2 kg between t = 59.7 and 361.0 s."
-    assert _when(sentence, [replace(rough, ci95=(-np.inf, np.inf))]) == sentence
+    assert _uncertain_times([rough]) == " The time of the change is uncertain: between t = 59.7 and 361.0 s."
+    assert not _uncertain_times([replace(rough, ci95=(-np.inf, np.inf))])
 
 
-def test_a_push_whose_edges_are_not_told_lasted_at_least_so_long() -> None:
-    """Where one of start and duration may be anything; both within an interval are told as they are."""
-    sentence = "Something pushed the arm from t = 43.04 s for 4 s: joint 1 felt 1.26 N m."
+def test_a_push_with_open_edges_may_have_lasted_longer() -> None:
+    """If start or duration has no interval; two intervals need no sentence."""
     start = Parameter(name="start", value=43.04, unit="s", standard_error=0.03, ci95=(42.9, 43.1), determined=True)
     duration = replace(start, name="duration", value=3.95, ci95=(3.6, 4.4))
-    assert _when(sentence, [start, duration]) == sentence
+    assert not _uncertain_times([start, duration])
     open_ = replace(start, ci95=(-np.inf, np.inf), determined=False)
-    told = _when(sentence, [open_, duration])
-    assert told == "Something pushed the arm at least from t = 43.0 to 47.0 s: joint 1 felt 1.26 N m."
+    assert _uncertain_times([open_, duration]) == " It may have begun earlier or ended later."

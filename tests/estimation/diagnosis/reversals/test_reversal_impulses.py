@@ -10,9 +10,10 @@ import pytest
 from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.calibration import MAX_HIGH_BAND_ERROR, REVERSAL_MARGIN
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect, _reversal_scatter
+from estimation.diagnosis.hypothesis_tests.refinement import _reversal_scatter
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording

@@ -123,9 +123,6 @@ def _rivals(
     chosen = selection.Selection(
         found=(selection.SelectedEffect(member(A, bic, worth), 1e-30),),  # type: ignore[arg-type]
         visible_in_torque=frozenset(seen),
-        first=None,  # type: ignore[arg-type]
-        last=None,  # type: ignore[arg-type]
-        accepted=None,  # type: ignore[arg-type]
     )
     told = selection.with_rivals(SimpleNamespace(rows=1000), [], chosen)  # type: ignore[arg-type]
     return told.found[0].rivals  # type: ignore[return-value]

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from estimation.diagnosis.hypothesis_tests import refinement
+from estimation.diagnosis.hypothesis_tests import fitted_effects
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
@@ -69,7 +69,7 @@ def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
         looked.append(1)
         return SimpleNamespace(outcomes=[])
 
-    monkeypatch.setattr(refinement, "accept", lambda problem, groups: groups)
+    monkeypatch.setattr(fitted_effects, "accept", lambda problem, groups: groups)
     monkeypatch.setattr(swap_search, "accept_all_but", lambda problem, members, i: ())
     monkeypatch.setattr(swap_search, "with_total_torque", lambda problem, members, hypotheses: problem)
     monkeypatch.setattr(swap_search, "refine", lambda problem, h, shape, beside: member(h, gains[h]))
@@ -158,7 +158,7 @@ def test_a_rival_is_tried_with_the_others_refined_beside_it(
         "_acts_on": lambda problem, hypothesis: (0, 1),
     }.items():
         monkeypatch.setattr(swap_search, name, value)
-    monkeypatch.setattr(refinement, "accept", accepted)
+    monkeypatch.setattr(fitted_effects, "accept", accepted)
     members, _ = swap_search.refine_with_swaps(
         SimpleNamespace(rows=1000),  # type: ignore[arg-type]
         [],

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from estimation.diagnosis.calibration import MIN_EXPLAINED_SHARE, MIN_RETAINED_CHI2, NEARLY_EXPLAINED_SHARE
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations import name_comparison
 from estimation.diagnosis.validations.name_comparison import ComparedNames, compare_with_free_functions
@@ -46,10 +46,7 @@ def _compared(
     monkeypatch.setattr(
         name_comparison, "score", lambda problem, group, beside: SimpleNamespace(gain=retained * names[0].gain)
     )
-    selection: Any = SimpleNamespace(
-        found=tuple(SelectedEffect(member, 1e-9) for member in names),
-        accepted=SimpleNamespace(gain=sum(member.gain for member in names)),
-    )
+    selection: Any = SimpleNamespace(found=tuple(SelectedEffect(member, 1e-9) for member in names))
     return compare_with_free_functions(PROBLEM, selection, [], 0.01)
 
 
@@ -94,9 +91,7 @@ def test_of_several_names_on_a_joint_the_weakest_goes_first(monkeypatch: pytest.
 
     monkeypatch.setattr(name_comparison, "free_functions", free)
     monkeypatch.setattr(name_comparison, "_is_plausible", lambda *arguments: True)
-    selection: Any = SimpleNamespace(
-        found=tuple(SelectedEffect(member, 1e-9) for member in names), accepted=SimpleNamespace(gain=470.0)
-    )
+    selection: Any = SimpleNamespace(found=tuple(SelectedEffect(member, 1e-9) for member in names))
     result = compare_with_free_functions(PROBLEM, selection, [], 0.01)
     assert [found.effect.hypothesis.label for found in result.named] == ["spring of joint 2"]
     assert asked == [("spring of joint 2",)] * 2

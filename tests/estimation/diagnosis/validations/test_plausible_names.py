@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, RARE_ODDS
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations import name_comparison
 from robots.robot import Robot

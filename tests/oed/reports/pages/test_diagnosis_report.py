@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.experiment_plans.detection_limits import Limit
-from estimation.diagnosis.validations.simulation_result import Curves, Simulation
+from estimation.diagnosis.simulations.simulation_result import Curves, Simulation
 from oed.reports.pages.diagnosis_limits import limits_page, limits_section
 from oed.reports.pages.diagnosis_report import diagnosis_page
 from oed.reports.pages.diagnosis_view import DiagnosisView, FindingView

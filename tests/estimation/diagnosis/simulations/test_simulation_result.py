@@ -11,11 +11,11 @@ from scipy.integrate import solve_ivp
 
 from estimation import load_model
 from estimation.diagnosis import Diagnosis, diagnose
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 from estimation.diagnosis.recordings.log_reading import build_recording
-from estimation.diagnosis.validations.forward_simulation import FittedRobot, simulate_both
-from estimation.diagnosis.validations.simulation_result import Simulation, read_simulation
+from estimation.diagnosis.simulations.forward_simulation import FittedRobot, simulate_both
+from estimation.diagnosis.simulations.simulation_result import Simulation, read_simulation
 from robots.base_parameters import find_base_parameters
 from robots.plants import simulate
 from robots.plants.closed_loop import Loop

@@ -1,4 +1,4 @@
-"""Simulates a fitted robot forward under a position loop, with and without what was found."""
+"""Forward simulation of a fitted robot under a position loop, without and with the findings."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.recordings.recording import Recording, cut_recording
-from estimation.diagnosis.validations.simulation_result import Curves, Simulation
+from estimation.diagnosis.simulations.simulation_result import Curves, Simulation
 from robots.plants.closed_loop import Driven, Loop, Reference, Tangent, drive
 from robots.regressor import TorqueModel
 from robots.terms.discrepancies.patterns import PREFIX
@@ -24,27 +24,28 @@ from robots.terms.situations.situation import Situation
 
 Array = NDArray[np.float64]
 
-# What is found is evaluated along the simulated motion up to this many times the loop's bandwidth: above, the loop
-# shows the noise of the driving torque, whose derivatives no effect may feel.
+# Cut-off of the simulated deviation on which effects depend, over the loop's bandwidth. Above it the deviation is noise
+# of the driving torque, and its derivatives would disturb the effects.
 SEEN = 3.0
+# Least loop inertia, as a share of torque RMS over acceleration RMS.
 SLUGGISH = 0.02
-# The width of a sign that is none.
+# Width of the sign [rad/s or m/s] at which it is zero at any velocity.
 NO_SIGN = 1e12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FittedRobot:
-    """A fitted robot.
+    """Base model and effects with fitted parameters.
 
     Attributes:
-        model: the base model.
+        model: base model.
         columns: indices of its base parameters.
-        values: their values (b,).
-        members: effects beside it; none of the base model alone.
-        coefficients: of each effect.
-        base_values_for_effects: base parameters (b,) by which effects reckon load and friction; None for `values`.
-        extra_load: what of the effects the gears bear; None for nothing.
-        since: moment from which phases count [s]; None for the first of a motion.
+        values: values of the base parameters (b,).
+        members: effects; empty for the base model alone.
+        coefficients: coefficients (k,) of each effect.
+        base_values_for_effects: base parameters (b,) from which effects compute load and friction; None for `values`.
+        extra_load: load of the effects on the gears; None without any.
+        since: time origin of phases [s]; None for the first sample of a motion.
     """
 
     model: TorqueModel
@@ -57,11 +58,21 @@ class FittedRobot:
     since: float | None = None
 
     def at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
-        """Gives what the base model says along a motion at the times of a recording."""
+        """Returns the state of the base model along a motion.
+
+        Args:
+            part: recording with the same times, (N,).
+            motion: positions, velocities and accelerations, (N, n) each.
+        """
         return self._by(self.values, part, motion)
 
     def felt_at(self, part: Recording, motion: tuple[Array, Array, Array]) -> Situation:
-        """Gives what effects depend on there."""
+        """Returns the state on which the effects depend, along a motion.
+
+        Args:
+            part: recording with the same times, (N,).
+            motion: positions, velocities and accelerations, (N, n) each.
+        """
         now = self._by(
             self.values if self.base_values_for_effects is None else self.base_values_for_effects, part, motion
         )
@@ -73,12 +84,12 @@ class FittedRobot:
         return replace(now, since=self.since)
 
     def base(self, part: Recording, motion: tuple[Array, Array, Array]) -> Array:
-        """Evaluates the base model's torque (N, n) along a motion of one log, with its gravity and payload."""
+        """Computes the base model's torque (N, n) along a motion of one log, with the log's gravity and payload."""
         own = self.model.under(part.gravities[0]).torque(*motion, self.values, columns=self.columns)
         return own + self.payload_torque(part, motion)
 
     def payload_torque(self, part: Recording, motion: tuple[Array, Array, Array]) -> Array:
-        """Evaluates the torque (N, n) of the payload that one log carries."""
+        """Computes the torque (N, n) of the payload of one log along a motion."""
         body = with_body(self.model, np.zeros(self.model.size), part.bodies[0])
         columns = np.flatnonzero(body).tolist()
         if not columns:
@@ -86,7 +97,7 @@ class FittedRobot:
         return self.model.under(part.gravities[0]).torque(*motion, body[columns], columns=columns)
 
     def beyond(self, now: Situation, members: Sequence[int]) -> Array:
-        """Evaluates the torque of some of the effects (N, n) [N m or N]."""
+        """Computes the torque (N, n) [N m or N] of the effects with these indices."""
         total = np.zeros_like(now.q)
         for i in members:
             member = self.members[i]
@@ -96,7 +107,15 @@ class FittedRobot:
         return total
 
     def unmeasured_torque(self, now: Situation, reading: Array) -> tuple[FittedRobot, Array]:
-        """Gives the plant without effects that only distort the reading, and the torque (N, n) that was read so."""
+        """Removes effects that distort only the measured torque.
+
+        Args:
+            now: state on which the effects depend.
+            reading: measured torque (N, n) [N m or N].
+
+        Returns:
+            The robot without these effects, and the undistorted torque (N, n).
+        """
         wrong = [i for i, member in enumerate(self.members) if member.hypothesis.effect.distorts]
         plain = [i for i in range(len(self.members)) if i not in wrong]
         beyond, torque = self.beyond(now, plain), reading.copy()
@@ -114,22 +133,22 @@ class FittedRobot:
 def simulate_both(
     before: FittedRobot, after: FittedRobot, whole: Recording, rows: slice, loop: Loop | None = None
 ) -> Simulation | None:
-    """Simulates a stretch of unseen data with both robots under the same loop.
+    """Simulates a stretch of held-out data with both models under the same position loop.
 
     Args:
-        before: the base model.
-        after: the extended one.
-        whole: the unseen data and all that heat and other histories depend on before.
-        rows: the stretch, within one log.
-        loop: 5 Hz, critically damped, by default.
+        before: base model.
+        after: extended model.
+        whole: held-out data, with the earlier data on which heat and other histories depend.
+        rows: rows of the stretch, within one log.
+        loop: position loop; 5 Hz, critically damped, by default.
 
     Returns:
-        What the loop had to do; None where a robot ran away from it.
+        Controller corrections and position errors; None if a simulation diverges.
     """
     loop = loop or Loop()
     part = cut_recording(whole, rows)
     inertia = _loop_inertia(before, part)
-    # The recording's torque is the arm's own; what drives it carries the log's payload besides.
+    # The recording's torque excludes the log's payload, but the driving torque moves it.
     driving = part.tau + before.payload_torque(part, (part.q, part.dq, part.ddq))
     reference = Reference(step=part.step, q=part.q, dq=part.dq, ddq=part.ddq, torque=driving)
     driven = [_driven(plant, whole, rows, reference, inertia, loop) for plant in (before, after)]
@@ -170,7 +189,7 @@ def simulate_both(
 def _driven(
     plant: FittedRobot, whole: Recording, rows: slice, reference: Reference, inertia: Array, loop: Loop
 ) -> tuple[Driven, bool]:
-    """Follows one robot; says too whether its effects were evaluated along the simulated motion."""
+    """Simulates one robot; the flag tells whether its effects were evaluated along the simulated motion."""
     part = cut_recording(whole, rows)
     measured = plant.at(part, (part.q, part.dq, part.ddq))
     plant, torque = plant.unmeasured_torque(plant.felt_at(part, (part.q, part.dq, part.ddq)), reference.torque)
@@ -193,12 +212,12 @@ def _driven(
 
 
 class _Effects:
-    """The effects' torque along motions near the measured one: a smooth part, and a factor of the velocity's sign."""
+    """Torque of the effects near the measured motion: a smooth part, and a factor of the friction sign."""
 
     def __init__(self, plant: FittedRobot, whole: Recording, rows: slice, cutoff: float) -> None:
         self.plant, self.part = plant, cut_recording(whole, rows)
         count = range(len(plant.members))
-        # What depends on the past, as a free function may, needs all of it; the rest this stretch alone.
+        # Effects that depend on earlier motion, as free functions may, need the earlier data.
         effects = [member.hypothesis.effect for member in plant.members]
         late = [i for i in count if effects[i].depends_on == "time" or effects[i].name.startswith(PREFIX)]
         self.near = [i for i in count if i not in late]
@@ -215,7 +234,14 @@ class _Effects:
         self.measured = self.along((self.part.q, self.part.dq, self.part.ddq)) if plant.members else (zero, zero)
 
     def along(self, motion: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-        """Evaluates both parts along a motion (N, n) of this stretch."""
+        """Computes both parts along a motion of this stretch.
+
+        Args:
+            motion: positions, velocities and accelerations, (N, n) each.
+
+        Returns:
+            Smooth torque and factor of the friction sign, (N, n) each [N m or N].
+        """
         part, h = self.part, self.part.step
         off = motion[0] - part.q
         padding = min(len(off) - 1, 3 * round(1 / h))
@@ -233,7 +259,7 @@ class _Effects:
 
 
 def _factor(turning: Array, sign: Array) -> Array:
-    """Divides by the sign (N, n); where that is small, neighbours say it."""
+    """Divides a torque (N, n) by the friction sign, and interpolates where the sign is small."""
     result = np.zeros_like(turning)
     rows = np.arange(len(turning))
     for j in range(turning.shape[1]):
@@ -244,7 +270,7 @@ def _factor(turning: Array, sign: Array) -> Array:
 
 
 def _coulomb(now: Situation) -> Array:
-    """The base model's Coulomb friction (n,)."""
+    """Returns the base model's Coulomb friction (n,) [N m or N]."""
     result = np.zeros(now.robot.n)
     for column, value in zip(now.model.columns, now.parameters, strict=True):
         if column.symbol == "f1":
@@ -257,7 +283,7 @@ def _tangent(now: Situation) -> Tangent:
     for i, column in enumerate(now.model.columns):
         if column.term == "rotor_inertia":
             inertia[:, column.joint - 1, column.joint - 1] += now.parameters[i]
-    # Friction but for its sign, by differences.
+    # Derivative of friction without its sign term, by central differences.
     step = 1e-3 * np.maximum(np.sqrt(np.mean(now.dq**2, axis=0)), 1e-9)
     up, down = now.dq + step, now.dq - step
     turning = _coulomb(now) * (sign_of(up, now.velocity_scale) - sign_of(down, now.velocity_scale))
@@ -267,7 +293,7 @@ def _tangent(now: Situation) -> Tangent:
 
 
 def _loop_inertia(plant: FittedRobot, part: Recording) -> Array:
-    """The inertia (n,) that the loop is laid out for; one that the fit has lost is taken from torque and motion."""
+    """Returns the inertia (n,) for the loop gains, with a lower bound from torque and acceleration RMS."""
     now = plant.at(part, (part.q, part.dq, part.ddq))
     own = np.mean(np.diagonal(_tangent(now).inertia, axis1=1, axis2=2), axis=0)
     torque, curve = (np.sqrt(np.mean(values**2, axis=0)) for values in (part.tau, part.ddq))

@@ -1,4 +1,4 @@
-"""Forward simulation of the stretch of held-out data in which the extension acts most."""
+"""Forward simulation of the stretch of held-out data in which the effects are strongest."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.priors import solve_map
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
-from estimation.diagnosis.validations.forward_simulation import FittedRobot, simulate_both
+from estimation.diagnosis.simulations.forward_simulation import FittedRobot, simulate_both
+from estimation.diagnosis.simulations.simulation_result import Simulation
 from estimation.diagnosis.validations.gain_intervals import model_columns
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult, found_in_one_log_only, split_runs
-from estimation.diagnosis.validations.simulation_result import Simulation
 
 Array = NDArray[np.float64]
 
-# Of this many seconds of unseen data the motion is simulated, by a fit to at most so many rows.
+# Duration of the simulated stretch [s], and largest number of rows of the fit for it.
 STRETCH = 5.0
 ENOUGH_ROWS = 12_000
 
@@ -26,16 +26,16 @@ ENOUGH_ROWS = 12_000
 def simulate_held_out(
     problem: Problem, members: Sequence[FittedEffect], measured: HeldOutResult, held_out: bool
 ) -> Simulation | None:
-    """Simulates the stretch of unseen data in which the extension acts most, without and with it.
+    """Simulates the stretch of held-out data in which the effects are strongest, without and with them.
 
     Args:
-        problem: the data of the fit.
-        members: what was found, at least one.
-        measured: of these members.
-        held_out: whether logs were kept apart; else the fit leaves out the part in which the stretch lies.
+        problem: data of the fit.
+        members: findings, at least one.
+        measured: held-out results of these members.
+        held_out: whether there are held-out logs. If not, the fit leaves out the part with the stretch.
 
     Returns:
-        The simulation; None where the fitted robot runs away from the loop.
+        The simulation; None if the simulated motion diverges.
     """
     whole, first = measured.whole, measured.first_held_out_row
     parts = [slice(max(run.start, first), run.stop) for run in whole.runs if run.stop > first]
@@ -62,14 +62,14 @@ def simulate_held_out(
 
 
 def _strongest(parts: Sequence[slice], strength: Array, length: int) -> tuple[slice, slice]:
-    """Finds the window of some rows in which a signal (N,) is strongest, and the part in which it lies."""
+    """Finds the window of `length` rows with the largest mean of `strength` (N,), and the part that contains it."""
     sums = np.concatenate([[0.0], np.cumsum(strength)])
     best, chosen = -1.0, (parts[0], parts[0])
     for part in parts:
         size = min(length, part.stop - part.start)
         for start in range(part.start, part.stop - size + 1, max(1, size // 4)):
             mean = float(sums[start + size] - sums[start]) / size
-            # A longer window goes before a short one that is hardly stronger by chance.
+            # Shorter windows are weighted down: their mean varies more by chance.
             value = mean * min(1.0, size / length)
             if value > best:
                 best, chosen = value, (part, slice(start, start + size))
@@ -77,7 +77,7 @@ def _strongest(parts: Sequence[slice], strength: Array, length: int) -> tuple[sl
 
 
 def _fits(problem: Problem, measured: HeldOutResult, left_out: slice | None) -> tuple[Array, Array]:
-    """Fits base model and nuisance alone, and with the effects, to all rows but those left out."""
+    """Fits base model and nuisance, without and with the effects, to all rows except those left out."""
     recording, effects = problem.recording, measured.effects
     kept = np.ones(len(recording), dtype=bool)
     if left_out is not None:
@@ -90,7 +90,7 @@ def _fits(problem: Problem, measured: HeldOutResult, left_out: slice | None) -> 
     weights = (~recording.sign_unknown / problem.whitening.scales(len(recording)))[rows]
     flat = (full * weights[:, :, None]).reshape(-1, full.shape[2])
     gram, cross = flat.T @ flat, flat.T @ (recording.tau[rows] * weights).reshape(-1)
-    # Thinned rows count for all.
+    # Compensates the decimation, so that the prior keeps its weight.
     factor = kept.sum() / max(len(rows), 1)
     alone, *_, everything = model_columns(full.shape[2] - sum(X.shape[2] for X in effects), effects)
     first, last = (

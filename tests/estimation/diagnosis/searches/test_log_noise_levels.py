@@ -11,9 +11,9 @@ import pytest
 from estimation import diagnose, on_one_clock, read_log
 from estimation.diagnosis.calibration import LARGE_HELD_OUT_ERROR
 from estimation.diagnosis.hypothesis_tests.groups import Group
-from estimation.diagnosis.hypothesis_tests.log_noise_levels import PASSED, profile_gain
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening
 from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.searches.log_noise_levels import PASSED, profile_gain
 from robots import load_robot
 
 STEP = 0.004

@@ -20,13 +20,13 @@ WORSE = 1.05
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curves:
-    """Curves of one simulated stretch, for pictures.
+    """Curves of one simulated stretch, for plots.
 
     Attributes:
         t: time [s], (N,).
-        measured: torque (N, n) [N m or N].
-        torque: simulated without and with what was found, (N, n) each.
-        deviation: simulated less measured position without and with it, (N, n) each [rad or m].
+        measured: measured torque (N, n) [N m or N].
+        torque: measured torque plus controller correction, without and with findings, (N, n) each [N m or N].
+        deviation: simulated minus measured position, without and with findings, (N, n) each [rad or m].
     """
 
     t: Array
@@ -43,13 +43,13 @@ class Simulation:
     controller correction is therefore the torque error of the model; the remaining deviation is its position error.
 
     Attributes:
-        start: of the stretch [s].
-        end: of the stretch [s].
-        loop: the assumed position loop.
+        start: start of the stretch [s].
+        end: end of the stretch [s].
+        loop: assumed position loop.
         torque: RMS of the controller correction over RMS of the measured torque (n,), without and with findings.
-        motion: RMS deviation from the measured position (n,) [rad or m], without and with it.
-        note: what a reader must know; empty for nothing.
-        curves: for pictures; None once loaded from a file.
+        motion: RMS deviation from the measured position (n,) [rad or m], without and with findings.
+        note: limitations of this simulation; empty without any.
+        curves: curves for plots; None after loading from a file.
     """
 
     start: float
@@ -62,14 +62,17 @@ class Simulation:
 
     @property
     def telling(self) -> int:
-        """The joint, from 0, whose loop what was found changes most, for better or worse."""
+        """Index (from 0) of the joint whose controller correction changes most with the findings."""
         return int(np.argmax(np.abs(np.nan_to_num(self.torque[0] - self.torque[1]))))
 
     def summary(self, lengths: Sequence[str]) -> str:
         """States controller correction and position error of the joint that changes most, without and with findings.
 
         Args:
-            lengths: the unit of each joint's position (n,).
+            lengths: unit of each joint's position (n,).
+
+        Returns:
+            One line of text.
         """
         joint = self.telling
         (old, new), (far, near) = (tuple(part[joint] for part in pair) for pair in (self.torque, self.motion))
@@ -82,7 +85,7 @@ class Simulation:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Writes it as plain data for `diagnosis.json`."""
+        """Returns the simulation as plain data for `diagnosis.json`, without the curves."""
 
         def pair(values: tuple[Array, Array]) -> dict[str, list[float | None]]:
             return {
@@ -101,7 +104,17 @@ class Simulation:
 
 
 def read_simulation(data: dict[str, Any]) -> Simulation:
-    """Reads what `Simulation.to_dict` wrote."""
+    """Reads the plain data of `Simulation.to_dict`.
+
+    Args:
+        data: entry `simulation` of `diagnosis.json`.
+
+    Returns:
+        The simulation, without curves.
+
+    Raises:
+        KeyError: an entry is missing.
+    """
 
     def pair(item: dict[str, list[float | None]]) -> tuple[Array, Array]:
         before, after = (np.array([number(value) for value in item[key]]) for key in ("before", "after"))

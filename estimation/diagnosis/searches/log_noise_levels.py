@@ -1,4 +1,4 @@
-"""What an effect explains where the noise was estimated with it, and some logs are quieter than others."""
+"""Likelihood ratio of an effect if each log has its own noise level."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import FittedEffect
 
 Array = NDArray[np.float64]
 
-# Energy of white rows of unit noise: a low-pass leaves so much of each.
+# Mean energy of a white row of unit noise after the low-pass.
 PASSED = 0.64
 
 
 def profile_gain(problem: Problem, member: FittedEffect) -> float:
-    """Gives twice the logarithm of an effect's likelihood ratio, the noise of each log free.
+    """Returns twice the log likelihood ratio of an effect, with the noise level of each log free.
 
-    The gain of a `FittedEffect` counts in units of a noise that all logs share and that was estimated before the effect
-    was known. In a log that the effect rules (a hand moves the arm, its motors only carry it), that is no noise but the
-    effect. With the level of each log profiled out, the ratio is sum_r N_r log(E_r / E_r'), E the squared residual of
-    log r without the effect and with it, N_r its white rows less what was fitted to them. Where effects are small
-    beside the noise, both are the same.
+    The gain of a `FittedEffect` assumes one noise for all logs, estimated before the effect was known. If an effect
+    dominates one log, this noise estimate contains the effect (a hand moves the arm, and the motors only carry it).
+    With the level of each log profiled out, the ratio is sum_r N_r log(E_r / E_r'). E_r and E_r' are the squared
+    residuals of log r without and with the effect; N_r is its number of white rows minus fitted parameters. For effects
+    that are small compared with the noise, both agree.
 
     Args:
-        problem: the data and base model.
-        member: an effect, measured beside the base model alone.
+        problem: data and base model.
+        member: an effect, fitted beside the base model alone.
     """
     P = problem.whitening.precision
     orthonormal = np.einsum("jk,knb->jnb", np.linalg.inv(P), problem.weighted_base_columns, optimize=True)
