@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.campaigns.checking import TorqueCheck, checked
-from oed.campaigns.clearing import CollisionFreeRanges
+from oed.campaigns.clearances import CollisionFreeRanges
 from oed.campaigns.excitation import excitation_stage
-from oed.campaigns.fitting import fit_stages
+from oed.campaigns.notes import campaign_notes
 from oed.campaigns.planning import Planner
 from oed.campaigns.programme import Programme
-from oed.campaigns.remarks import campaign_notes
 from oed.campaigns.result import Campaign
+from oed.campaigns.shortening import fit_stages
 from oed.campaigns.stages import Stage
 from oed.campaigns.timetable import make_timetable
 from oed.experiments import Design, LimitOptions, SearchOptions, usable_limits

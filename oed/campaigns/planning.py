@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.campaigns.checking import TorqueCheck
-from oed.campaigns.clearing import CollisionFreeRanges
+from oed.campaigns.clearances import CollisionFreeRanges
 from oed.campaigns.programme import duty_name
 from oed.campaigns.stages import Stage
 from oed.retiming import plan_move

@@ -69,7 +69,7 @@ def design_discriminating(
     progress: Progress,
 ) -> tuple[str, dict[str, Any]]:
     """Writes trajectory.csv, design.json and report.html; returns the summary and the data."""
-    from oed.campaigns.discriminations.discriminating import discriminate
+    from oed.campaigns.discriminations.design import discriminate
     from oed.reports.pages.discrimination_report import save_discrimination_report
     from robots.common.files import ResultFolder
 

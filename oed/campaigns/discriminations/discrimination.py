@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.hypothesis_tests.power import resolving_energy
-from oed.campaigns.discriminations.separating import Run
+from oed.campaigns.discriminations.motions import Run
 from oed.experiments.results.design_file import DESIGN, TRAJECTORY
 from oed.experiments.safety_checks.margins import margin_data, missing_limits
 from oed.exports import write_trajectory

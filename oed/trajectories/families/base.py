@@ -82,7 +82,7 @@ class Family(ABC):
 
     @property
     def fastest(self) -> float:
-        """The rate w [rad/s] with max |p'| <= w max |p - c| for the motion and each derivative p (Bernstein).
+        """The rate w [rad/s] with ``max |p'| <= w max |p - c|`` for the motion and each derivative p (Bernstein).
 
         Infinite where no such inequality is known.
         """
@@ -99,10 +99,10 @@ class Family(ABC):
     def shares(self, samples: int) -> tuple[float, ...]:
         """Shares of the limits of q, dq, ddq and dddq that, kept at `limit_times`, keep the limits at all times.
 
-        Between two samples the basis differs from its chord by r(t). The coefficients follow from the M samples, x =
-        B^+ (B x), so that |r(t) x| <= ||r(t) B^+||_1 max |B x|: with e the largest such norm, max |p - c| <=
-        (1 + e) max over the samples |p - c|. It is measured at some times between the samples, with a reserve for
-        what it does between those.
+        Between two samples the basis differs from its chord by r(t). The coefficients follow from the M samples,
+        ``x = B^+ (B x)``, so ``|r(t) x| <= ||r(t) B^+||_1 max |B x|``. With e the largest such norm, the maximum of
+        ``|p - c|`` over time is at most (1 + e) times that over the samples. The norm is evaluated at some times
+        between the samples, with a reserve for the times between those.
 
         Args:
             samples: M.

@@ -11,7 +11,7 @@ import pytest
 import oed
 from oed.campaigns import Campaign, Programme
 from oed.campaigns.checking import TorqueCheck
-from oed.campaigns.clearing import CollisionFreeRanges
+from oed.campaigns.clearances import CollisionFreeRanges
 from oed.campaigns.planning import Planner
 from oed.experiments import Design
 from oed.trajectories import Segment

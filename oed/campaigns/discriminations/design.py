@@ -17,9 +17,9 @@ from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from oed.campaigns.discriminations.discrimination import Discrimination, DiscriminationScore
-from oed.campaigns.discriminations.judging import STEP, Discriminator, require_separable
+from oed.campaigns.discriminations.motions import ExperimentBuilder, Run
+from oed.campaigns.discriminations.probabilities import STEP, Discriminator, require_separable
 from oed.campaigns.discriminations.rivals import parse_rivals
-from oed.campaigns.discriminations.separating import ExperimentBuilder, Run
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InfeasibleError, InputError, NotIdentifiableError
 from robots.common.progress import SILENT, Progress

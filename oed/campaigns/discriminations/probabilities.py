@@ -15,7 +15,7 @@ from estimation.diagnosis.hypothesis_tests.power import chance_to_resolve
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.linear_algebra.orthonormal import orthonormal
 from oed.campaigns.discriminations.discrimination import DiscriminationScore
-from oed.campaigns.discriminations.separating import Run
+from oed.campaigns.discriminations.motions import Run
 from robots.common.errors import NotIdentifiableError
 
 Array = NDArray[np.float64]

@@ -11,11 +11,11 @@ import pytest
 
 from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from oed.campaigns.discriminations.discriminating import discriminate
+from oed.campaigns.discriminations.design import discriminate
 from oed.campaigns.discriminations.discrimination import Discrimination, DiscriminationScore
-from oed.campaigns.discriminations.judging import require_separable
+from oed.campaigns.discriminations.motions import ExperimentBuilder
+from oed.campaigns.discriminations.probabilities import require_separable
 from oed.campaigns.discriminations.rivals import parse_rivals
-from oed.campaigns.discriminations.separating import ExperimentBuilder
 from oed.exports import read_trajectory
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InfeasibleError, InputError, NotIdentifiableError
