@@ -220,11 +220,9 @@ class _Effects:
         count = range(len(plant.members))
         # Effects that depend on earlier motion, as free functions may, need the earlier data.
         effects = [member.hypothesis.effect for member in plant.members]
-        late = [
-            i for i in count if effects[i].persistence is not Persistence.STATE or effects[i].name.startswith(PREFIX)
-        ]
-        self.near = [i for i in count if i not in late]
-        self.late = late
+        memoryless = [e.persistence is Persistence.STATE and not e.name.startswith(PREFIX) for e in effects]
+        self.near = [i for i in count if memoryless[i]]
+        self.late = late = [i for i in count if not memoryless[i]]
         zero = np.zeros_like(self.part.q)
         self.sections = butter(4, min(2 * cutoff * self.part.step, 0.9), output="sos")
         self.history = (zero, zero)
