@@ -217,12 +217,11 @@ class _Effects:
 
     def __init__(self, plant: FittedRobot, whole: Recording, rows: slice, cutoff: float) -> None:
         self.plant, self.part = plant, cut_recording(whole, rows)
-        count = range(len(plant.members))
         # Effects that depend on earlier motion, as free functions may, need the earlier data.
         effects = [member.hypothesis.effect for member in plant.members]
         memoryless = [e.persistence is Persistence.STATE and not e.name.startswith(PREFIX) for e in effects]
-        self.near = [i for i in count if memoryless[i]]
-        self.late = late = [i for i in count if not memoryless[i]]
+        self.near = [i for i, own in enumerate(memoryless) if own]
+        self.late = late = [i for i, own in enumerate(memoryless) if not own]
         zero = np.zeros_like(self.part.q)
         self.sections = butter(4, min(2 * cutoff * self.part.step, 0.9), output="sos")
         self.history = (zero, zero)
