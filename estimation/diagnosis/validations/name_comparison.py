@@ -91,22 +91,45 @@ def _others(kept: Sequence[SelectedEffect], found: SelectedEffect) -> list[Fitte
 def _outperformed(
     problem: Problem, kept: Sequence[SelectedEffect], patterns: Sequence[Entry], false_alarm: float
 ) -> SelectedEffect | None:
-    """Finds the weakest effect of a joint, or of the whole robot, if a free function explains clearly more there."""
-    for joint in sorted({found.effect.hypothesis.joint or 0 for found in kept}):
-        own = [found for found in kept if (found.effect.hypothesis.joint or 0) == joint]
-        names, others = [f.effect for f in own], [f.effect for f in kept if f not in own]
-        here = [entry for entry in patterns if joint in (0, entry.hypothesis.joint)]
-        free, _ = free_functions(problem, here, others, false_alarm)
-        if not free:
+    """Finds the weakest effect where a free function explains the data better in the place of the named effects.
+
+    The places are each joint, for effects of the whole robot every joint, and for all effects of single joints together
+    one cause of the whole robot.
+    """
+    single = [found for found in kept if found.effect.hypothesis.joint is not None]
+    whole = [found for found in kept if found.effect.hypothesis.joint is None]
+    places = [
+        *(([f for f in single if f.effect.hypothesis.joint == j], (j,)) for j in range(1, problem.n + 1)),
+        (whole, (None, *range(1, problem.n + 1))),
+        (single, (None,)),
+    ]
+    for own, joints in places:
+        if not own:
             continue
-        gain = accept(problem, tuple(m.group for m in (*others, *names))).gain
-        gain -= accept(problem, tuple(m.group for m in others)).gain
-        excess, most = gain - sum(m.degrees for m in names), free[0].excess_chi2
-        # Formulas hold to some per cent only, and free functions also follow their errors.
-        nearly = excess >= NEARLY_EXPLAINED_SHARE * most or set_bic_gain(problem, names, others) >= free[0].bic_gain
-        if excess < MIN_EXPLAINED_SHARE * most or not nearly:
+        names, others = [f.effect for f in own], [f.effect for f in kept if f not in own]
+        here = [entry for entry in patterns if entry.hypothesis.joint in joints]
+        free, _ = free_functions(problem, here, others, false_alarm)
+        if free and not _explain_as_well(problem, names, others, free[0]):
             return min(own, key=lambda f: f.effect.gain)
     return None
+
+
+def _explain_as_well(
+    problem: Problem, names: Sequence[FittedEffect], others: Sequence[FittedEffect], free: FittedEffect
+) -> bool:
+    """Whether named effects explain the data as well as a free function in their place, beside other effects.
+
+    The function must not have a clearly better BIC. But formulas hold to some per cent only, and a function with more
+    parameters follows their errors, too.
+    """
+    gain = accept(problem, tuple(m.group for m in (*others, *names))).gain
+    gain -= accept(problem, tuple(m.group for m in others)).gain
+    degrees = sum(m.degrees for m in names)
+    share = (gain - degrees) / free.excess_chi2 if free.excess_chi2 > 0 else 1.0
+    if share < MIN_EXPLAINED_SHARE:
+        return False
+    flexible = free.degrees > degrees and share >= NEARLY_EXPLAINED_SHARE
+    return flexible or free.bic_gain <= set_bic_gain(problem, names, others) + MIN_BIC_GAIN
 
 
 def _retains_gain(problem: Problem, name: FittedEffect, beside: Sequence[FittedEffect]) -> bool:

@@ -9,7 +9,12 @@ from typing import Any
 
 import pytest
 
-from estimation.diagnosis.calibration import MIN_EXPLAINED_SHARE, MIN_RETAINED_CHI2, NEARLY_EXPLAINED_SHARE
+from estimation.diagnosis.calibration import (
+    MIN_BIC_GAIN,
+    MIN_EXPLAINED_SHARE,
+    MIN_RETAINED_CHI2,
+    NEARLY_EXPLAINED_SHARE,
+)
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.searches.selection import SelectedEffect
@@ -18,7 +23,7 @@ from estimation.diagnosis.validations.name_comparison import ComparedNames, comp
 from robots.terms.discrepancies.patterns import Pattern
 from tests.estimation.diagnosis.comparison_bench import PRICE, ROWS, adding, member_of
 
-PROBLEM: Any = SimpleNamespace(rows=ROWS)
+PROBLEM: Any = SimpleNamespace(rows=ROWS, n=3)
 
 
 def _function(kind: str, joint: int | None, gain: float, degrees: int) -> FittedEffect:
@@ -57,6 +62,8 @@ def _compared(
         (545.0, 4, True),  # more, but within the formula error
         (600.0, 6, False),  # clearly more, with a better BIC
         (600.0, 30, True),  # clearly more, but with far more parameters
+        (515.0, 2, False),  # hardly more, but with as few parameters: no error of the formula
+        (505.0, 2, True),  # not clearly more
         (900.0, 90, False),  # at any number of parameters, because the finding leaves a third
     ],
 )
@@ -68,7 +75,10 @@ def test_a_name_stands_where_no_function_in_its_place_is_clearly_better(
     excess, most = 498.0, gain - degrees
     assert stands is (
         excess >= MIN_EXPLAINED_SHARE * most
-        and (excess >= NEARLY_EXPLAINED_SHARE * most or gain - degrees * PRICE <= 500.0 - 2 * PRICE)
+        and (
+            (degrees > 2 and excess >= NEARLY_EXPLAINED_SHARE * most)
+            or gain - degrees * PRICE <= 500.0 - 2 * PRICE + MIN_BIC_GAIN
+        )
     )
     result = _compared(monkeypatch, [name], in_place=[function])
     assert [found.effect for found in result.named] == ([name] if stands else [])
