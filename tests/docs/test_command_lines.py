@@ -23,6 +23,7 @@ def command_lines() -> list[str]:
     return sorted(set(found))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", command_lines())
 def test_options_exist(line):
     """A printed call names a command of the program, options that it has, and all that it requires."""

@@ -137,6 +137,7 @@ def test_faulty_logs_are_refused(run, edited, tmp_path, change, fragments):
     assert set(tmp_path.rglob("*")) == before
 
 
+@pytest.mark.slow
 def test_unknown_names_are_refused(run, log_file, tmp_path):
     """Unknown methods, friction models, robots and files are refused with what there is."""
     out = tmp_path / "out"

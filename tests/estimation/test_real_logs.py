@@ -106,6 +106,7 @@ def test_double_pendulum_runs(data):
     assert (unseen <= [0.76, 0.43]).all(), unseen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("run", "table"), [("ddp", 0.19), ("dircol", 0.22)])
 def test_simple_pendulum_swing_ups(data, run, table):
     """The swing-ups of the simple pendulum are fitted; what is left is mostly above 4 Hz."""
@@ -118,6 +119,7 @@ def test_simple_pendulum_swing_ups(data, run, table):
     assert prediction.relative_spread[0] < 0.34
 
 
+@pytest.mark.slow
 def test_simple_pendulum_that_rings_is_refused(data):
     """The run that saturates and rings is no basis for a model, and is refused with the reason."""
     folder = data("simple_pendulum_dfki")

@@ -82,6 +82,7 @@ def test_the_number_is_the_rank(name, catalogue_robot, twin, states):
     assert find_base_parameters(rigid(robot)).size == 10 * robot.n - nullspace(Y).shape[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_regrouping_keeps_the_torque(name, catalogue_robot, states):
     """Base parameters give the torque of the standard parameters that they regroup, on states not seen before."""
@@ -114,6 +115,7 @@ def classes(Y):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_classes_follow_the_nullspace(name, catalogue_robot, states):
     """Unidentifiable is what no torque shows, identifiable what has no part in any unseen change of parameters.
@@ -152,6 +154,7 @@ def test_a_horizontal_planar_arm(made_robot):
     assert base.formulas() == ("Izz_1 + 0.16 m_2", "mPx_2", "mPy_2", "Izz_2")
 
 
+@pytest.mark.slow
 def test_a_tilted_base_shows_more(catalogue_robot, states):
     """On a tilted base joint 1 bears weight: mPx_1 and mPy_1 join the ER3A's 36 inertial base parameters."""
     robot = catalogue_robot("er3a")
@@ -179,6 +182,7 @@ def test_one_sliding_joint(made_robot):
     assert find_base_parameters(TorqueModel(level, base.model.terms)).formulas() == ("m_1 + Im_1", "offset_1")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_formulas_say_the_grouping(name, catalogue_robot):
     """The formulas, read back, are the grouping, to the six digits that they show."""
@@ -190,6 +194,7 @@ def test_formulas_say_the_grouping(name, catalogue_robot):
         np.testing.assert_allclose(read, row, rtol=5e-6)
 
 
+@pytest.mark.slow
 def test_the_seed_does_not_matter(catalogue_robot):
     """Other random states give the same parameters and the same regrouping."""
     model = default_model(catalogue_robot("panda"))
@@ -213,6 +218,7 @@ def rounded(robot, digits):
     return replace(robot, chain=Chain(tuple(joints)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("digits", [2, 3, 4, 5, 7, 9, 11])
 def test_rounded_right_angles_change_nothing(digits, catalogue_robot, states):
     """Right angles rounded to 1.57, 1.5708 or 1.5707963 leave the base parameters of exact ones.
@@ -230,6 +236,7 @@ def test_rounded_right_angles_change_nothing(digits, catalogue_robot, states):
     assert np.abs(error).max() < 1e4 * max(base.neglected, 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1e-2, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 1e-7])
 def test_nearly_right_angles_are_no_failure(size, catalogue_robot, states, caplog):
     """A calibrated robot, its angles and lengths off by any small amount, has a set that no seed changes.
@@ -281,6 +288,7 @@ def test_units_and_descriptions(catalogue_robot):
     assert [(c.name, c.joint, c.unit) for c in base.columns[:2]] == [("Izz_1", 1, "kg m2"), ("mPx_2", 2, "kg m")]
 
 
+@pytest.mark.slow
 def test_base_parameters_cross_process_borders(catalogue_robot, states):
     """Base parameters pickle, after use too, and give the same torques afterwards."""
     base = find_base_parameters(default_model(catalogue_robot("er3a")))

@@ -76,6 +76,7 @@ def test_references_are_smooth_and_within_limits(draw: object) -> None:
     assert (q < machine.upper + 0.1).all()
 
 
+@pytest.mark.slow
 def test_log_obeys_inverse_dynamics() -> None:
     """Without effects and noise the logged torque is the true robot's inverse dynamics."""
     case = draw_case(1, kind="er3a", periodic=False, duration=10.0, unseen=0.0)
@@ -92,6 +93,7 @@ def test_log_obeys_inverse_dynamics() -> None:
     assert np.median(np.abs(numeric - record.v_true)) < 1e-3 * np.abs(record.v_true).max()
 
 
+@pytest.mark.slow
 def test_size_is_what_shows_beyond_the_base_model() -> None:
     """An effect with a size of 1 % leaves 1 % of its joint's torque after a least-squares fit of the base model."""
     case = draw_case(7, hide=[Stribeck], size=0.01, kind="ur10", periodic=True, duration=20.0, unseen=0.0)
@@ -187,6 +189,7 @@ def test_a_loose_link_flies_lands_and_settles() -> None:
     assert np.abs(off).max() < 0.05 * 1e-3
 
 
+@pytest.mark.slow
 def test_two_effects_that_part_links_act_once() -> None:
     """With an elastic gear and backlash the parts of both add up to the torque difference by the link's motion."""
     machine = draw_machine("heavy", np.random.default_rng(9))

@@ -80,6 +80,7 @@ def test_every_deciding_constant_states_its_meaning() -> None:
         assert vars(calibration)[name] > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_constants_that_decide_are_nowhere_else(folder: str) -> None:
     """A new number in these folders is a deciding constant, unless it is listed as one of pure numerics."""

@@ -21,6 +21,8 @@ from robots.plants.effects import plant_effect
 from robots.robot import Robot
 from robots.signals import Log
 
+pytestmark = pytest.mark.slow
+
 SOME = ("asymmetric_friction", "friction_step", "load_dependent_friction", "stribeck", "spring", "payload_change")
 # The arm has no higher powers; one motion hardly determines them, and they would add errors on another.
 SIMPLE = "coulomb-viscous"
@@ -48,7 +50,6 @@ def stepped(arm: Robot, hidden: Callable[..., tuple[Log, Log]]) -> tuple[Diagnos
     return diagnose(arm, log, held_out=unseen, candidates=SOME, friction=SIMPLE), unseen
 
 
-@pytest.mark.slow
 def test_a_log_without_effects_has_nothing_found(arm: Robot, hidden: Callable[..., tuple[Log, Log]]) -> None:
     """Without an effect the verdict is `none`, with the base model as the extended model.
 
@@ -63,7 +64,6 @@ def test_a_log_without_effects_has_nothing_found(arm: Robot, hidden: Callable[..
     assert "only log" in result.how_unseen
 
 
-@pytest.mark.slow
 def test_a_step_of_friction_is_named_with_its_joint_its_time_and_its_gain(stepped: tuple[Diagnosis, Log]) -> None:
     """A friction step is named with joint, time to 0.2 s and coefficients, and reduces the held-out error."""
     result, _ = stepped
@@ -141,7 +141,6 @@ def test_the_summary_names_cause_joint_and_gain(stepped: tuple[Diagnosis, Log]) 
     assert len(stepped[0].to_frame()) == sum(len(f.parameters) for f in stepped[0].findings)
 
 
-@pytest.mark.slow
 def test_a_cause_outside_the_candidates_is_not_forced_into_a_name(
     arm: Robot, hidden: Callable[..., tuple[Log, Log]]
 ) -> None:
@@ -155,7 +154,6 @@ def test_a_cause_outside_the_candidates_is_not_forced_into_a_name(
     assert result.extended[0] < result.baseline[0]
 
 
-@pytest.mark.slow
 def test_peaks_that_are_cut_off_are_named_though_they_explain_little(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable
 ) -> None:
@@ -185,7 +183,6 @@ def test_peaks_that_are_cut_off_are_named_though_they_explain_little(
     assert not any("at its maximum" in note for note in whole.notes)
 
 
-@pytest.mark.slow
 def test_noise_that_is_a_third_of_the_torque_is_said(arm: Robot, fourier_motion: Callable, arm_plant: Callable) -> None:
     """Noise of a third of the torque gives a note on its joint, and no finding."""
     log = simulate(arm_plant(torque_noise=0.02), fourier_motion(arm, 0), seed=0)
@@ -198,7 +195,6 @@ def test_noise_that_is_a_third_of_the_torque_is_said(arm: Robot, fourier_motion:
     assert note.startswith("Joint 2: ")
 
 
-@pytest.mark.slow
 def test_unseen_motion_that_is_faster_than_friction_was_fitted_for_is_said(
     arm: Robot, fourier_motion: Callable, arm_plant: Callable
 ) -> None:

@@ -21,6 +21,8 @@ from robots.robot import Robot
 from robots.signals import Log, Motion
 from robots.terms.situations.flange_body import point_mass
 
+pytestmark = pytest.mark.slow
+
 ANGLE = np.radians(15.0)
 TILTED = 9.81 * np.array([0.0, -np.sin(ANGLE), -np.cos(ANGLE)])
 MASS, CENTRE = 1.5, (0.02, -0.03, 0.1)
@@ -54,7 +56,6 @@ def build(upright: Robot, fourier_motion: Callable[..., Motion], pinocchio_torqu
     return make
 
 
-@pytest.mark.slow
 def test_each_log_is_evaluated_as_its_base_stood(upright: Robot, build: Build, pinocchio_torque: Torque) -> None:
     """Columns, situations and the simulated robot use each log's own gravity and payload."""
     logs = (build(0), build(1, TILTED, MASS), build(2, TILTED))
@@ -110,7 +111,6 @@ def gained(upright: Robot, build: Build) -> tuple[Diagnosis, tuple[Log, Log]]:
     return diagnose(upright, logs, candidates=SOME, friction=SIMPLE), logs
 
 
-@pytest.mark.slow
 def test_a_wrong_torque_constant_is_told_from_a_tilt_and_a_mass(gained: tuple[Diagnosis, tuple[Log, Log]]) -> None:
     """With logs under two gravities, a wrong torque constant is named with joint and size."""
     result, _ = gained
@@ -137,7 +137,6 @@ def test_the_extended_model_predicts_on_the_base_as_described_and_as_tilted(
         assert np.all(predict(model, log).nrmse < 0.03)
 
 
-@pytest.mark.slow
 def test_a_tilt_that_was_not_told_is_not_taken_for_nothing(upright: Robot, build: Build) -> None:
     """With the known tilt, logs predict each other to the noise; without it, errors are large."""
     logs = (build(0), build(1, TILTED))
@@ -148,7 +147,6 @@ def test_a_tilt_that_was_not_told_is_not_taken_for_nothing(upright: Robot, build
     assert max(untold.baseline) > 0.3
 
 
-@pytest.mark.slow
 def test_a_base_askew_on_its_mount_is_found_under_two_gravities(upright: Robot, build: Build) -> None:
     """An unknown base tilt is found from logs under two gravities, with angles to 0.1 degrees."""
     askew = (0.03, -0.02, 0.0)
@@ -161,7 +159,6 @@ def test_a_base_askew_on_its_mount_is_found_under_two_gravities(upright: Robot, 
     assert finding.gain.ci95[0] > 0
 
 
-@pytest.mark.slow
 def test_what_only_a_tilt_shows_of_an_upright_axis_is_no_spring(upright: Robot, build: Build) -> None:
     """First moments about the vertical first axis are fitted with the tilt, and not named as a spring."""
     askew = (0.02, 0.015, 0.0)
@@ -175,7 +172,6 @@ def test_what_only_a_tilt_shows_of_an_upright_axis_is_no_spring(upright: Robot, 
     assert (told["own_moment_1"], told["own_moment_2"]) == pytest.approx((0.3 + 0.1 * 6, 0.2), abs=0.15)
 
 
-@pytest.mark.slow
 def test_unseen_logs_may_stand_as_none_before(upright: Robot, build: Build) -> None:
     """A model fitted on a level base predicts a tilted one, with the description's values where only a tilt shows."""
     result = diagnose(upright, build(0), held_out=build(1, TILTED), candidates=SOME, friction=SIMPLE)

@@ -46,6 +46,7 @@ def _stepped(recording: Recording, size: float) -> np.ndarray:
     return extra
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [0.1, 0.3])
 def test_the_moment_is_the_best_of_all(recording: Recording, posed: Callable, size: float) -> None:
     """From a grid point the search finds a change time at least as good as a scan with steps of 5 ms."""
@@ -80,6 +81,7 @@ def test_intervals_of_a_moment_hold_it(recording: Recording, posed: Callable) ->
     assert held >= 13
 
 
+@pytest.mark.slow
 def test_joints_must_agree_on_a_delay(recording: Recording, posed: Callable) -> None:
     """A delay of both joints has a BIC gain; opposite delays of both joints have none."""
     plain = posed(np.zeros_like(recording.tau))
@@ -122,6 +124,7 @@ def test_a_second_summit_belongs_to_the_interval() -> None:
     assert errors._reach(drop, 7.0, 0.02, (6.9, 10.0)) <= 0.1 * 1.15
 
 
+@pytest.mark.slow
 def test_an_interval_is_no_narrower_than_the_profile(recording: Recording, posed: Callable) -> None:
     """The standard error of a time is at least that of the profile likelihood."""
     noise = np.random.default_rng(3).normal(size=recording.tau.shape) * [0.02, 0.06]
@@ -132,6 +135,7 @@ def test_an_interval_is_no_narrower_than_the_profile(recording: Recording, posed
     assert np.sqrt(covariance[2, 2]) >= 0.999 * errors.shape_errors(problem, found, nothing)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moment", [0.0, 3e-3])
 def test_a_lag_of_one_joint_is_told_no_better_than_its_reversals(
     recording: Recording, posed: Callable, moment: float
@@ -159,6 +163,7 @@ def test_a_lag_of_one_joint_is_told_no_better_than_its_reversals(
     assert (found.local_bic_gain > 10) is (moment == 0)
 
 
+@pytest.mark.slow
 def test_friction_that_turns_round_over_microns_is_told_no_better_than_the_moments(
     recording: Recording, pose_arm: Callable[..., Problem]
 ) -> None:

@@ -53,6 +53,7 @@ def test_a_joint_that_never_moves_is_told(arm: Robot, alone: Callable[..., Log],
     assert np.isfinite(Diagnosis.load(tmp_path).baseline[0])
 
 
+@pytest.mark.slow
 def test_a_joint_that_trembles_by_a_count_is_at_rest(arm: Robot, arm_log: Callable, alone: Callable[..., Log]) -> None:
     """A joint that flickers by a count has no known sign, and its noise is that of the log in which it moves."""
     both = arm_log(torque_noise=0.02)

@@ -26,6 +26,7 @@ def wrong_way(problem, assemble, noise=0.3, seed=0):
     return assemble(problem.base, list(data.parts), 1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pull", ["entropic", "euclidean"])
 @pytest.mark.parametrize("weight", [None, 1e-7, 1e-2])
 def test_every_link_is_a_body_however_noisy(problem, assemble, pull, weight):
@@ -141,6 +142,7 @@ def test_the_pull_is_towards_the_description(problem_named, assemble):
     np.testing.assert_allclose(faint[bodies], described, rtol=0.05, atol=5e-3)
 
 
+@pytest.mark.slow
 def test_its_cost_does_not_depend_on_the_logs_length(problem_named):
     """Sums over the rows are all that is handed on: ten times the rows take no longer to solve."""
     problem = problem_named("seven joints")

@@ -42,6 +42,7 @@ def test_it_is_the_bounded_optimum(problem_named):
     np.testing.assert_allclose(found, expected, rtol=1e-3, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_the_total_mass_is_kept(problem_named):
     """A known total mass is kept exactly, within a range it stays inside, and neither costs torque accuracy."""
     problem = problem_named("seven joints")

@@ -51,11 +51,13 @@ def torque_error(problem, values):
 class TestContract:
     """What every estimator keeps."""
 
+    @pytest.mark.slow
     def test_exact_data_give_the_truth(self, member, problem):
         """Without noise, torque on another motion comes back exactly, for one, two, seven and prismatic joints."""
         solution = solved(member, problem.data())
         assert torque_error(problem, solution.values) < INEXACT.get(member.name, 1e-7)
 
+    @pytest.mark.slow
     def test_shapes_are_those_of_robot_and_model(self, member, problem):
         """Values are one a base parameter, weights one a joint, all finite, weights positive."""
         data = problem.data(noise=0.02)
@@ -74,6 +76,7 @@ class TestContract:
             assert standard.shape == (problem.base.model.size,)
             np.testing.assert_allclose(problem.base.from_standard(standard), solution.values, rtol=1e-9, atol=1e-12)
 
+    @pytest.mark.slow
     def test_noise_of_two_per_cent_is_averaged_out(self, member, problem):
         """From 1200 samples with 2 % noise, torque on another motion is right to 2 % in every joint."""
         # Some 10 to 64 parameters from 1200 samples a joint: the prediction's error is at most 0.7 % on average;
@@ -81,6 +84,7 @@ class TestContract:
         limit = 0.06 if member.name == "ols" else 0.02
         assert torque_error(problem, solved(member, problem.data(noise=0.02)).values) < limit
 
+    @pytest.mark.slow
     def test_the_order_of_rows_does_not_matter(self, member, problem_named, assemble):
         """Shuffled rows, or logs where the samples' order is the physics, give the same estimate."""
         problem = problem_named("two joints")
@@ -98,6 +102,7 @@ class TestContract:
         # Reweighting and simulating stop once a step is small beside the residual: 1e-4 and 1e-2 of 5 %.
         np.testing.assert_allclose(first, second, rtol=1e-3, atol=1e-4)
 
+    @pytest.mark.slow
     def test_rows_that_do_not_count_do_not_matter(self, member, problem_named, assemble):
         """Nonsense in masked rows leaves the estimate as it is."""
         problem = problem_named("two joints")
@@ -122,6 +127,7 @@ class TestContract:
         scaled = [Rows(part.motion, 1000 * part.tau, part.mask) for part in parts]
         np.testing.assert_allclose(solved(member, assemble(problem.base, scaled)).values, 1000 * first, rtol=1e-6)
 
+    @pytest.mark.slow
     def test_noisy_data_give_the_truth_on_average(self, member, problem_named):
         """The mean over 60 noisy fits is the truth within five standard errors of a mean."""
         problem = problem_named("one joint")

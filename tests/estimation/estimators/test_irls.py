@@ -23,6 +23,7 @@ def spoilt(problem, assemble, share, seed=0):
     return assemble(problem.base, parts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["two joints", "seven joints"])
 def test_outliers_hardly_move_robust_estimates(problem_named, assemble, name):
     """One row in twenty off by three standard deviations moves WLS ten times as much as Huber, and Tukey hardly."""

@@ -24,6 +24,7 @@ def test_a_stream_is_the_batch_whatever_its_chunks(problem_named, chunk):
     np.testing.assert_allclose(stream.values, data.moments.solve(weights, 0.0), rtol=1e-8, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_its_covariance_is_the_textbooks(problem_named):
     """With white noise, stated standard errors are the scatter of 100 runs within 25 %."""
     problem = problem_named("one joint")

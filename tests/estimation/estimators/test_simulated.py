@@ -23,6 +23,8 @@ from robots.common.errors import InputError
 from robots.regressor import default_model
 from robots.signals import Log, Motion
 
+pytestmark = pytest.mark.slow
+
 GRAVITY, ELBOW, WIDTH = 9.81, 0.4, 0.05
 KP, KD = np.array([400.0, 150.0]), np.array([40.0, 15.0])
 RUNS = 30
@@ -144,7 +146,6 @@ def monte_carlo(truth, controller):
     return means
 
 
-@pytest.mark.slow
 def test_least_squares_is_biased_by_noise_in_the_positions(monte_carlo):
     """With 0.3 mrad of noise in the positions, least squares misses inertias by tens of standard errors of the mean."""
     assert np.abs(monte_carlo["ols"][0]).max() > 30

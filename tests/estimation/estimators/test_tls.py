@@ -30,6 +30,7 @@ def noisy(problem, noise, seed):
     return replace(exact, parts=parts, moments=total)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["two joints", "with a prismatic joint"])
 def test_known_noise_leaves_no_bias_of_note(problem_named, name):
     """With noise of known covariance in q, dq, ddq, the largest bias falls to a seventh at most, others to half."""

@@ -37,6 +37,7 @@ def call(function, *arrays):
     return tau
 
 
+@pytest.mark.slow
 def test_compiled_torque_and_gravity_equal_the_model(model, tmp_path):
     """The C code gives the model's torque, and the gravity of its links alone, to 1e-9."""
     library = compiled(c_code(model, prefix="arm"), tmp_path)

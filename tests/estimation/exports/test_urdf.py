@@ -13,6 +13,8 @@ from robots.consistency import normalised_eigenvalues
 from robots.regressor import TorqueModel
 from robots.terms import RigidBody
 
+pytestmark = pytest.mark.slow
+
 # Rigid torques of two recursions over six bodies, of order 100 N m: rounding, relative to the largest.
 PARITY = 1e-9
 
@@ -42,7 +44,6 @@ def pinocchio_torque(path, q, dq, ddq):
     return np.array([pin.rnea(model, data, *row) for row in zip(q, dq, ddq, strict=True)])
 
 
-@pytest.mark.slow
 def test_an_urdf_reloads_and_gives_the_same_torques(ur10, tmp_path):
     """pinocchio, and our own reader, get the identified model's rigid-body torques from the written file."""
     robot, *models = ur10

@@ -18,6 +18,7 @@ from robots.signals import Log
 from tests.estimation.gate.findings_of import found, joints
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("options", [{}, {"period": 0.02}, {"torque_noise": 0.15}, {"encoder_counts": 1024.0}])
 def test_good_log_has_no_findings(er3a, good, seed, options):
@@ -28,6 +29,7 @@ def test_good_log_has_no_findings(er3a, good, seed, options):
     assert (report.unexplained < 0.3).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur10", "panda"])
 def test_good_logs_of_other_robots_have_no_findings(name, fourier_motion):
     """Robots without friction or gear ratios in their description pass as well."""
@@ -36,6 +38,7 @@ def test_good_logs_of_other_robots_have_no_findings(name, fourier_motion):
     assert check_log(robot, log).findings == ()
 
 
+@pytest.mark.slow
 def test_degrees_as_radians_are_refused(good, spoilt):
     """Positions in degrees leave the ranges, and the unit is named."""
     report = spoilt(q=np.rad2deg(good().q))
@@ -43,6 +46,7 @@ def test_degrees_as_radians_are_refused(good, spoilt):
     assert "degrees" in found(report, "unit_of_position")[0].text
 
 
+@pytest.mark.slow
 def test_motor_side_positions_are_refused(er3a, good, spoilt):
     """Positions of the motors leave the ranges; divided by the gear ratios they do not."""
     report = spoilt(q=good().q * er3a.gear_ratio)
@@ -52,6 +56,7 @@ def test_motor_side_positions_are_refused(er3a, good, spoilt):
     assert "mapping" in caught.value.remedy
 
 
+@pytest.mark.slow
 def test_small_motion_in_degrees_is_found_by_its_velocities(good, spoilt):
     """Positions in degrees that stay inside the ranges disagree with velocities in radians."""
     log = good()
@@ -97,11 +102,13 @@ def test_percent_of_rated_torque_is_reported(er3a, good, spoilt):
     assert "in percent" in found(report, "unit_of_torque")[0].text
 
 
+@pytest.mark.slow
 def test_motor_torque_is_found_by_the_description(good, spoilt):
     """Torques of a hundredth of those of the description are reported."""
     assert joints(spoilt(tau=good().tau / 100), "unit_of_torque")[:3] == [1, 2, 3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [0.7, 1.7, 5.0, 30.0])
 def test_common_delay_is_measured_to_a_part_of_a_sample(good, spoilt, samples):
     """A late torque is reported with an error below 0.3 samples, or four standard errors if these are more."""
@@ -114,6 +121,7 @@ def test_common_delay_is_measured_to_a_part_of_a_sample(good, spoilt, samples):
     assert finding.value == pytest.approx(0.004 * samples, abs=max(errors, 0.0012))
 
 
+@pytest.mark.slow
 def test_delay_of_one_joint_is_reported_for_that_joint(good, spoilt):
     """A delay of one joint is not attributed to the others."""
     log = good()
@@ -124,6 +132,7 @@ def test_delay_of_one_joint_is_reported_for_that_joint(good, spoilt):
     assert report.delay[1] == pytest.approx(0.012, abs=0.002)
 
 
+@pytest.mark.slow
 def test_joint_that_stands_is_reported(er3a, good):
     """A joint that hardly moves is named; if none moves, the log is refused."""
     log = good()
@@ -148,6 +157,7 @@ def test_velocity_columns_are_compared(good, spoilt):
     assert found(spoilt(dq=dq * 1000), "unit_of_time")
 
 
+@pytest.mark.slow
 def test_torque_without_connection_to_the_motion_is_refused(good, spoilt):
     """The motion does not explain shuffled torques."""
     rng = np.random.default_rng(0)
@@ -156,6 +166,7 @@ def test_torque_without_connection_to_the_motion_is_refused(good, spoilt):
     assert report.refused
 
 
+@pytest.mark.slow
 def test_joint_of_noise_is_badly_excited(good, spoilt):
     """A joint whose torque is noise is reported, and the others stay usable."""
     tau = good().tau.copy()
@@ -231,6 +242,7 @@ def test_log_of_another_robot_is_an_input_error(arm, good):
         check_log(arm, good())
 
 
+@pytest.mark.slow
 def test_report_has_verdict_findings_and_actions(good, spoilt):
     """Summary, table and JSON name verdict, findings, numbers and what to do."""
     report = spoilt(t=1e3 * good().t, tau=-good().tau)

@@ -120,6 +120,7 @@ def coverage():
     CHECKS.unregister(Coverage.name)
 
 
+@pytest.mark.slow
 def test_an_own_check_takes_part(er3a, good, coverage):
     """A registered check finds its faults beside the built-in ones, with their severities sorted together."""
     log = good()

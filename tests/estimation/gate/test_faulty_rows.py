@@ -10,6 +10,7 @@ from robots.signals import Log
 from tests.estimation.gate.findings_of import found, joints
 
 
+@pytest.mark.slow
 def test_clipped_torques_are_reported(good, spoilt):
     """Torques that accumulate at a limit are reported with their share of the rows."""
     limit = np.quantile(np.abs(good().tau), 0.95, axis=0)
@@ -18,6 +19,7 @@ def test_clipped_torques_are_reported(good, spoilt):
     assert found(report, "clipped")[0].value == pytest.approx(5.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_gap_cuts_the_log(er3a, good):
     """Nothing is interpolated across a gap: the log is split there."""
     log = good()
@@ -30,6 +32,7 @@ def test_gap_cuts_the_log(er3a, good):
     assert (len(first), second.t[0]) == (2000, log.t[2600])
 
 
+@pytest.mark.slow
 def test_spikes_are_left_out(good, spoilt):
     """Outliers in single rows are reported, and left out of the usable rows."""
     log = good()
@@ -44,6 +47,7 @@ def test_spikes_are_left_out(good, spoilt):
     assert np.abs(usable.tau).max() < 1e3
 
 
+@pytest.mark.slow
 def test_peaks_at_reversals_are_no_outliers(good, spoilt):
     """A sharp fall of friction makes a peak of torque at a reversal, on this joint and on others.
 
@@ -123,6 +127,7 @@ def test_a_column_that_hung_is_reported(good, spoilt):
     assert (len(first), len(second)) == (1001, len(tau) - 1400)
 
 
+@pytest.mark.slow
 def test_a_slow_joint_that_hung_is_reported(good, spoilt):
     """A jump of a position is judged by the steps around it: the joint may be much faster elsewhere."""
     q = good().q.copy()
@@ -145,6 +150,7 @@ def test_position_that_jumps_is_refused(good, spoilt):
     assert (finding.severity, finding.joint, finding.row) == ("refuse", 5, 2501)
 
 
+@pytest.mark.slow
 def test_a_joint_that_stands_most_of_the_time_does_not_jump_when_it_moves(good, spoilt):
     """A fast move of a fortieth of a second has several large steps in a row, a jump has one."""
     log = good()
@@ -160,6 +166,7 @@ def test_a_joint_that_stands_most_of_the_time_does_not_jump_when_it_moves(good, 
     assert (finding.joint, finding.value) == (4, pytest.approx(0.1, abs=0.01))
 
 
+@pytest.mark.slow
 def test_coarse_positions_and_torques_are_reported(good, spoilt):
     """Steps that are coarse for what they measure are reported with their size."""
     log = good()
@@ -168,6 +175,7 @@ def test_coarse_positions_and_torques_are_reported(good, spoilt):
     assert found(report, "quantised_torque")[0].value == pytest.approx(5.0)
 
 
+@pytest.mark.slow
 def test_a_column_copied_over_another_is_reported(good, spoilt):
     """Two columns that are equal in every row are reported; those that differ in one row are not."""
     log = good()

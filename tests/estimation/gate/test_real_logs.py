@@ -13,6 +13,7 @@ def names(report, severity=None):
     return {finding.name for finding in report.findings if severity in (None, finding.severity)}
 
 
+@pytest.mark.slow
 def test_last_joints_of_tiago_are_badly_excited(data):
     """Joints arm_5 to arm_7 have almost no current: they are reported, and the log stays usable for the others."""
     folder = data("tiago_figaroh")
@@ -41,6 +42,7 @@ def test_ur10_and_lwr_are_usable(data):
         assert {finding.joint for finding in report.of("warning")} <= {1, 5, 6, 7}
 
 
+@pytest.mark.slow
 def test_uneven_times_and_repeated_rows_of_panda_are_reported(data):
     """The time steps of the Panda vary, and 5 % of the rows repeat the row before."""
     report = check_log(load_robot("panda"), read_log(data("panda_gaz2019") / "traj1_first10s.parquet"))

@@ -11,6 +11,8 @@ from estimation.identifications.bootstrap import _refits
 from robots.common.errors import InputError
 from robots.plants import simulate
 
+pytestmark = pytest.mark.slow
+
 # Of the noise: each sample remembers this share of the one before.
 MEMORY = 0.95
 
@@ -36,7 +38,6 @@ def by_periods(arm, coloured):
     return log, estimate, bootstrap(arm, log, estimate)
 
 
-@pytest.mark.slow
 def test_periods_agree_with_the_sandwich(by_periods):
     """Under coloured noise both ways to the standard errors agree, where white-noise errors are twice too small.
 
@@ -52,7 +53,6 @@ def test_periods_agree_with_the_sandwich(by_periods):
     assert list(found.to_frame().index) == list(estimate.model.names)
 
 
-@pytest.mark.slow
 def test_moving_blocks_and_logs_agree_with_the_sandwich(arm, coloured):
     """Without periods, and with many logs, the errors agree as well; 1 in 1000 seeds fails wrongly."""
     log = coloured(4)

@@ -26,18 +26,21 @@ def chosen(arm, base):
     return choose_for
 
 
+@pytest.mark.slow
 def test_a_true_sign_stays_sharp(chosen, arm_log):
     """Where the truth is a sign, no joint gets a wider one."""
     choice = chosen(arm_log(velocity_scale=1e-4))
     assert choice.velocity_scales == (VELOCITY_SCALES[0],) * 2
 
 
+@pytest.mark.slow
 def test_a_wide_sign_is_found(chosen, arm_log):
     """Where friction changes sign over 0.05 rad/s, its width is found to the nearest candidates."""
     choice = chosen(arm_log(velocity_scale=0.05, torque_noise=0.005))
     assert all(0.02 <= scale <= 0.1 for scale in choice.velocity_scales)
 
 
+@pytest.mark.slow
 def test_noisy_encoders_ask_for_a_low_cutoff(chosen, arm_log):
     """Coarse encoders lower the cut-off; fine ones allow all that the motion holds."""
     fine, coarse = (chosen(arm_log(encoder_counts=counts)) for counts in (0.0, 3.0))
@@ -46,6 +49,7 @@ def test_noisy_encoders_ask_for_a_low_cutoff(chosen, arm_log):
     assert fine.cutoff >= 1.5
 
 
+@pytest.mark.slow
 def test_the_same_data_give_the_same_choice(chosen, arm_log):
     """Nothing in the choice is random."""
     first, again = chosen(arm_log()), chosen(arm_log())
@@ -53,6 +57,7 @@ def test_the_same_data_give_the_same_choice(chosen, arm_log):
     assert np.array_equal(first.held_out, again.held_out)
 
 
+@pytest.mark.slow
 def test_good_data_need_no_ridge(chosen, arm_log):
     """An exciting motion is fitted with the smallest ridge, and predicts left-out blocks to the noise."""
     log = arm_log(torque_noise=0.02)
@@ -69,6 +74,7 @@ def test_candidates_are_what_is_chosen_from(chosen, arm_log):
     assert chosen(arm_log(), cutoffs=(1000.0,), smoothers=()).cutoff == pytest.approx(100.0)  # 0.4 of 250 Hz
 
 
+@pytest.mark.slow
 def test_several_logs_are_chosen_for_together(chosen, arm_log):
     """Blocks come from all logs; short ones count as blocks of their own."""
     long, short = arm_log(), arm_log(1, 1)
@@ -76,6 +82,7 @@ def test_several_logs_are_chosen_for_together(chosen, arm_log):
     assert choice.cost < np.log(0.1)
 
 
+@pytest.mark.slow
 def test_a_standing_joint_does_no_better_than_a_constant(chosen, arm_log):
     """A joint that is held still is predicted by a constant only, and its cost counts as one."""
     log = arm_log()
@@ -87,6 +94,7 @@ def test_a_standing_joint_does_no_better_than_a_constant(chosen, arm_log):
         assert choice.held_out[1] > 0.9 * choice.spread[1]
 
 
+@pytest.mark.slow
 def test_ideal_data_are_no_trouble(chosen, arm_log):
     """Without any noise the left-out error may be zero, and the cost is finite."""
     assert np.isfinite(chosen(arm_log(encoder_counts=0.0, torque_noise=0.0)).cost)

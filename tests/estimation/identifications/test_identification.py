@@ -14,6 +14,8 @@ from robots.common.errors import InputError, NotIdentifiableError, OedError
 from robots.plants import Sensors
 from robots.signals import Log
 
+pytestmark = pytest.mark.slow
+
 SEEDS = 20
 
 
@@ -38,7 +40,6 @@ def experiment(er3a):
     return estimates, errors, deviations
 
 
-@pytest.mark.slow
 def test_the_truth_lies_within_three_standard_errors_as_often_as_it_should(experiment):
     """Design, simulate, identify: the true parameters lie within 3 standard errors in 99.7 % of cases.
 
@@ -87,7 +88,6 @@ def test_a_good_experiment_is_a_success(experiment):
         assert estimate.model.determined.mean() > 0.9
 
 
-@pytest.mark.slow
 def test_the_same_log_gives_the_same_model(arm, arm_log):
     """Nothing is random but the seeded correction of the standard errors."""
     first, again, other = (identify(arm, arm_log(), seed=seed) for seed in (0, 0, 1))
@@ -106,7 +106,6 @@ def test_ideal_sensors_give_the_truth(arm, arm_plant, arm_log):
     np.testing.assert_allclose(values, truth, rtol=0.01, atol=0.01)
 
 
-@pytest.mark.slow
 def test_two_logs_are_better_than_one(arm, arm_log):
     """A second log of another motion lowers the standard errors, by about the square root of two."""
     one = identify(arm, arm_log())
@@ -117,7 +116,6 @@ def test_two_logs_are_better_than_one(arm, arm_log):
     assert len(both.model.provenance["logs"]) == 2
 
 
-@pytest.mark.slow
 def test_options_choose_the_columns(arm, arm_log):
     """Friction, rotors and offsets are left out on request."""
     log = arm_log()
@@ -127,7 +125,6 @@ def test_options_choose_the_columns(arm, arm_log):
     assert {"Im_2", "offset_1", "f4_2"} <= set(identify(arm, log).model.names)
 
 
-@pytest.mark.slow
 def test_an_estimator_of_ones_own_is_used(arm, arm_log):
     """An object does what its name does."""
     log = arm_log()

@@ -36,6 +36,7 @@ def logs(plant, fourier_motion):
     )
 
 
+@pytest.mark.slow
 def test_a_payload_is_found_from_a_run_with_it(arm, logs):
     """Of a planar arm's payload, first moments and inertia come out within four standard errors, mass included."""
     free, carrying = logs

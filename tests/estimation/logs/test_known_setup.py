@@ -70,6 +70,7 @@ def test_a_tilted_base_shows_more_of_the_joint_on_a_vertical_axis(upright: Robot
     assert tilted.gravities == (tuple(TILTED),)
 
 
+@pytest.mark.slow
 def test_two_gravities_give_the_base_parameters_back_exactly(
     upright: Robot, fourier_motion: Callable[..., Motion], pinocchio_torque: Torque
 ) -> None:
@@ -128,6 +129,7 @@ def test_identify_counts_gravity_and_payload_of_logs(upright: Robot, build: Buil
     assert max(joint.residual_rms for joint in blind.joints) > 1.0
 
 
+@pytest.mark.slow
 def test_a_saved_model_predicts_under_every_gravity_it_knows(
     upright: Robot, build: Build, two: tuple, pinocchio_torque: Torque, tmp_path: Path
 ) -> None:
@@ -143,6 +145,7 @@ def test_a_saved_model_predicts_under_every_gravity_it_knows(
     assert "waist" in urdf_text(model, upright)
 
 
+@pytest.mark.slow
 def test_a_model_of_a_level_base_does_not_guess_what_a_tilt_shows(upright: Robot, build: Build, two: tuple) -> None:
     """Its parameters lack the waist's first moments: an error that names them; other payloads are no trouble."""
     level = identify(upright, build(0), friction="coulomb-viscous", offset=False).model
@@ -153,6 +156,7 @@ def test_a_model_of_a_level_base_does_not_guess_what_a_tilt_shows(upright: Robot
     assert predict(level, same).predicted == pytest.approx(predict(level, build(1)).predicted)
 
 
+@pytest.mark.slow
 def test_the_gate_knows_how_the_robot_was_set_up(upright: Robot, build: Build) -> None:
     """A log on a wall with a payload is in order once both are stated; spikes in it are left out all the same."""
     log = build(3, WALL, MASS)

@@ -32,6 +32,7 @@ def written(tmp_path):
     return write
 
 
+@pytest.mark.slow
 def test_the_file_gives_back_the_model(estimate, tmp_path):
     """Saving and loading changes no bit of values, covariance, names, terms and provenance."""
     path = tmp_path / "model.json"

@@ -18,6 +18,7 @@ def test_estimators_are_compared_on_unseen_data(arm, arm_log):
     assert list(table.to_frame().index) == [row.method for row in table.rows]
 
 
+@pytest.mark.slow
 def test_one_log_is_cut_in_two(arm, arm_log):
     """Of a single log, the last stretch is what no estimator sees."""
     table = compare_methods(arm, arm_log(), methods=["wls"])

@@ -16,6 +16,7 @@ def model(arm, arm_log):
     return identify(arm, arm_log()).model
 
 
+@pytest.mark.slow
 def test_unseen_motion_is_predicted_to_the_noise(model, arm_log):
     """On another motion the error is the torque noise, 2 % of the torque, and the parameters' small errors."""
     prediction = predict(model, arm_log(seed=1, motion_seed=1))
@@ -24,6 +25,7 @@ def test_unseen_motion_is_predicted_to_the_noise(model, arm_log):
     assert (prediction.nrmse > 0.015).all()
 
 
+@pytest.mark.slow
 def test_a_prediction_smooths_as_the_fit_did(arm, arm_log):
     """Where a spline has smoothed the fitted positions, it smooths others; where nothing is said, a low-pass does."""
     log = arm_log(encoder_counts=3.0)
@@ -79,6 +81,7 @@ def test_a_log_of_positions_is_enough(model, arm_log):
     assert np.array_equal(blind.predicted, predict(model, log).predicted)
 
 
+@pytest.mark.slow
 def test_currents_count_by_the_torque_constants(arm, arm_log):
     """A log of currents gives the parameters and errors of the same log in torque."""
     log = arm_log()
@@ -93,6 +96,7 @@ def by_torque_rms(estimate, log):
     return np.sqrt(np.mean((log.tau - predict(estimate.model, log).predicted) ** 2, axis=0))
 
 
+@pytest.mark.slow
 def test_a_saved_model_still_knows_its_torque_constants(arm, arm_log, tmp_path):
     """A model from its file compares with a log of currents as the model itself does."""
     from estimation import load_model

@@ -61,6 +61,7 @@ def test_a_ridge_with_a_pull_is_a_quadratic_penalty():
     np.testing.assert_allclose(moments.solve(weights, ridge), expected, rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_data_that_determine_the_parameters_are_not_pulled(arm, arm_log):
     """An exciting log is fitted without regularisation; a short piece of it leans on the description, and says so."""
     long = identify(arm, arm_log())

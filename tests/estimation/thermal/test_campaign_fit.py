@@ -23,6 +23,8 @@ from robots.plants import nominal_plant
 from robots.robot import Robot
 from robots.signals import Log, Motion
 
+pytestmark = pytest.mark.slow
+
 PERIOD, NOISE = 0.02, 0.05
 HEAT = (
     {"alpha": -0.012, "K1": 1.0, "K2": 1.2, "C1": 90.0, "C2": 700.0},
@@ -67,7 +69,6 @@ def estimate(arm: Robot, recorded: tuple[Motion, Log]) -> CampaignEstimate:
     return fit_campaign(arm, [log.rows(slice(0, 40000)), log.rows(slice(40000, None))])
 
 
-@pytest.mark.slow
 def test_rigid_body_friction_and_heat_come_out_together(arm: Robot, estimate: CampaignEstimate) -> None:
     """Friction at T0 is that of the cold arm, and heat ratios are within their errors of the truth."""
     names = estimate.model.names
@@ -136,7 +137,6 @@ def test_the_model_file_carries_the_heat(estimate: CampaignEstimate) -> None:
         ThermalTorqueModel(model=estimate.model, thermal=(None,))
 
 
-@pytest.mark.slow
 def test_friction_from_logs_feeds_single_fits(
     arm: Robot, recorded: tuple[Motion, Log], estimate: CampaignEstimate
 ) -> None:

@@ -14,6 +14,8 @@ from estimation.thermal.transcriptions.structure import find_structure
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.thermal import Fractional, SecondOrder
 
+pytestmark = pytest.mark.slow
+
 TRUTH = {"alpha": -0.0141, "beta": 0.9971, "K1": 4.41, "K2": 4.57, "C1": 737.61, "C2": 9163.45}
 # Least standard errors of an unbiased estimate: computed from finite differences of a matrix exponential [%].
 BOUND = {"K1": 0.937, "K2": 0.836, "C1": 1.936, "C2": 1.988, "beta": 0.0425}
@@ -26,7 +28,6 @@ def estimate(four_duties: Callable[[int], list[ThermalRun]]) -> ThermalEstimate:
     return fit_thermal(four_duties(7), alpha=TRUTH["alpha"])
 
 
-@pytest.mark.slow
 def test_errors_are_those_of_the_cramer_rao_bound(four_duties: Callable[[int], list[ThermalRun]]) -> None:
     """Over seeds the errors are the least possible ones, and the 95 % intervals hold the truth.
 
@@ -46,7 +47,6 @@ def test_errors_are_those_of_the_cramer_rao_bound(four_duties: Callable[[int], l
     assert missed <= 7
 
 
-@pytest.mark.slow
 def test_time_constants_are_those_of_the_thesis(estimate: ThermalEstimate) -> None:
     """At 97.65 W the time constants are 28.55 and 2.02 min, within five standard errors of 2 % and 3 %."""
     slow, fast = estimate["slow time constant at 97.65 W"], estimate["fast time constant at 97.65 W"]
@@ -63,7 +63,6 @@ def test_noise_in_proportion_is_seen(estimate: ThermalEstimate) -> None:
     assert estimate.colour == pytest.approx(1.0, abs=0.1)
 
 
-@pytest.mark.slow
 def test_without_a_thermometer_only_combinations_are_determined(
     four_duties: Callable[[int], list[ThermalRun]],
 ) -> None:
@@ -98,7 +97,6 @@ def test_a_thermometer_ties_them_down(stages: Callable[..., tuple[np.ndarray, ..
     assert found.noise["T2"] == pytest.approx(0.1, rel=0.2)
 
 
-@pytest.mark.slow
 def test_a_run_that_starts_warm_is_recognised(heated: Callable[..., ThermalRun]) -> None:
     """A joint that was warm at first is told, its temperatures are found, and the rest is right."""
     cold, warm = heated(1.0, 1), heated(0.4, 2, start=(24.0, 18.0))
@@ -118,7 +116,6 @@ def test_heating_alone_is_said(heated: Callable[..., ThermalRun]) -> None:
     assert found["slow time constant at 97.65 W"].value == pytest.approx(SLOW, rel=0.08)
 
 
-@pytest.mark.slow
 def test_a_short_log_gives_a_bound(heated: Callable[..., ThermalRun]) -> None:
     """A quarter of an hour does not determine a time constant of half an hour: that is said, with a bound below it."""
     found = fit_thermal(heated(1.0, 4, heating=900.0, cooling=0.0), alpha=TRUTH["alpha"])
@@ -128,7 +125,6 @@ def test_a_short_log_gives_a_bound(heated: Callable[..., ThermalRun]) -> None:
     assert found.bounds[name] < found[name].value
 
 
-@pytest.mark.slow
 def test_surroundings_that_were_not_measured_are_estimated(heated: Callable[..., ThermalRun]) -> None:
     """Without an ambient temperature the fit still finds the time constants, and says what it took."""
     runs = [heated(duty, 5, ambient=None) for duty in (0.4, 1.0)]
@@ -138,7 +134,6 @@ def test_surroundings_that_were_not_measured_are_estimated(heated: Callable[...,
     assert all(run.ambient == pytest.approx(20.0, abs=3.0) for run in found.runs)
 
 
-@pytest.mark.slow
 def test_motor_heat_is_told_from_friction_heat(stages: Callable[..., tuple[np.ndarray, ...]]) -> None:
     """From starts with the drives off and after hours of power without motion, W_e comes out within 5 %."""
     rng, runs, motor = np.random.default_rng(6), [], 15.0
@@ -158,7 +153,6 @@ def test_motor_heat_is_told_from_friction_heat(stages: Callable[..., tuple[np.nd
     assert found["K13"].value == found["K23"].value == 0.0
 
 
-@pytest.mark.slow
 def test_the_fractional_order_is_found() -> None:
     """From its own data, made by the closed form, the order comes out within 0.01."""
     truth = Fractional(alpha=-0.0141, beta=1.0, K=2.3, C=150.0, nu=0.6121)

@@ -62,6 +62,7 @@ def test_columns_times_the_mask_are_the_sums():
         np.testing.assert_allclose(columns * found.mask[10:40, joint, None], found.sums[joint][10:40], atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fastest", [0.7, 8.0])
 def test_white_noise_keeps_the_textbook_covariance(monkeypatch, fastest):
     """Of white noise, five rows averaged give sigma^2 (Y'Y)^-1, also of columns that turn within a few groups."""
@@ -78,6 +79,7 @@ def test_white_noise_keeps_the_textbook_covariance(monkeypatch, fastest):
     np.testing.assert_allclose(np.mean(errors, axis=0), np.sqrt(np.diag(inverse)), rtol=0.04)
 
 
+@pytest.mark.slow
 def test_averages_state_the_covariance_of_repeated_experiments(monkeypatch):
     """Over 400 draws of coloured, correlated noise, with rows that do not count, estimates scatter as stated."""
     monkeypatch.setattr(sandwich, "MOST_CORRECTED", 0)

@@ -17,8 +17,9 @@ from robots.common.errors import InfeasibleError, InputError
 from robots.common.files import sha256
 from robots.robot import Robot
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.slow
+
 def test_the_default_is_that_of_the_thesis(thesis_campaign: Campaign) -> None:
     """24 cycles of 5 min at 4 ms, without gaps: 2 h and 1.8 million samples."""
     assert thesis_campaign.duration == pytest.approx(7200.0, abs=1e-6)
@@ -109,7 +110,6 @@ def test_heat_is_the_work_of_friction(small_campaign: Campaign, two: Robot) -> N
     np.testing.assert_allclose(small_campaign.cycle_heat.sum(axis=0), total, rtol=1e-12)
 
 
-@pytest.mark.slow
 def test_temperatures_rise_in_heating_and_fall_in_cooling(er3a: Robot, er3a_design: Design) -> None:
     """Expected temperatures start at the surroundings', rise over the heating cycles and fall in the cooling test."""
     made = oed.campaign(er3a, design=er3a_design, programme=Programme(cycles=4, cooling=3), ambient=25.0)
@@ -185,7 +185,6 @@ def test_a_changed_file_is_refused(saved: Path, tmp_path: Path) -> None:
         Campaign.load(folder)
 
 
-@pytest.mark.slow
 def test_a_design_is_read_from_its_folder(er3a: Robot, er3a_design: Design, tmp_path: Path) -> None:
     """A saved design is the excitation stage; one for another robot is refused, one for another description noted."""
     er3a_design.save(tmp_path)

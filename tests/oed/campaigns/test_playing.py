@@ -13,6 +13,8 @@ from robots.common.errors import InputError
 from robots.plants import nominal_plant
 from robots.robot import Robot
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_cycle_of_the_thesis_plays(thesis_campaign: Campaign) -> None:
     """The first cycle is 75,000 samples at 4 ms, of 5 min, with q, tau, segment and cycle."""

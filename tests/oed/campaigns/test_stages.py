@@ -16,6 +16,8 @@ from robots.common.errors import InfeasibleError
 from robots.plants import nominal_plant
 from robots.robot import Robot
 
+pytestmark = pytest.mark.slow
+
 STAGES = ("excitation", "friction", "warm_up_100")
 
 
@@ -103,7 +105,6 @@ def test_duty_cycles_move_for_their_share_of_the_time(small_campaign: Campaign) 
     assert moving[1] > 0.9
 
 
-@pytest.mark.slow
 def test_power_on_holds_home(small_campaign: Campaign) -> None:
     """The power-on test has a stage of its own that holds home with the motors on."""
     stage = small_campaign.stages_by_name["power_on"]

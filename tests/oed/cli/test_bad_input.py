@@ -35,6 +35,7 @@ def trajectory(experiment: Path) -> pd.DataFrame:
 DESIGN = ("design", "--effort", "quick", "--workers", 1, "--out")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -128,6 +129,7 @@ def spoilt(table: pd.DataFrame, fault: str) -> tuple[pd.DataFrame, tuple[str, ..
     return table.iloc[:0], ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["nan", "backward", "column", "joints", "empty"])
 @pytest.mark.parametrize("command", ["simulate", "retime", "export"])
 def test_trajectories(
@@ -167,6 +169,7 @@ def test_simulate_needs_a_motion(run, robot: Path, out: Path) -> None:
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_retime_without_a_robot(run, trajectory: pd.DataFrame, out: Path, tmp_path: Path) -> None:
     """A file that names no robot asks for one."""
     path = tmp_path / "bare.csv"
@@ -206,6 +209,7 @@ def test_simulating_the_unknown(run, experiment: Path, robot: Path, out: Path, t
     refused(run(*line), out, "joint 1", "m_1")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["identify", "predict"])
 @pytest.mark.parametrize("fault", ["missing", "no torque", "joints", "nan", "backward"])
 def test_logs(command: str, fault: str, run, robot: Path, experiment: Path, out: Path, tmp_path: Path) -> None:

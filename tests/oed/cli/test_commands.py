@@ -154,6 +154,7 @@ def test_whole_loop(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     assert done.data["file"] == str(out)
 
 
+@pytest.mark.slow
 def test_export_forms(run, experiment: Path, tmp_path: Path) -> None:
     """An export has the columns and the unit that are asked for; the full one in degrees reads back."""
     source = experiment / "trajectory.csv"

@@ -36,6 +36,7 @@ def test_a_criterion_does_not_apply(run: Callable[..., Any], robot: Path, tmp_pa
     assert not (tmp_path / "no").exists()
 
 
+@pytest.mark.slow
 def test_errors_have_their_codes(run: Callable[..., Any], robot: Path, tmp_path: Path) -> None:
     """An unknown effect is bad input; an effect that shows in no motion cannot be done; no traceback, no files."""
     for rivals, code, part in (

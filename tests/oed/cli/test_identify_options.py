@@ -142,6 +142,7 @@ def test_mapping(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     assert max(bare.data["nrmse"]) < 0.1
 
 
+@pytest.mark.slow
 def test_torque_that_does_not_follow_from_the_motion(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     """A log in good order whose torque is noise is not bad input: code 1, with the reason, and nothing written."""
     table = pd.read_csv(experiment / "log.csv", comment="#")

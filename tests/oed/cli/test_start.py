@@ -7,6 +7,8 @@ import resource
 import subprocess
 import sys
 
+import pytest
+
 HEAVY = (
     "casadi",
     "pandas",
@@ -22,6 +24,7 @@ HEAVY = (
 )
 
 
+@pytest.mark.slow
 def test_help_is_light() -> None:
     """`oed --help` imports no numerical library."""
     code = (
@@ -37,6 +40,7 @@ def test_help_is_light() -> None:
         assert f"  {command} " in done.stdout
 
 
+@pytest.mark.slow
 def test_help_is_quick() -> None:
     """`oed --help` takes less than half a second of the processor."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -51,6 +55,7 @@ def test_help_is_quick() -> None:
     assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 0.5
 
 
+@pytest.mark.slow
 def test_it_runs_as_a_module() -> None:
     """`python -m oed` is `oed`, its exit code for bad input too."""
     done = subprocess.run([sys.executable, "-m", "oed", "predict"], capture_output=True, text=True, check=False)

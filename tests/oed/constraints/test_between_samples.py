@@ -27,6 +27,7 @@ def _dense(polynomial: TrigonometricPolynomial, count: int = 20001) -> np.ndarra
     return polynomial(np.linspace(0.0, 2 * np.pi, count))
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(seed=st.integers(0, 10_000), degree=st.integers(1, 8), extra=st.integers(1, 40), phase=st.floats(0.0, 1.0))
 def test_bounds_from_samples_hold_between_them(seed, degree, extra, phase):
@@ -52,6 +53,7 @@ def test_the_bound_is_attained_by_a_cosine_between_its_samples(degree, factor):
     assert high[0] == pytest.approx(1.0, abs=1e-14)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(seed=st.integers(0, 10_000), degree=st.integers(1, 8), samples=st.integers(1, 60))
 def test_tightened_bounds_kept_at_samples_are_given_bounds_kept_always(seed, degree, samples):
@@ -105,6 +107,7 @@ def test_exact_extremes_are_those_of_a_dense_sampling(seed, degree):
         assert polynomial(2 * np.pi * exact.lowest_at[row])[row] == pytest.approx(exact.lowest[row], abs=1e-11)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(seed=st.integers(0, 10_000), degree=st.integers(1, 12))
 def test_the_taylor_certificate_encloses_the_exact_range_tightly(seed, degree):

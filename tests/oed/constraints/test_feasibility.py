@@ -33,6 +33,7 @@ def _limits(robot, *others, obstacles=(), margin=0.005):
     return GeometricLimits(robot=robot, limits=(collisions, *others))
 
 
+@pytest.mark.slow
 def test_a_good_start_passes(robot):
     """A free start pose with its tool in the box, off singular poses, is accepted."""
     box = ToolBox(lower=(0.2, -0.5, 0.1), upper=(0.8, 0.5, 1.0))
@@ -40,6 +41,7 @@ def test_a_good_start_passes(robot):
     check_feasible(robot, limits, HOME)
 
 
+@pytest.mark.slow
 def test_a_start_pose_in_itself_names_the_pair_and_the_depth(robot):
     """The overlapping bodies, their depth and a pose that would do are named; that pose is free."""
     home = np.array([0.0, -2.0, -1.2, 0.0, 0.0, 0.0])
@@ -55,6 +57,7 @@ def test_a_start_pose_in_itself_names_the_pair_and_the_depth(robot):
     assert model.clearance(pose).min() > 0.0
 
 
+@pytest.mark.slow
 def test_the_floor_that_would_do_is_stated(robot):
     """Of a floor that the arm stands in, the height that would do is stated, and does."""
     with pytest.raises(InfeasibleError) as caught:
@@ -71,6 +74,7 @@ def test_a_floor_above_the_first_joint_is_named(robot):
         check_feasible(robot, _limits(robot, obstacles=(floor(0.4),)), HOME)
 
 
+@pytest.mark.slow
 def test_less_than_the_margin_is_told_apart_from_an_overlap(robot):
     """A start pose that is free but nearer than the margin says both."""
     model = collision_model(robot)
@@ -80,6 +84,7 @@ def test_less_than_the_margin_is_told_apart_from_an_overlap(robot):
         check_feasible(robot, _limits(robot, margin=0.3), HOME)
 
 
+@pytest.mark.slow
 def test_an_obstacle_in_the_way(robot):
     """A start pose within a box is refused by the box's name."""
     post = Box(name="post", size=[0.1, 0.1, 1.0], pose=homogeneous(np.eye(3), [0.3, 0.0, 0.5]))
@@ -99,6 +104,7 @@ def test_a_box_out_of_reach_states_the_nearest_point(robot):
     assert low == pytest.approx(reach, abs=1e-4)  # four digits are printed
 
 
+@pytest.mark.slow
 def test_the_approach_is_zero_within_reach(robot):
     """A box that the tool can enter is at no distance, however small it is."""
     place = robot.chain.flange(HOME)[:3, 3]

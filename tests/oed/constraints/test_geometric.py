@@ -82,6 +82,7 @@ def test_values_are_the_geometry(everything):
     np.testing.assert_array_equal(values[:, : len(model.pairs)], model.smooth_clearance(q)[0] - 0.01)
 
 
+@pytest.mark.slow
 def test_gradients_are_exact(everything):
     """Gradients of all rows agree with central differences."""
     robot, step = everything.robot, 1e-6
@@ -95,6 +96,7 @@ def test_gradients_are_exact(everything):
         assert error.max() < 2e-4
 
 
+@pytest.mark.slow
 def test_pullback_is_the_adjoint_of_the_gradients(everything):
     """The pullback of weights is the weighted sum of the gradients, and casadi's adjoint function gives the same."""
     robot = everything.robot
@@ -108,6 +110,7 @@ def test_pullback_is_the_adjoint_of_the_gradients(everything):
         np.testing.assert_allclose(np.array(adjoint(q[k], weights[k]))[:, 0], pulled[k], rtol=0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_they_are_pointwise_limits(everything):
     """As a limit of the state, rows are zero or more, do not depend on dq and ddq, and pass it where negative."""
     n = everything.robot.n
@@ -216,6 +219,7 @@ def test_each_limit_stops_a_solver(kind):
         assert 0.005 <= model.clearance(q)[0, 0] <= 0.005 + model.smoothing + 1e-6
 
 
+@pytest.mark.slow
 def test_no_limits_and_pickles(everything):
     """Without limits there are no rows; limits that crossed a process border give the same values."""
     none = GeometricLimits(robot=_planar())
@@ -226,6 +230,7 @@ def test_no_limits_and_pickles(everything):
     np.testing.assert_array_equal(copy.linearise(q)[0], everything.linearise(q)[0])
 
 
+@pytest.mark.slow
 def test_the_symbolic_function_gives_the_same_rows(everything):
     """The CasADi function, for use within a solver's own graph, gives values and gradients of one sample."""
     q = random_poses(everything.robot.limits, 2)

@@ -38,6 +38,7 @@ def test_rows_are_the_kinematics_at_the_samples(limits):
         assert rows.matrix[index] @ x == pytest.approx(matrix[sample] @ x)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_coefficients_that_keep_the_rows_keep_the_limits_at_all_times(limits, seed):

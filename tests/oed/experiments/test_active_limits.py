@@ -42,6 +42,7 @@ def used(design: Design, quantity: str) -> np.ndarray:
     return np.abs({"velocity": motion.dq, "acceleration": motion.ddq}[quantity]).max(axis=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("quantity", "bound"), [("velocity", 0.8), ("acceleration", 0.8), ("jerk", 0.8)])
 def test_derivatives(quantity: str, bound: float, make_robot) -> None:
     """Where one derivative's limit is far lower than the others', the design goes to it, and would pass it without."""
@@ -53,6 +54,7 @@ def test_derivatives(quantity: str, bound: float, make_robot) -> None:
     assert reached.max() > 0.97 * bound
 
 
+@pytest.mark.slow
 def test_position(make_robot) -> None:
     """A narrow range is used to its ends, and never left."""
     lower, upper = np.array([-0.4, -0.5]), np.array([0.6, 0.3])
@@ -66,6 +68,7 @@ def test_position(make_robot) -> None:
     assert min((tight.min(axis=0) - lower).min(), (upper - tight.max(axis=0)).min()) < 0.02
 
 
+@pytest.mark.slow
 def test_motor_speed(make_robot) -> None:
     """A motor's speed over its gear ratio bounds the joint, and the margin is stated at the motor."""
     loose = make_robot("RR", "geared")
@@ -122,6 +125,7 @@ def tool(motion_q: np.ndarray) -> np.ndarray:
     return np.column_stack([np.cos(q1) * reach, np.sin(q1) * reach, height])
 
 
+@pytest.mark.slow
 def test_tool_box(arm: Robot, free: Design) -> None:
     """The tool stays in its box, touches a wall of it nearly, and leaves it where there is none."""
     box = ToolBox(lower=(-0.2, -0.6, 0.3), upper=(0.85, 0.6, 1.2))
@@ -135,6 +139,7 @@ def test_tool_box(arm: Robot, free: Design) -> None:
     assert min(margin.value for margin in made.space) == pytest.approx(room, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_plane(arm: Robot, free: Design) -> None:
     """A link's frame stays on its side of a plane, and comes near it."""
     plane = PlaneLimit(link=3, normal=(0.0, 0.0, 1.0), offset=0.55, name="elbow above the table")
@@ -148,6 +153,7 @@ def test_plane(arm: Robot, free: Design) -> None:
     assert "elbow above the table" in made.summary()
 
 
+@pytest.mark.slow
 def test_singularity(arm: Robot, free: Design) -> None:
     """The distance to singular poses is kept: the elbow no longer stretches."""
     limit = SingularityLimit(smallest=0.45, length=0.65)
@@ -167,6 +173,7 @@ def smallest_singular_value(q: np.ndarray) -> float:
     return float(np.linalg.svd(np.vstack([linear / half, np.column_stack([[0, 0, 1], side, side])]))[1][-1])
 
 
+@pytest.mark.slow
 def test_obstacle(arm: Robot, free: Design) -> None:
     """The arm keeps its clearance from a box beside it; without watching, the same design runs into the box."""
     centre, half = np.array([0.5, 0.45, 0.8]), np.array([0.1, 0.1, 0.8])
@@ -197,6 +204,7 @@ def test_space_without_room(arm: Robot, space: GeometricLimit, message: str) -> 
         design(arm, space=[space])
 
 
+@pytest.mark.slow
 def test_home_is_moved_where_nobody_stated_it(arm: Robot) -> None:
     """If the usual home pose violates a workspace limit, the nearest valid pose is used, and the design says so."""
     plane = PlaneLimit(link=3, normal=(0.0, 0.0, 1.0), offset=0.55)
@@ -215,6 +223,7 @@ def test_period_too_short(make_robot) -> None:
     assert caught.value.joint == 2
 
 
+@pytest.mark.slow
 def test_every_start_is_reported(make_robot) -> None:
     """The outcome of each random start is in the design and its file."""
     made = design(make_robot("RR", "two"), effort=Effort(islands=1, starts=3, screened=5, hops=0, finish_samples=60))
@@ -224,6 +233,7 @@ def test_every_start_is_reported(make_robot) -> None:
     assert made.to_dict()["solver"]["islands"][0]["starts"] == [list(pair) for pair in island.starts]
 
 
+@pytest.mark.slow
 def test_files_of_designs_in_space(arm: Robot, tmp_path: Path) -> None:
     """What the limits in space came to is saved and loaded."""
     made = design(arm, home=[0.0, 0.6, 0.9], space=[ToolBox(lower=(-0.2, -0.6, 0.3), upper=(0.85, 0.6, 1.2))])

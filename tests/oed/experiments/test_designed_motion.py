@@ -18,6 +18,8 @@ from robots.loading import load_robot
 from robots.robot import Robot
 from tests.oed import flat
 
+pytestmark = pytest.mark.slow
+
 NAMES = ("er3a", "ur10", "panda", "prismatic", "single", "seven", "narrow")
 SCALE = 0.02
 
@@ -27,7 +29,6 @@ def design(request, designed) -> Design:
     return designed(request.param)
 
 
-@pytest.mark.slow
 def test_rest_at_both_ends(design: Design) -> None:
     """The whole experiment starts and ends at rest, in one pose."""
     for end in (0, -1):
@@ -41,7 +42,6 @@ def test_uniform_period(design: Design) -> None:
     np.testing.assert_allclose(np.diff(design.motion.t), design.robot.period, atol=1e-12)
 
 
-@pytest.mark.slow
 def test_limits_at_one_kilohertz(design: Design) -> None:
     """Through the file's positions, velocities and accelerations, a quintic passes no limit at 1 kHz."""
     motion, limits = design.motion, design.robot.limits
@@ -128,7 +128,6 @@ def pinocchio_columns(robot: Robot, q: np.ndarray, dq: np.ndarray, ddq: np.ndarr
     return np.column_stack(columns)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "friction"), [(n, "coulomb-viscous") for n in NAMES] + [("er3a", "polynomial")])
 def test_quality_from_the_file(name: str, friction: str, designed, tmp_path: Path) -> None:
     """The stated condition numbers follow from the CSV alone, by pinocchio and tanh friction."""

@@ -123,6 +123,7 @@ def test_own_limit_of_motion_decides_and_is_reported():
     assert kept.success
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("limits", "error", "message"),
     [

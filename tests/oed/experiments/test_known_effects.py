@@ -52,6 +52,7 @@ def by_hand(
     return tau + np.asarray(robot.rotor_inertia) * ddq
 
 
+@pytest.mark.slow
 def test_the_limit_counts_effects_with_their_derivatives(robot: Robot) -> None:
     """Values are those of pinocchio and of the formulas; the Jacobian is that of central differences."""
     rng = np.random.default_rng(0)
@@ -141,6 +142,7 @@ def test_the_motion_keeps_the_limit_with_the_spring(tight: Robot, tmp_path) -> N
     assert [m.value for m in again.check()] == pytest.approx([m.value for m in aware.margins], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_without_limits_nothing_is_claimed_to_count(make_robot) -> None:
     """A robot without torque limits or dynamics: the summary says that the spring could not be counted."""
     spring = PlantEffect(effect="spring", joint=1, coefficients=(1.0, 0.0, 0.0, 0.0), shape=(0.0, 0.0))

@@ -16,6 +16,8 @@ from robots.common.errors import InputError
 from robots.loading import load_robot
 from tests.oed.flat import grouped
 
+pytestmark = pytest.mark.slow
+
 BRIEF = Effort(islands=1, starts=1, screened=20, hops=0, finish_samples=100)
 
 
@@ -26,7 +28,6 @@ def front() -> ParetoFront:
     return oed.pareto(robot, points=3, **grouped(friction="coulomb-viscous", effort=BRIEF, workers=1, strokes=False))
 
 
-@pytest.mark.slow
 def test_extremes_are_best_in_their_own_criterion(front: ParetoFront) -> None:
     """The design for cond alone has the smallest cond, that for log det alone the largest log det, and both differ."""
     cond, d = front.values.T

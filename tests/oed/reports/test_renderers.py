@@ -39,6 +39,7 @@ def everything() -> Picture:
     return Picture(title="Everything", name="everything", panels=(marks, logs, bars), columns=2)
 
 
+@pytest.mark.slow
 def test_plotly_draws_every_kind(everything: Picture) -> None:
     """Each series becomes a trace of its kind, each name one entry of the legend, each text escaped."""
     figure = to_plotly(everything)
@@ -59,6 +60,7 @@ def test_plotly_draws_every_kind(everything: Picture) -> None:
     assert figure.layout.xaxis3.ticktext == ("a", "b")
 
 
+@pytest.mark.slow
 def test_matplotlib_draws_every_kind(everything: Picture) -> None:
     """The same picture is drawn by matplotlib, in a figure of its own or in one that is given."""
     figure = to_matplotlib(everything)
@@ -102,6 +104,7 @@ def test_shared_axes_zoom_together() -> None:
     ] * 2
 
 
+@pytest.mark.slow
 def test_png_is_a_picture(everything: Picture, tmp_path: Path) -> None:
     """The PNG can be read, is not blank, and no figure of pyplot was opened or left."""
     import matplotlib.pyplot as plt

@@ -138,6 +138,7 @@ def test_autocorrelation_is_that_of_its_definition(gaps: bool) -> None:
     np.testing.assert_allclose(autocorrelation(y, 19), np.array(expected) / expected[0], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_residual_of_nothing_is_said_to_be_nothing() -> None:
     """A joint without measurements, and one without error, are drawn all the same."""
     residual = np.column_stack([np.full(500, np.nan), np.zeros(500)])

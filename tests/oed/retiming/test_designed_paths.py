@@ -33,6 +33,7 @@ def _experiment(limits, seed: int) -> Motion:
     return Sequence(segments=tuple(parts), period=PERIOD).motion()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_a_feasible_timing_never_becomes_slower(limits, seed):
     """Whatever keeps the limits is retimed, no slower, on exactly its path, within every limit."""
@@ -56,6 +57,7 @@ def test_time_optimal_moves_are_left_alone(limits):
     assert result.duration_after <= plan.duration + 1e-9
 
 
+@pytest.mark.slow
 def test_a_failure_of_the_linear_programmes_is_survived(limits, monkeypatch):
     """Where TOPP-RA finds nothing on any grid, a smooth given timing is refined on its own."""
     given = _experiment(limits, 0)
@@ -87,6 +89,7 @@ def test_another_grid_is_tried(limits, monkeypatch):
     assert len(grid) == len(speed) == grids[-1] == 751
 
 
+@pytest.mark.slow
 def test_a_given_timing_that_passes_a_limit_is_named(limits):
     """A timing too fast for the limits is made slower, and the verdict says which limit it had passed."""
     given = _experiment(limits, 1)

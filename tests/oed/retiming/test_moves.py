@@ -16,6 +16,7 @@ from robots.common.errors import InfeasibleError, InputError, SolverError
 PERIOD = 0.004
 
 
+@pytest.mark.slow
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=200)
 @given(
     seed=st.integers(0, 100_000),

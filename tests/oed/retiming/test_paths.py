@@ -49,6 +49,7 @@ def test_paths_must_be_finite_points(points):
         split_path(points, np.ones(2))
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 1000), tolerance=st.floats(1e-3, 1.0))
 def test_simplified_polylines_stay_within_the_tolerance(seed, tolerance):
     """Each point lies within the tolerance of the leg that replaces it, and both ends are kept."""

@@ -73,6 +73,7 @@ def test_a_line_under_a_jerk_limit_is_near_its_optimum():
     assert optimum - 1e-9 <= result.duration_after <= 1.01 * optimum
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("jerk", [True, False])
 def test_a_curve_gets_faster_and_keeps_path_and_limits(limits, seed, jerk):
@@ -91,6 +92,7 @@ def test_a_curve_gets_faster_and_keeps_path_and_limits(limits, seed, jerk):
     np.testing.assert_allclose(result.motion.q[[0, -1]], slow.q[[0, -1]], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_velocity_and_acceleration_are_the_derivatives_of_position(limits):
     """The three columns of the result belong together: each is the integral of the next by Simpson's rule."""
     motion = retime(_wave(seed=5), limits, period=PERIOD).motion
@@ -112,6 +114,7 @@ def test_there_and_back_stops_at_the_turn():
     assert result.motion.dq[turn, 0] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_pause_is_dropped():
     """A motion that rests on the way is split there, and the rest takes no time."""
     half = _wave(duration=4.0, n=2, seed=1)
@@ -154,6 +157,7 @@ class _Arm:
         return self.rigid(motion.q, motion.dq, motion.ddq) + self.friction(motion.dq)
 
 
+@pytest.mark.slow
 def test_torque_with_friction_keeps_its_limit_and_nearly_uses_it():
     """Rigid-body torque plus Coulomb and viscous friction, evaluated afresh at every sample, stays within the limit."""
     arm = _Arm()
@@ -213,6 +217,7 @@ def test_paths_that_make_no_sense_are_refused(limits):
         Toppra(grid=100)
 
 
+@pytest.mark.slow
 def test_the_summary_says_what_happened(limits):
     """The summary names durations, the most used limit and its joint."""
     result = retime(_wave(seed=3), limits, period=PERIOD)

@@ -61,6 +61,7 @@ def test_gravity_does_no_work_on_the_posed_joint(joint):
     assert np.abs(torque).max() > 1.0
 
 
+@pytest.mark.slow
 def test_the_fewest_joints_move_and_least():
     """Joints that do not help stay at home, and of equally good poses the one that moves fewer joints is taken."""
     robot = load_robot("er3a")

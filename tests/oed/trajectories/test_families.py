@@ -51,6 +51,7 @@ def test_any_coefficients_rest_where_they_started(name, harmonics, frequency, se
     assert np.abs(ddq).max() <= 2e-9 * made.duration * steep + 1e-8
 
 
+@pytest.mark.slow
 @EACH
 @settings(deadline=None, max_examples=25)
 @given(harmonics=st.integers(2, 8), seed=st.integers(0, 10_000), order=st.integers(0, 3))

@@ -69,6 +69,7 @@ def test_coefficients_round_trip():
     assert again.harmonics == 5
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(
     harmonics=st.integers(2, 12),

@@ -11,6 +11,7 @@ def _bounds(velocity=4.0, acceleration=16.0, jerk=320.0) -> JointBounds:
     return JointBounds(lower=-np.inf, upper=np.inf, velocity=velocity, acceleration=acceleration, jerk=jerk)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(
     distance=st.floats(1e-4, 50.0),
@@ -30,6 +31,7 @@ def test_the_fastest_stroke_is_ruckigs(distance, velocity, acceleration, jerk):
     assert profile.duration == pytest.approx(plan.duration, rel=1e-6)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(distance=st.floats(1e-3, 50.0), share=st.floats(0.01, 1.0), sign=st.sampled_from([-1, 1]))
 def test_a_stroke_is_smooth_and_ends_where_it_should(distance, share, sign):

@@ -116,6 +116,7 @@ def test_a_folder_of_another_user_is_not_trusted(fresh, needs_compiler, square, 
     assert isinstance(batch_function(square), VectorisedFunction)
 
 
+@pytest.mark.slow
 def test_another_compiler_builds_anew(fresh, needs_compiler, square, monkeypatch, tmp_path):
     """A library is used again only with the compiler, the processor and the source it was built for."""
     batch_function(square, "compiled")
@@ -126,6 +127,7 @@ def test_another_compiler_builds_anew(fresh, needs_compiler, square, monkeypatch
     assert len(list(fresh.glob("*.so"))) == 2
 
 
+@pytest.mark.slow
 def test_sines_of_vectors_are_done_without(fresh, needs_compiler, function, expected, monkeypatch, tmp_path):
     """Where the C library has no sines of whole vectors, they are taken one by one."""
     path, _ = compiled.compiler()

@@ -85,6 +85,7 @@ def test_out_of_a_wrong_shape_is_refused(backend, function):
         evaluate(*arguments, out=(second,))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["er3a", "ur10", "panda"])
 def test_both_evaluators_agree(name, catalogue_robot, states, needs_compiler):
     """Compiled and vectorised regressors and their adjoints agree to 1e-12 of their largest value."""

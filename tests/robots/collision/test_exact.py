@@ -26,6 +26,7 @@ def _coal(first, second) -> float:
     return coal.distance(*first, *second, coal.DistanceRequest(), coal.DistanceResult())
 
 
+@pytest.mark.slow
 def test_segments_are_as_far_apart_as_coal_says(segments):
     """The distance of 4,000 pairs of segments, parallel and degenerate ones among them, is coal's of thin capsules."""
     a0, a1, b0, b1 = segments(4000)
@@ -81,6 +82,7 @@ def test_boxes_are_as_far_as_coal_says(segments):
         assert ours == pytest.approx(max(expected, 0), abs=2e-6 if expected > 2e-3 else 2e-3)
 
 
+@pytest.mark.slow
 def test_boxes_against_a_search_along_the_segment(segments):
     """The distance to a box is the smallest along the segment, also where an edge runs along a face."""
     x0, x1, half, _ = segments(300, seed=3)

@@ -95,6 +95,7 @@ def test_another_choice_of_joints_has_no_stated_capsules():
     assert set(model.assumed) == {"base", "link 1", "link 2", "link 3"}
 
 
+@pytest.mark.slow
 def test_other_limits_keep_the_stated_capsules():
     """A robot whose limits were changed has the shapes of its file."""
     robot = load_robot("er3a")
@@ -102,6 +103,7 @@ def test_other_limits_keep_the_stated_capsules():
     assert collision_model(slower).names == collision_model(robot).names
 
 
+@pytest.mark.slow
 def test_assumed_shapes_of_the_catalogue_warn_once(monkeypatch):
     """The shapes of the ER3A are assumed, which is said once; those of the Panda are the maker's."""
     monkeypatch.setattr(loading, "_warned", set())

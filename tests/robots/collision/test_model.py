@@ -53,6 +53,7 @@ def test_smooth_clearances_are_a_little_smaller(model, poses):
     assert (smooth[~free] < 0).all()
 
 
+@pytest.mark.slow
 def test_gradients_are_exact(model, poses):
     """Gradients agree with central differences of the smooth clearance and are zero for joints that don't matter."""
     q, step = poses[:60], 1e-6
@@ -67,6 +68,7 @@ def test_gradients_are_exact(model, poses):
         np.testing.assert_array_equal(gradients[:, still, joint], 0.0)
 
 
+@pytest.mark.slow
 def test_compiled_and_vectorised_agree(monkeypatch):
     """The compiled clearances are the vectorised ones."""
     robot = load_robot("er3a")
@@ -126,6 +128,7 @@ def test_neighbours_and_what_always_touches_are_not_watched():
         assert text in model.summary()
 
 
+@pytest.mark.slow
 def test_the_choice_of_pairs_is_the_same_every_time():
     """Pairs and exclusions do not change from one making to the next."""
     robot = load_robot("panda")
@@ -179,6 +182,7 @@ def test_capsules_enclose_the_arm(name):
         assert any(inside), f"{name}: the end of link {link}"
 
 
+@pytest.mark.slow
 def test_models_cross_process_borders():
     """A pickled model gives the same clearances."""
     model = collision_model(load_robot("er3a"), scene=_scene())

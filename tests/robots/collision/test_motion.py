@@ -46,6 +46,7 @@ def model(request, slider_chain, arm, limits):
     return collision_model(load_robot(request.param), scene=Scene(obstacles=(floor(-0.5),)))
 
 
+@pytest.mark.slow
 def test_no_point_travels_farther_than_the_bound(model):
     """Seen from the first body, no end of the second's spine moves more between two samples than the bound says."""
     motion = _wave(model.chain.n, 0.5, 0.3, 2.0, 0.1)
@@ -152,6 +153,7 @@ def test_a_disagreement_is_not_confirmed(monkeypatch, limits):
     assert report.confirmed is False
 
 
+@pytest.mark.slow
 def test_blocks_of_a_long_motion_meet(monkeypatch, model):
     """A motion searched in blocks gives what it gives in one."""
     motion = _wave(model.chain.n, 0.3, 0.2, 2.0, 0.02)

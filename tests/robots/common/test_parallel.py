@@ -79,6 +79,7 @@ def jobs(tmp_path, monkeypatch):
     sys.modules.pop("parallel_jobs", None)
 
 
+@pytest.mark.slow
 def test_processes_keep_the_order_and_use_one_blas_thread(jobs, monkeypatch):
     """Results come in order, from other processes with one BLAS thread; the environment is restored."""
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
@@ -90,6 +91,7 @@ def test_processes_keep_the_order_and_use_one_blas_thread(jobs, monkeypatch):
     assert dict(os.environ) == before
 
 
+@pytest.mark.slow
 def test_exception_crosses_processes_as_itself(jobs):
     """An error of ours arrives with its kind and fields."""
     from robots.common.errors import InfeasibleError
@@ -99,6 +101,7 @@ def test_exception_crosses_processes_as_itself(jobs):
     assert (caught.value.problem, caught.value.joint) == ("no motion", 2)
 
 
+@pytest.mark.slow
 def test_death_of_a_worker_is_explained(jobs):
     """A worker that ends abruptly is an error of ours that says what to do."""
     with pytest.raises(OedError, match="__main__"):
@@ -218,6 +221,7 @@ def test_at_least_one_core_is_available(monkeypatch):
     assert available_cores() == 1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals to a process group")
 def test_interrupt_from_a_terminal_ends_workers_without_their_tracebacks(tmp_path):
     """An interrupt of the process group ends the script by KeyboardInterrupt soon, and workers write nothing."""

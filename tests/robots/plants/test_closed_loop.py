@@ -41,6 +41,7 @@ def one_joint(turning, spring, passes=25):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("turning", "spring"),
     [

@@ -40,6 +40,7 @@ def test_any_chain(seed, n, random_robot, twin, states):
     agree(robot, twin, states(robot, 5, seed))
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10_000), n=st.integers(2, 8))
 def test_a_joint_feels_only_the_links_it_carries(seed, n, random_robot):

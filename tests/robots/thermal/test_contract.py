@@ -40,6 +40,7 @@ def oracle(model: ThermalModel, power: float, t: np.ndarray, start: float) -> np
     return oracles.integrate(model.name, model.values, lambda _: power, t, begin)[:, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("power", "start"), [(97.65, 20.0), (0.0, 45.0), (40.0, 33.0)])
 def test_the_response_to_constant_power_is_the_solution(model: ThermalModel, power: float, start: float) -> None:
     """The closed form (eq. 110, 122, 141) solves the heat balance to 1e-6 of the temperature's change."""
@@ -51,6 +52,7 @@ def test_the_response_to_constant_power_is_the_solution(model: ThermalModel, pow
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=(3e-6 if isinstance(model, Fractional) else 1e-6) * scale)
 
 
+@pytest.mark.slow
 def test_steps_of_any_length_agree(model: ThermalModel) -> None:
     """Powers that change from step to step, over seconds or hours, are followed exactly."""
     rng = np.random.default_rng(1)

@@ -92,6 +92,7 @@ def test_a_zero_spread_ignores_residuals_at_first() -> None:
     assert online.temperatures[0] == pytest.approx(20.0, abs=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on the path")
 def test_c_does_the_same(model: ThermalModel, tmp_path: Path) -> None:
     """The generated C compiles without warnings and gives Python's torques and temperatures to rounding."""

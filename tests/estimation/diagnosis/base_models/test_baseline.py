@@ -49,6 +49,7 @@ def test_friction_that_turns_round_at_once_leaves_nothing(
     assert np.all(result.baseline < 0.006)
 
 
+@pytest.mark.slow
 def test_beside_reversals_a_fit_to_the_other_rows_leaves_no_more_than_the_torque(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable
 ) -> None:

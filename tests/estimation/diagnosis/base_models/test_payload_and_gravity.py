@@ -33,6 +33,7 @@ def logs(arm: Robot, arm_log: Callable[..., Log]) -> tuple[Log, Log]:
     return first, replace(second, t=second.t + start, payload=_point(MASS, CENTRE))
 
 
+@pytest.mark.slow
 def test_a_known_payload_is_taken_off_and_felt(arm: Robot, logs: tuple[Log, Log]) -> None:
     """The torque that is subtracted and added to the rigid-body torque is pinocchio's torque of the point mass."""
     recording = build_recording(arm, logs)

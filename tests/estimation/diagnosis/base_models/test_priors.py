@@ -37,6 +37,7 @@ def test_a_direction_without_data_goes_to_the_target() -> None:
     assert values == pytest.approx([3.0, 5.0], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_standing_joint_does_not_make_another_motion_absurd(arm: Robot, arm_log: Callable[..., Log]) -> None:
     """After a fit to a log in which joint 2 rests, the error on a full motion is at most four times the torque RMS.
 

@@ -104,6 +104,7 @@ def _forces(robot: Robot, flange: Flange, state: Situation, X: np.ndarray) -> np
     return forces
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frequency", [0.6, 1.5, 3.0])
 def test_columns_are_the_torque_against_masses_on_springs(
     flange: Flange, robot: Robot, state: Situation, frequency: float
@@ -121,6 +122,7 @@ def test_columns_are_the_torque_against_masses_on_springs(
             assert np.all(error < 0.01 * np.sqrt(np.mean(expected**2)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
 def test_a_tank_of_other_damping_is_a_mixture_of_both_phases(
     flange: Flange, robot: Robot, state: Situation, factor: float
@@ -168,6 +170,7 @@ def test_level_is_across_gravity_and_upright_along_it(
     assert np.abs(along[:, 2:]).max() > 0.1 * size
 
 
+@pytest.mark.slow
 def test_each_log_begins_at_rest_under_its_own_gravity(robot: Robot) -> None:
     """The oscillator starts each log at rest, and the vertical direction is that of the log's own gravity."""
     t = PERIOD * np.arange(500)

@@ -78,6 +78,7 @@ def test_its_period_is_proposed_out_of_noise(moved: Situation, pushed: np.ndarra
     )
 
 
+@pytest.mark.slow
 def test_a_period_with_which_the_motion_repeats_is_none() -> None:
     """Periods of the motion are not tried, and none at all if logs are hours apart."""
     periodic = _moved(2 * np.pi / 6.0 * np.array([1.0, 2.0, 3.0, 1.0, 2.0, 3.0]))

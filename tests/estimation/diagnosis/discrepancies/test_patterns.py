@@ -123,6 +123,7 @@ def test_a_stranger_is_told_by_what_it_depends_on(
         assert values["frequency"] == pytest.approx(1.13 if "odd" in pattern else 0.27, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_line_is_proposed_at_its_top(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:

@@ -134,6 +134,7 @@ def test_limits_grow_as_the_root_of_the_time(ur10):
     np.testing.assert_allclose(np.array(sizes[0]) / sizes[1], 2.0, rtol=0.1)  # ten of the slowest periods against 2.5
 
 
+@pytest.mark.slow
 def test_a_joint_at_rest_is_told(ur10):
     """Friction of a joint that does not move has a note and no limit; the limits of other joints are finite."""
     model = default_model(ur10, velocity_scale=2e-3)
@@ -155,6 +156,7 @@ def test_unknown_dynamics_are_refused():
         planned_limits(model, model.nominal, [_motion(500)])
 
 
+@pytest.mark.slow
 def test_a_log_shorter_than_the_slowest_heat_is_told(ur10):
     """For a short log the limit of a thermal effect notes that longer time constants cannot be distinguished."""
     model = default_model(ur10, velocity_scale=2e-3)

@@ -56,6 +56,7 @@ def _guess(problem, name, joint, shape, share):
     return Guess(hypothesis, shape, weights * share * np.sqrt(np.mean(problem.recording.tau[:, row] ** 2)) / size)
 
 
+@pytest.mark.slow
 def test_every_kind_has_its_motions(problem):
     """Each kind of experiment that an effect can name has a generator of its motions."""
     assert set(MAKERS) == set(EXPERIMENTS)
@@ -113,6 +114,7 @@ def test_heat_is_not_told_by_going_on_at_once(problem):
     assert plan.resolves > 0.99
 
 
+@pytest.mark.slow
 def test_heat_of_the_logs_goes_on_in_the_experiment(problem):
     """An experiment after the logs shows the same as the second part of one that begins with the logs' motion."""
     recording = problem.recording
@@ -250,6 +252,7 @@ def test_limits_of_zero_are_no_limits(problem):
             assert np.isfinite(stage.motion.q).all()
 
 
+@pytest.mark.slow
 def test_the_experiment_starts_from_the_arm_itself(problem):
     """A payload in the first log does not change the information of an experiment without it."""
     body = point_mass(6.0, (0.0, 0.1, 0.2))
@@ -268,6 +271,7 @@ def test_the_experiment_starts_from_the_arm_itself(problem):
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_a_tilted_base_counts_with_the_parameters_that_it_shows(problem):
     """With a tilted base, the first joint's first moments, which level logs do not determine, are fitted, too."""
     causes = [_guess(problem, "spring", 1, (0.0, 0.0), 0.02), _guess(problem, "torque_constant_error", 1, (), 0.02)]

@@ -52,6 +52,7 @@ def test_what_one_joint_alone_tells_is_no_common_coefficient() -> None:
     assert agreed < 0.01 * _shared(1.0, 1.0, 1.0, 1.0)[0]
 
 
+@pytest.mark.slow
 def test_reversals_tell_a_delay_no_better_than_their_moments_are_known() -> None:
     """Information g from reversals with time error m is reduced to 1 / (1 / g + m^2); other rows count in full."""
     robot = load_robot("ur10")
@@ -96,6 +97,7 @@ def test_a_joint_whose_other_effects_formula_may_hide_it_need_not_agree() -> Non
     assert shared_coefficient_gain(gram, alone, apart) < 0.02 * float(alone.sum() ** 2 / gram.sum())
 
 
+@pytest.mark.slow
 def test_what_other_effects_explain_on_a_joint_makes_its_own_coefficient_doubtful() -> None:
     """The formula variance of a joint's coefficient is from 5 % of the torque of accepted effects there."""
     robot = load_robot("ur10")

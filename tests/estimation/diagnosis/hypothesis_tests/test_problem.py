@@ -41,6 +41,7 @@ def _written_out(problem: Problem, extra: np.ndarray) -> tuple[float, float]:
     return left[0], left[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["asymmetric_friction", "payload_change", "torque_sensor_drift"])
 def test_a_score_is_the_fall_of_the_squared_residual(problem: Problem, name: str) -> None:
     """The gain of a hypothesis is the decrease of the squared residual in plain least squares."""

@@ -24,6 +24,7 @@ SIZE = 0.5  # N m
 ERRORS = [0.01, 0.02, 0.03, 0.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("before", "after", "open_"),
     [(0.0, 0.0, ()), (0.4, 0.0, (0,)), (0.0, -0.4, (1,)), (0.4, 0.4, (0, 1))],
@@ -51,6 +52,7 @@ def test_a_push_that_goes_on_has_no_edge_there(
     assert open_event_edges(problem, member, [], ERRORS) == wanted
 
 
+@pytest.mark.slow
 def test_a_push_at_the_log_s_end_and_what_is_no_push_have_their_errors(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:

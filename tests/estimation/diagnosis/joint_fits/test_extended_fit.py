@@ -46,6 +46,7 @@ def _estimable(problem: Problem, member: FittedEffect) -> np.ndarray:
     return np.linalg.norm(null, axis=0)[-len(member.coefficients) :] < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "joint", "shape"),
     [("payload_change", None, (MIDDLE, 1.0)), ("torque_sensor_drift", 1, None), ("friction_step", 2, (MIDDLE,))],
@@ -101,6 +102,7 @@ def test_a_change_between_two_logs_is_within_the_pause(
     assert 1.96 * error == pytest.approx((begins - ends) / 2, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pattern:load:0:even", "load_dependent_friction", "joint_elasticity"])
 def test_the_model_is_what_was_fitted(
     arm: Robot, recording: Recording, pose_arm: Callable[..., Problem], tmp_path: Path, name: str
@@ -131,6 +133,7 @@ def test_the_model_is_what_was_fitted(
         assert np.abs(other - base - own).max() > 1e-3 * recording.tau.std()
 
 
+@pytest.mark.slow
 def test_a_vibration_keeps_its_phase_in_a_later_motion(
     recording: Recording, pose_arm: Callable[..., Problem], tmp_path: Path
 ) -> None:
@@ -157,6 +160,7 @@ def _rows(recording: Recording, rows: slice) -> dict[str, object]:
     return {"starts": (0,), **{name: getattr(recording, name)[rows] for name in names}}
 
 
+@pytest.mark.slow
 def test_no_log_knows_a_delay_better_than_its_formula(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:

@@ -62,6 +62,7 @@ def _members(problem: Problem, *places: Hypothesis) -> list[FittedEffect]:
     return sorted(found, key=lambda m: places.index(m.hypothesis))
 
 
+@pytest.mark.slow
 def test_a_friction_by_the_load_is_asked_for_with_the_spring_that_the_gear_bears(
     recording: Recording, pose_arm: Callable[..., Problem]
 ) -> None:
@@ -75,6 +76,7 @@ def test_a_friction_by_the_load_is_asked_for_with_the_spring_that_the_gear_bears
     assert (weight.effect.name, weight.joint, weight.shape) == ("spring", 1, found[0].shape)
 
 
+@pytest.mark.slow
 def test_the_load_is_what_base_model_and_spring_have_together(
     arm: Robot,
     recording: Recording,
@@ -146,6 +148,7 @@ def test_the_model_is_what_was_fitted_with_a_load_that_the_gear_bears(
             load_model(tmp_path)
 
 
+@pytest.mark.slow
 def test_nothing_is_borne_of_what_no_gear_feels(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """Friction does not load a gear; a spring does, but improves no fit without load-dependent effects."""
     problem = pose_arm(recording)

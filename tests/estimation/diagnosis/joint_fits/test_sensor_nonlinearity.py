@@ -23,6 +23,7 @@ from robots.terms.effects import EFFECTS
 SATURATION, TILT = Hypothesis(EFFECTS["torque_constant_saturation"], 1), Hypothesis(EFFECTS["base_tilt"], None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [0.85, 0.3, -0.25])
 def test_base_model_and_a_false_reading_are_told_apart(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], error: float
@@ -77,6 +78,7 @@ def test_slopes_of_a_reading_are_exact(
     np.testing.assert_allclose(slopes[:, 1], (torque(0, h) - torque(0, -h)) / (2 * h), atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [2.0, -0.2])
 def test_a_reading_is_undone(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], error: float

@@ -59,6 +59,7 @@ def test_a_velocity_is_as_uncertain_as_its_exponent_lets_it_be(
     assert abs(np.log(velocity / SPEED)) < told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "told"), [(0.0, True), (1.0, True), (0.0, False)])
 def test_a_choice_is_told_where_the_other_explains_less(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], share: float, told: bool
@@ -77,6 +78,7 @@ def test_a_choice_is_told_where_the_other_explains_less(
         assert member.shape[2] == share
 
 
+@pytest.mark.slow
 def test_a_moment_while_the_drive_is_at_its_limit_may_be_anywhere_there(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:

@@ -43,6 +43,7 @@ def hidden(
     return pose_arm(replace(recording, tau=tau)), true, limit
 
 
+@pytest.mark.slow
 def test_all_of_the_torque_is_known_beside_what_cuts_it_off(hidden: tuple[Problem, np.ndarray, float]) -> None:
     """The total torque is known to 3 % of the clipped part; a base model fitted to the clipped log is not."""
     problem, true, limit = hidden
@@ -68,6 +69,7 @@ def test_all_of_the_torque_is_known_beside_what_cuts_it_off(hidden: tuple[Proble
     assert again.coefficients[0] == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_problem_whose_torque_nothing_cuts_off_stays_as_it_is(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
@@ -76,6 +78,7 @@ def test_a_problem_whose_torque_nothing_cuts_off_stays_as_it_is(
     assert with_total_torque(problem, [], [CLIPPING, OTHER]) is problem
 
 
+@pytest.mark.slow
 def test_noise_that_is_cut_off_is_lost_on_average(hidden: tuple[Problem, np.ndarray, float]) -> None:
     """The column is the mean loss of noisy torques, to three standard errors, at every level."""
     problem, _, limit = hidden
@@ -96,6 +99,7 @@ def test_noise_that_is_cut_off_is_lost_on_average(hidden: tuple[Problem, np.ndar
     np.testing.assert_allclose(told, lost, atol=3 * 0.03 * limit / np.sqrt(5000) + 0.002 * limit)
 
 
+@pytest.mark.slow
 def test_an_extended_model_cuts_off_all_of_its_torque(hidden: tuple[Problem, np.ndarray, float]) -> None:
     """A model clips the sum of base model and other effects, in any order of its extensions."""
     problem, _, limit = hidden

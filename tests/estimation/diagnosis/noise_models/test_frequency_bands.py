@@ -78,6 +78,7 @@ def test_a_larger_inertia_is_known_further(counted: tuple[Recording, np.ndarray,
     assert unbiased_frequencies(recording, 3 * np.eye(1), noise) < unbiased_frequencies(recording, np.eye(1), noise)
 
 
+@pytest.mark.slow
 def test_without_encoder_noise_nothing_is_biased(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
     """Without acceleration errors, or without inertia, the frequency is infinite."""
     recording, _, noise = counted

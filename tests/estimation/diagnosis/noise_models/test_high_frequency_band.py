@@ -56,6 +56,7 @@ def _cosine(problem: Problem) -> tuple[float, float]:
     return float(group.cross[0] / group.gram[0, 0]), float(group.gram[0, 0] ** -0.5)
 
 
+@pytest.mark.slow
 def test_a_ripple_tells_its_energy_over_the_noise(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """The information above the band is the wave's energy between both cut-offs over the noise density.
 
@@ -95,6 +96,7 @@ def test_the_slope_has_the_products_of_an_effect_with_the_residual(
         assert abs(group.cross[0]) > 4 * np.sqrt(group.gram[0, 0])
 
 
+@pytest.mark.slow
 def test_what_shakes_the_arm_is_no_inertia(arm: Robot, recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """A vibration above the band keeps its energy, because the arm's response does not count as inertia torque."""
     model = default_model(arm)
@@ -121,6 +123,7 @@ def test_what_shakes_the_arm_is_no_inertia(arm: Robot, recording: Recording, pos
     assert found.gain > 30.0  # noise exceeds this once in 10,000
 
 
+@pytest.mark.slow
 def test_only_fast_effects_are_measured_there(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """An effect by acceleration has no rows above the band, and a slow signal has almost no energy there."""
     problem = pose_arm(recording, wider=MAX_HIGH_BAND_ERROR)
@@ -140,6 +143,7 @@ def test_found_beside_it_a_ripple_is_taken_off(recording: Recording, pose_arm: C
     assert score(problem, group, accepted).gain == pytest.approx(0.0, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_the_extended_model_knows_it_as_well(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """Rows above the band reduce the standard errors of coefficients at least as much as in a score."""
     energies, extended = [], []
@@ -154,6 +158,7 @@ def test_the_extended_model_knows_it_as_well(recording: Recording, pose_arm: Cal
     assert np.all(extended[1] / extended[0] < 1.4 * energies[1] / energies[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut_off", [0, 30])
 @pytest.mark.parametrize("same", [True, False])
 def test_noise_that_repeats_with_the_motion_tells_less(
@@ -179,6 +184,7 @@ def test_noise_that_repeats_with_the_motion_tells_less(
     assert energies[1] / energies[0] == pytest.approx(5.0 if same else 1.0, rel=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("periods", [0.0, 2.95])
 def test_noise_is_levelled(clean: Recording, pose_arm: Callable[..., Problem], periods: float) -> None:
     """Noise that grows with frequency has unit density above the band after whitening.
@@ -202,6 +208,7 @@ def test_noise_is_levelled(clean: Recording, pose_arm: Callable[..., Problem], p
             assert power[(f >= low) & (f < high)].mean() == pytest.approx(1.0, abs=0.4)
 
 
+@pytest.mark.slow
 def test_a_log_in_which_a_joint_stands_levels_no_noise(clean: Recording, pose_arm: Callable[..., Problem]) -> None:
     """A longer log in which a joint rests does not change that joint's noise level above the band.
 
@@ -231,6 +238,7 @@ def test_a_log_in_which_a_joint_stands_levels_no_noise(clean: Recording, pose_ar
     assert power[(f > cutoffs[1]) & (f < 0.8 * cutoffs[0])].mean() == pytest.approx(1.0, abs=0.4)
 
 
+@pytest.mark.slow
 def test_a_vibration_above_the_band_is_told(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """A steady oscillation between both cut-offs is significant with the rows above the band only."""
     size = 0.03

@@ -49,6 +49,7 @@ def _density(whitening: Whitening, recording: Recording, joint: int) -> np.ndarr
     return np.asarray(2 * step * whitening.scale[joint] ** 2 / np.abs(1 - lags @ a) ** 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [0.0, 1.5])
 def test_neither_rests_nor_effects_colour_the_noise(arm: Robot, arm_plant: Callable, stiffness: float) -> None:
     """With rests and a cubic spring of ten times the noise, the density is right to a factor of 1.5.
@@ -77,6 +78,7 @@ def test_neither_rests_nor_effects_colour_the_noise(arm: Robot, arm_plant: Calla
         assert _density(naive, recording, 0)[1] > 10 * true[1]
 
 
+@pytest.mark.slow
 def test_a_short_log_has_no_free_functions(arm: Robot, arm_plant: Callable) -> None:
     """A log of ten seconds has no nuisance functions, because they would absorb the noise."""
     log = simulate(arm_plant(torque_noise=0.01), _moves(0), seed=0)

@@ -79,6 +79,7 @@ def test_few_rows_are_lost(arm: Robot, fourier_motion: Callable) -> None:
     assert recording.sign_unknown.mean() < 0.15
 
 
+@pytest.mark.slow
 def test_no_more_rows_are_lost_at_a_reversal_than_a_kick_spreads_to(arm: Robot, fourier_motion: Callable) -> None:
     """Without jumps of acceleration no row is flagged; with a fine encoder two, with a coarse one six or more.
 
@@ -91,6 +92,7 @@ def test_no_more_rows_are_lost_at_a_reversal_than_a_kick_spreads_to(arm: Robot, 
     assert _beside(_counted(motion, kicked, 2**15), arm) >= 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("counts", [2.0**15, 2.0**20, 2.0**26, 2.0**40])
 def test_rows_that_count_beside_a_reversal_have_a_velocity_that_is_known(
     arm: Robot, fourier_motion: Callable, counts: float
@@ -129,6 +131,7 @@ def test_rows_beside_a_reversal_count_of_joints_that_are_trusted_alone(arm: Robo
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("counts", "loop", "most"),
     [
@@ -159,6 +162,7 @@ def test_a_jolt_is_what_a_kick_may_leave_of_the_acceleration(
     assert smooth.reversal_acceleration_error[0] < recording.reversal_acceleration_error[0] / 30
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("counts", [2.0**26, 2.0**30, 2.0**40])
 def test_moments_of_reversals_are_as_wrong_as_is_said(arm: Robot, fourier_motion: Callable, counts: float) -> None:
     """The error of reversal times is estimated within a factor of three."""

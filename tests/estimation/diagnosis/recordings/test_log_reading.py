@@ -49,6 +49,7 @@ def test_a_repeated_motion_is_known_better_than_a_single_pass(arm: Robot, fourie
     assert np.all(error[200:-200].std(axis=0) < 0.01 * motion.ddq.std(axis=0))
 
 
+@pytest.mark.slow
 def test_a_log_that_begins_in_motion_is_known_to_its_ends(arm: Robot) -> None:
     """With a fine encoder, acceleration errors at the ends are at most 1.5 times those in the middle."""
     rng = np.random.default_rng(0)
@@ -83,6 +84,7 @@ def test_a_slow_motion_is_known_to_the_ends_of_a_log_that_cuts_it(arm: Robot) ->
         assert np.all(np.sqrt(np.mean(end**2, axis=0)) < 10 * within)
 
 
+@pytest.mark.slow
 def test_logs_share_one_clock(arm: Robot, fourier_motion: Callable) -> None:
     """Logs are ordered by their times; overlapping logs are refused."""
     log = _log(fourier_motion(arm, duration=20.0), 2**20)

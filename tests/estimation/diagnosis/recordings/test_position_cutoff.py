@@ -33,6 +33,7 @@ def logs(arm_plant: Callable, fourier_motion: Callable, arm: Robot) -> tuple[Log
     return log, smeared(log, 5e-4)
 
 
+@pytest.mark.slow
 def test_coloured_noise_is_kept_out_of_the_acceleration(arm: Robot, logs: tuple[Log, Log], fourier_motion) -> None:
     """With coloured noise, the acceleration error is less than a third of that with the cut-off from the spectrum."""
     noisy = logs[1]

@@ -48,6 +48,7 @@ def test_only_a_log_that_no_parameters_explain_is_hopeless(arm: Robot, logs: lis
     assert 0.8 < found[1] <= 1.0
 
 
+@pytest.mark.slow
 def test_where_all_are_hopeless_none_is_left_out(arm: Robot, logs: list[Log]) -> None:
     """A single log is never left out, and neither are logs that are all unusable."""
     assert not _found(arm, [_ringing(logs[0], [0, 1])])

@@ -128,6 +128,7 @@ def test_positions_that_say_too_little_of_reversals_say_nothing(cases: Callable)
     assert np.isinf(timing.errors[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cutoff", "step"), [(5.0, 0.004), (20.0, 0.004), (40.0, 0.01), (60.0, 0.001)])
 def test_a_table_is_the_motion_of_a_force_that_a_loop_undoes(cutoff: float, step: float) -> None:
     """The tabulated acceleration integrates to velocity and position, with little energy in the passed band."""
@@ -175,6 +176,7 @@ def test_joints_whose_rows_count_are_timed_where_that_tells_far_more(recording: 
     assert timing.beside(both) is None
 
 
+@pytest.mark.slow
 def test_what_reversals_tell_counts_as_one_row_for_each_joint(
     pose_arm: Callable[..., Problem], recording: Recording
 ) -> None:

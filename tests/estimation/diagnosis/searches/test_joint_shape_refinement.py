@@ -34,6 +34,7 @@ def problem(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Pro
     return pose_arm(replace(recording, tau=recording.tau + gear + iron))
 
 
+@pytest.mark.slow
 def test_together_they_leave_the_valley_in_which_one_does_what_the_other_should(problem: Problem) -> None:
     """Joint refinement finds both true shapes, where refining one effect after the other does not."""
     alone = refine(problem, LOAD, (1.0, 0.0), accept(problem, ()))
@@ -48,6 +49,7 @@ def test_together_they_leave_the_valley_in_which_one_does_what_the_other_should(
     assert refine_shapes_jointly(problem, [alone]) == [alone]
 
 
+@pytest.mark.slow
 def test_what_explains_far_more_beside_another_form_is_taken_with_it(problem: Problem) -> None:
     """A candidate is added with a refit of the first effect if that increases its gain much; otherwise it is not."""
     alone = refine(problem, LOAD, (1.0, 0.0), accept(problem, ()))

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
@@ -23,6 +24,7 @@ LOST = 0.25
 """Of the shoulder's largest torque."""
 
 
+@pytest.mark.slow
 def test_torque_that_is_cut_off_does_not_draw_the_base_model(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
@@ -60,6 +62,7 @@ def test_torque_that_is_cut_off_does_not_draw_the_base_model(
     )
 
 
+@pytest.mark.slow
 def test_little_is_searched_anew_where_it_changes_what_was_found(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem]
 ) -> None:
@@ -79,6 +82,7 @@ def test_little_is_searched_anew_where_it_changes_what_was_found(
     )
 
 
+@pytest.mark.slow
 def test_a_search_is_done_again_where_the_slow_part_of_the_noise_is_smaller(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable[..., Motion], pose_arm: Callable[..., Problem]
 ) -> None:

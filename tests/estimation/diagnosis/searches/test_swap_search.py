@@ -104,6 +104,7 @@ def late(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Proble
     return pose_arm(replace(recording, tau=tau + ripple))
 
 
+@pytest.mark.slow
 def test_a_rival_on_the_joint_of_the_newest_takes_the_place_of_one_that_won(late: Problem) -> None:
     """A lag of joint 1 is replaced by a delay of all joints, once the ripple on joint 2 is in the model."""
     lag = refine(late, LAG, (0.003,), accept(late, ()))

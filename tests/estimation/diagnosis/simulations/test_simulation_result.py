@@ -24,6 +24,8 @@ from robots.regressor import default_model
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
 
+pytestmark = pytest.mark.slow
+
 
 def member(effect: str, joint: int | None, shape: tuple[float, ...], coefficients: list[float]) -> FittedEffect:
     """Builds an effect as a diagnosis would have found it."""
@@ -41,7 +43,6 @@ def found(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> Diagnosi
     return diagnose(arm, logs[0], held_out=later, candidates=("spring", "stribeck"), friction="coulomb-viscous")
 
 
-@pytest.mark.slow
 def test_the_simulated_robot_comes_nearer_with_what_was_found(found: Diagnosis) -> None:
     """On the joint with the spring, correction and position error fall by more than half."""
     assert found.verdict == "named"
@@ -80,7 +81,6 @@ def test_it_is_written_and_read(found: Diagnosis, tmp_path: object) -> None:
     assert load_model(tmp_path).extensions  # type: ignore[arg-type]
 
 
-@pytest.mark.slow
 def test_where_nothing_is_found_nothing_is_simulated(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:
     """A diagnosis without findings has no simulation."""
     log = simulate(arm_plant(torque_noise=0.02), fourier_motion(arm, 0))
@@ -103,7 +103,6 @@ def planar(q: np.ndarray, v: np.ndarray, push: np.ndarray) -> np.ndarray:
     return np.linalg.solve(M, push - bias)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("stribeck", [False, True], ids=["base", "extended"])
 def test_the_arm_moves_as_an_independent_solver_says(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable, stribeck: bool

@@ -55,6 +55,7 @@ def narrow(arm: Robot, arm_log: Callable[..., Log]) -> tuple[Recording, Recordin
     return replace(small, tau=Y_small @ values), replace(whole, tau=Y @ values)
 
 
+@pytest.mark.slow
 def test_forms_of_a_spring_that_fit_alike_are_listed(
     pose_arm: Callable[..., Problem], narrow: tuple[Recording, Recording]
 ) -> None:

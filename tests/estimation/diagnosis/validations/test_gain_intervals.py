@@ -118,6 +118,7 @@ def _other_motion(seed: int, effect: float, there: float) -> HeldOutErrors:
     return held_out_errors(problem, [X], other, Z, [W], GaussianPrior(np.zeros((3, 3)), np.zeros(3)))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_true_effect_is_seldom_called_harmful_by_a_log_that_leaves_the_base_open() -> None:
     """At most 12 of 200 true effects are called harmful, though many have a larger held-out error.
 

@@ -47,6 +47,7 @@ def found_in(robot: Robot, log: Log, **options: object) -> tuple[MeasuredComplia
     return measure_gear_compliance(base.situation(recording, values), recording, [log], false_alarm=0.01, **options)
 
 
+@pytest.mark.slow
 def test_the_stiffness_of_a_gear_is_measured(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:
     """Compliance, delay and lost motion are within 3.5 standard errors, on the elastic joint only.
 
@@ -128,6 +129,7 @@ def test_a_diagnosis_says_what_the_encoders_measured(twisted: Diagnosis, tmp_pat
     assert again.to_dict() == twisted.to_dict()
 
 
+@pytest.mark.slow
 def test_without_encoders_nothing_is_measured(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> None:
     """A log without link positions gives no measured compliance."""
     assert found_in(arm, simulate(arm_plant(), fourier_motion(arm, 2))) == ()

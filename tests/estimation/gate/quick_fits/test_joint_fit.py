@@ -37,6 +37,7 @@ def test_rounding_is_no_column(er3a, rows):
     assert not scaled[:, : len(silent)][:, silent].any()
 
 
+@pytest.mark.slow
 def test_the_whole_fit_leaves_out_each_fold(er3a, rows):
     """Errors on held-out sixths equal those of dense ridge regression, row by row."""
     n, p = er3a.n, rows.bodies

@@ -25,6 +25,8 @@ from robots.regressor import default_model
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
 
+pytestmark = pytest.mark.slow
+
 PAIR = "stribeck:2,load_dependent_friction:2"
 
 
@@ -83,7 +85,6 @@ def test_every_kind_keeps_all_limits_and_rests_at_home(kind: str, workshop: Expe
         assert np.abs(step).max() <= limits.jerk.max() * two.period**3 / 6
 
 
-@pytest.mark.slow
 def test_files_say_what_to_play_and_how_sure_it_is(found: Discrimination, two: Robot, tmp_path: Path) -> None:
     """The saved trajectory is the motion that was judged; the file gives kind, reason, chance and segments."""
     found.save(tmp_path)
@@ -97,7 +98,6 @@ def test_files_say_what_to_play_and_how_sure_it_is(found: Discrimination, two: R
     assert data["segments"][-1]["end"] == pytest.approx(motion.duration)
 
 
-@pytest.mark.slow
 def test_more_noise_needs_larger_effects(two: Robot, found: Discrimination) -> None:
     """What a rival leaves goes with the inverse square of the noise: twice the noise, twice the smallest size."""
     noisy = discriminate(two, PAIR, noise=2 * found.noise)

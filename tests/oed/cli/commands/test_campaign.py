@@ -41,6 +41,7 @@ def test_a_campaign_is_written_whole(run: Callable[..., Any], robot: Path, exper
     assert "the file exists" in again.err
 
 
+@pytest.mark.slow
 def test_a_campaign_and_its_stages_play(run: Callable[..., Any], robot: Path, planned: Path, tmp_path: Path) -> None:
     """Oed simulate plays the whole campaign, a log a cycle, and any of its stages."""
     done = run("simulate", "--campaign", planned, "--out", tmp_path / "logs", "--json")
@@ -68,6 +69,7 @@ def test_without_a_design_a_quick_one_is_made(run: Callable[..., Any], robot: Pa
     assert "comes from a quick search" in done.out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
@@ -108,6 +110,7 @@ def test_a_joint_that_cannot_move_is_infeasible(run: Callable[..., Any], stuck: 
     assert "joint 2" in done.err
 
 
+@pytest.mark.slow
 def test_a_design_of_another_robot_is_refused(run: Callable[..., Any], experiment: Path, tmp_path: Path) -> None:
     """The design must be for the campaign's robot."""
     done = run("campaign", "--robot", "er3a", "--design", experiment, "--out", tmp_path / "out", "--quiet")
@@ -115,6 +118,7 @@ def test_a_design_of_another_robot_is_refused(run: Callable[..., Any], experimen
     assert "for two, not for er3a" in done.err
 
 
+@pytest.mark.slow
 def test_simulate_plays_one_thing(run: Callable[..., Any], robot: Path, planned: Path) -> None:
     """A trajectory and a campaign at once are bad input."""
     line = ("simulate", "--robot", robot, "--trajectory", planned / "friction.csv", "--campaign", planned)

@@ -18,6 +18,8 @@ from robots.loading import load_robot
 from robots.plants import load_plant, simulate
 from robots.signals import Motion
 
+pytestmark = pytest.mark.slow
+
 PLANT = """
 effects:
   - {effect: friction_step, joint: 2, parameters: {coulomb_step: 2.5, viscous_step: 1.0, change_time: MOMENT}}
@@ -59,7 +61,6 @@ def done(robot: Path, logs: Path, tmp_path_factory: pytest.TempPathFactory) -> P
     return out
 
 
-@pytest.mark.slow
 def test_a_hidden_damage_is_named(done: Path, experiment: Path) -> None:
     """The file names the damage that the plant had, its joint and its time, and the gain on the unseen log."""
     data = json.loads((done / "diagnosis.json").read_text())
@@ -83,7 +84,6 @@ def test_its_files_are_of_use(done: Path) -> None:
     assert "smallest effect size" in page
 
 
-@pytest.mark.slow
 def test_limits_before_any_experiment(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     """With --limits, a trajectory alone tells what it could show, and what it could not."""
     line = ("diagnose", "--limits", "--robot", robot, "--trajectory", experiment / "trajectory.csv", "--out", tmp_path)
@@ -101,7 +101,6 @@ def test_limits_before_any_experiment(run, robot: Path, experiment: Path, tmp_pa
     assert changed["stribeck", 2]["detectable"] == pytest.approx(5 * limits["stribeck", 2]["detectable"], rel=1e-3)
 
 
-@pytest.mark.slow
 def test_limits_by_an_identified_model(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     """An identified model stands in for the description."""
     line = ["diagnose", "--limits", "--robot", robot, "--trajectory", experiment / "trajectory.csv"]
@@ -110,7 +109,6 @@ def test_limits_by_an_identified_model(run, robot: Path, experiment: Path, tmp_p
     assert any(np.isfinite(limit["detectable"] or np.inf) for limit in result.data["limits"])
 
 
-@pytest.mark.slow
 def test_an_extended_model_is_a_model_like_any_other(
     run, done: Path, logs: Path, robot: Path, experiment: Path, tmp_path: Path
 ) -> None:
@@ -177,7 +175,6 @@ def test_bad_use_is_told(arguments, message, run, robot: Path, tmp_path: Path) -
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.slow
 def test_logs_with_clocks_of_their_own(data: Callable[[str], Path], run: Callable[..., Any], tmp_path: Path) -> None:
     """Logs that overlap are put one after the other as --own-clocks does, and that is said; one log twice is refused.
 

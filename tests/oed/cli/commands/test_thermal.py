@@ -20,6 +20,8 @@ from robots.plants import load_plant, simulate
 from robots.plants.heat import heat_piece, reference_friction
 from robots.signals import Log, Motion
 
+pytestmark = pytest.mark.slow
+
 PLANT = """
 sensors: {torque_noise: 0.01}
 thermal:
@@ -75,7 +77,6 @@ def done(robot: Path, logs: Path, tmp_path_factory: pytest.TempPathFactory) -> P
     return out
 
 
-@pytest.mark.slow
 def test_the_model_predicts_cold_and_warm(done: Path, robot: Path, logs: Path) -> None:
     """model.json is a model like any other, with a thermal model a joint that has the true time constants."""
     data = json.loads((done / "model.json").read_text())
@@ -137,7 +138,6 @@ def test_results_are_not_overwritten(run: Callable[..., Any], done: Path, robot:
     assert "--force" in ended.err or "exists" in ended.err
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -50,6 +50,7 @@ def test_rest_at_both_ends(problem: FourierProblem) -> None:
         assert np.abs(ddq).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_limits_hold_between_the_samples(problem: FourierProblem) -> None:
     """A point on the bound of the imposed rows keeps the limits on a 20 kHz grid, and wastes nearly nothing."""
     t = np.arange(0, problem.family.duration, 1 / 20_000)

@@ -10,6 +10,8 @@ from robots import load_robot
 from robots.common.errors import InputError
 from robots.signals import Motion
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def robot():
@@ -35,7 +37,6 @@ def result(robot, given):
     return retime(robot, given)
 
 
-@pytest.mark.slow
 def test_it_is_faster_within_all_limits(result, robot, given):
     """A slow motion becomes faster, and the margins, measured anew, are positive."""
     assert result.success

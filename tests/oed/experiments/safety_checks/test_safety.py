@@ -80,6 +80,7 @@ def test_the_rms_torque_decides(er3a):
     assert kept.success
 
 
+@pytest.mark.slow
 def test_an_rms_limit_below_gravity_is_told_first(er3a):
     """A joint whose motor cannot hold the home pose for long is named, with the limit that would do."""
     bound = np.full(6, np.inf)

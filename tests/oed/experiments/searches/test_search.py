@@ -20,6 +20,8 @@ from robots.common.errors import InputError
 from robots.loading import load_robot
 from tests.oed import flat
 
+pytestmark = pytest.mark.slow
+
 REFERENCE = {"coulomb-viscous": 28.0, "polynomial": 180.0}
 
 
@@ -29,7 +31,6 @@ def file_of(design: Design, folder: Path) -> bytes:
     return (folder / "trajectory.csv").read_bytes()
 
 
-@pytest.mark.slow
 def test_same_seed_same_file(robot_named, tiny, brief, tmp_path: Path) -> None:
     """The same seed gives the same file byte for byte, in this process and in two others; another seed does not."""
     effort = replace(tiny, islands=2)
@@ -44,7 +45,6 @@ def test_same_seed_same_file(robot_named, tiny, brief, tmp_path: Path) -> None:
     assert run("other", workers=1, seed=1) != here
 
 
-@pytest.mark.slow
 def test_any_executor(make_robot, tiny, brief, tmp_path: Path) -> None:
     """An executor of the user's runs the searches, with the same result."""
     robot, effort = make_robot("RR", "two"), replace(tiny, islands=2)
@@ -54,7 +54,6 @@ def test_any_executor(make_robot, tiny, brief, tmp_path: Path) -> None:
     assert file_of(found, tmp_path / "a") == file_of(flat.design(robot, workers=1, **options), tmp_path / "b")
 
 
-@pytest.mark.slow
 def test_time_limit(robot_named) -> None:
     """A time limit stops a long search early; the design says so, and is a good one all the same."""
     start = time.monotonic()
@@ -76,7 +75,6 @@ def test_no_time_at_all(make_robot) -> None:
     assert design.islands[0].iterations == 0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cond", "d", "a", "e", "cond-d"])
 def test_better_than_chance(name: str, designed) -> None:
     """By each criterion the design beats the best of its random starts, by a good part."""
@@ -165,7 +163,6 @@ def test_interrupt_keeps_the_best(make_robot) -> None:
         flat.design(robot, criterion=Interrupting(), **options)
 
 
-@pytest.mark.slow
 def test_interrupt(tmp_path: Path) -> None:
     """Ctrl-C during the search ends the command with code 130, one line, and the files of the best design so far."""
     command = [sys.executable, "-W", "ignore", "-c", "from oed.cli import main; main()", "design", "--robot", "er3a"]
@@ -207,7 +204,6 @@ class Listener:
         self.finished += 1
 
 
-@pytest.mark.slow
 def test_progress(make_robot, brief) -> None:
     """The bar hears of every local solution, never backwards, with the best value in the criterion's own sense."""
     heard, effort = Listener(), Effort(islands=2, starts=4, screened=10, hops=6, finish_samples=100)
@@ -229,7 +225,6 @@ def test_effort_out_of_range(wrong: dict) -> None:
         Effort(**wrong)
 
 
-@pytest.mark.slow
 def test_quick_effort_reaches_the_reference() -> None:
     """Even with quick effort, er3a reaches 28 over 52 columns and 180 over 64, unscaled, in SI units."""
     for friction, bound in REFERENCE.items():

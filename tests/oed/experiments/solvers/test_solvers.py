@@ -35,6 +35,7 @@ def start(problem: FourierProblem) -> np.ndarray:
     return min((problem.shrunk(rng.normal(size=problem.size), 0.95) for _ in range(20)), key=problem.cost)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: solver.name)
 def test_better_and_within(solver: Solver, problem: FourierProblem, start: np.ndarray) -> None:
     """A solution is far better than its start, within every limit, and counts what it cost."""
@@ -143,6 +144,7 @@ def begin(limited: FourierProblem) -> np.ndarray:
     return min((limited.shrunk(rng.normal(size=limited.size), 0.95) for _ in range(20)), key=limited.cost)
 
 
+@pytest.mark.slow
 def test_more_iterations_are_no_worse(limited: FourierProblem, begin: np.ndarray) -> None:
     """Under curved limits a longer solution is no worse than a shorter one: nothing is lost by pulling it within."""
     values = []
@@ -156,6 +158,7 @@ def test_more_iterations_are_no_worse(limited: FourierProblem, begin: np.ndarray
     assert values[-1] < values[0]
 
 
+@pytest.mark.slow
 def test_no_worse_than_slsqp_under_curved_limits(limited: FourierProblem, begin: np.ndarray) -> None:
     """From near an optimum on which curved limits decide, SLSQP ends at nothing that is better by 2 %."""
     stage = Stage(sharpness=16, max_iter=150, barrier=1e-4)

@@ -17,6 +17,8 @@ from robots.limits import Limits
 from robots.robot import Robot
 from tests.oed import flat
 
+pytestmark = pytest.mark.slow
+
 EFFORT, SOLVER = Effort(islands=1, starts=1, screened=10, hops=0, finish_samples=100), Ipopt(max_iter=10, finish_iter=5)
 
 
@@ -51,7 +53,6 @@ def html(design: Design) -> str:
     return render(design_page(design))
 
 
-@pytest.mark.slow
 def test_stands_alone(html: str) -> None:
     """The page loads nothing: no address, no linked script, style, picture or font."""
     assert not re.findall(r"""(?:src|href)\s*=\s*["'](?!#|data:)""", html.split("<script")[0])
@@ -100,7 +101,6 @@ def test_a_passed_limit_is_bad_news(design: Design) -> None:
     assert design_page(design).status == "good"
 
 
-@pytest.mark.slow
 def test_pictures_on_request(design: Design, tmp_path: Path) -> None:
     """With PNG each picture is a file; without, the page is alone."""
     with ResultFolder(tmp_path / "plain") as folder:

@@ -83,6 +83,7 @@ def view():
     )
 
 
+@pytest.mark.slow
 def test_the_page_tells_all(view):
     """The page holds verdict, finding, parameters, rivals, gain, limits and next step, and escapes names."""
     text = render(diagnosis_page(view))
@@ -95,6 +96,7 @@ def test_the_page_tells_all(view):
     assert "two <joints>" not in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("verdict", "expected", "following"),
     [
@@ -114,6 +116,7 @@ def test_a_page_without_findings(verdict, expected, following, view):
     assert following in render(page)
 
 
+@pytest.mark.slow
 def test_no_chance_is_told_that_nobody_knows(view):
     """What the smallest number of a computer says of a probability is no probability."""
     sure = replace(view, findings=(replace(view.findings[0], p_value=2.2e-308),))
@@ -158,6 +161,7 @@ def test_what_has_no_name_is_not_told_to_need_no_experiment(view):
     assert "Move the joint alone" in unexplained
 
 
+@pytest.mark.slow
 def test_a_rare_rival_that_fits_as_well_is_not_passed_over(view):
     """A cause is named although what few robots have fits about as well: the next step says so."""
     close = replace(view.findings[0], rivals=(("shear thinning", 7.9), ("presliding", 40.0)))
@@ -166,6 +170,7 @@ def test_a_rare_rival_that_fits_as_well_is_not_passed_over(view):
     assert "about as well: shear thinning." in text
 
 
+@pytest.mark.slow
 def test_what_to_play_next_is_told(view):
     """The page lists which motion is played when, with what payload and base, and where the motion comes from."""
     run = {"motion": 1, "pause_s": 2.0, "payload_kg": 0.0, "gravity": None}
@@ -198,6 +203,7 @@ def test_a_note_is_told_of_the_places_it_is_of():
     )
 
 
+@pytest.mark.slow
 def test_the_simulated_motion_is_told(view):
     """The page says what was simulated under which loop, per joint in its unit, and draws the joint that changes."""
     t = 0.01 * np.arange(N)
@@ -231,6 +237,7 @@ def test_an_ambiguous_verdict_is_no_good_news(view):
     assert "several causes fit" in page.verdict
 
 
+@pytest.mark.slow
 def test_without_unseen_data_no_gain_is_claimed(view):
     """Where no run was left to measure on, the page shows no error bars and no percentages."""
     none = np.full(2, np.nan)

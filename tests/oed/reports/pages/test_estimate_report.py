@@ -18,6 +18,8 @@ from robots.plants import nominal_plant, simulate
 from robots.robot import Robot
 from robots.signals import Motion
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def estimate() -> Estimate:
@@ -47,7 +49,6 @@ def html(estimate: Estimate) -> str:
     return render(estimate_page(estimate))
 
 
-@pytest.mark.slow
 def test_tells_every_parameter(estimate: Estimate, html: str) -> None:
     """Each parameter has its value, its standard error and its unit on the page; an undetermined one says so."""
     model = estimate.model
@@ -91,7 +92,6 @@ def test_stands_alone(html: str) -> None:
     assert "https://" not in html
 
 
-@pytest.mark.slow
 def test_pictures_on_request(estimate: Estimate, tmp_path: Path) -> None:
     """With PNG each picture is a file beside the page."""
     with ResultFolder(tmp_path / "out") as folder:

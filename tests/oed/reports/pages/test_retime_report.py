@@ -32,6 +32,7 @@ def case() -> SimpleNamespace:
     return SimpleNamespace(result=result, given=given, page=retime_page(result, given))
 
 
+@pytest.mark.slow
 def test_tells_before_and_after(case: SimpleNamespace) -> None:
     """The verdict has both durations, and the page both motions."""
     retimed = case.result.retimed

@@ -53,6 +53,7 @@ def test_duty_runs_are_read_off_the_logs() -> None:
     assert duty_runs([replace(log, metadata={}) for log in logs()]) == ()
 
 
+@pytest.mark.slow
 def test_each_duty_cycle_has_its_own_curve_from_zero(fit: ThermalEstimate) -> None:
     """Two runs are points and lines from minute zero on; a single one is no comparison."""
     picture = duty_picture(fit, duty_runs(logs()), title="joint 1")
@@ -101,6 +102,7 @@ def test_friction_curves_go_from_cold_to_warm(fit: ThermalEstimate) -> None:
     np.testing.assert_allclose(warm.y / cold.y, least, rtol=0.03)
 
 
+@pytest.mark.slow
 def test_models_stand_beside_each_other() -> None:
     """The table has a row per model with its held-out error, and marks the chosen one."""
     choice = choose_thermal(heated(), orders=("first", "second"), start="ambient", starts=1)

@@ -10,6 +10,8 @@ import pytest
 from oed.reports import Fact, Footer, Page, Panel, Picture, Section, Series, Table, render
 from robots.common.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 VOID = {"meta", "link", "br", "hr", "img", "input", "col", "wbr"}
 
 
@@ -79,7 +81,6 @@ def full(six: Any) -> str:
     )
 
 
-@pytest.mark.slow
 def test_page_is_well_formed(full: str) -> None:
     """Every element is closed in order, every identifier is used once, and every reference has its target."""
     outline = parse(full)

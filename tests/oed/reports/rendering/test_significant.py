@@ -52,6 +52,7 @@ def test_error_has_two_digits() -> None:
     assert percent(0.0342) == "3.42 %"
 
 
+@pytest.mark.slow
 @given(
     st.floats(-1e8, 1e8).filter(lambda value: value == 0 or abs(value) > 1e-8),
     st.floats(1e-9, 1e6),

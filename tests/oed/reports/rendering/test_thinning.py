@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from oed.reports.rendering.thinning import thin_indices
 
 
+@pytest.mark.slow
 @given(st.integers(1, 5000), st.integers(6, 400), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.3, 1.0]))
 def test_extremes_and_ends_survive(count: int, points: int, seed: int, missing: float) -> None:
     """The smallest, the largest, the first and the last value stay, in order, within the number of points."""

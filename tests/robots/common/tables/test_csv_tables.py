@@ -28,6 +28,7 @@ def refused(path, **kwargs):
     return caught.value
 
 
+@pytest.mark.slow
 @SHARED_FOLDER
 @given(values=arrays(np.float64, st.integers(1, 30), elements=st.floats(-1e300, 1e300, allow_subnormal=False)))
 def test_pandas_reads_the_csv_file(tmp_path, values):

@@ -23,6 +23,7 @@ def refused(path, **kwargs):
     return caught.value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @SHARED_FOLDER
 @given(values=arrays(np.float64, st.tuples(st.integers(1, 30), st.integers(1, 4))))
@@ -50,6 +51,7 @@ plain_values = st.recursive(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @SHARED_FOLDER
 @given(metadata=st.dictionaries(st.text(), plain_values, max_size=4))

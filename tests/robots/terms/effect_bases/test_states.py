@@ -15,6 +15,7 @@ from robots.terms.effects.thermal_friction import SLOWER, heat
 from robots.terms.situations.situation import situation
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("travel", [0.02, 2e-4])
 def test_the_bristle_follows_dahls_equation(travel):
     """The bristle's deflection is that of Dahl's equation through reversals, even within a sample's travel."""

@@ -54,6 +54,7 @@ def test_a_rotor_is_as_sure_as_what_tells_it(seen):
         np.testing.assert_allclose(np.diff(along, 2), 0.0, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", ["backlash", "joint_elasticity"])
 def test_a_rotor_that_is_told_is_as_one_that_is_described(effect, seen):
     """A first joint's gear and link are without the rotor, whether the description has it or the shape."""

@@ -11,6 +11,7 @@ from robots.terms.effects import EFFECTS
 from robots.terms.effects.backlash import QUICKEST, SLOWEST
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("free", "longest"), [(0.05, 0.1), (0.08, 0.05)])
 def test_a_loose_gear_lets_its_link_cross(seen, free, longest):
     """Where the load changes sign the link flies over, as long as the growing load needs, or the longest time.
@@ -41,6 +42,7 @@ def test_a_loose_gear_lets_its_link_cross(seen, free, longest):
     assert np.sum(speed[during]) * 0.004 == pytest.approx(2.0, rel=0.1)  # from half a gap of one to the other
 
 
+@pytest.mark.slow
 def test_sides_change_at_the_load_that_is_said(seen):
     """With another zero of the load, the lag's bursts are where the load passes it, and nowhere before."""
     now = seen(5, seed=1)

@@ -126,6 +126,7 @@ def test_proposals_come_from_the_grid(effect, seen):
     assert len(proposed) <= 5 or proposed == grid
 
 
+@pytest.mark.slow
 def test_a_robot_at_rest_shows_no_friction(effect, seen, random_robot):
     """What motion brings about is zero at rest, and nothing at rest is not finite."""
     robot = random_robot(3, 4)
@@ -143,6 +144,7 @@ def test_a_robot_at_rest_shows_no_friction(effect, seen, random_robot):
         assert all(np.isfinite(point).all() for point in effect.grid(now, where))
 
 
+@pytest.mark.slow
 def test_logs_do_not_touch_each_other(effect, seen):
     """But for heat, an effect sees each log as if it were alone."""
     t = np.concatenate([0.004 * np.arange(700), 60 + 0.004 * np.arange(800)])

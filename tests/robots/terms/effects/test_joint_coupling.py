@@ -11,6 +11,7 @@ COUPLING = EFFECTS["joint_coupling"]
 VALUES = np.array([0.05, 0.7, 0.4, 1.2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_a_seal_between_two_drives_brakes_how_they_turn_against_each_other(seen, way):
     """Power lost is F |dq_j + w dq_k|, whichever joint feels it, and torque is its slope along each velocity."""
@@ -23,6 +24,7 @@ def test_a_seal_between_two_drives_brakes_how_they_turn_against_each_other(seen,
     assert not tau[:, :3].any()
 
 
+@pytest.mark.slow
 def test_an_axis_counted_the_other_way_gives_the_same_machine(seen):
     """Joint 5 counted backwards: its torque changes sign, and so do what its motion costs and the way."""
     now = seen(5, seed=4)

@@ -45,6 +45,7 @@ def test_an_encoder_offset_moves_the_joint(now, torque):
         np.testing.assert_allclose(X[SOME, :, 0], expected, rtol=1e-5, atol=1e-5)  # the difference's own error
 
 
+@pytest.mark.slow
 def test_an_elastic_gear_lets_its_link_lag(now, torque):
     """A stiff gear changes all torques as a link does that lags by its load, with its velocity and acceleration."""
     for joint in (1, 3, 5):
@@ -134,6 +135,7 @@ def test_level_axes_are_x_and_y_of_an_upright_robot():
     np.testing.assert_array_equal(level_axes(np.array([0.0, 0.0, -9.81])), [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
+@pytest.mark.slow
 def test_a_payload_is_a_body_on_the_flange(now, twin, catalogue_robot, seen):
     """A body's mass, moments and inertia change the torques as a heavier link does; its products are left out."""
     pin = pytest.importorskip("pinocchio")
@@ -155,6 +157,7 @@ def test_a_payload_is_a_body_on_the_flange(now, twin, catalogue_robot, seen):
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("swing", [0.0, 0.5])
 def test_a_soft_gear_keeps_its_link_behind(seen, swing):
     """The link's load is that of a mass, alike or changing, behind a spring, by an integrator of scipy."""
@@ -180,6 +183,7 @@ def test_a_stiff_gear_follows_at_once(seen):
     np.testing.assert_array_equal(followed(now, load, 1e9, np.ones(len(load))), load)
 
 
+@pytest.mark.slow
 def test_size_of_an_effect_tells_its_time(seen):
     """What follows from a coefficient is offered: the gap that is crossed, a delay's own reversals, a resonance."""
     now = seen(5, seed=1)
@@ -195,6 +199,7 @@ def test_size_of_an_effect_tells_its_time(seen):
         assert EFFECTS[name].likely(now, joint, (1e-3,), np.array([0.04])) == ((0.02,),)
 
 
+@pytest.mark.slow
 def test_a_gear_of_known_compliance_has_a_resonance(now, seen, twin):
     """A link on a gear of compliance c has the stiffness 1 / c; those of a scan are of its inertia, by pinocchio.
 
