@@ -80,6 +80,11 @@ class FittedEffect:
         return self.local_evidence.bic_gain
 
     @property
+    def best_bic_gain(self) -> float:
+        """The better of both BIC gains: a transient effect need not pay for rows in which it does not act."""
+        return max(self.bic_gain, self.local_bic_gain)
+
+    @property
     def excess_chi2(self) -> float:
         """Chi-square minus its mean in pure noise; not negative."""
         return max(self.gain - self.degrees, 0.0)
@@ -111,11 +116,10 @@ class FittedEffect:
         return float(np.sum(own[acts] ** 2) / max(np.sum(own**2), 1e-300))
 
 
-def set_bic_gain(problem: Problem, members: Sequence[FittedEffect], beside: Sequence[FittedEffect] = ()) -> float:
-    """Returns the BIC gain of `members` together, if the effects `beside` are already in the model."""
+def set_bic_gain(problem: Problem, members: Sequence[FittedEffect]) -> float:
+    """Returns the BIC gain of several effects together."""
     cost = sum(member.gain - member.bic_gain for member in members)
-    known = accept(problem, tuple(m.group for m in beside)).gain if beside else 0.0
-    return accept(problem, tuple(m.group for m in (*beside, *members))).gain - known - cost
+    return accept(problem, tuple(m.group for m in members)).gain - cost
 
 
 def accept_all_but(problem: Problem, members: Sequence[FittedEffect], i: int) -> Accepted:

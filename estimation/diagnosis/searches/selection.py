@@ -181,7 +181,7 @@ def with_rivals(problem: Problem, entries: Sequence[Entry], selection: Selection
         if found.effect.hypothesis not in selection.visible_in_torque:
             # A transient effect counts only the rows in which it acts, so its local BIC gain may be the larger one.
             beside, own = accept_all_but(problem, members, i), found.effect
-            reference = max(own.bic_gain, own.local_bic_gain)
+            reference = own.best_bic_gain
             result = scan(problem, entries, beside)
             near = screen_candidates(problem, result, [*members[:i], *members[i + 1 :]], reference)
             rest = [o for o in near if o.hypothesis != found.effect.hypothesis]

@@ -16,7 +16,7 @@ from estimation.diagnosis.calibration import (
     NEARLY_EXPLAINED_SHARE,
 )
 from estimation.diagnosis.hypothesis_tests.evidence import is_close_rival
-from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, set_bic_gain
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry
@@ -124,12 +124,13 @@ def _explain_as_well(
     """
     gain = accept(problem, tuple(m.group for m in (*others, *names))).gain
     gain -= accept(problem, tuple(m.group for m in others)).gain
+    own = gain - sum(m.gain - m.best_bic_gain for m in names)
     degrees = sum(m.degrees for m in names)
     share = (gain - degrees) / free.excess_chi2 if free.excess_chi2 > 0 else 1.0
     if share < MIN_EXPLAINED_SHARE:
         return False
     flexible = free.degrees > degrees and share >= NEARLY_EXPLAINED_SHARE
-    return flexible or free.bic_gain <= set_bic_gain(problem, names, others) + MIN_BIC_GAIN
+    return flexible or free.best_bic_gain <= own + MIN_BIC_GAIN
 
 
 def _retains_gain(problem: Problem, name: FittedEffect, beside: Sequence[FittedEffect]) -> bool:

@@ -111,7 +111,7 @@ def _rivals(
 
     def member(hypothesis: Hypothesis, bic: float, worth: float) -> SimpleNamespace:
         values = {"group": hypothesis, "shape": (), "gain": 5.0}
-        return SimpleNamespace(hypothesis=hypothesis, bic_gain=bic, local_bic_gain=worth, **values)
+        return SimpleNamespace(hypothesis=hypothesis, bic_gain=bic, best_bic_gain=max(bic, worth), **values)
 
     monkeypatch.setattr(selection, "accept", lambda problem, groups: groups)
     monkeypatch.setattr(selection, "accept_all_but", _all_but)
