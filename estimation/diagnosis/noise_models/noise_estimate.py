@@ -21,7 +21,7 @@ from estimation.diagnosis.noise_models.bursts import find_bursts
 from estimation.diagnosis.noise_models.frequency_bands import find_bands, unbiased_frequencies
 from estimation.diagnosis.noise_models.masked_rows import find_masked_rows
 from estimation.diagnosis.noise_models.noise_nuisance_basis import NuisanceProjection
-from estimation.diagnosis.noise_models.noise_spectrum import ALL_FREQUENCIES, WITHOUT_LOW_FREQUENCIES, fit_noise_process
+from estimation.diagnosis.noise_models.noise_spectrum import WITH_NUISANCE, WITHOUT_NUISANCE, fit_noise_process
 from estimation.diagnosis.noise_models.spectral_lines import remove_lines
 from estimation.diagnosis.noise_models.whitening import Whitening, free_columns
 from estimation.diagnosis.recordings.log_reading import Recording
@@ -71,7 +71,7 @@ def estimate_whitening(
     Returns:
         The whitening filters, with bands, masked rows, and weights of the rows.
     """
-    colour = WITHOUT_LOW_FREQUENCIES if len(spared) else ALL_FREQUENCIES
+    colour = WITH_NUISANCE if len(spared) else WITHOUT_NUISANCE
     longest = rest_rows(recording.step)
     rests = find_masked_rows(recording.sign_unknown, recording.starts, longest)
     # Where the direction of motion is unknown, the residual is not noise.
@@ -100,7 +100,7 @@ def estimate_whitening(
         left = beside.left(pieces)
     counts, pieces = np.maximum(measured.sum(axis=0), 1).astype(float), left
     slowest, fastest = max(colour.flat, FEWEST / (sum(map(len, pieces)) * step)), INSIDE * cutoffs
-    slowest = slowest if slowest <= ALL_FREQUENCIES.flat else 0.0
+    slowest = slowest if slowest <= WITHOUT_NUISANCE.flat else 0.0
     period = next((cycle.period for cycle in recording.cycles if cycle is not None), None)
     noise = fit_noise_process(pieces, step, counts, parameters, (slowest, fastest), beside, period, colour)
     levels = None

@@ -44,8 +44,8 @@ class SpectrumSettings:
 # With nuisance functions, the whole memory is used. The order that predicts best misses much of the noise slower than a
 # second, against which slow effects are tested. Without nuisance functions, such an order would take slow effects for
 # noise.
-WITHOUT_LOW_FREQUENCIES = SpectrumSettings(flat=0.15, memory=1.0, rows=100, times=HIGHEST_ORDER, held=False)
-ALL_FREQUENCIES = SpectrumSettings(flat=1.0, memory=0.2, rows=1, times=1, held=True)
+WITH_NUISANCE = SpectrumSettings(flat=0.15, memory=1.0, rows=100, times=HIGHEST_ORDER, held=False)
+WITHOUT_NUISANCE = SpectrumSettings(flat=1.0, memory=0.2, rows=1, times=1, held=True)
 
 
 def fit_noise_process(
