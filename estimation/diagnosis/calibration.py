@@ -120,29 +120,8 @@ MAX_GLITCH_SHARE = 0.1
 MAX_EFFECTS = 4
 """Effects that are found at most."""
 
-MAX_CANDIDATES = 7
-"""Hypotheses that are refined at each step."""
-
 MIN_CANDIDATE_GAIN = 0.3
 """Share of the best chi-square on the grid that a candidate must have."""
-
-MIN_NOISE_CHANGE = 0.03
-"""Change of the log of the noise from which the search is repeated."""
-
-MIN_SLOW_NOISE_CHANGE = 0.1
-"""The same of the noise's slowest part."""
-
-MIN_BASE_CHANGE = 0.02
-"""Change of the base model's torque from which it is repeated."""
-
-MIN_EFFECT_CHANGE = 0.2
-"""Change of an effect's torque from which it is repeated."""
-
-MIN_GEAR_LOAD = 0.01
-"""Share of a gear's own load from which another load counts."""
-
-MIN_WINDOW_GAIN = 0.1
-"""Share of its chi-square that a finer search of an event's window may add."""
 
 # Free functions and held-out data.
 

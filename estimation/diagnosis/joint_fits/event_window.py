@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimation.diagnosis.calibration import MIN_BIC_GAIN, MIN_WINDOW_GAIN
+from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
@@ -14,6 +14,9 @@ from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
 from estimation.diagnosis.hypothesis_tests.time_windows import best_window
 from robots.common.parallel import threaded
 from robots.terms.effect_bases.capabilities import Persistence
+
+# Share of its chi-square that a finer search of an event's window may add.
+MIN_WINDOW_GAIN = 0.1
 
 
 def open_event_edges(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.calibration import MIN_BIC_GAIN, MIN_GEAR_LOAD
+from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, set_bic_gain
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
@@ -20,6 +20,8 @@ from robots.terms.effects import EFFECTS
 
 Array = NDArray[np.float64]
 
+# Share of a gear's own load from which another load counts.
+MIN_GEAR_LOAD = 0.01
 # Effect that may replace another one if the gear load is included.
 BY_LOAD = EFFECTS["load_dependent_friction"]
 

@@ -6,13 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimation.diagnosis.calibration import MAX_CANDIDATES, MIN_CANDIDATE_GAIN
+from estimation.diagnosis.calibration import MIN_CANDIDATE_GAIN
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scan import Outcome, Scan
 from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effects import Effect
 
+# Hypotheses that are refined at each step.
+MAX_CANDIDATES = 7
 # Assumed largest ratio of refined gain to grid gain of a transient effect, whose refinement takes longest.
 TWICE = 2.0
 

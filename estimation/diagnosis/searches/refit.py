@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.calibration import MIN_BASE_CHANGE, MIN_EFFECT_CHANGE, MIN_NOISE_CHANGE, MIN_SLOW_NOISE_CHANGE
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
@@ -26,6 +25,14 @@ from robots.terms.effect_bases.gear_load import with_gear_load
 
 Array = NDArray[np.float64]
 
+# Change of the log of the noise from which the search is repeated.
+MIN_NOISE_CHANGE = 0.03
+# The same of the noise's slowest part.
+MIN_SLOW_NOISE_CHANGE = 0.1
+# Change of the base model's torque from which it is repeated.
+MIN_BASE_CHANGE = 0.02
+# Change of an effect's torque from which it is repeated.
+MIN_EFFECT_CHANGE = 0.2
 # Clipped torque, as a share of the largest, above which a row is not used as a measurement.
 CUT = 0.01
 
