@@ -21,7 +21,7 @@ MIN_RETAINED_CHI2 = 0.75
 # Which logs and rows count.
 
 MAX_UNEXPLAINED_POWER = 0.5
-"""Share of the squared torque. A log of which a fit to it alone leaves more, on every joint, is left out."""
+"""Share of the squared torque. A log is left out if even a fit to this log alone leaves more on every joint."""
 
 REST_TIME = 0.3
 """Time [s]. A joint whose direction is unknown for longer is at rest."""
@@ -107,7 +107,7 @@ OTHER_FORMULA_ERROR = 0.05
 """Share of other effects' torque by which their formulas may be wrong on a joint."""
 
 POWER = 0.95
-"""Chance with which an effect of the stated size is found, and told from its rival."""
+"""Chance with which an effect of the stated size is found, and separated from its rival."""
 
 SHOCK_COUNT = 0.01
 """Expected number of noise shocks as large from which a short effect may be one."""

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.scoring import Score, accept, score
+from estimation.diagnosis.hypothesis_tests.scoring import Score, score
 from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
@@ -67,7 +67,7 @@ def effects_prior(problem: Problem, members: Sequence[FittedEffect]) -> Gaussian
     pull = problem.prior
     own, targets = [], []
     for i, member in enumerate(members):
-        others = accept(problem, tuple(m.group for k, m in enumerate(members) if k != i))
+        others = accept_all_but(problem, members, i)
         precision, target = shrinkage_precision(score(problem, member.group, others)), np.zeros(member.group.size)
         if member.group.reversal_columns is not None and problem.timing is not None:
             timed = np.sum(member.group.reversal_columns**2, axis=0)

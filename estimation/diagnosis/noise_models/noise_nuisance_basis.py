@@ -43,8 +43,9 @@ class NuisanceProjection:
         self.pieces = []  # per joint and log
         lengths = [-(-(run.stop - run.start) // bands[0].stride) for run in runs]
         self.measured = np.split(measured, np.cumsum(lengths)[:-1])
+        starts = tuple(run.start for run in runs)
         for j, (X, band) in enumerate(zip(columns, bands, strict=False)):
-            whole = np.concatenate([band.passed(np.asfortranarray(X[run])) for run in runs]) * measured[:, [j]]
+            whole = band.passed(np.asfortranarray(X), starts=starts) * measured[:, [j]]
             self.pieces.append(np.split(orthonormal(whole, FAINT), np.cumsum(lengths)[:-1]))
 
     def left(self, pieces: list[Array]) -> list[Array]:

@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
-from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.gear_load import NO_GEAR_LOAD, GearLoadFit, find_gear_load
 from estimation.diagnosis.joint_fits.sensor_nonlinearity import fit_sensor_nonlinearity
@@ -176,5 +175,4 @@ def _unusable_rows(problem: Problem, member: FittedEffect) -> NDArray[np.bool_] 
 
 def _again(problem: Problem, members: Sequence[FittedEffect], k: int) -> FittedEffect:
     """Refines one member beside the others, starting from its shape."""
-    others = tuple(member.group for i, member in enumerate(members) if i != k)
-    return refine(problem, members[k].hypothesis, members[k].shape, accept(problem, others))
+    return refine(problem, members[k].hypothesis, members[k].shape, accept_all_but(problem, members, k))

@@ -1,4 +1,4 @@
-"""What a diagnosis must know of an effect besides its columns."""
+"""Capabilities of effects: what a diagnosis must know in addition to their columns."""
 
 from __future__ import annotations
 
