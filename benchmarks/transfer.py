@@ -66,6 +66,8 @@ def main() -> int:
     parser.add_argument("--how", choices=("identify", "diagnose"), default="identify")
     options = parser.parse_args()
     warnings.simplefilter("ignore", AssumedValueWarning)
+    if not options.folder.is_dir():
+        parser.error(f"no folder {options.folder}")
     given = {"friction": options.friction} if options.friction else {}
     ratios = []
     print("| split | plain | own | ratio | own by joint | in the band | worst joint |\n|---|---|---|---|---|---|---|")
